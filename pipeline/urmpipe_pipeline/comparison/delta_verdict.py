@@ -11,7 +11,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.comparison.deviation import AXES, Kind, Verdict
+from urmpipe_pipeline.comparison.deviation import AXES, KINDS, Kind, Verdict
 from urmpipe_pipeline.comparison.tolerance import allowed_for
 
 
@@ -46,7 +46,7 @@ class DeltaVerdict:
     @property
     def kind(self) -> Kind:
         """Of what the worst quantity is measured: axis or norm."""
-        return "norm" if self.quantity == "norm" else "axis"
+        return KINDS[self.quantity]
 
     @property
     def allowed(self) -> float | None:
@@ -90,7 +90,7 @@ def delta_verdict(
         return None
     x, y, z = np.abs(delta).T
     sizes = np.column_stack((x, y, z, np.sqrt(x * x + y * y + z * z)))  # summed as the model does it
-    held = [allowed_for(axis, "norm" if axis == "norm" else "axis", tolerance) for axis in AXES]
+    held = [allowed_for(axis, KINDS[axis], tolerance) for axis in AXES]
     allowed = np.array([math.inf if one is None else one for one in held])
     known = np.isfinite(sizes).all(axis=1)
     out = ~known | (sizes > allowed).any(axis=1)

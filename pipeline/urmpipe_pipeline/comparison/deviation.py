@@ -28,6 +28,9 @@ the orientation, a joint."""
 AXES = ("x", "y", "z", "norm")
 """The columns of `Deviation.delta`."""
 
+KINDS: dict[str, Kind] = {"x": "axis", "y": "axis", "z": "axis", "norm": "norm"}
+"""What these are measured of."""
+
 WHOLE = 0.99
 """A log that covers a smaller share of the reference is told: by hand, starts and ends vary by less."""
 

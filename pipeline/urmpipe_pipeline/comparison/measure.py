@@ -11,7 +11,7 @@ from urmpipe_models.delta import delta
 from urmpipe_models.errors import LogError
 from urmpipe_models.orientation import angle_between
 from urmpipe_models.repolarizer import FULL_TURN
-from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Kind
+from urmpipe_pipeline.comparison.deviation import AXES, KINDS, Deviation
 from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, joints_apart, lacking
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
 from urmpipe_pipeline.comparison.statistics import Measured, correlation, describe, overall
@@ -20,9 +20,6 @@ from urmpipe_pipeline.gaps import gaps_behind
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.results import Run
-
-KINDS: tuple[Kind, ...] = ("axis", "axis", "axis", "norm")
-"""What the columns of delta are measured of."""
 
 START_SAMPLES = 11
 """Samples by which the turns of the start are counted: as few as outvote a wild one."""
@@ -87,7 +84,7 @@ def measure(
 
 def _in_space(values: FloatArray, path: FloatArray, angle: FloatArray | None) -> list[Measured]:
     """Return what is measured of the pose: x, y, z, norm, path, and the angle where there is one."""
-    found = [Measured(axis, KINDS[i], "m", values[:, i]) for i, axis in enumerate(AXES)]
+    found = [Measured(axis, KINDS[axis], "m", values[:, i]) for i, axis in enumerate(AXES)]
     found.append(Measured("path", "path", "m", path))
     return found if angle is None else [*found, Measured("angle", "angle", "rad", angle)]
 

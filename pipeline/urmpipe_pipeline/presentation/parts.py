@@ -9,6 +9,7 @@ from typing import Any, Generic, TypeAlias, TypeVar, overload
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.json_values import plain
 from urmpipe_pipeline.palette import INK_COLOUR
@@ -116,6 +117,12 @@ def ends(position: FloatArray) -> tuple[Spot, ...]:
         Spot(spot_at(position[row]), word, INK_COLOUR, always=False)
         for word, row in (("start", known[0]), ("end", known[-1]))
     )
+
+
+def within_words(position: FloatArray) -> str:
+    """Return between which corners a path in [m], shape (n, 3), stays: "within (0, ...) m and (1, ...) m"."""
+    low, high = (text.point(end(position, axis=0)) for end in (np.nanmin, np.nanmax))
+    return f"within ({low}) m and ({high}) m"
 
 
 def spot_at(position: FloatArray) -> tuple[float, float, float]:

@@ -15,6 +15,7 @@ from urmpipe_models.row_blocks import norms
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.figure import Computed, Figure, Line, Mark, Panel, Shape, View
+from urmpipe_pipeline.presentation.parts import within_words
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.runs.results import Run
 
@@ -204,8 +205,7 @@ def _extent_words(motion: str, tcp: PointLog) -> str:
     """Say between which places a point moves and how fast."""
     if not np.isfinite(tcp.position).any():
         return f"{motion} over time by forward kinematics. It has no value."
-    low, high = (text.point(end(tcp.position, axis=0)) for end in (np.nanmin, np.nanmax))
-    said = f"{motion} over time by forward kinematics. It stays within ({low}) m and ({high}) m"
+    said = f"{motion} over time by forward kinematics. It stays {within_words(tcp.position)}"
     for values, word, unit in ((tcp.velocity, "speed", "m/s"), (tcp.acceleration, "acceleration", "m/s²")):
         norm = norms(values)
         if np.isfinite(norm).any():

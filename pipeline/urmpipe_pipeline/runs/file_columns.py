@@ -87,9 +87,8 @@ def _lost(log: JointLog, kept: Sequence[LogColumn]) -> Iterator[LogWarning]:
     """Yield what of the file is not in the recording."""
     empty = [column.name for column in log.columns if column not in kept]
     if empty:
-        yield LogWarning(
-            "not-exported", f"{', '.join(empty)}: not ingested, since a column of them was empty"
-        )
+        said = f"{', '.join(empty)}: not ingested, since a column of them was empty"
+        yield LogWarning("not-exported", said)
     for inference in log.inferences:
         if inference.kind == "columns not used":
             said = f"{inference.value}: not ingested ({inference.evidence}), so they cannot leave"

@@ -24,7 +24,6 @@ REGULAR = 0.01
 ROUNDING_NS = 1000
 """Clocks are printed to the microsecond or finer: so much beyond the last known time is still at it."""
 
-
 MOST = 20_000_000
 """Samples of a grid, where a log does not have as many rows: more come of a broken clock or a mistyped period
 and would fill the memory."""
@@ -63,9 +62,9 @@ class Grid:
         motion explains are row before, row after and joint index, shape (u, 3): a warning counts what was
         left open.
         """
-        if self.own or not len(unresolved):
-            return self.resample(values), ()
         result = self.resample(values)
+        if self.own or not len(unresolved):
+            return result, ()
         inside = inside_spans(*self._between(unresolved), unresolved[:, 2], result.shape)
         left = int(np.count_nonzero((inside & ~np.isnan(result)).any(axis=1)))
         result[inside] = np.nan
@@ -142,9 +141,7 @@ def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
     ideal = t[0] + np.arange(len(t)) * mean
     regular = bool(np.max(np.abs(t - ideal)) <= REGULAR * mean)
     clock = None if regular else behind_rounded(t)
-    if clock is not None and (
-        tsp is None or abs(tsp * 1e9 - clock.period) <= REGULAR * clock.period / len(t)
-    ):
+    if clock and (tsp is None or abs(tsp * 1e9 - clock.period) <= REGULAR * clock.period / len(t)):
         even = clock.t_ns - clock.t_ns[0] + t[0]
         return Grid(even, clock.period / 1e9, True, t, (_rounded(clock),))
     wanted = tsp * 1e9 if tsp is not None else mean if regular else float(np.median(np.diff(t)))
@@ -171,10 +168,9 @@ def _refuse_endless(log: JointLog, wanted: float, count: int) -> None:
 
 def _rounded(clock: Regular) -> LogWarning:
     """Say that a regular clock is seen behind rounded times."""
-    said = f"the times are those of a regular clock of {clock.period / 1e6:.6g} ms in steps of"
-    return LogWarning(
-        "clock-rounded", f"{said} {clock.resolution / 1e6:.6g} ms: the rows are taken as regular"
-    )
+    said = f"the times are those of a regular clock of {clock.period / 1e6:.6g} ms"
+    steps = f"in steps of {clock.resolution / 1e6:.6g} ms: the rows are taken as regular"
+    return LogWarning("clock-rounded", f"{said} {steps}")
 
 
 def _changes(log: JointLog, wanted: float, count: int, in_gap: NDArray[np.bool_]) -> list[LogWarning]:
@@ -185,11 +181,7 @@ def _changes(log: JointLog, wanted: float, count: int, in_gap: NDArray[np.bool_]
     inside = f"; {left} of them lie inside gaps and have no value" if left else ""
     warnings = [LogWarning("resampled", f"{said} every {wanted / 1e6:.6g} ms (linear){inside}")]
     if wanted < (1.0 - REGULAR) * median:
-        warnings.append(
-            LogWarning(
-                "upsampled",
-                f"the grid of {wanted / 1e6:.6g} ms is finer than the log's {median / 1e6:.6g} ms: the"
-                " samples between its rows are interpolated, not measured",
-            )
-        )
+        said = f"the grid of {wanted / 1e6:.6g} ms is finer than the log's {median / 1e6:.6g} ms"
+        why = "the samples between its rows are interpolated, not measured"
+        warnings.append(LogWarning("upsampled", f"{said}: {why}"))
     return warnings

@@ -33,8 +33,6 @@ QUANTISED_DIGITS = 5
 LONGEST_TSP = 1e9
 """Periods in [s] from this one on are no times that integers of 64 bits hold in [ns]."""
 
-UNUSED_PERIOD = unused_period("period")
-
 EULER_SINGULAR = "euler-singular"
 
 
@@ -112,7 +110,8 @@ def run_of(
     doubts = implausible(log, found.q, robot, turns, found.broken[:, 1:], timed=timed, tsp=grid.tsp)
     q, left_open = grid.resample_joints(found.q, found.unresolved)
     warnings = [*log.warnings, *far_from_recorded(robot, log), *found.warnings, *doubts]
-    warnings += [*grid.warnings, *left_open, *([UNUSED_PERIOD] if clocked and options.period else [])]
+    warnings += [*grid.warnings, *left_open]
+    warnings += [unused_period("period")] if clocked and options.period else []
     method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
     qd, qdd = _rates(log, grid, q, method, grid.steps(found.broken), warnings)
     tcp, noticed = kinematics(robot, q, qd, qdd)
@@ -173,9 +172,8 @@ def kinematics(
     if robot is None or q.shape[1] == 0:
         return None, []
     if q.shape[1] != len(robot.coordinates):
-        raise LogError(
-            f"found {q.shape[1]} joints, allowed: {len(robot.coordinates)}, as robot {robot.name} has"
-        )
+        allowed = f"{len(robot.coordinates)}, as robot {robot.name} has"
+        raise LogError(f"found {q.shape[1]} joints, allowed: {allowed}")
     tcp = point_over_log(robot, q, qd, qdd)
     notices = missing_visuals(robot)
     if not tcp.singular.any():

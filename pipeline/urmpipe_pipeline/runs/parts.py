@@ -36,7 +36,7 @@ AUDIT_NOTES: dict[AuditKind, str] = {
 def log_facts(run: Run) -> tuple[Fact, ...]:
     """Return what a log is: its arm, rows, grid and duration."""
     return (
-        Fact("Robot", robot_words(run)),
+        Fact("Robot", run.robot.name if run.robot else "none: no kinematics"),
         Fact("Source", run.log.source, brief=False),
         *_time_facts(run),
         recording_fact(run.recording),
@@ -55,11 +55,6 @@ def _time_facts(run: Run) -> Iterator[Fact]:
         every = f" every {text.seconds(period)} s" if count > 1 else ""
         yield Fact(name, f"{text.counted(count, noun)}{every}")
     yield Fact("Duration", Value(run.duration, "s"))
-
-
-def robot_words(run: Run) -> str:
-    """Return the arm of a log, or that it has none."""
-    return run.robot.name if run.robot else "none: no kinematics"
 
 
 def log_tables(run: Run) -> Iterator[Table]:

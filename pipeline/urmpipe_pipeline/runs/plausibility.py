@@ -117,10 +117,8 @@ def outlier_warnings(motion: JointMotion, outliers: NDArray[np.int64]) -> list[L
                 for j in joints
             )
             said = f"an outlier, off the motion of the other rows: {steps}"
-            hint = "it stays; take it out of the file if the arm was not there"
-            warnings.append(
-                LogWarning("outlier-last" if row else "outlier-first", f"{said}; {hint}", row + 1)
-            )
+            said = f"{said}; it stays; take it out of the file if the arm was not there"
+            warnings.append(LogWarning("outlier-last" if row else "outlier-first", said, row + 1))
     return warnings
 
 

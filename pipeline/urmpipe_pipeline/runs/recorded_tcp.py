@@ -12,6 +12,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.messages import Hint
+from urmpipe_models.orientation import best_rotation
 from urmpipe_models.transform import Transform, rpy_of
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, fit, spread
@@ -113,16 +114,11 @@ def _called(columns: Sequence[LogColumn]) -> list[str]:
 
 
 def _base(robot: Chain, q: FloatArray, recorded: FloatArray) -> tuple[list[float], float]:
-    """Return the base with which the points agree best, in [m] and [rad], and the rms distance left in [m].
-
-    Source: Kabsch 1976: with the singular values of sum (a - mean a)(b - mean b)^T = U S V^T the rotation is
-    V diag(1, 1, det V U^T) U^T.
-    """
+    """Return the base with which the points agree best, in [m] and [rad], and the rms left in [m]."""
     known = np.isfinite(q).all(axis=1) & np.isfinite(recorded).all(axis=1)
     computed, wanted = positions_over_log(replace(robot, base=Transform()), q[known]), recorded[known]
     middle, target = computed.mean(axis=0), wanted.mean(axis=0)
-    u, _, vt = np.linalg.svd((computed - middle).T @ (wanted - target))
-    turn = vt.T @ np.diag([1.0, 1.0, np.linalg.det(vt.T @ u.T)]) @ u.T
+    turn, _ = best_rotation((wanted - target).T @ (computed - middle))
     shift = target - turn @ middle
     miss = computed @ turn.T + shift - wanted
     x, y, z = (tuple(row) for row in turn.tolist())

@@ -24,9 +24,8 @@ def infer_robot(log: JointLog) -> tuple[Chain, Inference] | None:
     robots = [robot for robot in map(load_robot, robot_names()) if len(robot.moving) == len(log.joints)]
     named = [robot for robot in robots if robot.name in words]
     if len(named) == 1:
-        return named[0], Inference(
-            "robot", named[0].name, "its name in the names of the joint columns", hints=(Hint("robot"),)
-        )
+        why = "its name in the names of the joint columns"
+        return named[0], Inference("robot", named[0].name, why, hints=(Hint("robot"),))
     return _by_kinematics(log, named or robots)
 
 
@@ -41,11 +40,8 @@ def _by_kinematics(log: JointLog, robots: Sequence[Chain]) -> tuple[Chain, Infer
     if log.tcp_position is None:
         return None
     rows = spread(log.rows)
-    fits: dict[str, Fit] = {}
-    for robot in robots:
-        found = fit(robot, log.q[rows], log.tcp_position[rows])
-        if found is not None:
-            fits[robot.name] = found
+    found = {robot.name: fit(robot, log.q[rows], log.tcp_position[rows]) for robot in robots}
+    fits = {name: one for name, one in found.items() if one is not None}
     best = single_out(fits) if fits else None
     if best is None:
         return None

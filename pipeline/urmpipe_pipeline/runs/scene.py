@@ -6,10 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.figure import SpaceFigure
-from urmpipe_pipeline.presentation.parts import ends
+from urmpipe_pipeline.presentation.parts import ends, within_words
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene
 from urmpipe_pipeline.runs.figures import times_of
 from urmpipe_pipeline.runs.results import Run
@@ -35,11 +34,10 @@ def path_figure(run: Run) -> Iterator[SpaceFigure]:
         paths.append(Path("forward kinematics", run.tcp.position, run.t_ns, AXIS_COLOURS["norm"]))
     if not paths or not np.isfinite(known := np.asarray(paths[-1].position)).any():
         return
-    low, high = np.nanmin(known, axis=0), np.nanmax(known, axis=0)
     yield SpaceFigure(
         "Path in space",
         "The tool centre point, equal scale on all axes.",
-        f"Path of {run.name} in three dimensions, within ({text.point(low)}) m and ({text.point(high)}) m.",
+        f"Path of {run.name} in three dimensions, {within_words(known)}.",
         tuple(paths),
         ends(known),
     )

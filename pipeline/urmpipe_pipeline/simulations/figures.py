@@ -9,12 +9,12 @@ import numpy as np
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
-from urmpipe_pipeline.comparison.deviation import AXES
+from urmpipe_pipeline.comparison.deviation import AXES, KINDS
 from urmpipe_pipeline.comparison.tolerance import allowed_for
 from urmpipe_pipeline.comparison.wording import SYMBOLS
 from urmpipe_pipeline.palette import AXIS_COLOURS, run_colour
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, SpaceFigure, View
-from urmpipe_pipeline.presentation.parts import ends
+from urmpipe_pipeline.presentation.parts import ends, within_words
 from urmpipe_pipeline.presentation.scene import Path
 from urmpipe_pipeline.simulations.signal_groups import Group
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation, extremes
@@ -48,12 +48,11 @@ def path_figure(simulation: Simulation) -> Iterator[SpaceFigure]:
     every = np.concatenate([np.empty((0, 3)), *known])
     if not len(every):
         return
-    low, high = text.point(every.min(axis=0)), text.point(every.max(axis=0))
+    names = ", ".join(path.name for path in paths)
     yield SpaceFigure(
         "Path in space",
         "The tip of each arm, equal scale on all axes.",
-        f"Path of {', '.join(path.name for path in paths)} in three dimensions, within ({low}) m and"
-        f" ({high}) m.",
+        f"Path of {names} in three dimensions, {within_words(every)}.",
         paths,
         ends(known[0] if len(known[0]) else every),
     )
@@ -79,15 +78,14 @@ def kept_rows(simulation: Simulation) -> tuple[int, ...]:
 
 def _plain(simulation: Simulation, group: Group) -> tuple[Panel, ...]:
     """Return the panel of signals that are not judged."""
-    wanted = {one.display_unit for one in group.signals}
     lines = tuple(
         Line(signal.columns, names, colours, dashed=k < group.wanted, steps=signal.type != "Real")
         for k, (signal, names, colours) in enumerate(
             zip(group.signals, group.names, group.colours, strict=True)
         )
     )
-    display = wanted.pop() if len(wanted) == 1 else ""
-    return (Panel(group.variables, group.unit, lines, simulation.t_ns, share=2.3, display_unit=display),)
+    unit = group.display_unit
+    return (Panel(group.variables, group.unit, lines, simulation.t_ns, share=2.3, display_unit=unit),)
 
 
 def _judged(simulation: Simulation, group: Group, verdict: DeltaVerdict) -> tuple[Panel, ...]:
@@ -99,19 +97,12 @@ def _judged(simulation: Simulation, group: Group, verdict: DeltaVerdict) -> tupl
     columns = np.column_stack([one.columns for one in (*vectors, *sizes)])
     panels = []
     for axis, values in zip(AXES, columns.T, strict=False):
-        kind = "norm" if axis == "norm" else "axis"
-        panels.append(
-            Panel(
-                SYMBOLS[axis],
-                group.unit,
-                (Line(values, (SYMBOLS[axis],), (AXIS_COLOURS[axis],)),),
-                simulation.t_ns,
-                allowed_for(axis, kind, verdict.tolerance),
-                signed=kind == "axis",
-                peaks=(verdict.sample,) if verdict.quantity == axis else (),
-                small=True,
-            )
-        )
+        kind, symbol = KINDS[axis], SYMBOLS[axis]
+        line = Line(values, (symbol,), (AXIS_COLOURS[axis],))
+        allowed = allowed_for(axis, kind, verdict.tolerance)
+        peaks = (verdict.sample,) if verdict.quantity == axis else ()
+        signed = kind == "axis"
+        panels.append(Panel(symbol, group.unit, (line,), simulation.t_ns, allowed, signed, peaks, small=True))
     return tuple(panels)
 
 

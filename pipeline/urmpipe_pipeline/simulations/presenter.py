@@ -9,6 +9,7 @@ from itertools import groupby
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.comparison.wording import meter_words, out_words, size_of, used_words
 from urmpipe_pipeline.presentation.figure import Drawing, Text
 from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table, recording_fact
@@ -25,10 +26,9 @@ from urmpipe_pipeline.presentation.section import (
     Section,
     Value,
 )
-from urmpipe_pipeline.simulations.answers import answers_of
 from urmpipe_pipeline.simulations.figures import path_figure, signal_figures
 from urmpipe_pipeline.simulations.scene import simulation_scene
-from urmpipe_pipeline.simulations.signal_groups import Group, groups_of
+from urmpipe_pipeline.simulations.signal_groups import Group, answers_of, groups_of
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.simulations.tables import (
     blocks_table,
@@ -38,7 +38,6 @@ from urmpipe_pipeline.simulations.tables import (
     settings_table,
     signals_table,
 )
-from urmpipe_pipeline.simulations.wording import outcome_words
 
 
 def present(simulation: Simulation) -> Presentation:
@@ -58,14 +57,23 @@ def present(simulation: Simulation) -> Presentation:
     )
 
 
+def outcome_words(simulation: Simulation) -> str:
+    """Return how a simulation ended: "delta of log-to-delta out of tolerance", "one-drive: 401 samples"."""
+    if simulation.failed is not None:
+        return f"{simulation.name} did not reach its end"
+    worst = simulation.judged_worst
+    if worst is None:
+        return f"{simulation.name}: {text.counted(len(simulation.t_ns), 'sample')}"
+    within = "within" if worst.verdict == "pass" else "out of"
+    return f"{worst.block} of {simulation.name} {within} tolerance"
+
+
 def _decisive(simulation: Simulation) -> Iterator[Fact]:
     """Yield why it failed and when, or which delta meter decided."""
     if simulation.failed is not None:
         yield Fact("Why", simulation.failed)
-        yield Fact(
-            "Recorded until",
-            f"t = {text.seconds(float(simulation.t[-1]))} s" if len(simulation.t_ns) else "its start",
-        )
+        end = f"t = {text.seconds(float(simulation.t[-1]))} s" if len(simulation.t_ns) else "its start"
+        yield Fact("Recorded until", end)
     elif (worst := simulation.judged_worst) is not None:
         yield Fact("Furthest out" if worst.verdict == "fail" else "Closest to the limit", Ref(worst.block))
         yield Fact("Decided by", meter_words(worst))
@@ -92,9 +100,8 @@ def _line(simulation: Simulation) -> dict[str, Cell]:
 
 def _body(simulation: Simulation) -> Section:
     failed = simulation.failed
-    end = Check(
-        "reaches its end", "pass" if failed is None else "fail", failed or "", kind="simulation-failed"
-    )
+    ended: Verdict = "pass" if failed is None else "fail"
+    end = Check("reaches its end", ended, failed or "", kind="simulation-failed")
     return Section(
         f"Simulation {simulation.name}",
         simulation.verdict,
@@ -141,18 +148,15 @@ def _facts(simulation: Simulation) -> Iterator[Fact]:
 def _sections(simulation: Simulation) -> Iterator[Section]:
     """Yield set points and answers, then what each block did; blocks that are judged rank first."""
     answers = answers_of(simulation)
-    by_block = [
-        (block, list(some))
-        for block, some in groupby([*answers, *groups_of(simulation)], lambda one: one.block)
-    ]
+    groups = groupby([*answers, *groups_of(simulation)], lambda one: one.block)
+    by_block = [(block, list(some)) for block, some in groups]
     worst = simulation.judged_worst
     opened = by_block[0 if answers else -1][0] if by_block else ""
     judged = {one.block: one for one in simulation.verdicts}
     by_block += [(block, []) for block in judged if block not in dict(by_block)]
-    for block, groups in by_block:
-        yield _section(
-            simulation, block, groups, judged.get(block), opened=block == (worst.block if worst else opened)
-        )
+    opened = worst.block if worst else opened
+    for block, own in by_block:
+        yield _section(simulation, block, own, judged.get(block), opened=block == opened)
 
 
 def _section(

@@ -1,10 +1,9 @@
-"""Which signals of a simulation share a plot, and their colours: the same in the viewer and in the report."""
+"""Which signals of a simulation share a plot, and their colours: set points and answers, those of a block."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import groupby
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
@@ -17,9 +16,14 @@ MOST = len(JOINT_COLOURS)
 NAMED = 3
 """Variables that the title of a plot names; of more, the first and the last."""
 
-
 FAMILY = 3
 """So many blocks of one kind with the same variables are plotted together, variable by variable."""
+
+SET, REAL = "set_", "real_"
+"""How the two inputs of a controller begin whose rests agree: set_theta, real_theta."""
+
+ANSWERS = "Set point and answer"
+"""What the plots of what a controller is to hold and what it measures are called."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,10 +58,15 @@ class Group:
         return tuple(one.names if self.family else one.variables for one in self.signals)
 
     @property
-    def shown(self) -> tuple[str, float]:
-        """The unit that people like to see them in, if all have the same, and how many of it one unit is."""
+    def display_unit(self) -> str:
+        """The unit that people like to see all of them in; empty where they differ."""
         wanted = {one.display_unit for one in self.signals}
-        return text.display_unit(self.unit, wanted.pop() if len(wanted) == 1 else "")
+        return wanted.pop() if len(wanted) == 1 else ""
+
+    @property
+    def shown(self) -> tuple[str, float]:
+        """The unit that they are shown in, and how many of it one of their own is."""
+        return text.display_unit(self.unit, self.display_unit)
 
     @property
     def colours(self) -> tuple[tuple[str, ...], ...]:
@@ -119,10 +128,9 @@ def _groups_of_block(simulation: Simulation, block: str) -> Iterator[Group]:
     if judged:
         yield Group(block, judged[0].unit, tuple(judged), verdict)
     others = [one for one in own if one not in judged]
-    order = list(dict.fromkeys(one.unit for one in others))
-    others.sort(key=lambda one: order.index(one.unit))
-    for unit, signals in groupby(others, key=lambda one: one.unit):
-        yield from (Group(block, unit, some) for some in _packed(list(signals)))
+    for unit in dict.fromkeys(one.unit for one in others):
+        same = [one for one in others if one.unit == unit]
+        yield from (Group(block, unit, packed) for packed in _packed(same))
 
 
 def _packed(signals: list[Signal]) -> Iterator[tuple[Signal, ...]]:
@@ -137,3 +145,29 @@ def _packed(signals: list[Signal]) -> Iterator[tuple[Signal, ...]]:
         some.append(one)
         lines += width
     yield tuple(some)
+
+
+def answers_of(simulation: Simulation) -> list[Group]:
+    """Return the groups of what controllers are to hold and what they measure, one a quantity and unit.
+
+    A block whose inputs set_NAME and real_NAME are both connected to recorded signals is such a controller.
+    """
+    signals = {one.name: one for one in simulation.signals}
+    pairs: dict[tuple[str, str], list[tuple[Signal, Signal]]] = {}
+    for name, source in simulation.connections.items():
+        block, _, variable = name.rpartition(".")
+        if not variable.startswith(SET):
+            continue
+        quantity = variable.removeprefix(SET)
+        measured = simulation.connections.get(f"{block}.{REAL}{quantity}", "")
+        wanted, real = signals.get(source), signals.get(measured)
+        if wanted is not None and real is not None and wanted.unit == real.unit:
+            pairs.setdefault((quantity, real.unit), []).append((wanted, real))
+    return [_answers(unit, some) for (_, unit), some in pairs.items()]
+
+
+def _answers(unit: str, pairs: list[tuple[Signal, Signal]]) -> Group:
+    """Return the set points, each once, and behind them the answers."""
+    wanted = tuple({one.name: one for one, _ in pairs}.values())
+    real = tuple({one.name: one for _, one in pairs}.values())
+    return Group(ANSWERS, unit, (*wanted, *real), family=True, wanted=len(wanted))

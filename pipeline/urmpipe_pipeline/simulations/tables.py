@@ -59,14 +59,9 @@ def connections_table(simulation: Simulation) -> Table:
 
 def settings_table(simulation: Simulation) -> Table:
     """Return the parameters and start values of all blocks."""
+    by = {True: "the system", False: "the block"}
     rows = [
-        (
-            f"{block.name}.{one.variable}",
-            one.causality,
-            f"{one.value:.10g}",
-            one.unit,
-            "the system" if one.given else "the block",
-        )
+        (f"{block.name}.{one.variable}", one.causality, f"{one.value:.10g}", one.unit, by[one.given])
         for block in simulation.blocks
         for one in block.settings
     ]

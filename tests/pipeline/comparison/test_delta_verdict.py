@@ -14,8 +14,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.delta import delta as model_delta
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison.delta_verdict import delta_verdict
-from urmpipe_pipeline.comparison.deviation import AXES
-from urmpipe_pipeline.comparison.measure import KINDS
+from urmpipe_pipeline.comparison.deviation import AXES, KINDS
 from urmpipe_pipeline.comparison.statistics import Measured, describe, overall
 from urmpipe_pipeline.comparison.wording import meter_words
 
@@ -122,7 +121,7 @@ def test_it_is_the_verdict_of_compare(delta: FloatArray, which: list[str], row: 
     tolerance = {kind: share * sizes.get(kind, sizes["y"]) for kind in which}
     assume(min(tolerance.values()) > 0.0)  # compare tells no share of nothing
     found = delta_verdict("meter", np.arange(len(delta)), delta, tolerance)
-    measured = [Measured(axis, KINDS[i], "m", values[:, i]) for i, axis in enumerate(AXES)]
+    measured = [Measured(axis, KINDS[axis], "m", values[:, i]) for i, axis in enumerate(AXES)]
     every = [describe(one, np.arange(len(delta)) / 1e9, np.arange(len(delta)), tolerance) for one in measured]
     assert found is not None
     assert found.verdict == overall(every)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from urmpipe_pipeline.palette import JOINT_COLOURS, REFERENCE_COLOUR
-from urmpipe_pipeline.simulations.answers import TITLE, answers_of
+from urmpipe_pipeline.simulations.signal_groups import ANSWERS, answers_of
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 
 MakeSimulation = Callable[..., Simulation]
@@ -30,7 +30,7 @@ def controlled(make_simulation: MakeSimulation) -> Simulation:
 
 def test_set_points_stand_before_their_answers_a_plot_a_quantity(controlled: Simulation) -> None:
     theta, omega = answers_of(controlled)
-    assert (theta.block, theta.variables, theta.unit, theta.wanted) == (TITLE, "theta", "rad", 2)
+    assert (theta.block, theta.variables, theta.unit, theta.wanted) == (ANSWERS, "theta", "rad", 2)
     assert [one.name for one in theta.signals] == [
         "set_point1.theta", "set_point2.theta", "load1.theta", "load2.theta",
     ]  # fmt: skip
