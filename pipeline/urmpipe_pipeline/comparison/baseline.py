@@ -168,17 +168,15 @@ def _share_noise(
 
 def _differences(now: Comparison, before: Comparison, pairs: Sequence[Pair]) -> Iterator[Difference]:
     """Yield what differs in how the two were made, in all and log by log."""
-    made, was = _made(now), _made(before)
+    yield from _differing(_made(before), _made(now))
+    for run, old in pairs:
+        yield from _differing(_facts(old), _facts(run), f" of {run.name}")
+
+
+def _differing(was: Mapping[str, Any], made: Mapping[str, Any], of: str = "") -> Iterator[Difference]:
     for what in dict.fromkeys([*was, *made]):
         if was.get(what) != made.get(what):
-            yield Difference(what, was.get(what), made.get(what))
-    for run, old in pairs:
-        here, there = _facts(run), _facts(old)
-        yield from (
-            Difference(f"{what} of {run.name}", there[what], here[what])
-            for what in here
-            if there[what] != here[what]
-        )
+            yield Difference(f"{what}{of}", was.get(what), made.get(what))
 
 
 def _made(result: Comparison) -> dict[str, Any]:

@@ -59,10 +59,14 @@ def _check(run: str, name: str, said: str) -> Check:
 
 def since_words(found: BaselineComparison) -> str:
     """Return how much is worse than a baseline: "5 quantities worse, 1 gone", "nothing worse"."""
-    count = len(found.worse)
-    said = [f"{count} {'quantity' if count == 1 else 'quantities'} worse"] if count else []
+    said = [f"{quantities(len(found.worse))} worse"] if found.worse else []
     said += [f"{len(found.gone)} gone"] if found.gone else []
     return ", ".join(said) or "nothing worse"
+
+
+def quantities(count: int) -> str:
+    """Return a count of quantities: "1 quantity", "5 quantities"."""
+    return f"{count} {'quantity' if count == 1 else 'quantities'}"
 
 
 def worse_words(one: Change) -> str:

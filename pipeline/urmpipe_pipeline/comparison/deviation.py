@@ -190,12 +190,8 @@ class Deviation(Shown):
         if not lengths[longest]:
             return None
         first, last = int(starts[longest]), int(ends[longest]) - 1
-        return Stretch(
-            int(lengths[longest]),
-            int(self.sample[first]),
-            float(self.t[first]),
-            float(self.t_ns[last] - self.t_ns[first]) / 1e9,
-        )
+        lasts = float(self.t_ns[last] - self.t_ns[first]) / 1e9
+        return Stretch(last - first + 1, int(self.sample[first]), float(self.t[first]), lasts)
 
     @property
     def all_statistics(self) -> tuple[Statistics, ...]:
@@ -262,7 +258,7 @@ class Deviation(Shown):
     def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the JSON object of one run."""
         worst, longest = self.worst, self.longest_out
-        angle = self.statistics.get("angle")
+        angle, norm = self.statistics.get("angle"), float(self.delta[worst, 3])
         return {
             "name": self.name,
             "samples": len(self.sample),
@@ -278,11 +274,7 @@ class Deviation(Shown):
             "joints": {name: one.to_dict() for name, one in self.joint_statistics.items()},
             "joint_turns": dict(zip(self.joint_statistics, self.joint_turns, strict=True)),
             "start": dict(zip(AXES, self.start, strict=True)),
-            "worst": {
-                "t": float(self.t[worst]),
-                "sample": int(self.sample[worst]),
-                "norm": float(self.delta[worst, 3]),
-            },
+            "worst": {"t": float(self.t[worst]), "sample": int(self.sample[worst]), "norm": norm},
             "out_of_tolerance": int(np.count_nonzero(self.outside)),
             "share_out": self.share_out,
             "longest_out": None if longest is None else asdict(longest),

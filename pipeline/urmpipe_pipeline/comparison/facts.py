@@ -48,9 +48,8 @@ def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     yield from (replace(fact, brief=False) for fact in _furthest_joint(one))
     compared = f"{text.counted(len(one.sample), 'sample')} over {text.seconds(one.duration)} s"
     yield Fact("Compared", compared)
-    yield Fact(
-        "Covered", Value(covered, "%"), "share of the reference within the log's time", covered < WHOLE
-    )
+    share = "share of the reference within the log's time"
+    yield Fact("Covered", Value(covered, "%"), share, covered < WHOLE)
     yield _left_out(one, len(result.reference.t_ns))
     yield from _out_of_tolerance(one)
     yield Fact("Clocks", *sync_words(one.sync))
@@ -88,9 +87,8 @@ def alignment_words(one: Deviation) -> tuple[str, str]:
             return f"tool centre point moved by {moved}", f"the constant offset that fits best: {by}"
     turned = text.quantity(alignment.angle, "rad")
     moved = text.quantity(float(alignment.moved(one.actual).max()), "m")
-    rule = (
-        "the first compared poses agree" if alignment.mode == "start" else "the rigid motion that fits best"
-    )
+    first = alignment.mode == "start"
+    rule = "the first compared poses agree" if first else "the rigid motion that fits best"
     about = f"turned about the origin, then moved by {_vector(alignment.translation)} mm"
     return f"{alignment.mode}: moved by up to {moved}, turned by {turned}", f"{rule}: {about}"
 

@@ -39,18 +39,14 @@ def overview_figure(comparison: Comparison) -> Iterator[Figure]:
         return
     largest = [one.statistics["norm"].max for one in ranking]
     logarithmic = min(largest) > 0.0 and max(largest) > APART * min(largest)
+    placed = [(f"{place}. {one.name}", one) for place, one in enumerate(ranking, start=1)]
     order = "; ".join(
-        f"{place}. {one.name}: at most {text.quantity(one.statistics['norm'].max, 'm')}, {one.verdict}"
-        for place, one in enumerate(ranking, start=1)
+        f"{name}: at most {text.quantity(one.statistics['norm'].max, 'm')}, {one.verdict}"
+        for name, one in placed
     )
     lines = tuple(
-        Line(
-            column(one.delta, 3),
-            (f"{place}. {one.name}",),
-            (run_colour(comparison.runs.index(one)),),
-            t_ns=one.t_ns,
-        )
-        for place, one in enumerate(ranking, start=1)
+        Line(column(one.delta, 3), (name,), (run_colour(comparison.runs.index(one)),), t_ns=one.t_ns)
+        for name, one in placed
     )
     panel = Panel(
         "‖Δ‖", "m", lines, limit=comparison.tolerance.get("norm"), signed=False, logarithmic=logarithmic,
@@ -183,24 +179,14 @@ def _joint_panel(one: Deviation, delta: FloatArray, held: Sequence[Statistics], 
     own = [j for j, joint in enumerate(held) if joint.unit == unit]
     values = delta if len(own) == len(held) else delta[:, own]
     names, colours = tuple(held[j].quantity for j in own), tuple(map(joint_colour, own))
-    first = held[own[0]]
-    return Panel(
-        "Δ joints", unit, (Line(values, names, colours),), one.t_ns, first.tolerance, small=True, share=1.9
-    )
+    line, allowed = Line(values, names, colours), held[own[0]].tolerance
+    return Panel("Δ joints", unit, (line,), one.t_ns, allowed, small=True, share=1.9)
 
 
 def _panel(one: Deviation, held: Statistics, line: Line) -> Panel:
     """Return one quantity over time with its tolerance and its largest value."""
-    return Panel(
-        symbol(held),
-        held.unit,
-        (line,),
-        one.t_ns,
-        held.tolerance,
-        held.kind == "axis",
-        (one.peak(held),),
-        small=True,
-    )
+    signed, peaks = held.kind == "axis", (one.peak(held),)
+    return Panel(symbol(held), held.unit, (line,), one.t_ns, held.tolerance, signed, peaks, small=True)
 
 
 def _instant(one: Deviation) -> dict[int, str]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from functools import partial
+from typing import Any
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.baseline_section import baseline_section, worse_facts
-from urmpipe_pipeline.comparison.checks import log_checks, log_properties
+from urmpipe_pipeline.comparison.baseline_section import baseline_checks, baseline_section, worse_facts
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.facts import alignment_words, decisive_facts, deviation_facts, sync_words
@@ -19,10 +20,26 @@ from urmpipe_pipeline.comparison.tables import (
     statistics_rows,
     statistics_tables,
 )
-from urmpipe_pipeline.comparison.wording import amount_words, tolerance_words, verdict_words
+from urmpipe_pipeline.comparison.wording import (
+    amount_words,
+    decided_words,
+    out_words,
+    quantity_name,
+    tolerance_words,
+    verdict_words,
+)
 from urmpipe_pipeline.palette import run_colour
 from urmpipe_pipeline.presentation.parts import inputs_table, minute, provenance_table, recording_fact
-from urmpipe_pipeline.presentation.section import Block, Event, Fact, Level, Presentation, Section, Value
+from urmpipe_pipeline.presentation.section import (
+    Block,
+    Check,
+    Event,
+    Fact,
+    Level,
+    Presentation,
+    Section,
+    Value,
+)
 from urmpipe_pipeline.runs.parts import log_events, log_tables
 from urmpipe_pipeline.runs.playback_figures import playback_figures
 
@@ -95,13 +112,46 @@ def _log(one: Deviation, result: Comparison) -> Section:
         tuple(statistics_tables(one)),
         partial(deviation_figures, one),
         partial(_page, one),
-        tuple(log_checks(result, one)),
-        log_properties(result, one),
+        tuple(_checks(result, one)),
+        _properties(result, one),
         partial(_events, one),
         result.warnings_of(one),
         rank=result.ranking.index(one),
         opened=one is result.worst,
     )
+
+
+def _checks(result: Comparison, one: Deviation) -> Iterator[Check]:
+    """Yield the checks of a log: its tolerances, then its quantities against the baseline."""
+    for held in one.all_statistics:
+        if held.verdict is not None:
+            row = "" if held.missing else f" (row {one.row(held)})"
+            out = out_words(held.out_of_tolerance or 0, len(one.sample))
+            said = f"{decided_words(held)}{row}; out of tolerance: {out}"
+            yield Check(quantity_name(held), held.verdict, said if held.verdict == "fail" else "", one.name)
+    if result.baseline:
+        yield from baseline_checks(result.baseline, one.name)
+
+
+def _properties(result: Comparison, one: Deviation) -> dict[str, Any]:
+    """Return what is worth keeping of a log, and every field of the statistics of each quantity."""
+    longest = one.longest_out
+    return {
+        "reference": result.reference.name,
+        "verdict": one.verdict,
+        "duration": one.duration,
+        "samples": len(one.sample),
+        "left_out": one.left_out,
+        "reference_left_out": one.reference_left_out,
+        "sync_offset": one.sync.offset,
+        "share_out": one.share_out,
+        "longest_out": 0.0 if longest is None else longest.duration,
+        "speed_correlation": one.speed_correlation,
+    } | {
+        f"{quantity_name(held)}.{field}": value
+        for held in one.all_statistics
+        for field, value in asdict(held).items()
+    }
 
 
 def _page(one: Deviation) -> Iterator[Block]:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.sync_coarse import FLOOR, mean_rates, peaks
 from urmpipe_pipeline.comparison.sync_fine import Estimate, refine
 from urmpipe_pipeline.comparison.sync_views import View, views
-from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
+from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory, extent
 from urmpipe_pipeline.joint_log import LogWarning
 
 SyncOption: TypeAlias = Literal["start", "auto"] | float
@@ -52,14 +50,8 @@ SHOWN = 5
 """Offsets that a message names, the best ones."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Fault:
-    """Why a view of two motions tells no offset.
-
-    Attributes:
-        message: What was found.
-        similarity: The best of any offset.
-    """
+class _Fault(NamedTuple):
+    """Why a view of two motions tells no offset, and the best similarity of any."""
 
     message: str
     similarity: float = -1.0
@@ -67,13 +59,10 @@ class _Fault:
 
 def check_sync(option: SyncOption) -> None:
     """Raise an `OptionError` if there is no such way to put clocks together."""
-    if isinstance(option, str):
-        if option in ("start", "auto"):
-            return
-    elif abs(option) < LONGEST_OFFSET:
-        return
-    allowed = f"start, auto, or a time in s below {LONGEST_OFFSET:g}"
-    raise OptionError(Finding(parameter="sync", found=str(option), allowed=allowed))
+    known = option in ("start", "auto") if isinstance(option, str) else abs(option) < LONGEST_OFFSET
+    if not known:
+        allowed = f"start, auto, or a time in s below {LONGEST_OFFSET:g}"
+        raise OptionError(Finding(parameter="sync", found=str(option), allowed=allowed))
 
 
 def synchronise(
@@ -120,7 +109,7 @@ def synchronise(
 def _look(view: View, reference: str) -> Estimate | _Fault:
     """Return the offset that one view tells, or why it tells none."""
     for side, values in ((reference, view.reference), ("this log", view.log)):
-        if not _moves(values):
+        if extent(values) <= STILL:
             return _Fault(f"no motion of the {view.by} in {side}")
     found = mean_rates(view)
     near = peaks(found, view.turned) if found else []
@@ -152,12 +141,6 @@ def _rivals(one: Estimate, best: Estimate, apart: float) -> bool:
     """Tell whether an offset explains a motion nearly as well as the best, and is another by so many [s]."""
     near = _unlike(one.similarity) < RIVAL * _unlike(best.similarity)
     return near and abs(one.offset - best.offset) > apart
-
-
-def _moves(values: FloatArray) -> bool:
-    """Tell whether any channel moves."""
-    there = values[np.isfinite(values).all(axis=1)]
-    return bool(len(there)) and bool((np.ptp(there, axis=0) > STILL).any())
 
 
 def sync_doubts(name: str, sync: Sync, period: float) -> list[LogWarning]:

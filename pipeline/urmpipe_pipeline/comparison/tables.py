@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, replace
 
 from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.baseline_section import quantities
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
 from urmpipe_pipeline.comparison.facts import alignment_words, largest
@@ -104,9 +105,7 @@ def comparison_lines(result: Comparison) -> Iterator[dict[str, Cell]]:
             "Made": minute(result.provenance),
             "Reference": result.reference.name,
             "Verdict": Judged(one.verdict),
-            "Worse than its baseline": f"in {worse} {'quantity' if worse == 1 else 'quantities'}"
-            if worse
-            else "",
+            "Worse than its baseline": f"in {quantities(worse)}" if worse else "",
             **{title: cell(one) for title, cell in _sizes(result).values()},
         }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from numbers import Real
 
@@ -61,23 +61,15 @@ def parse_tolerance(
     found: dict[str, float] = {}
     named: set[str] = set()
     faults = []
-    for part in text.split(","):
-        name, sign, value = part.rpartition("=")
-        kinds = (name.strip(),) if sign else tuple(bare)
+    for part, kinds, value in _parts(text, bare):
         number = _number(value, UNITS.get(kinds[0], {}), zero)
         twice = " twice" if number is not None and not named.isdisjoint(kinds) else ""
         if number is None or twice:
-            angle = not sign and _number(value, ANGLES, zero) is not None and not twice
-            hints = (Hint(parameter, f"{one}={part.strip()}", "says of what") for one in ("angle", "joint"))
-            found_part = f"{shown(part.strip())}{twice}"
-            faults.append(
-                Finding(
-                    parameter=parameter,
-                    found=found_part,
-                    allowed=ALLOWED,
-                    hints=tuple(hints) if angle else (),
-                )
-            )
+            angle = value == part and _number(value, ANGLES, zero) is not None and not twice
+            of_what = ("angle", "joint") if angle else ()
+            hints = tuple(Hint(parameter, f"{one}={part.strip()}", "says of what") for one in of_what)
+            said = f"{shown(part.strip())}{twice}"
+            faults.append(Finding(parameter=parameter, found=said, allowed=ALLOWED, hints=hints))
             continue
         named.update(kinds)
         found |= dict.fromkeys(kinds, number)
@@ -89,12 +81,18 @@ def parse_tolerance(
 def kinds_with_unit(text: str, bare: Sequence[str] = ("axis",)) -> frozenset[str]:
     """Return the kinds whose tolerance has its unit behind it: nobody took a metre for a millimetre there."""
     kinds: set[str] = set()
-    for part in text.split(","):
-        name, sign, value = part.rpartition("=")
+    for _, some, value in _parts(text, bare):
         match = QUANTITY.fullmatch(value)
         if match is not None and match[2]:
-            kinds.update((name.strip(),) if sign else bare)
+            kinds.update(some)
     return frozenset(kinds)
+
+
+def _parts(text: str, bare: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...], str]]:
+    """Yield each part of a tolerance with the kinds that it is for and, behind its name, the quantity."""
+    for part in text.split(","):
+        name, sign, value = part.rpartition("=")
+        yield part, (name.strip(),) if sign else tuple(bare), value
 
 
 def check_tolerance(

@@ -104,3 +104,9 @@ class Alignment:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
         return asdict(self)
+
+
+def extent(values: FloatArray) -> float:
+    """Return the largest span of the columns of values in [m] or [rad], shape (n, k); 0 without a value."""
+    known = values[np.isfinite(values).all(axis=1)]
+    return float(np.ptp(known, axis=0).max()) if known.size else 0.0

@@ -6,12 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation
 from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
-from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.comparison.trajectory import Trajectory, extent
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
 from urmpipe_pipeline.runs.results import Run
@@ -95,13 +94,7 @@ def _rests(one: Deviation) -> bool:
     """Tell whether a log stays where it is while it is compared: its tool centre point, and its joints."""
     run = one.run
     compared = (one.t_ns[0] <= run.t_ns) & (run.t_ns <= one.t_ns[-1])
-    return _extent(one.actual) < AT_REST and _extent(run.q[compared]) < AT_REST
-
-
-def _extent(values: FloatArray) -> float:
-    """Return the largest span of a column of shape (n, k), in its unit; 0 without a value."""
-    known = values[np.isfinite(values).all(axis=1)]
-    return float(np.ptp(known, axis=0).max()) if known.size else 0.0
+    return extent(one.actual) < AT_REST and extent(run.q[compared]) < AT_REST
 
 
 def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
@@ -110,14 +103,12 @@ def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
         unit, other, most = ("rad", "deg", LARGE_ANGLE) if "rad" in UNITS[kind] else ("m", "mm", LARGE_LENGTH)
         if value > most:
             bare = f"{value:g}"
-            said = (
-                f"a tolerance of {text.allowed(value, unit)} ({kind}) lets anything pass: {bare} is in {unit}"
-            )
+            said = f"a tolerance of {text.allowed(value, unit)} ({kind}) lets anything pass"
             hints = (
                 Hint("tolerance", f"{kind}={bare}{other}", f"if {other} was meant"),
                 Hint("tolerance", f"{kind}={bare}{unit}", "if not"),
             )
-            yield LogWarning("large-tolerance", said, hints=hints)
+            yield LogWarning("large-tolerance", f"{said}: {bare} is in {unit}", hints=hints)
 
 
 def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
@@ -159,8 +150,7 @@ def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:
 def _cause(apart: float) -> str:
     """Return what usually lies behind a distance in [m] between kinematics and recorded tool centre point."""
     usual = text.allowed(CALIBRATION)
-    if apart <= CALIBRATION:
-        return (
-            f"usual up to {usual} where a controller knows its arm's calibration, which the robot here lacks"
-        )
-    return f"more than a calibration makes ({usual}): another robot, tool or base?"
+    if apart > CALIBRATION:
+        return f"more than a calibration makes ({usual}): another robot, tool or base?"
+    known = "a controller knows its arm's calibration, which the robot here lacks"
+    return f"usual up to {usual} where {known}"
