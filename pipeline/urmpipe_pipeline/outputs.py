@@ -77,6 +77,9 @@ JOINTS = re.compile(rb"\A[^\n]*," + TARGET_ROW.encode() + rb"\r?\n")
 GENERATION_TOOL = re.compile(rb"<fmiModelDescription\s[^>]*\sgenerationTool=\"urmpipe\b")
 """How the model description of an FMU of ours tells where it comes from."""
 
+EXPORT_HEADER = "urmpipe export"
+"""Stands at the start of every export of ours that has room for it; Parquet has it in its metadata."""
+
 FIRST_LINES = {
     "map": MAP_HEADER, "audit": ",".join(AUDIT_COLUMNS), "statistics": STATISTICS_HEADER,
     "junit": JUNIT_HEADER, "drawing": DRAWING_HEADER,

@@ -171,13 +171,7 @@ class SpaceFigure:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A drawing that is ready (SVG).
-
-    Attributes:
-        title: Its heading.
-        alt: What it shows, for who does not see it.
-        svg: The drawing.
-    """
+    """A drawing that is ready (SVG), and what it shows for who does not see it."""
 
     title: str
     alt: str

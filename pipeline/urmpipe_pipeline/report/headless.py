@@ -93,8 +93,7 @@ async def _drawn(browser: Kaleido, figure: Figure, suffix: FigureFormat) -> byte
         drawn: bytes = await browser.calc_fig(spec, opts=size)
     except (KaleidoError, DevtoolsProtocolError, RuntimeError, OSError, TimeoutError) as error:
         said = f"{figure.title!r} could not be drawn: {_said(error)}"
-        finding = Finding(said, parameter="figures")
-        raise OutputError(finding) from error
+        raise OutputError(Finding(said, parameter="figures")) from error
     return drawn
 
 

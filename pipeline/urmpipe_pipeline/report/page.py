@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import TypeAlias
 
+from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure, Text
 from urmpipe_pipeline.presentation.figure import Figure as GivenFigure
 from urmpipe_pipeline.presentation.section import Block, Presentation, Ref, Section, Table
@@ -68,14 +69,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """The page.
-
-    Attributes:
-        title: The names of what it shows.
-        banner: The verdict.
-        summaries: What a minute is enough for.
-        parts: All there is, one a result.
-    """
+    """The page: the names of what it shows, the verdict, what a minute is enough for, a part a result."""
 
     title: str
     banner: Banner
@@ -89,7 +83,13 @@ class Page:
 
 
 def lay_out(presentations: Sequence[Presentation]) -> Page:
-    """Return the page about some results, in the order in which they are given."""
+    """Return the page about some results, in the order in which they are given.
+
+    Raises:
+        OptionError: If there is none.
+    """
+    if not presentations:
+        raise OptionError("a report needs at least one run, comparison or simulation; found none")
     shown = [(one, Anchors(one.body, f"r{number}")) for number, one in enumerate(presentations, start=1)]
     titles = Counter(one.body.title for one in presentations)
     return Page(
@@ -116,11 +116,8 @@ def _summaries(shown: Sequence[tuple[Presentation, Anchors]]) -> Iterator[Summar
     for ranked, some in groupby(worst_first(shown), lambda pair: bool(_ranking(pair[0].body))):
         for group in [[pair] for pair in some] if ranked else [list(some)]:
             cards = cards_of(group, plain=not beside)
-            tables = tuple(
-                grid(table, anchors.href, folds=False)
-                for one, anchors in group
-                for table in _ranking(one.body)
-            )
+            ranked_by = ((table, anchors) for one, anchors in group for table in _ranking(one.body))
+            tables = tuple(grid(table, anchors.href, folds=False) for table, anchors in ranked_by)
             if cards or tables:
                 which = f": {group[0][0].body.title}" if ranked and len(shown) > 1 else ""
                 yield Summary(f"{_heading(cards)}{which}", cards, tables)
@@ -135,11 +132,8 @@ def _heading(cards: Sequence[Card]) -> str:
 
 def _ranking(body: Section) -> list[Table]:
     """Return the tables about the parts of a result, which stand with their cards."""
-    return [
-        one
-        for one in body.tables
-        if one.columns and any(isinstance(cell, Ref) for cell in one.columns[0].cells)
-    ]
+    tables = (one for one in body.tables if one.columns)
+    return [one for one in tables if any(isinstance(cell, Ref) for cell in one.columns[0].cells)]
 
 
 def _part(section: Section, anchors: Anchors, links: Links, which: str = "") -> Part:

@@ -1,28 +1,30 @@
-"""The report as one HTML file, and the figures of it as files of their own."""
+"""The report as one HTML file in which nothing foreign runs, and its figures as files of their own."""
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from importlib.resources import files
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.report.figure_files import FigureFile, FigureOptions, figure_stem, write_figures
-from urmpipe_pipeline.report.markup import asset, environment, script_hash
 from urmpipe_pipeline.report.page import Page, lay_out
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
 
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What was written.
-
-    Attributes:
-        path: The HTML file.
-        figures: The files of its figures; none unless they were asked for.
-    """
+    """What was written: the HTML file, and the files of its figures; none unless they were asked for."""
 
     path: Path
     figures: tuple[FigureFile, ...] = ()
@@ -38,7 +40,7 @@ def render_report(presentations: Sequence[Presentation]) -> str:
     Raises:
         OptionError: If there is nothing to report.
     """
-    return _render(_lay_out(presentations))
+    return _render(lay_out(presentations))
 
 
 def write_report(
@@ -63,20 +65,13 @@ def write_report(
         OptionError: If there is nothing to report.
         OutputError: If it may not be written there, or the figures cannot be drawn.
     """
-    page = _lay_out(presentations)
+    page = lay_out(presentations)
     with guarded_output(path, inputs, kind="report") as part:
         part.write_bytes(_render(page).encode("utf-8", "replace"))  # a file name may hold bytes of no text
         if progress and figures is None:
             progress(1.0)
-        files = () if figures is None else write_figures(page.figures, figures, inputs, progress)
-    return Written(path, files)
-
-
-def _lay_out(presentations: Sequence[Presentation]) -> Page:
-    """Return the page about at least one result."""
-    if not presentations:
-        raise OptionError("a report needs at least one run, comparison or simulation; found none")
-    return lay_out(presentations)
+        drawn = () if figures is None else write_figures(page.figures, figures, inputs, progress)
+    return Written(path, drawn)
 
 
 def _render(page: Page) -> str:
@@ -84,13 +79,68 @@ def _render(page: Page) -> str:
     from plotly.offline import get_plotlyjs
 
     plotly, script = get_plotlyjs(), asset("page.js")
-    engine = environment()
-    engine.filters["stem"] = figure_stem
-    return engine.get_template("template.html.jinja").render(
-        page=page,
-        version=version("urmpipe"),
-        hashes=[script_hash(plotly), script_hash(script)],
-        style=asset("style.css"),
-        plotly=plotly,
-        script=script,
+    return (
+        environment()
+        .get_template("template.html.jinja")
+        .render(
+            page=page,
+            version=version("urmpipe"),
+            hashes=[script_hash(plotly), script_hash(script)],
+            style=asset("style.css"),
+            plotly=plotly,
+            script=script,
+        )
     )
+
+
+def environment() -> Environment:
+    """Return the template engine: it escapes everything but what passes the filters raw and json."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    engine = Environment(
+        loader=PackageLoader(__package__, "assets"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    engine.filters |= {"raw": Markup, "json": script_json, "data_address": data_address, "stem": figure_stem}
+    engine.filters["kind"] = lambda block: type(block).__name__
+    return engine
+
+
+def data_address(svg: str) -> str:
+    """Return a drawing as the source of an image.
+
+    Browsers run no script in an image, load nothing for it and let nobody click in it, whatever the file
+    says that it came from.
+    """
+    data = base64.b64encode(svg.encode("utf-8", "replace")).decode("ascii")
+    return f"data:image/svg+xml;base64,{data}"
+
+
+def script_json(value: Any) -> Markup:
+    """Return a value as JSON that can stand inside a script element: no <, > or & is left in it.
+
+    Raises:
+        ValueError: If the value holds a NaN or an infinity, which JSON has no word for.
+    """
+    from markupsafe import Markup
+
+    written = json.dumps(value, allow_nan=False, separators=(",", ":"))
+    for letter in "<>&":
+        written = written.replace(letter, f"\\u{ord(letter):04x}")
+    return Markup(written)
+
+
+def script_hash(script: str) -> str:
+    """Return a script's hash as a content security policy writes it."""
+    digest = hashlib.sha256(script.encode("utf-8")).digest()
+    return f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
+
+
+def asset(name: str) -> str:
+    """Return the text of a file that is embedded in every page."""
+    return files(__package__).joinpath("assets", name).read_text(encoding="utf-8")

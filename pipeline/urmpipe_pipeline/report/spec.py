@@ -88,7 +88,7 @@ def stacked(panels: Sequence[Panel], across: Spec, shapes: Sequence[Spec] = ()) 
 
     Args:
         panels: From the top.
-        across: That axis, from `time_axis`, `row_axis` or `quantity_axis`.
+        across: That axis, from `time_axis`, `row_axis` or `axis`.
         shapes: Drawn through all of them.
     """
     layout = base_layout() | {"hovermode": "x unified", "hoversubplots": "axis"}

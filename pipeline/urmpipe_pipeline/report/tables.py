@@ -8,7 +8,8 @@ from typing import TypeAlias
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.presentation.digits import held, unit_of, written
+from urmpipe_pipeline.presentation.brief import head
+from urmpipe_pipeline.presentation.digits import held, written
 from urmpipe_pipeline.presentation.section import (
     Cell,
     Column,
@@ -26,7 +27,6 @@ LONG = 12
 
 MOST = 500
 """Rows of a table at most; what is left out is counted. The JSON output holds them all."""
-
 
 Href: TypeAlias = Callable[[Cell], str]
 """Returns where a cell leads; empty if it leads nowhere."""
@@ -126,7 +126,7 @@ def grid(table: Table, href: Href, *, folds: bool = True) -> Grid:
     more = f"{rows - MOST} more; the JSON output lists them all." if rows > MOST else ""
     return Grid(
         table.title,
-        tuple((_head(column), _is_number(column)) for column, _ in kept),
+        tuple((head(column), _is_number(column)) for column, _ in kept),
         tuple(zip(*(cells for _, cells in kept), strict=True)),
         table.folded or (folds and rows > LONG),
         " ".join(filter(None, (more, table.note))),
@@ -152,11 +152,6 @@ def shown_facts(facts: Sequence[Fact], href: Href) -> Iterator[ShownFact]:
         value = held(fact.value) if isinstance(fact.value, Value) else written(fact.value, unit=True)
         if value != text.NOTHING:
             yield ShownFact(fact.name, value, fact.help, href(fact.value))
-
-
-def _head(column: Column) -> str:
-    unit = unit_of(column.cells)
-    return f"{column.title} [{unit}]" if unit else column.title
 
 
 def _is_number(column: Column) -> bool:

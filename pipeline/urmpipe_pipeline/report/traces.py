@@ -13,12 +13,10 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.decimate import POINTS, decimate
 from urmpipe_pipeline.report.spec import BAND, FAULT, INK, MUTED, Spec, typed
+from urmpipe_pipeline.text import DIGITS
 
 DASHES = ("solid", "dash", "dot", "dashdot")
 """Tells the ninth joint from the first: colours repeat, dashes do not."""
-
-DIGITS = text.DIGITS
-"""Digits after the point of a value under the pointer, as many as the tables have."""
 
 FINE_DIGITS = 6
 """Digits after the point of a value in SI: micrometres; angles in [rad] and rates have `DIGITS`."""
@@ -193,12 +191,8 @@ def instant(at: float, words: str, start: float, end: float) -> Spec:
     share = (at - start) / ((end - start) or 1.0)
     side = "left" if share < 0.1 else "right" if share > 0.9 else "center"
     head = {"text": words, "textposition": "end", "textangle": 0, "xanchor": side}
-    font = {"color": FAULT, "size": 11}
-    return {
-        "type": "line",
-        "line": {"color": FAULT, "width": 1, "dash": "dot"},
-        "label": head | {"font": font},
-    } | ends
+    head |= {"font": {"color": FAULT, "size": 11}}
+    return {"type": "line", "line": {"color": FAULT, "width": 1, "dash": "dot"}, "label": head} | ends
 
 
 def _largest(values: FloatArray) -> float:

@@ -5,12 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import groupby
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
 from urmpipe_models.inverse.along_path.joint_path import JointPath
 from urmpipe_models.inverse.along_path.joint_speeds import TooFast
 from urmpipe_models.inverse.along_path.jumps import Jump
@@ -113,17 +111,13 @@ def tables(one: SolvedTargets) -> Iterator[Table]:
     elif one.reached.any():
         yield joints_table(one)
     if found := ghosts(one):
-        yield table_of(
-            "Branches",
-            {"branch": "Branch", "drawn": "Drawn", "rows": "Rows"},
-            [
-                ("chosen", f"solid, its tip {colour_word(run_colour(0))}", Value(int(one.reached.sum()))),
-                *(
-                    (one.name, colour_word(ghost_colour(i)), Value(int(np.isfinite(one.q).all(axis=1).sum())))
-                    for i, one in enumerate(found)
-                ),
-            ],
+        heads = {"branch": "Branch", "drawn": "Drawn", "rows": "Rows"}
+        chosen = ("chosen", f"solid, its tip {colour_word(run_colour(0))}", Value(int(one.reached.sum())))
+        others = (
+            (ghost.name, colour_word(ghost_colour(i)), Value(int(np.isfinite(ghost.q).all(axis=1).sum())))
+            for i, ghost in enumerate(found)
         )
+        yield table_of("Branches", heads, [chosen, *others])
 
 
 def solutions_table(one: SolvedTargets) -> Table:
@@ -131,12 +125,16 @@ def solutions_table(one: SolvedTargets) -> Table:
     targets = np.flatnonzero(one.reached)
     places = np.nonzero(one.solutions.reached) if one.every else (targets, one.chosen[targets])
     q, labels, miss, angle = one.solutions.q, one.solutions.labels, one.miss, one.angle
+
+    def joint(j: int, unit: str) -> Callable[[tuple[int, int]], Cell]:
+        return lambda at: _shown(q[*at, j], unit)
+
     heads: dict[str, tuple[str, Callable[[tuple[int, int]], Cell]]] = {
         "row": ("Row", lambda at: Value(int(one.row[at[0]]))),
         "branch": ("Branch", lambda at: str(labels[at])),
     }
     for j, (name, unit) in enumerate(zip(one.robot.coordinates, one.joint_units, strict=True)):
-        heads[name] = name, partial(_joint_value, q, j, unit)
+        heads[name] = name, joint(j, unit)
     heads["miss"] = "off by", lambda at: Value(float(miss[at]), "m")
     if angle is not None:
         heads["angle"] = "turned by", lambda at: Value(float(angle[at]), "rad")
@@ -144,11 +142,6 @@ def solutions_table(one: SolvedTargets) -> Table:
     rows, columns = (some.tolist() for some in places)
     made = columns_of(list(zip(rows, columns, strict=True)), heads)
     return Table(title, tuple(replace(one, brief=one.key != "angle") for one in made))
-
-
-def _joint_value(q: FloatArray, joint: int, unit: str, at: tuple[int, int]) -> Value:
-    """Return a joint value of a solution."""
-    return _shown(q[*at, joint], unit)
 
 
 def _shown(value: float, unit: str) -> Value:
@@ -165,10 +158,8 @@ def joints_table(one: SolvedTargets) -> Table:
     columns += [Column(key, key, list(map(_shown, values, units))) for key, values in ends.items()]
     if one.t is not None and len(q) > 1:
         speed = np.abs(np.diff(q, axis=0)) / np.diff(one.t[one.reached])[:, None]
-        for key, values in (
-            ("fastest", speed.max(axis=0)),
-            ("allowed", [joint.velocity for joint in joints]),
-        ):
+        speeds = {"fastest": speed.max(axis=0), "allowed": [joint.velocity for joint in joints]}
+        for key, values in speeds.items():
             cells = [
                 f"{text.quantity(round(value, 9), unit)}/s" if np.isfinite(value) else None
                 for value, unit in zip(values, units, strict=True)

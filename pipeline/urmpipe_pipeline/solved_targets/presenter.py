@@ -32,7 +32,7 @@ from urmpipe_pipeline.text import counted, enumerated
 
 def present(one: SolvedTargets) -> Presentation:
     """Return what solved targets show."""
-    row = opening_row(one)
+    row, reached = opening_row(one), int(one.reached.sum())
     body = Section(
         f"Targets {one.name}",
         one.verdict,
@@ -41,12 +41,7 @@ def present(one: SolvedTargets) -> Presentation:
         partial(_figures, one),
         partial(_page, one),
         tuple(_checks(one)),
-        {
-            "targets": len(one),
-            "reached": int(one.reached.sum()),
-            "robot": one.robot.name,
-            "method": one.method,
-        },
+        {"targets": len(one), "reached": reached, "robot": one.robot.name, "method": one.method},
         partial(events, one),
         one.warnings,
     )
@@ -66,7 +61,7 @@ def present(one: SolvedTargets) -> Presentation:
                 "Robot": one.robot.name,
                 "Method": method_words(one.method),
                 "Rows": Value(len(one)),
-                "Reached": Value(int(one.reached.sum())),
+                "Reached": Value(reached),
                 "Duration": None if one.t_ns is None else Value(float(one.t_ns[-1]) / 1e9, "s"),
                 "Warnings": Value(len(one.warnings)),
             },

@@ -19,11 +19,9 @@ differ by where they can be told apart."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ghost:
-    """A branch of the solutions that brings the tool to targets as the chosen ones do.
+    """A branch that brings the tool to targets as the chosen solutions do: "right, elbow up, flipped".
 
-    Attributes:
-        name: The branch, such as "right, elbow up, flipped".
-        q: Joint values in [rad] or [m], shape (n, joints); NaN where there is none, or the chosen one.
+    q is in [rad] or [m], shape (n, joints); NaN where there is no solution, or the chosen one.
     """
 
     name: str

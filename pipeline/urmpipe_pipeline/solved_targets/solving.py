@@ -119,23 +119,22 @@ def _result(
 ) -> SolvedTargets:
     """Return solutions with how far they miss their targets, and with what a person should know.
 
-    Args:
-        request: What was solved.
-        solutions: What was found.
-        chosen: The column nearest to the start, shape (n,).
-        listed: True of the solutions that a person is shown, shape (n, k).
-        path: How they follow each other.
-        branches: All solutions of the targets of a path.
+    Chosen is the column nearest to the start, shape (n,), listed what a person is shown, shape (n, k); of a
+    path, how the solutions follow each other, and its branches: all solutions of its targets.
     """
     given, form = request.given, request.form
     solutions = replace(solutions, reasons=_with_faults(solutions.reasons, given.faults))
     miss, angle = missed_by(request.arm, solutions, given.targets)
     reached = np.asarray(solutions.reached.any(axis=1))
+    near: Iterator[LogWarning] = iter(())
+    if path is None:  # of a path its nearest point is printed
+        poses = given.targets.rotation is not None
+        near = near_singular_warnings(request.arm, solutions, given.row, listed, orientation=poses)
     warnings = (
         *given.warnings,
         *start_warnings(request.arm, request.start),
         *singular_warnings(solutions, given.row, listed),
-        *(_nearly_singular(request, solutions, listed) if path is None else ()),
+        *near,
         *shortfall_warnings(solutions, given.row),
         *(within_pi_warnings(request.arm, solutions.q) if request.within_pi else ()),
         *_far(request, reached),
@@ -147,12 +146,6 @@ def _result(
         chosen=chosen, miss=miss, angle=angle, every=request.every, branches=branches, path=path,
         warnings=warnings, provenance=provenance("ik", options, [given.file] if given.file else []),
     )  # fmt: skip
-
-
-def _nearly_singular(request: Request, solutions: Solutions, listed: BoolArray) -> Iterator[LogWarning]:
-    """Yield a warning of solutions that are nearly singular; of a path its nearest point is printed."""
-    poses = request.given.targets.rotation is not None
-    return near_singular_warnings(request.arm, solutions, request.given.row, listed, orientation=poses)
 
 
 def _far(request: Request, reached: BoolArray) -> Iterator[LogWarning]:

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from urmpipe_pipeline.outputs import EXPORT_HEADER
 from urmpipe_pipeline.presentation.exports import ExportTable, Poses, Times
-from urmpipe_pipeline.tables.metadata import MARK
 from urmpipe_pipeline.tables.times import text_of
 
 SLICE = 65_536
@@ -20,8 +20,7 @@ SLICE = 65_536
 TAIL = 1 << 16
 """The last line stands within so many bytes of the end."""
 
-
-TUM_HEAD = f"# {MARK}: t [s] x y z [m] qx qy qz qw\n"
+TUM_HEAD = f"# {EXPORT_HEADER}: t [s] x y z [m] qx qy qz qw\n"
 
 
 def write_csv(table: ExportTable, path: Path) -> list[str]:
@@ -29,9 +28,8 @@ def write_csv(table: ExportTable, path: Path) -> list[str]:
 
     Numbers have the shortest decimal text that gives the same double, NaN is an empty cell; times are exact.
     """
-    return write_columns(
-        path, [column.name for column in table.columns], [one.values for one in table.columns]
-    )
+    columns = table.columns
+    return write_columns(path, [one.name for one in columns], [one.values for one in columns])
 
 
 def write_columns(path: Path, names: Sequence[str], columns: Sequence[Any]) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_models.messages import Hint
-from urmpipe_pipeline.tables.metadata import MARK
+from urmpipe_pipeline.outputs import EXPORT_HEADER
 
 DESCRIPTION = 116
 """Bytes at the start of a MAT file that are free text."""
@@ -35,7 +35,7 @@ def write_mat(name: str, fields: Mapping[str, Any], path: Path, target: Path) ->
         raise OutputError(Finding(file=str(target), found=f"{size} bytes", allowed=allowed, hints=(hint,)))
     savemat(path, {name: struct}, appendmat=False, oned_as="column", long_field_names=True)
     with path.open("r+b") as file:
-        file.write(f"MATLAB 5.0 MAT-file, {MARK}".encode().ljust(DESCRIPTION))
+        file.write(f"MATLAB 5.0 MAT-file, {EXPORT_HEADER}".encode().ljust(DESCRIPTION))
     return differences(name, struct, path)
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from urmpipe_pipeline.presentation.exports import ExportTable, Times
-from urmpipe_pipeline.tables.metadata import as_json
 from urmpipe_pipeline.tables.times import typed
 
 KEY = b"urmpipe"
@@ -17,16 +15,16 @@ CLOCK = "clock [ns]"
 """The column of the exact clock; the file's own times are doubles where they count s, ms or us."""
 
 
-def write_parquet(table: ExportTable, about: Mapping[str, Any], path: Path) -> list[str]:
+def write_parquet(table: ExportTable, about: str, path: Path) -> list[str]:
     """Write a table and return how the file differs from it, read back.
 
-    A missing sample is a null. The metadata `urmpipe` of the schema are JSON, the metadata `unit` of each
-    column are its unit; the last column is the clock of the file in integer [ns], if it has one.
+    A missing sample is a null. The metadata `urmpipe` of the schema are `about` (JSON), the metadata `unit`
+    of each column are its unit; the last column is the clock of the file in integer [ns], if it has one.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    columns = [*table.columns]
+    columns = table.columns
     arrays = [
         typed(column.values)
         if isinstance(column.values, Times)
@@ -40,7 +38,7 @@ def write_parquet(table: ExportTable, about: Mapping[str, Any], path: Path) -> l
     if table.clock_ns is not None and CLOCK not in [column.name for column in columns]:
         arrays.append(pa.array(table.clock_ns))
         fields.append(pa.field(CLOCK, pa.int64(), metadata={b"unit": b"ns"}))
-    written = pa.Table.from_arrays(arrays, schema=pa.schema(fields, {KEY: as_json(about).encode()}))
+    written = pa.Table.from_arrays(arrays, schema=pa.schema(fields, {KEY: about.encode()}))
     pq.write_table(written, path)
     return differences(written, path)
 

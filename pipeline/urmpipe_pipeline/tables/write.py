@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
@@ -14,11 +15,11 @@ from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.outputs import guarded_output, know_own
+from urmpipe_pipeline.json_values import json_ready
+from urmpipe_pipeline.outputs import EXPORT_HEADER, guarded_output, know_own
 from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
 from urmpipe_pipeline.tables.lines import write_csv, write_tum
 from urmpipe_pipeline.tables.mat_file import write_mat
-from urmpipe_pipeline.tables.metadata import MARK, as_json, described
 from urmpipe_pipeline.tables.options import ExportOptions, Format
 from urmpipe_pipeline.tables.parquet_file import is_ours, write_parquet
 from urmpipe_pipeline.text import unique
@@ -39,7 +40,7 @@ def is_export(path: Path) -> bool:
         head = file.read(HEAD)
     if head.startswith(PARQUET):
         return is_ours(path)
-    return MARK.encode() in head and head.startswith((b"# ", b"MATLAB 5.0"))
+    return EXPORT_HEADER.encode() in head and head.startswith((b"# ", b"MATLAB 5.0"))
 
 
 know_own("export", is_export)
@@ -151,12 +152,13 @@ def _writer(
     exports: Exports, table: ExportTable, to: Format, rows: str, target: Path
 ) -> Callable[[Path], list[str]]:
     """Return what writes a table to a path."""
-    about = described(exports.about, rows)
     if to == "csv":
         return partial(write_csv, table)
+    named = {"mark": EXPORT_HEADER, "schema": 1, "name": exports.about["name"], "rows": rows}
+    about = json.dumps(json_ready({**named, **exports.about}))  # JSON: every encoding can hold it
     if to == "parquet":
         return partial(write_parquet, table, about)
-    fields = {**exports.rows[rows].fields(table), "metadata": as_json(about)}
+    fields = {**exports.rows[rows].fields(table), "metadata": about}
     return partial(write_mat, exports.kind, fields, target=target)
 
 
@@ -202,8 +204,7 @@ def write_all(
     with ExitStack() as stack:
         parts = [stack.enter_context(guarded_output(path, inputs, "export")) for path in targets]
         for path, part, write in zip(targets, parts, writers, strict=True):
-            wrong = write(part)
-            if wrong:
+            if wrong := write(part):
                 said = f"reads back otherwise than written: {', '.join(wrong)}"
                 raise OutputError(Finding(said, str(path)))
 

@@ -26,8 +26,8 @@ from urmpipe_pipeline.presentation.scene import Path, Spot
 from urmpipe_pipeline.presentation.section import Block, Fact, Presentation, Section
 from urmpipe_pipeline.report import spec
 from urmpipe_pipeline.report.figures import drawn_figures, span_of
-from urmpipe_pipeline.report.markup import data_address
 from urmpipe_pipeline.report.page import Page, lay_out
+from urmpipe_pipeline.report.render import data_address
 from urmpipe_pipeline.report.space import drawn_space
 from urmpipe_pipeline.results import present
 from urmpipe_pipeline.runs.results import Run

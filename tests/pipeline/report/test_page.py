@@ -21,8 +21,8 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.compare import compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.report import render_report, write_report
-from urmpipe_pipeline.report.markup import asset, script_json
 from urmpipe_pipeline.report.page import lay_out
+from urmpipe_pipeline.report.render import asset, script_json
 from urmpipe_pipeline.results import present, read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
 
