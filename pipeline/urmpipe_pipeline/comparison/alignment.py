@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import get_args
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.errors import LogError
 from urmpipe_models.orientation import angle_between, best_rotation, conjugate, matrices, product, quaternions
 from urmpipe_models.transform import rpy_of, translation
 from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, lacking
 from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
 from urmpipe_pipeline.runs.results import Run
-
-ALIGN_MODES: tuple[AlignMode, ...] = get_args(AlignMode)
 
 RESOLVED = 1e-4
 """Positions that leave a line by less than this, root mean square in [m], leave the rotation about it open: a
@@ -29,12 +26,6 @@ tool, as much as the best arms repeat to."""
 IN_COMMON = 1e-9
 """Two motions across a line have nothing in common if their covariance is below this share of their sizes:
 rounding leaves as much."""
-
-
-def check_align(mode: str) -> None:
-    """Raise an `OptionError` if there is no such alignment."""
-    if mode not in ALIGN_MODES:
-        raise OptionError(Finding(parameter="align", found=mode, allowed=", ".join(ALIGN_MODES)))
 
 
 def align(matched: Matched, mode: AlignMode, run: Run) -> Matched:

@@ -8,13 +8,13 @@ from typing import Literal, get_args
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.continuity import continuous_quaternions
-from urmpipe_models.errors import Finding, LogError, OptionError, for_each
+from urmpipe_models.errors import Finding, LogError, OptionError, check_choice, for_each
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import quaternions
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.alignment import align, check_align
+from urmpipe_pipeline.comparison.alignment import align
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.matching import NO_ROBOT, as_recorded, by_kinematics, file_of, lacking, match
@@ -66,11 +66,9 @@ class CompareOptions:
 
     def __post_init__(self) -> None:
         check_tolerance(self.tolerance)
-        if self.tcp not in get_args(Tcp):
-            allowed = ", ".join(get_args(Tcp))
-            raise OptionError(Finding(parameter="tcp", found=self.tcp, allowed=allowed))
+        check_choice("tcp", self.tcp, get_args(Tcp))
         check_sync(self.sync)
-        check_align(self.align)
+        check_choice("align", self.align, get_args(AlignMode))
 
 
 def trajectory(run: Run, tcp: Tcp = "fk") -> Trajectory:

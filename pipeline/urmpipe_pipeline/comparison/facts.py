@@ -106,12 +106,10 @@ def _furthest_joint(one: Deviation) -> Iterator[Fact]:
 
 
 def _left_out(one: Deviation, reference_samples: int) -> Fact:
-    said = (
-        f"{one.left_out} of {text.counted(one.left_out + len(one.sample), 'sample')},"
-        f" {one.reference_left_out} of {reference_samples} of the reference"
-    )
+    own = f"{one.left_out} of {text.counted(one.left_out + len(one.sample), 'sample')}"
+    theirs = f"{one.reference_left_out} of {reference_samples} of the reference"
     some = bool(one.left_out or one.reference_left_out)
-    return Fact("Left out", said, "no counterpart, or no value", some)
+    return Fact("Left out", f"{own}, {theirs}", "no counterpart, or no value", some)
 
 
 def _out_of_tolerance(one: Deviation) -> Iterator[Fact]:

@@ -162,9 +162,8 @@ def _joints(
 ) -> tuple[FloatArray | None, FloatArray | None]:
     """Return the joints of both sides at the compared samples; None where they cannot be compared."""
     order = joint_order(reference.joints, log.joints)
-    if order is None or joints_apart(reference, log.joints, log.joint_units):
-        return None, None
-    if reference.q is None or log.q is None:
+    apart = joints_apart(reference, log.joints, log.joint_units)
+    if order is None or apart or reference.q is None or log.q is None:
         return None, None
     return interpolate(at_ns, reference.t_ns, reference.q[:, order]), log.q[sample]
 

@@ -147,13 +147,11 @@ def _refuse_unheld(
     """Raise a `LogError` if there is a tolerance for what a side does not have: nothing would be judged."""
     faults = []
     if "angle" in tolerance and angle is None:
-        said = f"angle: found a side without an orientation, allowed: {ORIENTED}"
-        faults.append(lacking(run, said, parameter="tolerance"))
+        faults.append(f"angle: found a side without an orientation, allowed: {ORIENTED}")
     if "joint" in tolerance and joint_delta is None:
-        said = f"joint: found that {unheld(reference, run)}, allowed: the same joints on both sides"
-        faults.append(lacking(run, said, parameter="tolerance"))
+        faults.append(f"joint: found that {unheld(reference, run)}, allowed: the same joints on both sides")
     if faults:
-        raise LogError(*faults)
+        raise LogError(*(lacking(run, said, parameter="tolerance") for said in faults))
 
 
 def _speed(run: Run, matched: Matched) -> FloatArray:

@@ -60,12 +60,7 @@ class Rates:
 
 @dataclass(frozen=True, slots=True)
 class Peak:
-    """An offset at which two motions are more alike than beside it.
-
-    Attributes:
-        offset_ns: t_reference - t_log in integer [ns].
-        similarity: How alike they are there, -1 to 1.
-    """
+    """An offset t_reference - t_log in integer [ns] at which two motions are most alike, from -1 to 1."""
 
     offset_ns: int
     similarity: float

@@ -52,14 +52,8 @@ def write_report(
 ) -> Written:
     """Write the report, and its figures as files if asked for: all or none.
 
-    An existing file is replaced only if it is a report or a figure of ours and no input.
-
-    Args:
-        presentations: As `render_report` takes them.
-        path: Where to.
-        inputs: Files that must not be overwritten.
-        figures: Where the figures go, and in which formats.
-        progress: Told the share that is done, 0..1.
+    An existing file is replaced only if it is a report or a figure of ours and no input. Progress is told the
+    share that is done, 0..1.
 
     Raises:
         OptionError: If there is nothing to report.
@@ -79,17 +73,14 @@ def _render(page: Page) -> str:
     from plotly.offline import get_plotlyjs
 
     plotly, script = get_plotlyjs(), asset("page.js")
-    return (
-        environment()
-        .get_template("template.html.jinja")
-        .render(
-            page=page,
-            version=version("urmpipe"),
-            hashes=[script_hash(plotly), script_hash(script)],
-            style=asset("style.css"),
-            plotly=plotly,
-            script=script,
-        )
+    template = environment().get_template("template.html.jinja")
+    return template.render(
+        page=page,
+        version=version("urmpipe"),
+        hashes=[script_hash(plotly), script_hash(script)],
+        style=asset("style.css"),
+        plotly=plotly,
+        script=script,
     )
 
 

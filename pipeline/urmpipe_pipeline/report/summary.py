@@ -97,7 +97,7 @@ def word_of(verdict: Verdict, instead: str = "") -> str:
 def banner_of(shown: Sequence[tuple[Presentation, Anchors]]) -> Banner:
     """Return the verdict: the worst result leads, none of the others hides behind it."""
     (worst, anchors), *others = worst_first(shown)
-    told = [_sentence(one) for one, _ in others[:TOLD]]
+    told = [f"{word_of(one.verdict, one.word)}: {one.headline.rstrip('.')}." for one, _ in others[:TOLD]]
     if left := Counter(word_of(one.verdict, one.word) for one, _ in others[TOLD:]):
         told.append(f"And {', '.join(f'{count} more: {word}' for word, count in left.items())}.")
     return Banner(
@@ -171,10 +171,6 @@ def _kind(line: Mapping[str, Cell]) -> tuple[str, ...]:
 def _badness(verdict: Verdict, used: float) -> tuple[int, float]:
     """Return what puts the worst first."""
     return STATES.index(verdict), -used
-
-
-def _sentence(one: Presentation) -> str:
-    return f"{word_of(one.verdict, one.word)}: {one.headline.rstrip('.')}."
 
 
 def _most_used(one: Presentation) -> float:

@@ -26,12 +26,7 @@ RESTING = 0.01
 
 
 class OtherUnit(NamedTuple):
-    """The unit in which recorded derivatives would agree with the differences.
-
-    Attributes:
-        said: Which, behind "would agree".
-        time: The unit that the times have then, where it is theirs.
-    """
+    """How recorded derivatives "would agree" with the differences; the unit of the times, if by theirs."""
 
     said: str
     time: str | None = None
@@ -107,13 +102,10 @@ def _central(q: FloatArray, tsp: float) -> tuple[FloatArray, FloatArray]:
 def _blanked(
     rates: tuple[FloatArray, FloatArray], reach: int, broken: IntArray | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Take out, in place, the derivatives that are made of samples on both sides of a broken step.
+    """Take out of q' and q'', in place, what is made of samples on both sides of a broken step.
 
-    Args:
-        rates: q' and q'', shape (g, joints).
-        reach: Samples to either side that a derivative is made of; those at the ends share the first and
-            the last whole window.
-        broken: First and last broken step and joint index, shape (b, 3).
+    A derivative is made of so many samples to either side (`reach`); those at the ends share the first and
+    the last whole window.
     """
     if broken is not None and len(broken):
         count, (first, last, joints) = len(rates[0]), broken.T

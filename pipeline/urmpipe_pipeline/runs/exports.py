@@ -29,8 +29,6 @@ from urmpipe_pipeline.runs.file_columns import file_table
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.text import encodable
 
-XYZ = "xyz"
-
 
 def exports(run: Run) -> Exports:
     """Return what can leave of a run."""
@@ -85,10 +83,10 @@ def grid_table(run: Run) -> ExportTable:
             ("p", "m", run.tcp.position), ("v", "m/s", run.tcp.velocity), ("a", "m/s2", run.tcp.acceleration),
         )  # fmt: skip
         for name, unit, values in points[: 3 if moves else 1]:
-            columns += columns_of([name + axis for axis in XYZ], [unit] * 3, values)
+            columns += columns_of([name + axis for axis in "xyz"], [unit] * 3, values)
         columns += columns_of(["rz", "ry", "rx"], ["rad"] * 3, run.tcp.euler_zyx)
     if run.tcp_recorded is not None:
-        columns += columns_of([f"recorded_tcp_{axis}" for axis in XYZ], ["m"] * 3, run.tcp_recorded)
+        columns += columns_of([f"recorded_tcp_{axis}" for axis in "xyz"], ["m"] * 3, run.tcp_recorded)
     if run.rotation_recorded is not None:
         unit = "rad" if len(run.rotation_names) == 3 else "1"
         names = [f"recorded_{name}" for name in run.rotation_names]

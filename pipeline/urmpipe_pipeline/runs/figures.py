@@ -133,10 +133,9 @@ def motion_figure(run: Run) -> Iterator[Figure]:
         title, caption = "Poses of the tool centre point", f"{point} and its {angles}"
         alt = f"Poses of {point} of {run.name} by forward kinematics."
     else:
-        caption = (
-            f"Rates and accelerations of the joints; {point}, its velocity v and acceleration a, and its"
-        )
-        caption += f" {angles} The angles go on past ±π, so that none jumps.{_singular_words(run.tcp)}"
+        caption = f"Rates and accelerations of the joints; {point}, its velocity v and acceleration a,"
+        caption += f" and its {angles} The angles go on past ±π, so that none jumps."
+        caption += _singular_words(run.tcp)
         alt = partial(_extent_words, f"Motion of {point} of {run.name}", run.tcp)
     yield Figure(title, caption, alt, views, share=2.2)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.errors import Finding, LogError, OptionError, check_choice
 from urmpipe_models.kinematics.forward import PointLog, point_over_log
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
@@ -127,9 +127,8 @@ def _refuse_senseless(tsp: float | None, derivative: str | None) -> None:
     if tsp is not None and not 0 < tsp < LONGEST_TSP:
         allowed = f"a positive time below {LONGEST_TSP:g} s"
         raise OptionError(Finding(parameter="tsp", found=f"{tsp:g} s", allowed=allowed))
-    if derivative is not None and derivative not in get_args(Method):
-        allowed = ", ".join(get_args(Method))
-        raise OptionError(Finding(parameter="derivative", found=derivative, allowed=allowed))
+    if derivative is not None:
+        check_choice("derivative", derivative, get_args(Method))
 
 
 def _rates(

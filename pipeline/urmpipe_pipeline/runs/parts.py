@@ -62,9 +62,7 @@ def log_tables(run: Run) -> Iterator[Table]:
     if run.log.joints:
         yield audit_table(run)
     yield inference_table(run)
-    yield columns_table(run)
-    yield inputs_table("Input files", run.log.files)
-    yield provenance_table(run.provenance)
+    yield from file_tables(run)
 
 
 def audit_table(run: Run, *, brief: bool = False) -> Table:
@@ -106,15 +104,17 @@ def inference_table(run: Run, *, brief: bool = False) -> Table:
     return replace(table, columns=(*others, replace(last, brief=False)))
 
 
-def columns_table(run: Run) -> Table:
-    """Return the columns of the file that were used, and in which units they were read."""
+def file_tables(run: Run) -> Iterator[Table]:
+    """Yield which columns of the files were used, in which units, the files, and how the run was made."""
     heads: Heads[LogColumn] = {
         "name": ("Column", lambda one: one.name),
         "role": ("Holds", lambda one: one.role),
         "unit": ("Unit", lambda one: one.unit),
     }
     columns = columns_of(run.log.columns, heads)
-    return Table(f"Columns ({len(run.log.columns)})", columns, brief=False, folded=True)
+    yield Table(f"Columns ({len(run.log.columns)})", columns, brief=False, folded=True)
+    yield inputs_table("Input files", run.log.files)
+    yield provenance_table(run.provenance)
 
 
 def log_events(run: Run) -> Iterator[Event]:

@@ -7,13 +7,13 @@ from functools import partial
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.outputs import AUDIT_COLUMNS
-from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table, rows_table
+from urmpipe_pipeline.presentation.parts import rows_table
 from urmpipe_pipeline.presentation.section import Block, Judged, Presentation, Ref, Section, Table, Value
 from urmpipe_pipeline.runs.figures import run_figures
 from urmpipe_pipeline.runs.parts import (
     audit_table,
     audit_words,
-    columns_table,
+    file_tables,
     inference_table,
     log_events,
     log_facts,
@@ -72,6 +72,4 @@ def _page(run: Run) -> Iterator[Block]:
     """Yield what only a page shows of a log."""
     yield from playback_figures(run)
     yield from path_figure(run)
-    yield columns_table(run)
-    yield inputs_table("Input files", run.log.files)
-    yield provenance_table(run.provenance)
+    yield from file_tables(run)

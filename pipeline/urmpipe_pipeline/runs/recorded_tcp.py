@@ -86,18 +86,21 @@ def _asked(robot: Chain) -> str:
 
 def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) -> Iterator[tuple[str, Hint]]:
     """Yield what brings kinematics and recorded points together, and what to give then."""
+
+    def agrees(changed: FloatArray) -> bool:
+        found = fit(robot, changed, recorded)
+        return found is not None and min(found.distance, found.with_tool) <= CLOSE_WITH_TOOL
+
     columns = [column for column in log.columns if column.role == "joint"]
     for first, second in combinations(range(q.shape[1]), 2):
         order = list(range(q.shape[1]))
         order[first], order[second] = second, first
-        found = fit(robot, q[:, order], recorded)
-        if found is not None and min(found.distance, found.with_tool) <= CLOSE_WITH_TOOL:
+        if agrees(q[:, order]):
             names = _called([columns[j] for j in order]) if columns else [log.joints[j] for j in order]
             said = f"with {log.joints[first]} and {log.joints[second]} exchanged they agree"
             yield said, Hint("joints", names, "exchanges them")
     for j, name in enumerate(log.joints):
-        found = fit(robot, q * np.where(np.arange(q.shape[1]) == j, -1.0, 1.0), recorded)
-        if found is not None and min(found.distance, found.with_tool) <= CLOSE_WITH_TOOL:
+        if agrees(q * np.where(np.arange(q.shape[1]) == j, -1.0, 1.0)):
             said = f"with {name} counted the other way they agree"
             yield said, Hint("log_map", None, "says so with sign = -1 for its column")
     base, distance = _base(robot, q, recorded)

@@ -34,10 +34,9 @@ def simulation_table(simulation: Simulation) -> ExportTable:
     columns = [ExportColumn("t [s]", "s", Times(simulation.t_ns, "s"))]
     for one in simulation.signals:
         unit = encodable(one.unit)
+        behind = f" [{unit}]" if unit else ""
         columns += [
-            ExportColumn(
-                f"{encodable(name)} [{unit}]" if unit else encodable(name), unit, np.ascontiguousarray(values)
-            )
+            ExportColumn(f"{encodable(name)}{behind}", unit, np.ascontiguousarray(values))
             for name, values in zip(one.names, one.columns.T, strict=True)
         ]
     return ExportTable(tuple(columns), simulation.t_ns)
@@ -66,9 +65,8 @@ def _poses(simulation: Simulation) -> list[Poses]:
     if not simulation.arms:
         hint = Hint("to", "csv", "writes its signals")
         raise RecordingError(Finding("no block of kinematics, so no pose", where, hints=(hint,)))
+    several = len(simulation.arms) > 1
     return [
-        poses_by_kinematics(
-            arm.block if len(simulation.arms) > 1 else "", arm.chain, simulation.t_ns, arm.q, where
-        )
+        poses_by_kinematics(arm.block if several else "", arm.chain, simulation.t_ns, arm.q, where)
         for arm in simulation.arms
     ]

@@ -15,7 +15,6 @@ from urmpipe_pipeline.presentation.figure import Drawing, Text
 from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table, recording_fact
 from urmpipe_pipeline.presentation.section import (
     Block,
-    Cell,
     Check,
     Event,
     Fact,
@@ -52,7 +51,18 @@ def present(simulation: Simulation) -> Presentation:
         word="simulated",
         opens_at_ns=_opening_time(simulation),
         scene=partial(simulation_scene, simulation),
-        lines=({"System": Ref(body.title)} | _line(simulation),),
+        lines=(
+            {
+                "System": Ref(body.title),
+                "Verdict": Judged(simulation.verdict),
+                "Blocks": Value(len(simulation.blocks)),
+                "Signals": Value(sum(one.columns.shape[1] for one in simulation.signals)),
+                "Samples": Value(len(simulation.t_ns)),
+                "Duration": Value(simulation.duration, "s"),
+                "Communication step": Value(simulation.step, "s"),
+                "Warnings": Value(len(simulation.warnings)),
+            },
+        ),
         created=simulation.provenance.created,
     )
 
@@ -86,18 +96,6 @@ def _opening_time(simulation: Simulation) -> int:
     return int(simulation.t_ns[shown]) if len(simulation.t_ns) else 0
 
 
-def _line(simulation: Simulation) -> dict[str, Cell]:
-    return {
-        "Verdict": Judged(simulation.verdict),
-        "Blocks": Value(len(simulation.blocks)),
-        "Signals": Value(sum(one.columns.shape[1] for one in simulation.signals)),
-        "Samples": Value(len(simulation.t_ns)),
-        "Duration": Value(simulation.duration, "s"),
-        "Communication step": Value(simulation.step, "s"),
-        "Warnings": Value(len(simulation.warnings)),
-    }
-
-
 def _body(simulation: Simulation) -> Section:
     failed = simulation.failed
     ended: Verdict = "pass" if failed is None else "fail"
@@ -105,7 +103,7 @@ def _body(simulation: Simulation) -> Section:
     return Section(
         f"Simulation {simulation.name}",
         simulation.verdict,
-        (*_outcome(simulation), *_facts(simulation)),
+        tuple(_facts(simulation)),
         (*meters_table(simulation), *first_signals_table(simulation)),
         partial(_system, simulation),
         blocks=partial(_page, simulation),
@@ -117,14 +115,6 @@ def _body(simulation: Simulation) -> Section:
     )
 
 
-def _outcome(simulation: Simulation) -> Iterator[Fact]:
-    """Yield what decided: when it failed, or what the worst delta meter found."""
-    if simulation.failed is not None:
-        yield Fact("Failed after", Value(simulation.duration, "s"), simulation.failed)
-    elif (worst := simulation.judged_worst) is not None:
-        yield from (replace(one, brief=False) for one in _meter_facts(worst))
-
-
 def _meter_facts(one: DeltaVerdict) -> Iterator[Fact]:
     """Yield what a delta meter found: how much, when, how often it was too much."""
     yield Fact(size_of(one), Value(one.worst, "m", one.allowed, one.verdict, one.used), used_words(one))
@@ -133,7 +123,11 @@ def _meter_facts(one: DeltaVerdict) -> Iterator[Fact]:
 
 
 def _facts(simulation: Simulation) -> Iterator[Fact]:
-    """Yield what a simulation is: its description, its samples, its step."""
+    """Yield what decided (a failure, or the worst delta meter), then description, samples and step."""
+    if simulation.failed is not None:
+        yield Fact("Failed after", Value(simulation.duration, "s"), simulation.failed)
+    elif (worst := simulation.judged_worst) is not None:
+        yield from (replace(one, brief=False) for one in _meter_facts(worst))
     count = len(simulation.t_ns)
     yield Fact("Description", simulation.description)
     yield Fact("Samples", Value(count))

@@ -152,9 +152,8 @@ class FirstSignals(Sequence[Scalar]):
         inner = {source.partition(".")[0] for source in taken}
         signals = sorted(found.signals, key=lambda one: taken.isdisjoint((one.name, *one.names)))
         for block in dict.fromkeys(one.block for one in found.signals):
-            own = sorted(
-                _scalars(found, [one for one in signals if one.block == block]), key=lambda one: one.constant
-            )
+            some = _scalars(found, [one for one in signals if one.block == block])
+            own = sorted(some, key=lambda one: one.constant)
             at_once = 1 if block in inner else AT_ONCE
             yield from ((one.constant, k // at_once, block in inner, one) for k, one in enumerate(own))
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.errors import Finding, OptionError, check_choice
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.presentation.exports import Exports
 
@@ -41,8 +41,8 @@ class ExportOptions:
             ("rows", self.rows, get_args(RowNames)),
             ("tcp", self.tcp, get_args(PoseNames)),
         ):
-            if value is not None and value not in allowed:
-                raise _refused(parameter, value, ", ".join(allowed))
+            if value is not None:
+                check_choice(parameter, value, allowed)
         if self.tcp is not None and self.to != "tum":
             found = f"{self.tcp} with a table ({self.to})"
             raise _refused("tcp", found, "with trajectories", Hint("to", "tum", "writes them"))

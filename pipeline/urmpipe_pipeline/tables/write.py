@@ -52,12 +52,7 @@ POSE_COLUMNS = (
 
 @dataclass(frozen=True, slots=True)
 class ExportedFile:
-    """A file that was written.
-
-    Attributes:
-        path: Where it is.
-        rows: Rows of numbers in it.
-    """
+    """A file that was written, and how many rows of numbers are in it."""
 
     path: Path
     rows: int
