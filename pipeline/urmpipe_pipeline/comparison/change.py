@@ -64,15 +64,14 @@ class Change:
     def _grown(self, *, before: int, now: int) -> tuple[Worse, ...]:
         """Return what is larger on one side (0 the baseline, 1 now) than on the other, or rests on less."""
         one, other = ((self.before, self.now)[side] for side in (before, now))
-        found: list[Worse] = ["max"] if other.max > one.max + self.noise else []
-        found += ["rms"] if other.rms > one.rms + self.noise else []
-        noise = self.share_noise
-        if noise is not None and (other.share_out or 0.0) > (one.share_out or 0.0) + noise[now]:
-            found.append("share_out")
-        lasted, lasts = (one.samples or 0) * self.periods[before], other.samples
-        if lasts is not None and lasts * self.periods[now] < KEPT * lasted:
-            found.append("samples")
-        return tuple(found)
+        noise, count, lasted = self.share_noise, other.samples, (one.samples or 0) * self.periods[before]
+        grown: dict[Worse, bool] = {
+            "max": other.max > one.max + self.noise,
+            "rms": other.rms > one.rms + self.noise,
+            "share_out": noise is not None and (other.share_out or 0.0) > (one.share_out or 0.0) + noise[now],
+            "samples": count is not None and count * self.periods[now] < KEPT * lasted,
+        }
+        return tuple(name for name, more in grown.items() if more)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""

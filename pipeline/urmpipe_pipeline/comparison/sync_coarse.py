@@ -93,9 +93,7 @@ def mean_rates(view: View) -> Rates | None:
 def rates(values: FloatArray, period_ns: int) -> FloatArray:
     """Return the mean rate between each value and the next, in [rad/s] or [m/s], shape (n - 1, k).
 
-    Args:
-        values: In [rad] or [m], shape (n, k).
-        period_ns: Between two of them, in integer [ns].
+    Values are in [rad] or [m], shape (n, k), and a period in integer [ns] apart.
     """
     return np.diff(values, axis=0) / (period_ns / 1e9)
 

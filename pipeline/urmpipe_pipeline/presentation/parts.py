@@ -24,12 +24,7 @@ Heads: TypeAlias = Mapping[str, tuple[str, Callable[[Item], Cell]]]
 
 
 class Cells(Sequence[Cell], Generic[Item]):
-    """The cells of a column that may be long, each made when it is shown.
-
-    Args:
-        items: What the rows are of.
-        cell: Returns the cell of one.
-    """
+    """The cells of a column that may be long, each made of its row's item when it is shown."""
 
     def __init__(self, items: Sequence[Item], cell: Callable[[Item], Cell]) -> None:
         self._items, self._cell = items, cell
@@ -59,14 +54,13 @@ def table_of(
     heads: Mapping[str, str],
     rows: Iterable[Sequence[Cell]],
     *,
-    note: str = "",
     brief: bool = False,
     folded: bool = False,
 ) -> Table:
     """Return a table of rows, a cell a column; the titles of the columns stand by their keys."""
     cells = list(rows)
     columns = (Column(key, head, [row[i] for row in cells]) for i, (key, head) in enumerate(heads.items()))
-    return Table(title, tuple(columns), note, brief, folded)
+    return Table(title, tuple(columns), brief=brief, folded=folded)
 
 
 def rows_table(title: str, keys: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> Table:

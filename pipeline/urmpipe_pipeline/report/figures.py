@@ -116,6 +116,5 @@ def _spec(figure: Figure, panels: Sequence[Panel], span: Span) -> Spec:
 
 def _quantity_axis(over: Over) -> Spec:
     least = np.nanmin(over.values[:], initial=np.inf)
-    return spec.axis(f"{label(over.title)} [{label(over.unit) or '-'}]") | {
-        "rangemode": "tozero" if least >= 0.0 else "normal"
-    }
+    look = {"rangemode": "tozero" if least >= 0.0 else "normal"}
+    return spec.axis(f"{label(over.title)} [{label(over.unit) or '-'}]") | look

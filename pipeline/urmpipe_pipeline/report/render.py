@@ -10,16 +10,15 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.report.figure_files import FigureFile, FigureOptions, figure_stem, write_figures
 from urmpipe_pipeline.report.page import Page, lay_out
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
-    from markupsafe import Markup
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +85,6 @@ def _render(page: Page) -> str:
 
 def environment() -> Environment:
     """Return the template engine: it escapes everything but what passes the filters raw and json."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
-
     engine = Environment(
         loader=PackageLoader(__package__, "assets"),
         autoescape=True,
@@ -118,8 +114,6 @@ def script_json(value: Any) -> Markup:
     Raises:
         ValueError: If the value holds a NaN or an infinity, which JSON has no word for.
     """
-    from markupsafe import Markup
-
     written = json.dumps(value, allow_nan=False, separators=(",", ":"))
     for letter in "<>&":
         written = written.replace(letter, f"\\u{ord(letter):04x}")

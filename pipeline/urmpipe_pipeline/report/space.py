@@ -123,12 +123,7 @@ def _in_space(position: FloatArray) -> Spec:
 
 
 def _scene(traces: list[Spec], positions: list[FloatArray]) -> Spec:
-    """Return a scene with equal scale on all axes.
-
-    Args:
-        traces: What is in it.
-        positions: Where that is, in [m], shape (any, 3) each: around a slim path all axes are equally long.
-    """
+    """Return a scene with equal scale on all axes; around slim paths in [m], all axes are equally long."""
     axes = {f"{name}axis": space_axis(f"{name} [m]") for name in "xyz"}
     scene = axes | {"aspectmode": "data", "camera": CAMERA}
     every = np.concatenate([np.empty((0, 3)), *positions])

@@ -19,9 +19,6 @@ from urmpipe_pipeline.presentation.parts import within_words
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.runs.results import Run
 
-COORDINATES = tuple(AXIS_COLOURS[axis] for axis in "xyz")
-"""The colours of x, y and z."""
-
 EULER = {"rz": AXIS_COLOURS["z"], "ry": AXIS_COLOURS["y"], "rx": AXIS_COLOURS["x"]}
 """The Euler angles in the colours of their axes."""
 
@@ -48,9 +45,7 @@ def times_of(run: Run) -> IntArray | None:
 def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
     """Yield the joints as the file has them and repolarized, with every finding marked; nothing of a path.
 
-    Args:
-        run: The log.
-        opened: Number of the view that the viewer opens: 0 before, 1 after; None for both.
+    The viewer opens one of the views (0 before, 1 after), or both.
     """
     if not run.log.joints:
         return
@@ -147,7 +142,7 @@ def point_name(run: Run) -> str:
 
 def coordinates(values: FloatArray) -> Line:
     """Return x, y and z in any unit, shape (n, 3), in their colours, by these names in all panels."""
-    return Line(values, tuple("xyz"), COORDINATES)
+    return Line(values, tuple("xyz"), tuple(AXIS_COLOURS[axis] for axis in "xyz"))
 
 
 def _derivatives(run: Run) -> Iterator[View]:

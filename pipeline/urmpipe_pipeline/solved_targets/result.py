@@ -268,12 +268,7 @@ class SolvedTargets(Result):
         return None if self.t_ns is None else float(self.t_ns[index] + self.clock_start_ns) / 1e9
 
     def _target(self, index: int, there: BoolArray) -> dict[str, Any]:
-        """Return a target as --json has it: every solution, and which of them is nearest to the start.
-
-        Args:
-            index: Which target, from 0.
-            there: True of its solutions, shape (k,).
-        """
+        """Return a target as --json has it: every solution, and which of them is nearest to the start."""
         columns = np.flatnonzero(there)
         chosen = np.flatnonzero(columns == self.chosen[index]).tolist()
         return {

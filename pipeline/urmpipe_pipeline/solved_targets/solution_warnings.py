@@ -72,13 +72,7 @@ def near_singular_warnings(
 
 
 def start_warnings(chain: Chain, start: FloatArray | None, parameter: str = "start") -> Iterator[LogWarning]:
-    """Yield a warning of a pose that is hardly in rad.
-
-    Args:
-        chain: The arm.
-        start: The pose in [rad] or [m], shape (joints,).
-        parameter: The keyword by which it was given.
-    """
+    """Yield a warning of a pose in [rad] or [m], shape (joints,), with values that are hardly in rad."""
     if start is None:
         return
     found = [

@@ -40,9 +40,7 @@ Progress = Callable[[float], None] | None
 def solve_targets(request: Request, progress: Progress = None) -> SolvedTargets:
     """Return the solutions of targets, each for itself or along a path, with all that a person should know.
 
-    Args:
-        request: What is to be solved; `refuse_unsolvable` has checked it.
-        progress: Called with the share of solving that is done, 0..1.
+    `refuse_unsolvable` has checked the request.
     """
     t_ns = request.given.t_ns
     return _of_targets(request, progress) if t_ns is None else _of_path(request, t_ns, progress)

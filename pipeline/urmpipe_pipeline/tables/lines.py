@@ -58,13 +58,9 @@ def texts(columns: Sequence[Any]) -> list[Any]:
 
 
 def write_lines(path: Path, head: str, columns: Sequence[Any], delimiter: str) -> None:
-    """Write a head and a line a row.
+    """Write a head, with its line end, and a line a row of columns as `texts` returned them.
 
-    Args:
-        path: The file.
-        head: What stands above the rows, with its line end.
-        columns: What `texts` returned, each of shape (n,); NaN is an empty cell.
-        delimiter: The sign between cells.
+    NaN is an empty cell.
     """
     rows = len(columns[0])
     with path.open("wb") as file:

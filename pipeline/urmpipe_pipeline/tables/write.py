@@ -184,11 +184,7 @@ def write_all(
 ) -> None:
     """Write all files beside their places, and rename them only when all were read back as written.
 
-    Args:
-        targets: Where they are to stand.
-        writers: What writes each to a path and returns how the file differs from what it wrote.
-        to: Their format.
-        inputs: Files that are never replaced.
+    A writer writes to a path, and returns how the file differs from what it wrote. Inputs are never replaced.
 
     Raises:
         OutputError: If one may not be written there, or did not read back as it was written.
