@@ -7,7 +7,7 @@ allowed. The command line prints these lines and exits with 2.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from urmpipe_models.messages import Finding as Finding  # noqa: PLC0414 - errors are made of them
@@ -79,12 +79,6 @@ class CosimulationError(UrmpipeError):
 
 class ViewerError(UrmpipeError):
     """A recording cannot be shown here: there is no display, or the viewer does not start."""
-
-
-def check_choice(parameter: str, found: str, allowed: Sequence[str]) -> None:
-    """Raise an `OptionError` if what was given for a parameter is none of the words that are allowed."""
-    if found not in allowed:
-        raise OptionError(Finding(parameter=parameter, found=found, allowed=", ".join(allowed)))
 
 
 def for_each(make: Callable[[Given], Made], items: Iterable[Given]) -> list[Made]:

@@ -8,12 +8,13 @@ from typing import Literal, get_args
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.continuity import continuous_quaternions
-from urmpipe_models.errors import Finding, LogError, OptionError, check_choice, for_each
+from urmpipe_models.errors import Finding, LogError, OptionError, for_each
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import quaternions
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline import text
+from urmpipe_pipeline.choices import check_choice
 from urmpipe_pipeline.comparison.alignment import align
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation

@@ -11,9 +11,10 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError, OptionError, check_choice
+from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.kinematics.forward import PointLog, point_over_log
 from urmpipe_models.messages import Hint
+from urmpipe_pipeline.choices import check_choice
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import Provenance, provenance

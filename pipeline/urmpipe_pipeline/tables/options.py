@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from urmpipe_models.errors import Finding, OptionError, check_choice
+from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.messages import Hint
+from urmpipe_pipeline.choices import check_choice
 from urmpipe_pipeline.presentation.exports import Exports
 
 Format = Literal["csv", "parquet", "mat", "tum"]
