@@ -60,7 +60,7 @@ def _tables(sections: Sequence[Section]) -> Iterator[Table]:
 
 
 def _has_verdicts(table: Table) -> bool:
-    return any(isinstance(cell, Judged) for one in table.columns for cell in one.cells)
+    return any(isinstance(cell, Judged) for one in table.columns for cell in one.cells[:ROWS])
 
 
 def _facts(facts: Sequence[Fact], *, strong: bool = False) -> Iterator[str]:
