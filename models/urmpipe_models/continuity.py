@@ -142,7 +142,7 @@ def _euler(angles: FloatArray, apart: FloatArray) -> FloatArray:
         if swapped.any():
             column[swaps] = column[swaps] * sign + half
         turns = np.cumsum(np.rint((column[steep] - column[steep - 1]) / FULL_TURN))
-        column -= np.repeat(FULL_TURN * np.append(0.0, turns), lengths)
+        column[:] -= np.repeat(FULL_TURN * np.append(0.0, turns), lengths)
     return result
 
 

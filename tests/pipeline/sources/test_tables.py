@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow.csv
 import pytest
 
 from urmpipe_models.chains.chain import Chain
@@ -329,3 +330,23 @@ def test_names_that_a_file_does_not_have_are_no_headers(read: Read) -> None:
         log = read(text)
         assert log.q.tolist() == [[0.5, 1.5], [0.6, 1.6]]
         assert {column.header for column in log.columns} == {""}
+
+
+def test_a_block_that_the_parser_loses_is_read_all_the_same(
+    read: Read, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parse = pyarrow.csv.read_csv
+    lost: list[bool] = []
+
+    def lose_the_first(*args: object, **options: object) -> object:
+        if not lost:
+            lost.append(True)
+            raise pyarrow.ArrowException("a chunk failed converting for an unknown reason")
+        return parse(*args, **options)
+
+    monkeypatch.setattr(pyarrow.csv, "read_csv", lose_the_first)
+    text = "t,q1,q2\n" + "".join(f"{0.005 * k:.3f},{0.0001 * k:.4f},1.5\n" for k in range(9000))
+    log = read(text)
+    assert lost
+    np.testing.assert_array_equal(log.q[:, 0], [float(f"{0.0001 * k:.4f}") for k in range(9000)])
+    assert log.t_ns.tolist() == [5_000_000 * k for k in range(9000)]
