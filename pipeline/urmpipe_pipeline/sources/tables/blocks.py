@@ -15,9 +15,6 @@ BLOCK_BYTES = 1 << 22
 """What is read at once: enough rows for several threads to parse, few enough to keep memory low."""
 
 _NEWLINES = b"\n\r"
-_RUNS = (b"\t", b"  ", b" \n", b" \r", b"\n ", b"\r ")
-"""None of these is in lines that are parted by single spaces already."""
-
 _GOES_ON = (b"", b" ", b"\t")  # nothing: what comes next is not read yet
 _TO_POINTS = bytes.maketrans(b",.", b".~")
 _FROM_POINTS = np.frombuffer(bytes.maketrans(b".~", b",."), dtype=np.uint8)
@@ -83,14 +80,14 @@ def end_of_rows(block: bytes, layout: Layout) -> int:
 
 def squeeze(block: bytes) -> bytes:
     """Return whole lines with every run of spaces and tabs as one space, and none at either end of a line."""
-    if not any(run in block for run in _RUNS) and block[:1] != b" " != block[-1:]:
-        return block
     signs: Bytes = np.frombuffer(block, dtype=np.uint8)
     blank = (signs == ord(" ")) | (signs == ord("\t"))
-    skipped = np.zeros_like(blank)
     ends = (signs == _NEWLINES[0]) | (signs == _NEWLINES[1])
+    skipped = np.zeros_like(blank)
     skipped[:1] = blank[:1]
     skipped[1:] = blank[1:] & (blank[:-1] | ends[:-1])
+    if not (skipped.any() or (blank[:-1] & ends[1:]).any() or b"\t" in block or block[-1:] == b" "):
+        return block
     result: bytes = np.where(blank, np.uint8(ord(" ")), signs)[~skipped].tobytes()
     for end in (b"\r", b"\n"):
         result = result.replace(b" " + end, end)
