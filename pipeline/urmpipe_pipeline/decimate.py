@@ -55,8 +55,6 @@ def decimate(values: FloatArray, points: int = POINTS, t: FloatArray | None = No
 def _missing(column: FloatArray, size: int) -> list[IntArray]:
     """Return the first and the last missing sample of each bucket that has one."""
     where = np.flatnonzero(np.isnan(column))
-    if not len(where):
-        return []
     bucket = where // size
     first = where[np.diff(bucket, prepend=-1) > 0]
     last = where[np.diff(bucket, append=len(column)) > 0]

@@ -72,8 +72,13 @@ def synchronise(
 
     auto correlates the rates of both sides over all offsets and refines the best one. It goes by the joints
     where both sides have the same number of them, unless the positions are clearly more alike (two arms may
-    follow one path with other joints). Where the two stand apart in space does not matter, but how the log
-    will be aligned does. A given offset is in [s]: t_reference = t_log + offset.
+    follow one path with other joints). Where the two stand apart in space does not matter.
+
+    Args:
+        reference: What was asked for.
+        log: What was done.
+        option: start, auto, or the offset in [s]: t_reference = t_log + offset.
+        align: How the log will be moved in space.
 
     Raises:
         LogError: If the motion does not tell the offset: there is none, it repeats itself, it is too even, or
@@ -139,7 +144,13 @@ def _rivals(one: Estimate, best: Estimate, apart: float) -> bool:
 
 
 def sync_doubts(name: str, sync: Sync, period: float) -> list[LogWarning]:
-    """Return what a person should know about an estimated offset of a log with a period in [s]."""
+    """Return what a person should know about an offset that was estimated.
+
+    Args:
+        name: The log's name.
+        sync: The offset.
+        period: The log's, in [s].
+    """
     said = f"the offset of {sync.offset:.6g} s, estimated by the {sync.by},"
     doubts = []
     if sync.precision is not None and sync.precision > CERTAIN * period:

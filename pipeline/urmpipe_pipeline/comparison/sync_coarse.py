@@ -60,7 +60,12 @@ class Rates:
 
 @dataclass(frozen=True, slots=True)
 class Peak:
-    """An offset t_reference - t_log in integer [ns] at which two motions are most alike, from -1 to 1."""
+    """An offset at which two motions are more alike than beside it.
+
+    Attributes:
+        offset_ns: t_reference - t_log in integer [ns].
+        similarity: How alike they are there, -1 to 1.
+    """
 
     offset_ns: int
     similarity: float
@@ -93,7 +98,9 @@ def mean_rates(view: View) -> Rates | None:
 def rates(values: FloatArray, period_ns: int) -> FloatArray:
     """Return the mean rate between each value and the next, in [rad/s] or [m/s], shape (n - 1, k).
 
-    Values are in [rad] or [m], shape (n, k), and a period in integer [ns] apart.
+    Args:
+        values: In [rad] or [m], shape (n, k).
+        period_ns: Between two of them, in integer [ns].
     """
     return np.diff(values, axis=0) / (period_ns / 1e9)
 

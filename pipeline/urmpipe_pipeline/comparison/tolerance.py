@@ -98,9 +98,12 @@ def _parts(text: str, bare: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...
 def check_tolerance(
     tolerance: Mapping[str, float], parameter: str = "tolerance", *, zero: bool = False
 ) -> None:
-    """Raise an `OptionError` with everything in a tolerance, in [m] or [rad] by kind, that makes no sense.
+    """Raise an `OptionError` with everything in a tolerance that is no kind or no positive number.
 
-    Messages name the keyword that gave it; 0 may be allowed, too.
+    Args:
+        tolerance: In [m] or [rad], by kind.
+        parameter: The keyword that gave it, for messages.
+        zero: Whether 0 is allowed.
     """
     sign = "0 or positive" if zero else "positive"
     faults = [

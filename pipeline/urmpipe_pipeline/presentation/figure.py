@@ -171,7 +171,13 @@ class SpaceFigure:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A drawing that is ready (SVG), and what it shows for who does not see it."""
+    """A drawing that is ready (SVG).
+
+    Attributes:
+        title: Its heading.
+        alt: What it shows, for who does not see it.
+        svg: The drawing.
+    """
 
     title: str
     alt: str

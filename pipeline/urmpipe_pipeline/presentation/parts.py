@@ -24,7 +24,12 @@ Heads: TypeAlias = Mapping[str, tuple[str, Callable[[Item], Cell]]]
 
 
 class Cells(Sequence[Cell], Generic[Item]):
-    """The cells of a column that may be long, each made of its row's item when it is shown."""
+    """The cells of a column that may be long, each made when it is shown.
+
+    Args:
+        items: What the rows are of.
+        cell: Returns the cell of one.
+    """
 
     def __init__(self, items: Sequence[Item], cell: Callable[[Item], Cell]) -> None:
         self._items, self._cell = items, cell

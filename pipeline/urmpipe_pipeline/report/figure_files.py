@@ -53,7 +53,13 @@ class FigureOptions:
 
 @dataclass(frozen=True, slots=True)
 class FigureFile:
-    """A file of a figure, the figure's heading, and that of the part of the report that it stands in."""
+    """A file of a figure.
+
+    Attributes:
+        path: Where it is.
+        title: The figure's heading.
+        part: The heading of the part of the report that it stands in.
+    """
 
     path: Path
     title: str

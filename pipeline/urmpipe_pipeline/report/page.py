@@ -69,7 +69,14 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """The page: the names of what it shows, the verdict, what a minute is enough for, a part a result."""
+    """The page.
+
+    Attributes:
+        title: The names of what it shows.
+        banner: The verdict.
+        summaries: What a minute is enough for.
+        parts: All there is, one a result.
+    """
 
     title: str
     banner: Banner

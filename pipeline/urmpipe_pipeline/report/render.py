@@ -23,7 +23,12 @@ from urmpipe_pipeline.report.page import Page, lay_out
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """What was written: the HTML file, and the files of its figures; none unless they were asked for."""
+    """What was written.
+
+    Attributes:
+        path: The HTML file.
+        figures: The files of its figures; none unless they were asked for.
+    """
 
     path: Path
     figures: tuple[FigureFile, ...] = ()
@@ -51,8 +56,14 @@ def write_report(
 ) -> Written:
     """Write the report, and its figures as files if asked for: all or none.
 
-    An existing file is replaced only if it is a report or a figure of ours and no input. Progress is told the
-    share that is done, 0..1.
+    An existing file is replaced only if it is a report or a figure of ours and no input.
+
+    Args:
+        presentations: As `render_report` takes them.
+        path: Where to.
+        inputs: Files that must not be overwritten.
+        figures: Where the figures go, and in which formats.
+        progress: Told the share that is done, 0..1.
 
     Raises:
         OptionError: If there is nothing to report.

@@ -26,7 +26,12 @@ RESTING = 0.01
 
 
 class OtherUnit(NamedTuple):
-    """How recorded derivatives "would agree" with the differences; the unit of the times, if by theirs."""
+    """The unit in which recorded derivatives would agree with the differences.
+
+    Attributes:
+        said: Which, behind "would agree".
+        time: The unit that the times have then, where it is theirs.
+    """
 
     said: str
     time: str | None = None

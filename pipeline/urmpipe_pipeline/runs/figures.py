@@ -45,7 +45,9 @@ def times_of(run: Run) -> IntArray | None:
 def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
     """Yield the joints as the file has them and repolarized, with every finding marked; nothing of a path.
 
-    The viewer opens one of the views (0 before, 1 after), or both.
+    Args:
+        run: The log.
+        opened: Number of the view that the viewer opens: 0 before, 1 after; None for both.
     """
     if not run.log.joints:
         return

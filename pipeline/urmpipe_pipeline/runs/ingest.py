@@ -87,10 +87,16 @@ def run_of(
     derivative: Method | None = None,
     name: str | None = None,
 ) -> Run:
-    """Return the run of a log that is there: what `ingest_log`, which tells the options, does behind reading.
+    """Return the run of a log that is there: what `ingest_log` does once it has read it.
 
-    The times of the log are strictly increasing; without a robot there are no kinematics. Of how it was read
-    `interval`, `repair` and `period` matter here. Its usual name is the log's.
+    Args:
+        log: The log, its times strictly increasing.
+        robot: The arm, with base and tool; None for no kinematics.
+        options: How it was read: `interval`, `repair` and `period` matter here.
+        made: How to repeat it.
+        tsp: Period of the grid in [s]; default: the log's own.
+        derivative: central or savgol; default: savgol for logs seen to be quantised, else central.
+        name: What to call it; default: the log's name.
 
     Raises:
         LogError: If the log's joints are not the robot's, or its times need a grid without end.

@@ -73,9 +73,14 @@ def settings_table(simulation: Simulation) -> Table:
 
 @dataclass(frozen=True, eq=False)
 class Scalar:
-    """A scalar of a signal, by its name in the system; its extremes are computed when they are shown.
+    """A scalar of a signal, whose extremes are computed when they are shown.
 
-    It has values in its unit, shape (n,), at times in [s], shape (n,).
+    Attributes:
+        block: Its block.
+        name: Its name in the system.
+        unit: Its unit; empty for none.
+        values: In its unit, shape (n,).
+        t: Times in [s], shape (n,).
     """
 
     block: str

@@ -31,10 +31,17 @@ def run_of_solutions(
     warnings: tuple[LogWarning, ...],
     made: Provenance,
 ) -> Run:
-    """Return joint values that inverse kinematics found, in [rad] or [m], shape (n, joints), as a run.
+    """Return joint values that inverse kinematics found as a run.
 
-    They are NaN where there is no solution: there the run has no pose, and nothing is interpolated. Times are
-    from the first row in integer [ns], shape (n,), the clock is that of the first row.
+    Args:
+        name: What to call it.
+        chain: The arm, with base and tool.
+        q: The chosen solutions in [rad] or [m], shape (n, joints); NaN where there is none: there the run has
+            no pose, and nothing is interpolated.
+        t_ns: Times from the first row in integer [ns], shape (n,); None without times.
+        clock_start_ns: The clock at the first row in integer [ns].
+        warnings: What a person should know.
+        made: How the solutions were made.
 
     Raises:
         LogError: If the times need a grid without end.

@@ -19,9 +19,11 @@ differ by where they can be told apart."""
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ghost:
-    """A branch that brings the tool to targets as the chosen solutions do: "right, elbow up, flipped".
+    """A branch of the solutions that brings the tool to targets as the chosen ones do.
 
-    q is in [rad] or [m], shape (n, joints); NaN where there is no solution, or the chosen one.
+    Attributes:
+        name: The branch, such as "right, elbow up, flipped".
+        q: Joint values in [rad] or [m], shape (n, joints); NaN where there is none, or the chosen one.
     """
 
     name: str

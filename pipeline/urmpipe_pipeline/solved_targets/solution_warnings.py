@@ -34,7 +34,10 @@ MANY_TURNS = 4.0 * np.pi
 def singular_warnings(solutions: Solutions, row: IntArray, listed: BoolArray) -> Iterator[LogWarning]:
     """Yield one warning for each family of singular poses: what is infinite there, and what was chosen.
 
-    Targets stand in data rows `row`, shape (n,); a person is shown the solutions `listed`, shape (n, k).
+    Args:
+        solutions: What was found.
+        row: Data row of each target, shape (n,).
+        listed: True of the solutions that a person is shown, shape (n, k).
     """
     for one in solutions.singular:
         rows = row[(one.where & listed & solutions.reached).any(axis=1)]
@@ -49,8 +52,14 @@ def near_singular_warnings(
     """Yield a warning of solutions that are singular or nearly so, and lie in no family that has a name.
 
     A wrist that is aligned but for the digits of a file lies in none: nothing is infinite there, and yet
-    the last of those digits turns joints far. Targets, poses if they have an orientation, stand in data rows
-    `row`, shape (n,); a person is shown the solutions `listed`, shape (n, k).
+    the last of those digits turns joints far.
+
+    Args:
+        chain: The arm.
+        solutions: What was found.
+        row: Data row of each target, shape (n,).
+        listed: True of the solutions that a person is shown, shape (n, k).
+        orientation: Whether poses were asked for; False of positions.
     """
     named = np.zeros_like(solutions.reached)
     for one in solutions.singular:
@@ -72,7 +81,13 @@ def near_singular_warnings(
 
 
 def start_warnings(chain: Chain, start: FloatArray | None, parameter: str = "start") -> Iterator[LogWarning]:
-    """Yield a warning of a pose in [rad] or [m], shape (joints,), with values that are hardly in rad."""
+    """Yield a warning of a pose that is hardly in rad.
+
+    Args:
+        chain: The arm.
+        start: The pose in [rad] or [m], shape (joints,).
+        parameter: The keyword by which it was given.
+    """
     if start is None:
         return
     found = [
@@ -117,8 +132,12 @@ def far_warnings(
 ) -> Iterator[LogWarning]:
     """Yield a warning of targets that are far out of reach, and would not be if they were in mm.
 
-    They stand in data rows `row`, shape (n,), and those `reached`, shape (n,), have a solution; of a file one
-    may say the unit.
+    Args:
+        chain: The arm.
+        targets: What was asked for.
+        row: Data row of each, shape (n,).
+        reached: True of those that have a solution, shape (n,).
+        of_file: Whether a file holds them, of which one may say the unit.
     """
     reach = longest(chain)
     away = np.linalg.norm(targets.position - np.asarray(chain.base.translation, dtype=float), axis=1)

@@ -40,7 +40,9 @@ Progress = Callable[[float], None] | None
 def solve_targets(request: Request, progress: Progress = None) -> SolvedTargets:
     """Return the solutions of targets, each for itself or along a path, with all that a person should know.
 
-    `refuse_unsolvable` has checked the request.
+    Args:
+        request: What is to be solved; `refuse_unsolvable` has checked it.
+        progress: Called with the share of solving that is done, 0..1.
     """
     t_ns = request.given.t_ns
     return _of_targets(request, progress) if t_ns is None else _of_path(request, t_ns, progress)
@@ -117,8 +119,13 @@ def _result(
 ) -> SolvedTargets:
     """Return solutions with how far they miss their targets, and with what a person should know.
 
-    Chosen is the column nearest to the start, shape (n,), listed what a person is shown, shape (n, k); of a
-    path, how the solutions follow each other, and its branches: all solutions of its targets.
+    Args:
+        request: What was solved.
+        solutions: What was found.
+        chosen: The column nearest to the start, shape (n,).
+        listed: True of the solutions that a person is shown, shape (n, k).
+        path: How they follow each other.
+        branches: All solutions of the targets of a path.
     """
     given, form = request.given, request.form
     solutions = replace(solutions, reasons=_with_faults(solutions.reasons, given.faults))

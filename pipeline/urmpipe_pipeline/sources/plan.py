@@ -83,7 +83,7 @@ def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan
 
 
 def _renamed(roles: Roles, names: Sequence[str]) -> Roles:
-    """Return the roles with the joints called as the user says, having refused others than a name a joint."""
+    """Return the roles with the joint names that the user gives: one for each joint, all different."""
     if not names:
         return roles
     if len(names) != len(roles.joints) or len(set(names)) < len(names):

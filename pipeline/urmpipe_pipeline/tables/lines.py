@@ -58,9 +58,13 @@ def texts(columns: Sequence[Any]) -> list[Any]:
 
 
 def write_lines(path: Path, head: str, columns: Sequence[Any], delimiter: str) -> None:
-    """Write a head, with its line end, and a line a row of columns as `texts` returned them.
+    """Write a head and a line a row.
 
-    NaN is an empty cell.
+    Args:
+        path: The file.
+        head: What stands above the rows, with its line end.
+        columns: What `texts` returned, each of shape (n,); NaN is an empty cell.
+        delimiter: The sign between cells.
     """
     rows = len(columns[0])
     with path.open("wb") as file:

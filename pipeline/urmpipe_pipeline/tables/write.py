@@ -52,7 +52,12 @@ POSE_COLUMNS = (
 
 @dataclass(frozen=True, slots=True)
 class ExportedFile:
-    """A file that was written, and how many rows of numbers are in it."""
+    """A file that was written.
+
+    Attributes:
+        path: Where it is.
+        rows: Rows of numbers in it.
+    """
 
     path: Path
     rows: int
@@ -184,7 +189,11 @@ def write_all(
 ) -> None:
     """Write all files beside their places, and rename them only when all were read back as written.
 
-    A writer writes to a path, and returns how the file differs from what it wrote. Inputs are never replaced.
+    Args:
+        targets: Where they are to stand.
+        writers: What writes each to a path and returns how the file differs from what it wrote.
+        to: Their format.
+        inputs: Files that are never replaced.
 
     Raises:
         OutputError: If one may not be written there, or did not read back as it was written.

@@ -280,9 +280,12 @@ def test_few_rows_or_none_are_drawn(count: int) -> None:
     values = np.full((count, 2), np.nan)
     some: dict[str, Any] = {"t_ns": T_NS[:count], "limit": 1.0, "small": True}
     for one in (panel(values, **some), panel(values, logarithmic=True, **some), panel(values, t_ns=None)):
-        drawn(figure(one))
-    drawn(figure(panel(values, over=Over(np.full(count, np.nan), "v", "m/s"))))
-    drawn_space(SpaceFigure("S", "C.", "A.", (Path("a", np.full((count, 3), np.nan), T_NS[:count], RED),)))
+        np.testing.assert_array_equal(numbers(trace(drawn(figure(one)), "x")["y"]), values[:, 0])
+    without_place = drawn(figure(panel(values, over=Over(np.full(count, np.nan), "v", "m/s"))))
+    assert not len(numbers(trace(without_place, "x")["y"]))
+    path = Path("a", np.full((count, 3), np.nan), T_NS[:count], RED)
+    found = drawn_space(SpaceFigure("S", "C.", "A.", (path,)))
+    np.testing.assert_array_equal(numbers(trace(found, "a")["x"]), values[:, 0])
 
 
 def test_figures_of_a_part_have_one_axis_of_time() -> None:

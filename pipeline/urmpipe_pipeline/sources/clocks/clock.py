@@ -98,7 +98,7 @@ def find_clocks(
     """Return the clock of each table.
 
     Raises:
-        LogError: If a time is text in no form that is known, or its unit cannot be told.
+        LogError: If a time is text of an unknown form, or its unit is unclear.
         OptionError: If its unit is given as one that is no time.
     """
     clocks = []
