@@ -27,6 +27,10 @@ def seconds(nanoseconds: IntArray) -> FloatArray:
     return np.true_divide(nanoseconds, 1e9, dtype=np.float64)
 
 
+Role = Literal["time", "joint", "rate", "acceleration", "position", "rotation"]
+ROLES: tuple[Role, ...] = get_args(Role)
+
+
 @dataclass(frozen=True, slots=True)
 class SourceFile:
     """An input file, so that a result can be traced to its bytes.
@@ -92,6 +96,10 @@ class LogWarning(Message):
         found: What was found.
         allowed: What is allowed.
         hints: What to give to have it otherwise.
+        assumption: What a verdict takes for granted that rests on it, as the end of "assuming ...": "the
+            joints are in deg"; empty where there is none.
+        role: What the columns hold that it is about: a verdict may rest on others.
+        asks: Whether no verdict rests on it before it is answered.
     """
 
     kind: str
@@ -103,6 +111,9 @@ class LogWarning(Message):
     found: str | None = None
     allowed: str | None = None
     hints: tuple[Hint, ...] = ()
+    assumption: str = ""
+    role: Role | None = None
+    asks: bool = False
 
     def of(self, name: str) -> LogWarning:
         """Return it as one about a log or a block of this name."""
@@ -110,16 +121,13 @@ class LogWarning(Message):
 
     def as_finding(self) -> Finding:
         """Return it as what is wrong, where warnings are errors."""
-        return Finding(**{one.name: getattr(self, one.name) for one in fields(self)})
+        own = ("assumption", "role", "asks")
+        return Finding(**{f.name: getattr(self, f.name) for f in fields(self) if f.name not in own})
 
     def place(self) -> str:
         """Return log, row and column: "log: row 5: q1"."""
         row = None if self.row is None else f"row {self.row}"
         return ": ".join(filter(None, (self.about, row, self.column)))
-
-
-Role = Literal["time", "joint", "rate", "acceleration", "position", "rotation"]
-ROLES: tuple[Role, ...] = get_args(Role)
 
 
 @dataclass(frozen=True, slots=True)

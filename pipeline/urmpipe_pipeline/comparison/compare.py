@@ -16,6 +16,7 @@ from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline import text
 from urmpipe_pipeline.choices import check_choice
 from urmpipe_pipeline.comparison.alignment import align
+from urmpipe_pipeline.comparison.assumptions import assumptions
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.matching import NO_ROBOT, as_recorded, by_kinematics, file_of, lacking, match
@@ -30,7 +31,7 @@ from urmpipe_pipeline.comparison.warnings import (
     recorded_apart,
     thin_evidence,
 )
-from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.joint_log import LogWarning, Role
 from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.repolarization.audit import audit_log
@@ -119,7 +120,29 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     elif chosen.tcp == "fk":
         failed = [one for one in deviations if one.verdict == "fail"]
         told += [hint.of(one.name) for one in failed for hint in lacking_tool(one.run.robot, one.run.log)]
-    return _comparison(wanted, deviations, chosen, told)
+    return _comparison(wanted, deviations, chosen, told, _taken_for_granted(reference, runs, chosen))
+
+
+def _taken_for_granted(reference: Run, runs: Sequence[Run], options: CompareOptions) -> tuple[str, ...]:
+    """Return what a verdict on runs assumes of them and the reference; raise what has to be told first."""
+    sides = [(run, _compared_roles(run, options)) for run in (reference, *runs)]
+    alike = all(any(w.role == "time" and w.assumption for w in run.warnings) for run, _ in sides)
+    if not alike:  # rows that have no times on any side are compared one by one, whatever their period
+        sides = [(run, {*roles, "time"} if run.timed else roles) for run, roles in sides]
+    return assumptions(sides)
+
+
+def _compared_roles(run: Run, options: CompareOptions) -> set[Role]:
+    """Return the roles of what is compared of a run: joints, or recorded positions and orientations."""
+    by_joints = bool(run.log.joints) and options.tcp == "fk"
+    roles: set[Role] = {"joint"} if by_joints or "joint" in options.tolerance else set()
+    return roles if by_joints else roles | _recorded_roles(options)
+
+
+def _recorded_roles(options: CompareOptions) -> set[Role]:
+    """Return what a verdict on recorded poses rests on."""
+    turned = "angle" in options.tolerance or options.align in ("start", "tool")
+    return {"position", "rotation"} if turned else {"position"}
 
 
 def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], sync: SyncOption) -> None:
@@ -175,7 +198,10 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     position, rotation = poses_over_log(run.robot, _on_rows(run))
     quat = continuous_quaternions(quaternions(rotation.reshape(-1, 9), "matrix"))
     computed = Trajectory(run.name, log.t_ns, position, log.files, quat)
-    found = _comparison(recorded, [_deviation(run.name, run, recorded, computed, chosen)], chosen)
+    assumed = assumptions([(run, {"joint", *_recorded_roles(chosen)})])
+    found = _comparison(
+        recorded, [_deviation(run.name, run, recorded, computed, chosen)], chosen, (), assumed
+    )
     lacks = lacking_tool(run.robot, log) if found.verdict == "fail" else []
     return replace(found, warnings=(*found.warnings, *lacks))
 
@@ -193,7 +219,8 @@ def _comparison(
     reference: Trajectory,
     deviations: Sequence[Deviation],
     options: CompareOptions,
-    told: Sequence[LogWarning] = (),
+    told: Sequence[LogWarning],
+    assumed: tuple[str, ...],
 ) -> Comparison:
     bare = {kind: value for kind, value in options.tolerance.items() if kind not in options.with_unit}
     warnings = [*large_tolerances(bare), *told]
@@ -215,6 +242,7 @@ def _comparison(
         dict(options.tolerance),
         tuple(warnings),
         provenance("compare", {"tolerance": dict(options.tolerance), **given}, inputs),
+        assumptions=assumed,
     )
 
 

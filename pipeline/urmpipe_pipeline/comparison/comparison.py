@@ -39,6 +39,7 @@ class Comparison(Result):
         provenance: How to repeat it.
         recording: Where it was written.
         baseline: What changed since an earlier comparison, if it was held against one.
+        assumptions: What the verdict takes for granted, each as the end of "assuming ...".
     """
 
     name: str
@@ -49,6 +50,7 @@ class Comparison(Result):
     provenance: Provenance
     recording: Path | None = field(default=None, metadata={"stored": False})
     baseline: BaselineComparison | None = None
+    assumptions: tuple[str, ...] = ()
 
     @property
     def within_tolerance(self) -> bool:
@@ -107,7 +109,8 @@ class Comparison(Result):
         failed = sum(one.verdict == "fail" for one in self.runs)
         count = f" ({failed} of {len(self.runs)} logs)" if failed and len(self.runs) > 1 else ""
         worse = ", worse than the baseline" if self.baseline and self.baseline.verdict == "fail" else ""
-        return line_of(f"{self.name}: {self.verdict}{count}{worse}", *logs)
+        assumed = f", assuming {' and '.join(self.assumptions)}" if self.assumptions else ""
+        return line_of(f"{self.name}: {self.verdict}{count}{worse}{assumed}", *logs)
 
     def _notes(self) -> list[str]:
         """Return what is to be known of it, and of its logs."""
@@ -125,6 +128,7 @@ class Comparison(Result):
         return {
             "schema": SCHEMA,
             "verdict": self.verdict,
+            "assumptions": list(self.assumptions),
             "tolerance": dict(self.tolerance),
             "reference": self.reference.name,
             "runs": [run.to_dict(voice) for run in self.runs],

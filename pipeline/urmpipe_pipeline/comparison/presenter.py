@@ -139,6 +139,7 @@ def _properties(result: Comparison, one: Deviation) -> dict[str, Any]:
     return {
         "reference": result.reference.name,
         "verdict": one.verdict,
+        "assumptions": "; ".join(result.assumptions),
         "duration": one.duration,
         "samples": len(one.sample),
         "left_out": one.left_out,

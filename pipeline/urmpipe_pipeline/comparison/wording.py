@@ -26,7 +26,7 @@ def verdict_words(one: Comparison) -> str:
     said += f" against {one.reference.name}{_points(one)}{_part(one)}"
     if one.baseline and one.baseline.verdict == "fail":
         said += f", {'and' if failed else 'but'} worse than the baseline {one.baseline.name}"
-    return said
+    return said + (f", assuming {' and '.join(one.assumptions)}" if one.assumptions else "")
 
 
 def _who(runs: Sequence[Deviation], total: int) -> str:

@@ -203,5 +203,6 @@ def even_clock(
     hints = [Hint("period", None, "sets another time between rows")]
     hints += [Hint("time", like, "takes this column as the time: it always increases")] if like else []
     said = "no time column: the rows are taken as 5 ms apart"
-    warning = LogWarning("assumed-period", said, hints=tuple(hints))
+    assumed = "the rows are 5 ms apart"
+    warning = LogWarning("assumed-period", said, hints=tuple(hints), assumption=assumed, role="time")
     return times, (Inference("period", "0.005 s", "assumed", hints=(Hint("period"),)),), [warning]

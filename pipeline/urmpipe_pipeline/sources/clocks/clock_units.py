@@ -101,7 +101,8 @@ def _short(time: Column, layout: Layout, step: float) -> Found:
 
 def _assumed(time: Column, step: float) -> LogWarning:
     said = f"the time {shown(time.name)} steps by {step:.6g}: taken as s"
-    return LogWarning("assumed-unit", said, hints=unit_hints([time], "s", "confirms it"))
+    hints, taken = unit_hints([time], "s", "confirms it"), "the times are in s"
+    return LogWarning("assumed-unit", said, hints=hints, assumption=taken, role="time")
 
 
 def _question(time: Column, layout: Layout, found: str, units: list[str]) -> LogError:

@@ -93,7 +93,9 @@ def settle_rotation(
         taken = choices[0][1][0].name
         said = f"no unit is given for {names}: they are taken as {taken}"
         hints = unit_hints(columns[:1], OTHER_UNIT[taken])
-        return _settled(columns, choices[0], "their names", LogWarning("assumed-unit", said, hints=hints))
+        taken_for = f"the orientation is in {taken}"
+        doubt = LogWarning("assumed-unit", said, hints=hints, assumption=taken_for, role="rotation")
+        return _settled(columns, choices[0], "their names", doubt)
     said = f"{names} may be of several forms: the recorded orientation is not used"
     hints = tuple(Hint("rotation", form, "says which") for form in sound)
     return Settled(warnings=(LogWarning("orientation", said, hints=hints),))

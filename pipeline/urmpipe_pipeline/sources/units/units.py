@@ -14,7 +14,7 @@ from urmpipe_models.chains.chain import Chain, JointKind
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import RotationForm, angles
-from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.joint_log import Inference, LogWarning, Role
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.units.kinematic_units import KinematicUnits
 from urmpipe_pipeline.sources.units.unit_evidence import Bounds, degrees_evidence, peak, radians_evidence
@@ -25,6 +25,8 @@ GIVEN = "given as an option"
 
 JOINTS = "prismatic joints"
 """Columns whose units do not follow from each other's."""
+
+POSITIONS = "positions"
 
 MOST_TURNS = 4
 """A joint value of more turns than this is not taken as rad without being told."""
@@ -228,7 +230,7 @@ class UnitFinder:
         if furthest > LONGEST_REACH:
             self._note(columns, "mm", f"values up to {furthest:.6g} reach further than any arm in m")
             return vocabulary().units["mm"]
-        self._assume("m", "positions", columns)
+        self._assume("m", POSITIONS, columns)
         return vocabulary().units["m"]
 
     def _angle(
@@ -292,4 +294,6 @@ class UnitFinder:
         turning = (Hint("unit", {"": other}, does),)  # of all joints that turn
         some = columns if what == JOINTS else columns[:1]
         hints = turning if unit == "rad" else unit_hints(some, other, does)
-        self._assumed.append(LogWarning("assumed-unit", said, hints=hints))
+        role: Role = "position" if what == POSITIONS else "joint"
+        taken = f"the {what} are in {unit}"
+        self._assumed.append(LogWarning("assumed-unit", said, hints=hints, assumption=taken, role=role))
