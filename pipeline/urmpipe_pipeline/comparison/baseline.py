@@ -60,7 +60,8 @@ def against_baseline(
     """Tell what changed since an earlier comparison: by log and quantity, and in how it was made.
 
     Logs are the same if their names are; where both comparisons are of one log, these are held against each
-    other whatever they are called. A quantity is worse if its largest value or its rms grew by more than the
+    other whatever they are called. A log of a baseline that was judged on a grid instead of its rows is
+    listed as made otherwise: its figures do not compare. A quantity is worse if its largest value or its rms grew by more than the
     noise, if more of its samples are out of the same tolerance than the noise can have put there, or if it
     rests on less than nine tenths of the samples, counted by the time that they stand for.
 
@@ -79,7 +80,9 @@ def against_baseline(
         name=before.name,
         recording=before.recording,
         noise=level,
-        changes=tuple(change for pair in pairs for change in _changes(*pair, level)),
+        changes=tuple(
+            change for pair in pairs if not _on_grid(now, before, pair) for change in _changes(*pair, level)
+        ),
         new=tuple(_absent(now, {run.name: (run, old) for run, old in pairs})),
         gone=tuple(_absent(before, {old.name: (run, old) for run, old in pairs})),
         differences=tuple(_differences(now, before, pairs)),
@@ -92,6 +95,12 @@ def _pairs(now: Comparison, before: Comparison) -> list[Pair]:
         return [(now.runs[0], before.runs[0])]
     old = {run.name: run for run in before.runs}
     return [(run, old[run.name]) for run in now.runs if run.name in old]
+
+
+def _on_grid(now: Comparison, before: Comparison, pair: Pair) -> bool:
+    """Tell whether a log was judged on a grid that is not the rows, its own or those of the reference."""
+    same = np.array_equal(now.reference.t_ns, before.reference.t_ns)
+    return not before.on_rows and (pair[1].run.resampled or not same)
 
 
 def _keyed(statistics: tuple[Statistics, ...]) -> dict[Key, Statistics]:
@@ -171,6 +180,8 @@ def _differences(now: Comparison, before: Comparison, pairs: Sequence[Pair]) -> 
     yield from _differing(_made(before), _made(now))
     for run, old in pairs:
         yield from _differing(_facts(old), _facts(run), f" of {run.name}")
+        if _on_grid(now, before, (run, old)):
+            yield Difference(f"judged on of {run.name}", "the grid", "the log's rows")
 
 
 def _differing(was: Mapping[str, Any], made: Mapping[str, Any], of: str = "") -> Iterator[Difference]:

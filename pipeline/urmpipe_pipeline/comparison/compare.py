@@ -6,12 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, LogError, OptionError, for_each
-from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import quaternions
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline import text
 from urmpipe_pipeline.choices import check_choice
@@ -34,7 +30,6 @@ from urmpipe_pipeline.comparison.warnings import (
 from urmpipe_pipeline.joint_log import LogWarning, Role
 from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.repolarization.audit import audit_log
 from urmpipe_pipeline.runs.recorded_tcp import lacking_tool
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources.columns.tcp_like import TCP_NOT_READ
@@ -74,7 +69,7 @@ class CompareOptions:
 
 
 def trajectory(run: Run, tcp: Tcp = "fk") -> Trajectory:
-    """Return where a run's tool centre point was, on its grid.
+    """Return where a run's tool centre point was, on its log's own rows.
 
     A log without joints (a path) is where it recorded itself; one with joints goes by `tcp`.
 
@@ -85,10 +80,10 @@ def trajectory(run: Run, tcp: Tcp = "fk") -> Trajectory:
 
 
 def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | None = None) -> Comparison:
-    """Hold runs against a reference run: delta on the samples of each run, statistics, verdict.
+    """Hold runs against a reference run: delta on the rows of each log, statistics, verdict.
 
-    The reference is interpolated linearly at the samples of the run; samples outside its time, inside a
-    gap of it, or without a value of their own are left out and counted.
+    The reference is interpolated linearly between its rows; rows of a log outside its time, inside a gap of
+    it, or without a value of their own are left out and counted.
 
     Args:
         reference: A path, or a run of its own.
@@ -172,9 +167,8 @@ def _differing_robots(runs: Sequence[Run]) -> list[LogWarning]:
 def compare_recorded(run: Run, options: CompareOptions | None = None) -> Comparison:
     """Hold the forward kinematics of a log against the tool centre point that the same log recorded.
 
-    Both stand in the same rows of one file: nothing is resampled; samples are rows, from 0. Their joints are
-    the same and are not compared.
-    Where samples left on a wrap were repaired, the repaired ones count.
+    Both stand in the same rows of one file. Their joints are the same and are not compared. Where samples
+    left on a wrap were repaired, the repaired ones count.
 
     Raises:
         OptionError: If another time than its own is asked for.
@@ -193,26 +187,14 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
         said = "one log, which recorded no tool centre point; allowed: a reference before the log"
         doubts = [one.as_finding() for one in log.warnings if one.kind == TCP_NOT_READ]
         raise LogError(lacking(run, said), *(replace(one, file=file_of(run)) for one in doubts))
-    name = f"{run.name} (recorded)"
-    recorded = Trajectory(name, log.t_ns, log.tcp_position, log.files, log.tcp_quat_xyzw)
-    position, rotation = poses_over_log(run.robot, _on_rows(run))
-    quat = continuous_quaternions(quaternions(rotation.reshape(-1, 9), "matrix"))
-    computed = Trajectory(run.name, log.t_ns, position, log.files, quat)
+    recorded = replace(as_recorded(run), name=f"{run.name} (recorded)", joints=(), joint_units=(), q=None)
+    computed = replace(by_kinematics(run), joints=(), joint_units=(), q=None)
     assumed = assumptions([(run, {"joint", *_recorded_roles(chosen)})])
     found = _comparison(
         recorded, [_deviation(run.name, run, recorded, computed, chosen)], chosen, (), assumed
     )
     lacks = lacking_tool(run.robot, log) if found.verdict == "fail" else []
     return replace(found, warnings=(*found.warnings, *lacks))
-
-
-def _on_rows(run: Run) -> FloatArray:
-    """Return the joints on the file's own rows: as they stand there, or repaired as the run was."""
-    if not any(entry.kind == "repaired" for entry in run.audit):
-        return run.log.q
-    read = run.provenance.options.get("read") or {}
-    intervals = {name: (low, high) for name, (low, high) in read.get("interval", {}).items()}
-    return audit_log(run.log, run.robot, interval=intervals, repaired=True).q
 
 
 def _comparison(
@@ -243,6 +225,7 @@ def _comparison(
         tuple(warnings),
         provenance("compare", {"tolerance": dict(options.tolerance), **given}, inputs),
         assumptions=assumed,
+        on_rows=True,
     )
 
 

@@ -40,6 +40,7 @@ class Comparison(Result):
         recording: Where it was written.
         baseline: What changed since an earlier comparison, if it was held against one.
         assumptions: What the verdict takes for granted, each as the end of "assuming ...".
+        on_rows: Whether the logs were judged on their own rows; before that was so, on the grid.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Comparison(Result):
     recording: Path | None = field(default=None, metadata={"stored": False})
     baseline: BaselineComparison | None = None
     assumptions: tuple[str, ...] = ()
+    on_rows: bool = False
 
     @property
     def within_tolerance(self) -> bool:

@@ -49,7 +49,7 @@ class Statistics:
         std: Standard deviation about the mean, of the samples themselves (n, not n - 1).
         p95: 95th percentile of the absolute values.
         t_max: When the largest stands, in [s] of the log.
-        sample_max: Grid sample of the largest, from 0.
+        sample_max: Row of the log with the largest, from 0.
         tolerance: Largest absolute value allowed, or None.
         out_of_tolerance: Compared samples above it or without a value; None without a tolerance.
         share_out: Their share of the compared samples, 0..1; None without a tolerance.
@@ -93,7 +93,7 @@ class Stretch:
 
     Attributes:
         samples: How many.
-        sample: The first of them, by its grid sample.
+        sample: The first of them, by its row of the log from 0.
         t: When it begins, in [s] of the log.
         duration: From its first to its last sample in [s].
     """
@@ -111,7 +111,7 @@ class Deviation(Shown):
     Attributes:
         name: The log's name, unique in the comparison.
         run: The ingested log.
-        sample: Grid samples that were compared, shape (m,).
+        sample: Rows of the log that were compared, from 0, shape (m,).
         t_ns: Their times on the log's clock in integer [ns], shape (m,).
         reference: Where the reference was, in [m], shape (m, 3).
         actual: Where the log was, aligned, in [m], shape (m, 3).
@@ -224,10 +224,8 @@ class Deviation(Shown):
         return np.asarray(self.actual[self.peak(one)])
 
     def row(self, one: Statistics) -> int:
-        """Return the log's row of numbers, from 1, that is nearest to where a quantity was largest."""
-        t_ns = self.run.log.t_ns
-        at = int(self.t_ns[self.peak(one)])
-        return int(np.argmin(np.abs(t_ns - at))) + 1
+        """Return the log's row of numbers, from 1, in which a quantity was largest."""
+        return one.sample_max + 1
 
     @property
     def decisive(self) -> Statistics:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import quaternions, slerp
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
@@ -23,7 +24,7 @@ class Matched:
     """Both sides at the samples that were compared.
 
     Attributes:
-        sample: Samples of the log, shape (m,).
+        sample: Rows of the log, from 0, shape (m,).
         t_ns: Their times on the log's clock in integer [ns], shape (m,).
         reference: Where the reference was, in [m], shape (m, 3).
         actual: Where the log was, aligned, in [m], shape (m, 3).
@@ -66,45 +67,53 @@ NO_ROBOT = ("no robot, so no forward kinematics", Hint("robot", None, "gives one
 
 
 def by_kinematics(run: Run) -> Trajectory:
-    """Return where a run's tool centre point was by its joints, on its grid.
+    """Return where a run's tool centre point was by its joints, on its log's own rows.
 
     Raises:
         LogError: If it has no kinematics.
     """
-    if run.tcp is None:
+    if run.tcp is None or run.robot is None:
         raise LogError(lacking(run, *NO_ROBOT))
-    quat = continuous_quaternions(quaternions(run.tcp.euler_zyx, "zyx"))
-    return _trajectory(run, run.tcp.position, quat)
+    rows = run.on_rows
+    if run.rows is None:
+        position, quat = run.tcp.position, quaternions(run.tcp.euler_zyx, "zyx")
+    else:
+        position, rotation = poses_over_log(run.robot, rows.q)
+        quat = quaternions(rotation.reshape(-1, 9), "matrix")
+    broken = np.unique([one.sample - 1 for one in run.audit if one.kind in ("unexplained", "ambiguous")])
+    return replace(_trajectory(run, position, continuous_quaternions(quat)), broken=broken.astype(np.int64))
 
 
 def as_recorded(run: Run) -> Trajectory:
-    """Return where a run recorded its tool centre point itself, on its grid.
+    """Return where a run recorded its tool centre point itself, on its log's own rows.
 
     Raises:
         LogError: If it recorded none.
     """
-    if run.tcp_recorded is None:
+    if run.log.tcp_position is None:
         hint = Hint("tcp", "fk", "goes by the joints of a log with a robot")
         raise LogError(lacking(run, "no recorded tool centre point", hint))
-    return _trajectory(run, run.tcp_recorded, _recorded_quat(run))
+    return _trajectory(run, run.log.tcp_position, run.log.tcp_quat_xyzw)
 
 
 def _trajectory(run: Run, position: FloatArray, quat: FloatArray | None) -> Trajectory:
     """Return where a run was, with the joints that it has."""
-    joints, units = run.log.joints, tuple(run.joint_units)
-    q = run.q if joints else None
-    return Trajectory(run.name, run.t_ns, position, run.log.files, quat, joints, units, q)
+    joints, units, rows = run.log.joints, tuple(run.joint_units), run.on_rows
+    q = rows.q if joints else None
+    return Trajectory(run.name, rows.t_ns, position, run.log.files, quat, joints, units, q)
 
 
 def match(reference: Trajectory, log: Trajectory, sync: Sync) -> Matched:
-    """Return both sides at the log's samples; the reference is interpolated there.
+    """Return both sides at the log's own rows; the reference is interpolated there.
 
     Positions and joints are interpolated linearly, orientations on the great arc. Samples outside the time of
-    the reference, inside a gap of it, or without a position of their own are left out and counted.
+    the reference, inside a gap or a broken step of it, or without a position of their own are left out and
+    counted.
     """
     shift = round(sync.offset * 1e9)
     at_ns = log.t_ns + shift
     wanted = interpolate(at_ns, reference.t_ns, reference.position)
+    wanted[_inside_broken(at_ns, reference)] = np.nan
     sample = np.flatnonzero(np.isfinite(wanted).all(axis=1) & np.isfinite(log.position).all(axis=1))
     at_ns = at_ns[sample]
     reference_q, actual_q = _joints(reference, log, sample, at_ns)
@@ -124,6 +133,15 @@ def match(reference: Trajectory, log: Trajectory, sync: Sync) -> Matched:
         sync=sync,
         alignment=Alignment(),
     )
+
+
+def _inside_broken(at_ns: IntArray, reference: Trajectory) -> NDArray[np.bool_]:
+    """Return which times lie strictly inside a broken step of the reference, shape (m,)."""
+    if reference.broken is None or not len(reference.broken):
+        return np.zeros(len(at_ns), np.bool_)
+    after = np.searchsorted(reference.t_ns, at_ns, side="left")
+    at_sample = reference.t_ns[np.minimum(after, len(reference.t_ns) - 1)] == at_ns
+    return np.asarray(np.isin(after - 1, reference.broken) & ~at_sample)
 
 
 def joints_apart(reference: Trajectory, joints: tuple[str, ...], units: tuple[str, ...]) -> str:
@@ -166,14 +184,6 @@ def _joints(
     if order is None or apart or reference.q is None or log.q is None:
         return None, None
     return interpolate(at_ns, reference.t_ns, reference.q[:, order]), log.q[sample]
-
-
-def _recorded_quat(run: Run) -> FloatArray | None:
-    """Return the orientation that a run recorded, on its grid."""
-    form, values = run.log.rotation_form, run.rotation_recorded
-    if form is None or values is None:
-        return None
-    return continuous_quaternions(quaternions(values, "quat_xyzw" if form == "matrix" else form))
 
 
 def _between(at_ns: IntArray, reference: Trajectory) -> FloatArray | None:

@@ -49,7 +49,7 @@ def describe(
 ) -> Statistics:
     """Return the statistics of one quantity over the samples that have a value, and the verdict on all.
 
-    The quantity has a value at least at one of the grid samples, shape (m,), whose times are in [s], shape
+    The quantity has a value at least at one of the log's rows, shape (m,), whose times are in [s], shape
     (m,). The tolerance is in [m] or [rad], by kind or by coordinate.
     """
     known = np.flatnonzero(np.isfinite(measured.values))

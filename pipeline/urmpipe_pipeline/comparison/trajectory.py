@@ -29,6 +29,8 @@ class Trajectory:
         joints: Names of the joints; none of a path.
         joint_units: rad or m, one a joint.
         q: Repolarized joint values in [rad] or [m], shape (m, joints); None without joints.
+        broken: Samples behind which a joint steps as no motion does, to the next one: nothing is known in
+            between, shape (k,).
     """
 
     name: str
@@ -39,6 +41,7 @@ class Trajectory:
     joints: tuple[str, ...] = ()
     joint_units: tuple[str, ...] = ()
     q: FloatArray | None = None
+    broken: IntArray | None = None
 
     @property
     def t(self) -> FloatArray:

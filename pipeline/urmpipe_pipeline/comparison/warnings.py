@@ -9,6 +9,7 @@ import numpy as np
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation
+from urmpipe_pipeline.comparison.matching import by_kinematics
 from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
 from urmpipe_pipeline.comparison.trajectory import Trajectory, extent
 from urmpipe_pipeline.joint_log import LogWarning
@@ -73,7 +74,7 @@ def _covered(one: Deviation, reference: Trajectory) -> str:
 
 def _beyond(one: Deviation, reference: Trajectory) -> int:
     """Return how many samples of a log lie outside the time of the reference."""
-    at_ns = one.run.t_ns + round(one.sync.offset * 1e9)
+    at_ns = one.run.on_rows.t_ns + round(one.sync.offset * 1e9)
     before, after = at_ns < reference.t_ns[0] - ROUNDING_NS, at_ns > reference.t_ns[-1] + ROUNDING_NS
     return int(np.count_nonzero(before | after))
 
@@ -92,9 +93,7 @@ def thin_evidence(one: Deviation) -> Iterator[LogWarning]:
 
 def _rests(one: Deviation) -> bool:
     """Tell whether a log stays where it is while it is compared: its tool centre point, and its joints."""
-    run = one.run
-    compared = (one.t_ns[0] <= run.t_ns) & (run.t_ns <= one.t_ns[-1])
-    return extent(one.actual) < AT_REST and extent(run.q[compared]) < AT_REST
+    return extent(one.actual) < AT_REST and extent(one.run.on_rows.q[one.sample]) < AT_REST
 
 
 def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
@@ -138,9 +137,9 @@ def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:
 
     The distance that is allowed is in [m].
     """
-    if run.tcp is None or run.tcp_recorded is None:
+    if run.tcp is None or run.log.tcp_position is None:
         return
-    apart = np.linalg.norm(run.tcp.position - run.tcp_recorded, axis=1)
+    apart = np.linalg.norm(by_kinematics(run).position - run.log.tcp_position, axis=1)
     if (known := apart[np.isfinite(apart)]).size and (most := float(known.max())) > allowed:
         said = f"by its joints it is up to {text.quantity(most, 'm')} from the tool centre point it recorded"
         remedy = f"this verdict does not judge it, a comparison of {run.name} alone does"

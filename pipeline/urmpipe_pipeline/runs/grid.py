@@ -24,6 +24,9 @@ REGULAR = 0.01
 ROUNDING_NS = 1000
 """Clocks are printed to the microsecond or finer: so much beyond the last known time is still at it."""
 
+RESAMPLED = "resampled"
+"""The kind of the warning that every run has whose grid is not the rows of its log."""
+
 MOST = 20_000_000
 """Samples of a grid, where a log does not have as many rows: more come of a broken clock or a mistyped period
 and would fill the memory."""
@@ -37,7 +40,7 @@ class Grid:
         t_ns: Times from the log's first row in integer [ns], shape (g,).
         tsp: Sampling period in [s]; 0 for a single sample.
         own: True if each sample is a row of the log, at its own time or that of the clock rounded to it.
-        source_ns: The rows' times in integer [ns], shape (n,).
+        source_ns: The rows' times in integer [ns], those of the regular clock behind rounded ones, shape (n,).
         warnings: What was changed.
     """
 
@@ -141,17 +144,17 @@ def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
     ideal = t[0] + np.arange(len(t)) * mean
     regular = bool(np.max(np.abs(t - ideal)) <= REGULAR * mean)
     clock = None if regular else behind_rounded(t)
-    if clock and (tsp is None or abs(tsp * 1e9 - clock.period) <= REGULAR * clock.period / len(t)):
-        even = clock.t_ns - clock.t_ns[0] + t[0]
-        return Grid(even, clock.period / 1e9, True, t, (_rounded(clock),))
-    wanted = tsp * 1e9 if tsp is not None else mean if regular else float(np.median(np.diff(t)))
-    if regular and abs(wanted - mean) <= REGULAR * mean / len(t):
-        return Grid(t, mean / 1e9, True, t, ())
-    count = int((t[-1] - t[0]) / wanted + 1e-6) + 1
+    own = t if clock is None else clock.t_ns - clock.t_ns[0] + t[0]
+    period = mean if regular else clock.period if clock else float(np.median(np.diff(t)))
+    wanted = period if tsp is None else tsp * 1e9
+    told = () if clock is None else (_rounded(clock),)
+    if (regular or clock) and abs(wanted - period) <= REGULAR * period / len(t):
+        return Grid(own, period / 1e9, True, own, told)
+    count = int((own[-1] - own[0]) / wanted + 1e-6) + 1
     _refuse_endless(log, wanted, count)
-    grid = np.rint(np.arange(count) * wanted).astype(np.int64) + t[0]
-    in_gap = inside_gaps(grid, t)
-    return Grid(grid, wanted / 1e9, False, t, tuple(_changes(log, wanted, count, in_gap)))
+    grid = np.rint(np.arange(count) * wanted).astype(np.int64) + own[0]
+    in_gap = inside_gaps(grid, own)
+    return Grid(grid, wanted / 1e9, False, own, (*told, *_changes(log, wanted, count, in_gap)))
 
 
 def _refuse_endless(log: JointLog, wanted: float, count: int) -> None:
@@ -179,7 +182,7 @@ def _changes(log: JointLog, wanted: float, count: int, in_gap: NDArray[np.bool_]
     said = f"{log.rows} rows with a median period of {median / 1e6:.6g} ms became {count} samples"
     left = int(in_gap.sum())
     inside = f"; {left} of them lie inside gaps and have no value" if left else ""
-    warnings = [LogWarning("resampled", f"{said} every {wanted / 1e6:.6g} ms (linear){inside}")]
+    warnings = [LogWarning(RESAMPLED, f"{said} every {wanted / 1e6:.6g} ms (linear){inside}")]
     if wanted < (1.0 - REGULAR) * median:
         said = f"the grid of {wanted / 1e6:.6g} ms is finer than the log's {median / 1e6:.6g} ms"
         why = "the samples between its rows are interpolated, not measured"

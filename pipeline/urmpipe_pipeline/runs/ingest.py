@@ -23,7 +23,7 @@ from urmpipe_pipeline.runs.derivatives import Method, derivatives, other_unit, r
 from urmpipe_pipeline.runs.grid import Grid, make_grid
 from urmpipe_pipeline.runs.plausibility import implausible
 from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.results import RowJoints, Run
 from urmpipe_pipeline.runs.robot_inference import infer_robot
 from urmpipe_pipeline.sources import ReadOptions, read_log
 from urmpipe_pipeline.sources.clocks.clock import unused_period
@@ -120,6 +120,7 @@ def run_of(
     return Run(
         name=name or log.name, log=log, robot=robot, tsp=grid.tsp, t_ns=grid.t_ns, q=q, qd=qd, qdd=qdd,
         tcp=tcp, tcp_recorded=recorded, audit=found.entries, warnings=(*warnings, *noticed), provenance=made,
+        rows=None if grid.own else RowJoints(grid.source_ns, found.q),
     )  # fmt: skip
 
 

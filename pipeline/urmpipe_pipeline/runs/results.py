@@ -11,6 +11,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.display import line_of, number_of
+from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_models.orientation import NAMES, angles
 from urmpipe_models.spelling import Voice
@@ -18,12 +19,25 @@ from urmpipe_pipeline.joint_log import JointLog, LogWarning, seconds
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
-from urmpipe_pipeline.runs.grid import interpolate
+from urmpipe_pipeline.runs.grid import RESAMPLED, interpolate
 
 if TYPE_CHECKING:
     import pandas as pd
 
 SCHEMA = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RowJoints:
+    """The joints on the file's own rows: where a log is judged.
+
+    Attributes:
+        t_ns: Times of the rows in integer [ns], those of the regular clock behind rounded ones, shape (n,).
+        q: Repolarized joint values in [rad] or [m], shape (n, joints).
+    """
+
+    t_ns: IntArray
+    q: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -45,6 +59,7 @@ class Run(Result):
         warnings: What a person should know.
         provenance: How to repeat it.
         recording: Where it was written.
+        rows: The joints on the file's rows where the grid has other samples; else None.
     """
 
     name: str
@@ -61,6 +76,26 @@ class Run(Result):
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
     recording: Path | None = field(default=None, metadata={"stored": False})
+    rows: RowJoints | None = None
+
+    @property
+    def resampled(self) -> bool:
+        """Whether its grid has other samples than the rows of the log."""
+        return any(one.kind == RESAMPLED for one in self.warnings)
+
+    @property
+    def on_rows(self) -> RowJoints:
+        """The joints on the file's own rows.
+
+        Raises:
+            LogError: If the run was recorded when they were not kept.
+        """
+        if self.rows is None and self.resampled:
+            said = (
+                "found a recording of the grid alone, allowed: one with the log's rows; ingest the log again"
+            )
+            raise LogError(Finding(said, self.log.files[0].name if self.log.files else self.name))
+        return self.rows or RowJoints(self.t_ns, self.q)
 
     @property
     def t(self) -> FloatArray:

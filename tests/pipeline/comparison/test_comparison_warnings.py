@@ -141,12 +141,12 @@ def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told(ar
     run = arms({"bad": np.zeros((50, 6))}).runs[0].run
     assert run.tcp is not None
     for away, expected in ((0.0005, []), (0.005, ["recorded-tcp-apart"])):
-        beside = replace(run, tcp_recorded=run.tcp.position + np.array([0.0, 0.0, away]))
+        beside = replace(run, log=replace(run.log, tcp_position=run.tcp.position + np.array((0, 0, away))))
         assert [one.kind for one in recorded_apart(beside, 1e-3)] == expected
     usual = "usual up to 5 mm where a controller knows its arm's calibration, which the robot here lacks"
     more = "more than a calibration makes (5 mm): another robot, tool or base?"
     for away, shown, cause in ((0.00104, "1.0400", usual), (0.0051, "5.1000", more)):
-        beside = replace(run, tcp_recorded=run.tcp.position + np.array([0.0, 0.0, away]))
+        beside = replace(run, log=replace(run.log, tcp_position=run.tcp.position + np.array((0, 0, away))))
         assert next(recorded_apart(beside, 1e-3)).message == (
             f"by its joints it is up to {shown} mm from the tool centre point it recorded, {cause};"
             " this verdict does not judge it, a comparison of bad alone does"

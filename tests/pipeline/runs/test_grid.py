@@ -108,7 +108,7 @@ def test_a_clock_rounded_to_milliseconds_is_regular_and_that_is_said() -> None:
     assert grid.own
     assert grid.tsp == pytest.approx(1 / 300, rel=1e-5)  # a millisecond in a second, over 300 rows
     assert np.abs(grid.t_ns - t).max() <= MS
-    np.testing.assert_array_equal(grid.source_ns, t)
+    np.testing.assert_array_equal(grid.source_ns, grid.t_ns)
     assert [(w.kind, w.message) for w in grid.warnings] == [
         (
             "clock-rounded",
@@ -116,7 +116,9 @@ def test_a_clock_rounded_to_milliseconds_is_regular_and_that_is_said() -> None:
             " the rows are taken as regular",
         )
     ]
-    assert not make_grid(log_at(t), 0.01).own
+    wider = make_grid(log_at(t), 0.01)
+    assert not wider.own
+    np.testing.assert_array_equal(wider.source_ns, grid.t_ns)  # another grid changes no time of a row
 
 
 def test_a_grid_that_would_fill_the_memory_is_refused() -> None:
