@@ -61,9 +61,10 @@ def against_baseline(
 
     Logs are the same if their names are; where both comparisons are of one log, these are held against each
     other whatever they are called. A log of a baseline that was judged on a grid instead of its rows is
-    listed as made otherwise: its figures do not compare. A quantity is worse if its largest value or its rms grew by more than the
-    noise, if more of its samples are out of the same tolerance than the noise can have put there, or if it
-    rests on less than nine tenths of the samples, counted by the time that they stand for.
+    listed as made otherwise: its figures do not compare. A quantity is worse if its largest value or its rms
+    grew by more than the noise, if more of its samples are out of the same tolerance than the noise can have
+    put there, or if it rests on less than nine tenths of the samples, counted by the time that they stand
+    for.
 
     Args:
         now: The comparison to judge.

@@ -40,7 +40,7 @@ class Grid:
         t_ns: Times from the log's first row in integer [ns], shape (g,).
         tsp: Sampling period in [s]; 0 for a single sample.
         own: True if each sample is a row of the log, at its own time or that of the clock rounded to it.
-        source_ns: The rows' times in integer [ns], those of the regular clock behind rounded ones, shape (n,).
+        source_ns: Times of the rows in integer [ns], of rounded ones those of the clock behind, shape (n,).
         warnings: What was changed.
     """
 

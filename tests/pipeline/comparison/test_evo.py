@@ -11,7 +11,7 @@ from evo.core.trajectory import PoseTrajectory3D
 from evo.tools.file_interface import read_tum_trajectory_file
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
 from asserting import there
 from exported import export_result
@@ -21,7 +21,9 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import AlignMode
-from urmpipe_pipeline.runs.ingest import ingest_log
+from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.runs.ingest import ingest_log, run_of
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables import ExportOptions
@@ -75,6 +77,39 @@ def test_errors_of_random_trajectories_are_those_of_evo(align: AlignMode, seed: 
     deviation = compare_runs(runs[0], runs[1:], CompareOptions(align=align)).runs[0]
     assert len(deviation.sample) == count
     assert_agree(deviation, runs[0], runs[1], align)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_errors_of_irregular_logs_are_those_of_evo_at_their_rows(seed: int) -> None:
+    """Both sides at the rows that are compared: the reference is interpolated there by SciPy."""
+    rng = np.random.default_rng(seed)
+    reference, log = (
+        path_at(np.cumsum(rng.uniform(0.002, 0.006, 300)), rng, name) for name in ("reference", "log")
+    )
+    assert log.resampled
+    one = compare_runs(reference, [log]).runs[0]
+    at = log.log.t[one.sample]
+    wanted = [np.interp(at, reference.log.t, column) for column in there(reference.log.tcp_position).T]
+    turned = Slerp(reference.log.t, Rotation.from_quat(there(reference.log.tcp_rotation)))(at)
+    moved = there(log.log.tcp_position)[one.sample], there(log.log.tcp_rotation)[one.sample]
+    sides = ((np.column_stack(wanted), turned.as_quat()), moved)
+    as_evos = [PoseTrajectory3D(p, q[:, [3, 0, 1, 2]], at) for p, q in sides]
+    distance, angle = evo_errors(*as_evos, "none")
+    np.testing.assert_allclose(one.delta[:, 3], distance, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(there(one.angle), angle, rtol=0, atol=1e-9)
+
+
+def path_at(t: FloatArray, rng: np.random.Generator, name: str) -> Run:
+    """Return the run of a path with an orientation, at these times in [s]."""
+    t_ns = np.rint((t - t[0]) * 1e9).astype(np.int64)
+    turn = np.column_stack([np.sin(t), 0.5 * np.cos(t), t]) + rng.normal(0, 0.01, (len(t), 3))
+    quat = Rotation.from_rotvec(turn)
+    log = JointLog(
+        name, "path", (), t_ns, (), np.empty((len(t), 0)),
+        tcp_position=rng.uniform(-1, 1, (len(t), 3)), tcp_rotation=quat.as_quat(), rotation_form="quat_xyzw",
+    )  # fmt: skip
+    return run_of(log, None, ReadOptions(), made=provenance("ingest", {}, ()))
 
 
 @pytest.mark.parametrize("align", ["none", "start", "rigid"])

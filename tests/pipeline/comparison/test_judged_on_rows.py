@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -91,7 +92,7 @@ def test_the_log_s_own_spike_fails_where_the_grid_would_lose_half_of_it() -> Non
 @pytest.mark.parametrize("rounded", [False, True])
 def test_no_grid_changes_a_verdict(tmp_path: Path, *, rounded: bool) -> None:
     rng = np.random.default_rng(1)
-    t = np.round(np.arange(300) / 300, 3) if rounded else uneven(300, 3)
+    t: FloatArray = np.round(np.arange(300) / 300, 3) if rounded else uneven(300, 3)
     q = motion(t) + rng.normal(0, 1e-3, (300, 6))
     names = ["asked", "done"]
     for name, values in zip(names, (motion(t), q), strict=True):
@@ -107,7 +108,7 @@ def test_no_grid_changes_a_verdict(tmp_path: Path, *, rounded: bool) -> None:
 
 
 def test_nothing_is_interpolated_across_gaps_and_steps_of_the_reference() -> None:
-    t = np.arange(100) * 0.01
+    t: FloatArray = np.arange(100) * 0.01
     q = motion(t)
     q[50:] += np.pi / 2 + 0.2  # a step that no motion explains
     kept = np.delete(np.arange(100), np.arange(20, 30))
@@ -122,7 +123,7 @@ def test_nothing_is_interpolated_across_gaps_and_steps_of_the_reference() -> Non
 
 def test_rows_count_alike_however_far_apart_they_are() -> None:
     """As in evo: a mean over rows, not over time."""
-    t = np.concatenate((np.arange(90) * 0.001, 0.1 + np.arange(10) * 0.1))
+    t: FloatArray = np.concatenate((np.arange(90) * 0.001, 0.1 + np.arange(10) * 0.1))
     q = motion(t)
     wanted = positions_over_log(UR5E, q)
     wanted[90:, 0] += 0.002
@@ -143,7 +144,7 @@ def test_a_baseline_made_on_the_grid_is_listed_as_made_otherwise_and_not_as_wors
     assert [(one.what, one.before, one.now) for one in found.differences] == [
         ("judged on of log", "the grid", "the log's rows")
     ]
-    regular = np.arange(200) * 0.005
+    regular: FloatArray = np.arange(200) * 0.005
     q = motion(regular)
     wanted = positions_over_log(UR5E, q)
     now = compare_runs(path(regular, wanted + 0.001), [joint_log(regular, q)])
@@ -154,7 +155,5 @@ def test_a_baseline_made_on_the_grid_is_listed_as_made_otherwise_and_not_as_wors
 
 def before_rows(result: Comparison) -> Comparison:
     """Return a comparison as recordings hold it that were made before logs were judged on their rows."""
-    from dataclasses import replace
-
     runs = tuple(replace(one, run=replace(one.run, rows=None)) for one in result.runs)
     return replace(result, runs=runs, on_rows=False)
