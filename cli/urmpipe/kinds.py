@@ -54,6 +54,10 @@ def _are_arguments(value: Any) -> bool:
     )  # fmt: skip
 
 
+def _are_sides(value: Any) -> bool:
+    return isinstance(value, (tuple, list)) and len(value) == 2 and all(map(_is_text, value))
+
+
 def _is_robot(value: Any) -> bool:
     from urmpipe_models.chains.chain import Chain
 
@@ -156,6 +160,7 @@ KINDS = {
     "rows": _one_of("grid", "file"),
     "run": Kind(_is_run, "a Run, such as urmpipe.ingest(LOG)"),
     "seed": COUNT,
+    "sides": Kind(_are_sides, 'two words in the names of columns, such as ("target", "actual")'),
     "step": SECONDS,
     "strict": FLAG,
     "sync": Kind(

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError, RecordingError, for_each
+from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError, for_each
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording import is_recording
@@ -70,7 +70,61 @@ def load_runs(
             found = (one if one.file else replace(one, file=str(operand)) for one in error.findings)
             raise LogError(*found) from error
 
-    return for_each(run_of, operands)
+    return _told_apart(operands, for_each(run_of, operands))
+
+
+def load_sides(
+    operands: Sequence[Path | MadeRun],
+    sides: tuple[str, str],
+    *,
+    robot: Chain | None = None,
+    read: ReadOptions | None = None,
+    tsp: float | None = None,
+    derivative: Method | None = None,
+) -> list[Run]:
+    """Return both sides of one log as runs: what was asked for, then what was done.
+
+    Args:
+        operands: The log (CSV), or a folder whose CSV files make it.
+        sides: A word in the names of the columns of each side, or "rest" for all others.
+        robot: The arm; None for the one that a side singles out.
+        read: How to read the log.
+        tsp: Period of the grid in [s].
+        derivative: How the joints are differentiated.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with it.
+        OptionError: If there is more than one log, or it is a recording.
+    """
+    log = operands[0]
+    if len(operands) > 1 or not isinstance(log, Path) or _is_recording(log) or sides[0] == sides[1]:
+        found = ",".join(sides) + (" with several logs" if len(operands) > 1 else "")
+        allowed = "two words for two sides of one log that is yet to be read"
+        raise OptionError(Finding(parameter="sides", found=found, allowed=allowed))
+
+    def run_of(side: tuple[str, str]) -> Run:
+        """Return the run of one side."""
+        one = replace(read or ReadOptions(), side=side)
+        name = f"{log.resolve().stem} ({side[0]})"
+        return ingest_log(log_files(log), robot=robot, read=one, tsp=tsp, derivative=derivative, name=name)
+
+    runs = for_each(run_of, (sides, sides[::-1]))
+    found_arm = next((run.robot for run in runs if run.robot), None)
+    return [on_robot(run, found_arm) if run.log.joints and run.robot is None else run for run in runs]
+
+
+def _told_apart(operands: Sequence[Path | MadeRun], runs: Sequence[Run]) -> list[Run]:
+    """Return runs of which no two have one name: those of files by their folders, too."""
+    names = [run.name for run in runs]
+
+    def named(operand: Path | MadeRun, run: Run) -> Run:
+        """Return a run under a name of its own."""
+        if names.count(run.name) == 1 or not isinstance(operand, Path):
+            return run
+        path = operand.resolve()
+        return replace(run, name=f"{path.name if path.is_dir() else path.stem} ({path.parent.name})")
+
+    return [named(*pair) for pair in zip(operands, runs, strict=True)]
 
 
 def _recorded(operand: Path) -> MadeRun:

@@ -33,7 +33,7 @@ from urmpipe_pipeline.comparison.tables import statistics_rows
 from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.warnings import BEYOND, EXCHANGED, LARGE_NOISE, large_noises
-from urmpipe_pipeline.operands import MadeRun, is_log, load_comparison, load_runs
+from urmpipe_pipeline.operands import MadeRun, is_log, load_comparison, load_runs, load_sides
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.results import kind_of, present, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
@@ -66,6 +66,7 @@ def compare(
     tcp: Tcp = "fk",
     sync: SyncOption = "start",
     align: AlignMode = "none",
+    sides: tuple[str, str] | None = None,
     baseline: PathLike | Comparison | None = None,
     noise: float | Mapping[str, float] | None = None,
     strict: bool = False,
@@ -95,6 +96,8 @@ def compare(
         tcp: Where a log was: fk or recorded.
         sync: How the clocks are put together: start, auto, or t_reference - t_log in [s].
         align: How a log is moved in space first: none, start, rigid or tool.
+        sides: Two words in the names of the columns of one log, such as ("target", "actual"): what was asked
+            for is the reference of what was done; "rest" for the columns without the other word.
         baseline: An earlier comparison, to tell what changed since.
         noise: Changes since then that mean nothing, in [m], or in [m] and [rad] by kind; default: 1 um and
             1 urad.
@@ -123,9 +126,10 @@ def compare(
         options = CompareOptions(_allowed(tolerance), tcp, sync, align, _with_unit(tolerance))
         level = _noise_level(noise, baseline)
         given = resolved(reading, robot, base, tool, base_link, tip_link)
-        _refuse_unused(operands, {**reading, "tsp": tsp, "derivative": derivative})
+        _refuse_unused(operands, {**reading, "tsp": tsp, "derivative": derivative, "sides": sides})
         earlier = None if baseline is None else _earlier(baseline)
-        load = partial(load_runs, robot=given.arm, read=given.options, tsp=tsp, derivative=derivative)
+        loader = load_runs if sides is None else partial(load_sides, sides=sides)
+        load = partial(loader, robot=given.arm, read=given.options, tsp=tsp, derivative=derivative)
         made = None if operands[1:] or earlier is None else _made_before(reference, output)
         made = made or _compared(operands, load, options)
         if earlier is not None:

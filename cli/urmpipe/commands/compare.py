@@ -55,6 +55,21 @@ def _noise(text: str) -> dict[str, float]:
     return parse_noise(text)
 
 
+def _sides(text: str) -> tuple[str, ...]:
+    """Return the two words.
+
+    Raises:
+        OptionError: If there are not two.
+    """
+    from urmpipe_models.errors import OptionError, shown
+
+    words = tuple(word.strip() for word in text.split(","))
+    if len(words) != 2 or not all(words):
+        raise OptionError(f"found {shown(text)}, allowed: two words, such as target,actual")
+    return words
+
+
+SIDES = ParsedType("REFERENCE,LOG", _sides)
 SYNC = ParsedType("sync", _sync)
 
 
@@ -101,6 +116,12 @@ def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command]
     show_default=True,
     help="Move the log first: to the same start pose, by the best rigid motion, by the best tool offset.",
 )
+@click.option(
+    "--sides",
+    type=SIDES,
+    help="Both sides of one log, by words in the names of its columns: target,actual; desired,actual;"
+    " commanded,measured. rest: the columns without the other word.",
+)
 @_file("--junit", metavar="FILE.xml", help="Write the verdicts as JUnit XML, for GitLab, Jenkins and GitHub.")
 @_file(
     "--csv",
@@ -133,7 +154,8 @@ def compare(
 
     REFERENCE is a path (t, x, y, z), a log, or a recording; so is each LOG. With REFERENCE alone, the
     forward kinematics of that log are held against the tool centre point that it recorded itself. A
-    folder stands for the files of one log. With --baseline, REFERENCE alone may be the recording of a
+    folder stands for the files of one log. With --sides, REFERENCE holds what was asked for and what was
+    done. With --baseline, REFERENCE alone may be the recording of a
     comparison, which stands as it was made.
 
     \b
@@ -141,6 +163,7 @@ def compare(
       urmpipe compare path.csv log.csv --robot urm6
       urmpipe compare path.csv coppelia.csv matlab.csv plots/ --robot urm6 --json
       urmpipe compare log.csv --robot ur5e --tolerance axis=2mm,angle=0.5deg
+      urmpipe compare rtde.csv --sides target,actual --robot ur5e
       urmpipe compare path.csv log.csv --robot urm6 --junit v.xml --csv v.csv
       urmpipe compare today.rrd --baseline released.rrd --noise 5um
 

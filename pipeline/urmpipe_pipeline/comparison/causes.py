@@ -32,7 +32,7 @@ def causes(run: Deviation, reference: Trajectory) -> Iterator[Advice]:
     enough for what decides.
     """
     if run.verdict == "fail":
-        yield from _late(run, reference)
+        yield from _late(run, reference) if run.statistics else ()
         yield from _zeros(run)
 
 

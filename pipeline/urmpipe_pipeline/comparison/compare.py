@@ -15,7 +15,16 @@ from urmpipe_pipeline.comparison.alignment import align
 from urmpipe_pipeline.comparison.assumptions import assumptions
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.matching import NO_ROBOT, as_recorded, by_kinematics, file_of, lacking, match
+from urmpipe_pipeline.comparison.matching import (
+    JOINTS_ALONE,
+    NO_ROBOT,
+    as_recorded,
+    by_joints_alone,
+    by_kinematics,
+    file_of,
+    lacking,
+    match,
+)
 from urmpipe_pipeline.comparison.measure import measure, unheld
 from urmpipe_pipeline.comparison.sync import SyncOption, check_sync, sync_doubts, synchronise
 from urmpipe_pipeline.comparison.tolerance import check_tolerance
@@ -68,15 +77,18 @@ class CompareOptions:
         check_choice("align", self.align, get_args(AlignMode))
 
 
-def trajectory(run: Run, tcp: Tcp = "fk") -> Trajectory:
+def trajectory(run: Run, tcp: Tcp = "fk", *, alone: bool = False) -> Trajectory:
     """Return where a run's tool centre point was, on its log's own rows.
 
-    A log without joints (a path) is where it recorded itself; one with joints goes by `tcp`.
+    A log without joints (a path) is where it recorded itself; one with joints goes by `tcp`, or nowhere where
+    the joints alone are compared.
 
     Raises:
         LogError: If the run has neither kinematics nor a recorded position to go by.
     """
-    return by_kinematics(run) if run.log.joints and tcp == "fk" else as_recorded(run)
+    if not run.log.joints or tcp == "recorded":
+        return as_recorded(run)
+    return by_joints_alone(run) if alone else by_kinematics(run)
 
 
 def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | None = None) -> Comparison:
@@ -101,10 +113,11 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     if not runs:
         raise OptionError("compare: no log to hold against the reference; at least one is needed")
     _refuse_poses_as_motion(reference, runs, chosen.sync)
-    wanted = trajectory(reference, chosen.tcp if reference.log.joints else "recorded")
-    names = text.unique([run.name for run in runs])
+    alone = _joints_alone(reference, runs, chosen)
+    wanted = trajectory(reference, chosen.tcp, alone=alone)
+    names = text.unique([reference.name, *(run.name for run in runs)])[1:]
     deviations = for_each(
-        lambda named: _deviation(*named, wanted, trajectory(named[1], chosen.tcp), chosen),
+        lambda named: _deviation(*named, wanted, trajectory(named[1], chosen.tcp, alone=alone), chosen),
         zip(names, runs, strict=True),
     )
     told = [*(one.of(reference.name) for one in reference.warnings), *exchanged(reference, runs)]
@@ -116,6 +129,21 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
         failed = [one for one in deviations if one.verdict == "fail"]
         told += [hint.of(one.name) for one in failed for hint in lacking_tool(one.run.robot, one.run.log)]
     return _comparison(wanted, deviations, chosen, told, _taken_for_granted(reference, runs, chosen))
+
+
+def _joints_alone(reference: Run, runs: Sequence[Run], options: CompareOptions) -> bool:
+    """Tell whether joints are held against joints without a place in space: nothing else is judged.
+
+    Raises:
+        LogError: If a place is judged, and a run with joints has no kinematics.
+    """
+    every = (reference, *runs)
+    lacks = [run for run in every if run.log.joints and run.tcp is None]
+    if not lacks or options.tcp == "recorded" or not all(run.log.joints for run in every):
+        return False
+    if options.align == "none" and set(options.tolerance) == {"joint"}:
+        return True
+    raise LogError(*(lacking(run, *NO_ROBOT, JOINTS_ALONE) for run in lacks))
 
 
 def _taken_for_granted(reference: Run, runs: Sequence[Run], options: CompareOptions) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def by_tolerance(run: Deviation) -> tuple[bool, float, float]:
     """Return how far out of its tolerance a log is, the furthest last: share used up, then the rms norm."""
-    return run.verdict == "fail", run.decisive.used or 0.0, run.statistics["norm"].rms
+    return run.verdict == "fail", run.decisive.used or 0.0, run.statistics.get("norm", run.decisive).rms
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

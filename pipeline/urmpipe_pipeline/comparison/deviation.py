@@ -128,7 +128,8 @@ class Deviation(Shown):
         alignment: How the log was moved in space.
         left_out: Samples of the log without a reference or without a value.
         reference_left_out: Samples of the reference outside the log's time.
-        statistics: One for each of x, y, z, norm and path, and for angle where there is one.
+        statistics: One for each of x, y, z, norm and path, and for angle where there is one; none where
+            joints alone are compared.
         joint_statistics: One a joint, by its name in the log; none where a side has no joints.
         start: delta at the first compared sample in [m]: x, y, z, norm (the paper's mutual calibration).
         speed_correlation: Pearson's r of the norm and the speed; None where one of them does not change.
@@ -171,7 +172,7 @@ class Deviation(Shown):
     @property
     def worst(self) -> int:
         """Index into the compared samples of the largest norm."""
-        return int(np.argmax(self.delta[:, 3]))
+        return int(np.argmax(self.delta[:, 3])) if self.statistics else self.decided_at
 
     @property
     def share_out(self) -> float:
@@ -203,7 +204,7 @@ class Deviation(Shown):
         """Every quantity at the compared samples in [m] or [rad], shape (m,) each; as `all_statistics`."""
         angle = () if self.angle is None else (self.angle,)
         joints = () if self.joint_delta is None else tuple(self.joint_delta.T)
-        return (*self.delta.T, self.path, *angle, *joints)
+        return (*self.delta.T, self.path, *angle, *joints) if self.statistics else joints
 
     def furthest_joint(self, unit: str) -> Statistics | None:
         """Return the joint in rad or m that is furthest off; None without one."""
@@ -219,9 +220,10 @@ class Deviation(Shown):
         """Index into the compared samples of what decides; the norm need not be largest there."""
         return self.peak(self.decisive)
 
-    def place(self, one: Statistics) -> FloatArray:
-        """Return where the log was when one of its quantities was largest, in [m], shape (3,)."""
-        return np.asarray(self.actual[self.peak(one)])
+    def place(self, one: Statistics) -> tuple[float, float, float] | None:
+        """Return where the log was when one of its quantities was largest, in [m]; None without a place."""
+        x, y, z = (float(value) for value in self.actual[self.peak(one)])
+        return (x, y, z) if self.statistics else None
 
     def row(self, one: Statistics) -> int:
         """Return the log's row of numbers, from 1, in which a quantity was largest."""
@@ -231,7 +233,8 @@ class Deviation(Shown):
     def decisive(self) -> Statistics:
         """The quantity that uses up most of its tolerance; the norm where nothing has one."""
         held = [one for one in self.all_statistics if one.used is not None]
-        return max(held, key=lambda one: one.used or 0.0, default=self.statistics["norm"])
+        otherwise = self.statistics.get("norm", self.all_statistics[0])
+        return max(held, key=lambda one: one.used or 0.0, default=otherwise)
 
     def _headline(self) -> str:
         """Return its verdict, and by what it is decided."""
@@ -256,7 +259,8 @@ class Deviation(Shown):
     def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the JSON object of one run."""
         worst, longest = self.worst, self.longest_out
-        angle, norm = self.statistics.get("angle"), float(self.delta[worst, 3])
+        told = {name: one.to_dict() for name, one in self.statistics.items()}
+        norm = float(self.delta[worst, 3]) if told else None
         return {
             "name": self.name,
             "samples": len(self.sample),
@@ -266,12 +270,12 @@ class Deviation(Shown):
             "sync_offset": self.sync.offset,
             "sync": self.sync.to_dict(),
             "alignment": self.alignment.to_dict(),
-            "delta": {axis: self.statistics[axis].to_dict() for axis in AXES},
-            "path": self.statistics["path"].to_dict(),
-            "angle": None if angle is None else angle.to_dict(),
+            "delta": {axis: told[axis] for axis in AXES if told},
+            "path": told.get("path"),
+            "angle": told.get("angle"),
             "joints": {name: one.to_dict() for name, one in self.joint_statistics.items()},
             "joint_turns": dict(zip(self.joint_statistics, self.joint_turns, strict=True)),
-            "start": dict(zip(AXES, self.start, strict=True)),
+            "start": dict(zip(AXES, self.start, strict=True)) if told else {},
             "worst": {"t": float(self.t[worst]), "sample": int(self.sample[worst]), "norm": norm},
             "out_of_tolerance": int(np.count_nonzero(self.outside)),
             "share_out": self.share_out,

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.joint_log import LogWarning
@@ -42,7 +43,10 @@ def exports(comparison: Comparison) -> Exports:
 
 
 def delta_table(comparison: Comparison) -> ExportTable:
-    """Return the compared samples of all logs, one below the other: deviation, reference and actual in SI."""
+    """Return the compared samples of all logs, one below the other: deviation, reference and actual in SI.
+
+    Where joints alone are compared, their deviations, under the names that the first log has for them.
+    """
     runs = comparison.runs
     names = np.repeat([encodable(run.name) for run in runs], [len(run.sample) for run in runs])
     columns = [
@@ -50,7 +54,12 @@ def delta_table(comparison: Comparison) -> ExportTable:
         ExportColumn("sample", "", np.concatenate([run.sample for run in runs])),
         ExportColumn("t [s]", "s", Times(np.concatenate([run.t_ns for run in runs]), "s")),
     ]
-    for what, axes in (("delta", AXES), ("reference", AXES[:3]), ("actual", AXES[:3])):
+    placed = all(run.statistics for run in runs)
+    if not placed:
+        joints = [f"delta_{name}" for name in runs[0].joint_statistics]
+        values = np.concatenate([run.values for run in runs], axis=1).T
+        columns += columns_of(joints, runs[0].run.joint_units, values)
+    for what, axes in (("delta", AXES), ("reference", AXES[:3]), ("actual", AXES[:3])) if placed else ():
         values = np.concatenate([getattr(run, what) for run in runs])
         columns += columns_of([f"{what}_{axis}" for axis in axes], ["m"] * len(axes), values)
     outside = np.concatenate([run.outside for run in runs]).astype(np.int64)
@@ -85,7 +94,14 @@ def _deviation(run: Deviation) -> dict[str, Any]:
 
 
 def _poses(comparison: Comparison) -> list[Poses]:
-    """Return the reference and the log at the compared samples of each log, both on the log's clock."""
+    """Return the reference and the log at the compared samples of each log, both on the log's clock.
+
+    Raises:
+        RecordingError: If joints alone are compared.
+    """
+    if not comparison.worst.statistics:
+        where = str(comparison.recording or comparison.name)
+        raise RecordingError(Finding("a comparison of joints alone, so no pose", where))
     found = []
     for one in comparison.runs:
         clock = one.run.log.clock_start_ns + one.t_ns

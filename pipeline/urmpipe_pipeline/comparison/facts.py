@@ -15,7 +15,6 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
 from urmpipe_pipeline.comparison.trajectory import Sync
 from urmpipe_pipeline.comparison.wording import decided_words, out_words, size_of, stretch_words, used_words
-from urmpipe_pipeline.presentation.parts import spot_at
 from urmpipe_pipeline.presentation.section import Advice, Fact, Place, Ref, Value
 from urmpipe_pipeline.runs.parts import log_facts
 
@@ -27,8 +26,14 @@ def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
     yield Fact("Decided by", decided_words(held))
     if not held.missing:
         yield Fact("Data row", Value(one.row(held)))
-    yield Fact("Position", Place(spot_at(one.place(held))))
+    yield Fact("Position", placed(one, held))
     yield from _furthest_joint(one)
+
+
+def placed(one: Deviation, held: Statistics) -> Place | None:
+    """Return where a log was when a quantity of it was largest; None where joints alone are compared."""
+    place = one.place(held)
+    return None if place is None else Place(place)
 
 
 def largest(one: Statistics | None, *, most: bool = False) -> Value | None:
@@ -44,7 +49,7 @@ def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     yield Fact(size_of(held), largest(held), used_words(held), brief=False)
     yield Fact("Time", Value(held.t_max, "s"), brief=False)
     yield Fact("Data row", Value(one.row(held)), brief=False)
-    yield Fact("Position", Place(spot_at(one.place(held))), brief=False)
+    yield Fact("Position", placed(one, held), brief=False)
     yield from (replace(fact, brief=False) for fact in _furthest_joint(one))
     compared = f"{text.counted(len(one.sample), 'sample')} over {text.seconds(one.duration)} s"
     yield Fact("Compared", compared)

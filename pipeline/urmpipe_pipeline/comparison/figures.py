@@ -20,7 +20,7 @@ from urmpipe_pipeline.palette import (
 )
 from urmpipe_pipeline.presentation.digits import written
 from urmpipe_pipeline.presentation.figure import Figure, Line, Over, Panel, SpaceFigure, View
-from urmpipe_pipeline.presentation.parts import ends, spot_at
+from urmpipe_pipeline.presentation.parts import ends
 from urmpipe_pipeline.presentation.scene import Path, Spot
 from urmpipe_pipeline.presentation.section import Value
 from urmpipe_pipeline.runs.figures import joints_figure, motion_figure, speed_figure
@@ -33,9 +33,9 @@ STRENGTHS = ((0.7, "strongly"), (0.4, "moderately"), (0.2, "weakly"))
 
 
 def overview_figure(comparison: Comparison) -> Iterator[Figure]:
-    """Yield the norm of every log over its own time, from best to worst; nothing of a single log."""
+    """Yield the norm of every log over its own time, from best to worst; nothing of a single one."""
     ranking = comparison.ranking
-    if len(ranking) < 2:
+    if len(ranking) < 2 or not all(one.statistics for one in ranking):
         return
     largest = [one.statistics["norm"].max for one in ranking]
     logarithmic = min(largest) > 0.0 and max(largest) > APART * min(largest)
@@ -63,7 +63,8 @@ def overview_figure(comparison: Comparison) -> Iterator[Figure]:
 
 def deviation_figures(one: Deviation) -> Iterator[Figure]:
     """Yield the plots of a compared log: how it deviates, then how it moves."""
-    yield _deviation(one)
+    if one.statistics:
+        yield _deviation(one)
     yield from _joints(one)
     yield from joints_figure(one.run, 1 if one.joint_delta is not None else None)
     if np.isfinite(one.speed).any():
@@ -71,10 +72,12 @@ def deviation_figures(one: Deviation) -> Iterator[Figure]:
     yield from motion_figure(one.run)
 
 
-def path_figure(one: Deviation) -> SpaceFigure:
-    """Return the reference and the actual path in space, the actual one coloured by its deviation."""
-    place = spot_at(one.place(one.decisive))
-    return SpaceFigure(
+def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
+    """Yield the reference and the actual path in space, the actual one coloured by its deviation."""
+    place = one.place(one.decisive)
+    if place is None:
+        return
+    yield SpaceFigure(
         "Path in space",
         "Equal scale on all axes. The colour is the distance from the reference at the same time.",
         f"Paths of the reference and of {one.name} in three dimensions. The verdict was decided at"

@@ -65,6 +65,9 @@ ORIENTED = "joints with a robot, or a recorded orientation"
 NO_ROBOT = ("no robot, so no forward kinematics", Hint("robot", None, "gives one"))
 """What a run without kinematics lacks, and what to give."""
 
+JOINTS_ALONE = Hint("tolerance", "joint=0.1deg", "judges the joints alone")
+"""What else to give where both sides have joints."""
+
 
 def by_kinematics(run: Run) -> Trajectory:
     """Return where a run's tool centre point was by its joints, on its log's own rows.
@@ -96,6 +99,11 @@ def as_recorded(run: Run) -> Trajectory:
     return _trajectory(run, run.log.tcp_position, run.log.tcp_quat_xyzw)
 
 
+def by_joints_alone(run: Run) -> Trajectory:
+    """Return a run's joints on its log's own rows, without a place in space: its position is NaN."""
+    return _trajectory(run, np.full((run.log.rows, 3), np.nan), None)
+
+
 def _trajectory(run: Run, position: FloatArray, quat: FloatArray | None) -> Trajectory:
     """Return where a run was, with the joints that it has."""
     joints, units, rows = run.log.joints, tuple(run.joint_units), run.on_rows
@@ -114,7 +122,10 @@ def match(reference: Trajectory, log: Trajectory, sync: Sync) -> Matched:
     at_ns = log.t_ns + shift
     wanted = interpolate(at_ns, reference.t_ns, reference.position)
     wanted[_inside_broken(at_ns, reference)] = np.nan
-    sample = np.flatnonzero(np.isfinite(wanted).all(axis=1) & np.isfinite(log.position).all(axis=1))
+    sides = wanted, log.position
+    if not np.isfinite(reference.position).any() and reference.q is not None and log.q is not None:
+        sides = interpolate(at_ns, reference.t_ns, reference.q), log.q  # compared by their joints alone
+    sample = np.flatnonzero(np.all([np.isfinite(side).all(axis=1) for side in sides], axis=0))
     at_ns = at_ns[sample]
     reference_q, actual_q = _joints(reference, log, sample, at_ns)
     first, last = log.t_ns[[0, -1]] + shift

@@ -43,12 +43,13 @@ def measure(
     Source: [UrmArm2021]_ eq. 19-23.
     """
     values = np.column_stack(delta(_columns(matched.reference), _columns(matched.actual)))
-    path = distance_from_path(matched.actual, reference.position, ~gaps_behind(reference.t_ns))
-    path = np.minimum(path, values[:, 3])  # the reference of that time is on its path, but for rounding
-    angle = _angle(matched)
+    placed, path, angle = bool(np.isfinite(values).any()), values[:, 3], _angle(matched)
+    if placed:
+        path = distance_from_path(matched.actual, reference.position, ~gaps_behind(reference.t_ns))
+        path = np.minimum(path, values[:, 3])  # the reference of that time is on its path, but for rounding
     joint_delta, turns = _joint_delta(run, matched)
     _refuse_unheld(run, reference, tolerance, angle, joint_delta)
-    in_space, of_joints = _in_space(values, path, angle), _of_joints(run, joint_delta)
+    in_space, of_joints = _in_space(values, path, angle) if placed else [], _of_joints(run, joint_delta)
     t, sample = seconds(matched.t_ns), matched.sample
     statistics, joint_statistics = (
         {one.quantity: describe(one, t, sample, tolerance) for one in measured}

@@ -55,7 +55,7 @@ def present(result: Comparison) -> Presentation:
         facts=(*decisive_facts(worst, colour), *_against(result)),
         body=_body(result),
         opens_at_ns=int(worst.t_ns[worst.decided_at]),
-        scene=partial(comparison_scene, result),
+        scene=partial(comparison_scene, result) if worst.statistics else None,
         lines=tuple(comparison_lines(result)),
         rows=partial(statistics_rows, result),
         created=result.provenance.created,
@@ -157,7 +157,7 @@ def _properties(result: Comparison, one: Deviation) -> dict[str, Any]:
 
 def _page(one: Deviation) -> Iterator[Block]:
     """Yield what only a page shows of a compared log."""
-    yield path_figure(one)
+    yield from path_figure(one)
     yield from speed_cloud(one)
     yield from playback_figures(one.run)
     yield from log_tables(one.run)
@@ -181,6 +181,8 @@ def _events(one: Deviation) -> Iterator[Event]:
     held = one.decisive
     if held.tolerance is not None:
         yield Event(round(held.t_max * 1e9), f"decides: {amount_words(held)}", level)
+    if not one.statistics:
+        return
     x, y, z, norm = (text.quantity(float(value), "m") for value in one.delta[one.worst])
     said = f"largest deviation: {norm} (x {x}, y {y}, z {z})"
     yield Event(int(one.t_ns[one.worst]), said, level)

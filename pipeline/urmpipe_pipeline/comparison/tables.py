@@ -9,11 +9,11 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.baseline_section import quantities
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
-from urmpipe_pipeline.comparison.facts import alignment_words, largest
+from urmpipe_pipeline.comparison.facts import alignment_words, largest, placed
 from urmpipe_pipeline.comparison.wording import size_of, symbol
 from urmpipe_pipeline.palette import run_colour
-from urmpipe_pipeline.presentation.parts import Heads, columns_of, minute, rows_table, spot_at
-from urmpipe_pipeline.presentation.section import Cell, Column, Judged, Place, Ref, Table, Value
+from urmpipe_pipeline.presentation.parts import Heads, columns_of, minute, rows_table
+from urmpipe_pipeline.presentation.section import Cell, Column, Judged, Ref, Table, Value
 
 ABOUT = {"axis": "position", "norm": "position", "path": "path", "angle": "orientation", "joint": "joints"}
 """What the kinds of deviation are about."""
@@ -52,11 +52,11 @@ def reference_of(result: Comparison, one: Deviation) -> Ref:
 def _sizes(result: Comparison) -> Heads[Deviation]:
     """Return the columns of the largest deviations, and of how much was out and covered."""
     return {
-        "max_x": ("max |Δx|", lambda one: largest(one.statistics["x"])),
-        "max_y": ("max |Δy|", lambda one: largest(one.statistics["y"])),
-        "max_z": ("max |Δz|", lambda one: largest(one.statistics["z"])),
-        "max_norm": ("max ‖Δ‖", lambda one: largest(one.statistics["norm"])),
-        "max_path": ("max path", lambda one: largest(one.statistics["path"])),
+        "max_x": ("max |Δx|", lambda one: largest(one.statistics.get("x"))),
+        "max_y": ("max |Δy|", lambda one: largest(one.statistics.get("y"))),
+        "max_z": ("max |Δz|", lambda one: largest(one.statistics.get("z"))),
+        "max_norm": ("max ‖Δ‖", lambda one: largest(one.statistics.get("norm"))),
+        "max_path": ("max path", lambda one: largest(one.statistics.get("path"))),
         "max_angle": ("max angle", lambda one: largest(one.statistics.get("angle"))),
         "max_joint": ("max joint", lambda one: largest(one.furthest_joint("rad"))),
         "max_slide": ("max slide", lambda one: largest(one.furthest_joint("m"))),
@@ -71,7 +71,7 @@ def _conditions(result: Comparison, names: Heads[Deviation]) -> Iterator[Column]
     heads: Heads[Deviation] = {
         **names,
         "t": ("decided at t", lambda one: Value(one.decisive.t_max, "s")),
-        "place": ("log there at x, y, z", lambda one: Place(spot_at(one.place(one.decisive)))),
+        "place": ("log there at x, y, z", lambda one: placed(one, one.decisive)),
         "longest_out": ("longest out", lambda one: _stretch(one, "duration")),
         "longest_out_t": ("longest out from t", lambda one: _stretch(one, "t")),
         "sync_offset": ("offset", lambda one: Value(one.sync.offset, "s", signed=True)),

@@ -45,6 +45,8 @@ def _points(one: Comparison) -> str:
         return ""
     if one.provenance.options.get("tcp") == "recorded":
         return ", as recorded on both sides"
+    if not one.worst.statistics:
+        return ", by the joints alone"
     every = all(run.run.log.joints for run in one.runs)
     return f", by the joints {'on both sides' if every else 'of the reference'}"
 

@@ -36,6 +36,8 @@ class ReadOptions:
         skip_bad: Leave out rows that cannot be read, up to one in a hundred; each is a warning.
         interval: LOW, HIGH of the interval to which the environment limits a joint, by its name; by "" that
             of all joints that turn; in the file's own unit.
+        side: A word in the names of the columns to read, or "rest", and that of the columns to leave out, in
+            a table that holds both what was asked for and what was done.
         repair: Whether samples that a linear resampling left on a wrap are put on the line through their
             neighbours.
     """
@@ -56,6 +58,7 @@ class ReadOptions:
     skip_bad: bool = False
     interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     repair: bool = False
+    side: tuple[str, str] | None = None
 
     def __post_init__(self) -> None:
         """Take lists as tuples and numbers of columns as text; refuse what is of a wrong kind.
@@ -135,6 +138,10 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "skip_bad": _FLAG,
     "interval": (_are_named(_is_interval), INTERVALS),
     "repair": _FLAG,
+    "side": (
+        lambda value: _are(_is_word)(value) and len(value) == 2,
+        "two words, such as ('target', 'actual')",
+    ),
 }
 """What each field takes, and what to say of anything else."""
 

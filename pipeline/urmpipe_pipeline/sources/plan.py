@@ -14,6 +14,7 @@ from urmpipe_pipeline.sources.clocks.time_file import clock_of_file, time_file
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of, given_units, refuse_twins
 from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_header
 from urmpipe_pipeline.sources.columns.roles import Roles, assign, joint_inference
+from urmpipe_pipeline.sources.columns.sides import of_side
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH, Tables
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -77,6 +78,7 @@ def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan
         refuse_twins(clock.columns, own, tables.layouts, Hint("time", None, "says which: give its number"))
     times = {column for clock in clocks for column in clock.columns}
     rest = [column for column in columns if column not in times]
+    rest = of_side(rest, options.side, tables.layouts[0].file)
     only = None if apart is None else 1 - apart
     roles = _renamed(_roles(rest, tables, options, robot, only), options.names)
     return Plan(tables, clocks, roles, units, apart)

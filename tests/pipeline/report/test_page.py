@@ -241,7 +241,7 @@ def test_hostile_texts_stay_texts(hostile: Comparison) -> None:
     for attrs, spec in page.all("script"):
         if attrs:
             assert json.loads(spec)["data"]
-    assert any(said == hostile.runs[0].name for _, said in page.all("td"))
+    assert any(said == hostile.runs[0].run.name for _, said in page.all("td"))
     assert any(hostile.runs[0].name in said for _, said in page.all("h1"))
 
 
@@ -286,7 +286,7 @@ def test_a_log_of_one_sample_and_a_path_have_pages_too(comparison: Comparison) -
     nothing = np.empty((1, 0))
     path = replace(
         single,
-        log=replace(log, joints=(), q=nothing),
+        log=replace(log, joints=(), q=nothing, tcp_position=one.position),
         robot=None,
         q=nothing,
         tcp=None,
@@ -295,7 +295,7 @@ def test_a_log_of_one_sample_and_a_path_have_pages_too(comparison: Comparison) -
     result = compare_runs(path, [single])
     page = Page(render_report([present(result), present(single), present(path)]))
     assert len([part for part in page.all("section") if "part" in (part[0]["class"] or "")]) == 4
-    assert [said for _, said in page.all("h1")] == ["PASS shifted within tolerance against shifted"]
+    assert [said for _, said in page.all("h1")] == ["PASS shifted-2 within tolerance against shifted"]
 
 
 def test_nothing_to_report_is_an_error(tmp_path: Path) -> None:
