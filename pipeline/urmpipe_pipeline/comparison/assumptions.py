@@ -10,6 +10,9 @@ from urmpipe_pipeline.comparison.matching import file_of
 from urmpipe_pipeline.joint_log import LogWarning, Role
 from urmpipe_pipeline.runs.results import Run
 
+NAMED = 3
+"""Runs that an assumption names; more are only counted."""
+
 
 def assumptions(sides: Sequence[tuple[Run, Collection[Role]]]) -> tuple[str, ...]:
     """Return what the verdict on some runs assumes, each once, with the runs where it is not all of them.
@@ -27,9 +30,14 @@ def assumptions(sides: Sequence[tuple[Run, Collection[Role]]]) -> tuple[str, ...
             found.setdefault(one.assumption, []).append(run.name)
     every = {run.name for run, _ in sides}
     return tuple(
-        said if set(names) == every else f"{said} in {', '.join(dict.fromkeys(names))}"
+        said if set(names) == every else f"{said} ({_named(list(dict.fromkeys(names)))})"
         for said, names in found.items()
     )
+
+
+def _named(names: Sequence[str]) -> str:
+    """Return some runs by their names, or how many they are."""
+    return ", ".join(names) if len(names) <= NAMED else f"{len(names)} logs"
 
 
 def _assumed(run: Run, roles: Collection[Role]) -> list[LogWarning]:

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.display import line_of
+from urmpipe_models.display import line_of, number_of
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Verdict
@@ -109,10 +109,11 @@ class Comparison(Result):
             for one in reversed(self.ranking)
         )
         failed = sum(one.verdict == "fail" for one in self.runs)
-        count = f" ({failed} of {len(self.runs)} logs)" if failed and len(self.runs) > 1 else ""
+        share = f" ({failed} of {len(self.runs)} logs)" if failed and len(self.runs) > 1 else ""
         worse = ", worse than the baseline" if self.baseline and self.baseline.verdict == "fail" else ""
-        assumed = f", assuming {' and '.join(self.assumptions)}" if self.assumptions else ""
-        return line_of(f"{self.name}: {self.verdict}{count}{worse}{assumed}", *logs)
+        count = len(self.assumptions)
+        assumed = f", on {number_of(count, 'assumption')}" if count else ""
+        return line_of(f"{self.name}: {self.verdict}{share}{worse}{assumed}", *logs)
 
     def _notes(self) -> list[str]:
         """Return what is to be known of it, and of its logs."""

@@ -95,7 +95,7 @@ def test_errors_of_irregular_logs_are_those_of_evo_at_their_rows(seed: int) -> N
     moved = there(log.log.tcp_position)[one.sample], there(log.log.tcp_rotation)[one.sample]
     sides = ((np.column_stack(wanted), turned.as_quat()), moved)
     as_evos = [PoseTrajectory3D(p, q[:, [3, 0, 1, 2]], at) for p, q in sides]
-    distance, angle = evo_errors(*as_evos, "none")
+    distance, angle = evo_errors(as_evos[0], as_evos[1], "none")
     np.testing.assert_allclose(one.delta[:, 3], distance, rtol=0, atol=1e-9)
     np.testing.assert_allclose(there(one.angle), angle, rtol=0, atol=1e-9)
 

@@ -108,22 +108,21 @@ def test_no_grid_changes_a_verdict(tmp_path: Path, *, rounded: bool) -> None:
 
 
 def test_nothing_is_interpolated_across_gaps_and_steps_of_the_reference() -> None:
-    t: FloatArray = np.arange(100) * 0.01
+    t = np.linspace(0.0, 0.99, 100)
     q = motion(t)
     q[50:] += np.pi / 2 + 0.2  # a step that no motion explains
     kept = np.delete(np.arange(100), np.arange(20, 30))
     reference = joint_log(t[kept], q[kept], "asked")
     between = t[:-1] + 0.005
-    one = compare_runs(reference, [joint_log(between, motion(between))], CompareOptions({"axis": 9.0})).runs[
-        0
-    ]
+    log = joint_log(between, motion(between))
+    one = compare_runs(reference, [log], CompareOptions({"axis": 9.0})).runs[0]
     lost = np.setdiff1d(np.arange(99), one.sample)
     np.testing.assert_array_equal(lost, [*range(19, 30), 49])
 
 
 def test_rows_count_alike_however_far_apart_they_are() -> None:
     """As in evo: a mean over rows, not over time."""
-    t: FloatArray = np.concatenate((np.arange(90) * 0.001, 0.1 + np.arange(10) * 0.1))
+    t = np.concatenate((np.linspace(0.0, 0.089, 90), np.linspace(0.1, 1.0, 10)))
     q = motion(t)
     wanted = positions_over_log(UR5E, q)
     wanted[90:, 0] += 0.002
@@ -144,7 +143,7 @@ def test_a_baseline_made_on_the_grid_is_listed_as_made_otherwise_and_not_as_wors
     assert [(one.what, one.before, one.now) for one in found.differences] == [
         ("judged on of log", "the grid", "the log's rows")
     ]
-    regular: FloatArray = np.arange(200) * 0.005
+    regular = np.linspace(0.0, 0.995, 200)
     q = motion(regular)
     wanted = positions_over_log(UR5E, q)
     now = compare_runs(path(regular, wanted + 0.001), [joint_log(regular, q)])

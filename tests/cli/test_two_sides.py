@@ -1,0 +1,150 @@
+"""What was asked for against what was done, in one file; and joints without an arm."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import urmpipe
+from asserting import refusal
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.errors import LogError, OptionError, RecordingError
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.robots.catalogue import load_robot
+
+UR5E = load_robot("ur5e")
+LATE = 4
+"""Rows that what was done lags behind."""
+
+
+def motions(rows: int = 250) -> tuple[FloatArray, FloatArray]:
+    """Return the joints that were asked for and those that were done, in [rad]."""
+    t = 0.008 * np.arange(rows + LATE)
+    q = np.column_stack([0.3 * np.sin(0.9 * t + k) + 0.2 * k for k in range(6)])
+    return q[LATE:], q[:-LATE]
+
+
+def vectors(q: FloatArray) -> FloatArray:
+    """Return x, y, z and the rotation vector as a UR writes them."""
+    from scipy.spatial.transform import Rotation
+
+    position, rotation = poses_over_log(UR5E, q)
+    return np.column_stack((position, Rotation.from_matrix(rotation).as_rotvec()))
+
+
+def written(path: Path, names: list[str], *parts: FloatArray, delimiter: str = ",") -> Path:
+    """Write a table and return its path."""
+    header = delimiter.join(names)
+    np.savetxt(path, np.column_stack(parts), "%.12g", delimiter, header=header, comments="")
+    return path
+
+
+def six(pattern: str) -> list[str]:
+    """Return names with the numbers 0 to 5."""
+    return [pattern.format(k) for k in range(6)]
+
+
+T = np.linspace(0.0, 1.992, 250)
+
+
+@pytest.mark.parametrize("tcp", ["fk", "recorded"])
+def test_target_and_actual_of_one_rtde_log(tmp_path: Path, tcp: str) -> None:
+    asked, done = motions()
+    names = ["timestamp", *six("target_q_{}"), *six("target_TCP_pose_{}"), *six("actual_q_{}")]
+    names += six("actual_TCP_pose_{}")
+    log = written(tmp_path / "rtde.csv", names, T, asked, vectors(asked), done, vectors(done), delimiter=" ")
+    result = urmpipe.compare(log, robot="ur5e", sides=("target", "actual"), tcp=tcp)  # type: ignore[arg-type]
+    one = result.runs[0]
+    assert (result.reference.name, one.name) == ("rtde (target)", "rtde (actual)")
+    exact = np.linalg.norm(vectors(asked)[:, :3] - vectors(done)[:, :3], axis=1)
+    np.testing.assert_allclose(one.delta[:, 3], exact, atol=1e-10)  # twelve digits in the file
+    assert one.joint_delta is not None
+    np.testing.assert_allclose(one.joint_delta, asked - done, atol=1e-10)
+    assert result.verdict == "fail" and exact.max() > 0.01
+    assert result.assumptions == ()
+
+
+SPECIMENS = {
+    "ros2 controller": ("desired,actual", "desired.positions[{}]", "actual.positions[{}]"),
+    "fri": ("commanded,measured", "commanded_position_{}", "measured_position_{}"),
+    "suffixes": ("cmd,meas", "A{}_cmd", "A{}_meas"),
+    "one word": ("des,rest", "q{}_des", "q{}"),
+    "rest first": ("rest,actual", "q_{}", "actual_q_{}"),
+}
+
+
+@pytest.mark.parametrize("name", SPECIMENS)
+def test_joints_of_two_sides_are_compared_without_a_robot(tmp_path: Path, name: str) -> None:
+    words, of_asked, of_done = SPECIMENS[name]
+    asked, done = motions()
+    header = ["time [s]", *(f"{one} [rad]" for one in (*six(of_done), *six(of_asked)))]
+    log = written(tmp_path / "log.csv", header, T, done, asked)
+    reference, other = words.split(",")
+    found = urmpipe.compare(log, sides=(reference, other), tolerance="joint=1mrad")
+    one = found.runs[0]
+    assert one.joint_delta is not None
+    np.testing.assert_allclose(one.joint_delta, asked - done, atol=1e-10)
+    assert one.verdict == "fail" and not one.statistics
+    largest = max(one.joint_statistics.values(), key=lambda held: held.max)
+    assert one.decisive == largest
+    as_dict = found.to_dict()["runs"][0]
+    assert (as_dict["delta"], as_dict["path"], as_dict["angle"], as_dict["start"]) == ({}, None, None, {})
+    assert as_dict["worst"] == {"t": largest.t_max, "sample": largest.sample_max, "norm": None}
+    assert urmpipe.compare(log, sides=(reference, other), tolerance="joint=9rad").verdict == "pass"
+
+
+def test_joints_alone_come_back_from_a_recording_a_report_and_an_export(tmp_path: Path) -> None:
+    asked, done = motions()
+    for name, q in (("asked", asked), ("done", done)):
+        written(tmp_path / f"{name}.csv", ["t", *six("q{} [rad]")], T, q)
+    kept = tmp_path / "kept.rrd"
+    made = urmpipe.compare(tmp_path / "asked.csv", tmp_path / "done.csv", tolerance="joint=1deg", output=kept)
+    assert urmpipe.read_recording(kept).to_dict() == made.to_dict()
+    page = tmp_path / "report.html"
+    urmpipe.report(kept, output=page)
+    assert "by the joints alone" in page.read_text(encoding="utf-8")
+    table = tmp_path / "table.csv"
+    urmpipe.export(kept, output=table)
+    header, *rows = table.read_text().splitlines()
+    assert header == "run,sample,t [s]," + ",".join(six("delta_q{} [rad]")) + ",out_of_tolerance"
+    numbers = np.array([row.split(",")[3:9] for row in rows], np.float64)
+    np.testing.assert_allclose(numbers, asked - done, atol=1e-10)
+    said = refusal(RecordingError, urmpipe.export, kept, output=tmp_path / "poses.tum")
+    assert said == f"{kept}: a comparison of joints alone, so no pose"
+
+
+def test_a_place_is_asked_for_where_it_is_judged(tmp_path: Path) -> None:
+    asked, done = motions()
+    for name, q in (("asked", asked), ("done", done)):
+        written(tmp_path / f"{name}.csv", ["t", *six("q{} [rad]")], T, q)
+    said = refusal(LogError, urmpipe.compare, tmp_path / "asked.csv", tmp_path / "done.csv")
+    lacks = "no robot, so no forward kinematics; robot=NAME|FILE gives one;"
+    lacks += ' tolerance="joint=0.1deg" judges the joints alone'
+    assert said == f"asked.csv: {lacks}\ndone.csv: {lacks}"
+
+
+def test_sides_that_are_not_there_are_refused(tmp_path: Path) -> None:
+    asked, done = motions()
+    log = written(tmp_path / "log.csv", ["t", *six("target_q_{}"), *six("actual_q_{}")], T, asked, done)
+    said = refusal(LogError, urmpipe.compare, log, sides=("desired", "actual"))
+    assert said == (
+        f"{log}: sides: found no column with the word desired in its name, allowed: a word of them, such as"
+        " q, target, actual"
+    )
+    allowed = "allowed: two words for two sides of one log that is yet to be read"
+    said = refusal(OptionError, urmpipe.compare, log, log, sides=("target", "actual"))
+    assert said == f"sides: found target,actual with several logs, {allowed}"
+    assert refusal(OptionError, urmpipe.compare, log, sides=("q", "q")) == f"sides: found q,q, {allowed}"
+
+
+def test_a_name_never_stands_against_itself(tmp_path: Path) -> None:
+    asked, done = motions()
+    for name, q in (("asked", asked), ("done", done)):
+        (tmp_path / name).mkdir()
+        written(tmp_path / name / "log.csv", ["t", *six("q{} [rad]")], T, q)
+    both = urmpipe.compare(tmp_path / "asked" / "log.csv", tmp_path / "done" / "log.csv", "ur5e")
+    assert (both.reference.name, both.runs[0].name) == ("log (asked)", "log (done)")
+    again = urmpipe.compare(tmp_path / "done" / "log.csv", tmp_path / "done" / "log.csv", "ur5e")
+    assert (again.reference.name, again.runs[0].name) == ("log (done)", "log (done)-2")
