@@ -7,6 +7,11 @@ dark ground alike; the tests hold this.
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.arrays import FloatArray
+
 _COLOURS = {
     "violet": "#8652ed",
     "orange": "#fda201",
@@ -42,6 +47,9 @@ NEUTRAL_COLOUR = "#c8d0d4"
 DEVIATION_COLOUR = "#fe046c"
 """The deviation made visible in the 3D view: the enlarged path and the worst place; crimson."""
 
+VALUE_SCALE = ((0.0, "#8fc1e3"), (0.35, "#e69f00"), (0.7, "#d55e00"), (1.0, "#6b0f00"))
+"""Small to large: darker all the way, blue to red, legible on white and to the colour-blind."""
+
 INK_COLOUR = "#1b2329"
 """Marks that are no data, such as where a path begins."""
 
@@ -59,6 +67,17 @@ def run_colour(index: int) -> str:
 def rgb(colour: str) -> tuple[int, int, int]:
     """Return red, green and blue of #rrggbb, each 0..255."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+
+
+def value_colours(values: FloatArray) -> NDArray[np.uint8]:
+    """Return red, green and blue of values from 0 to the largest on `VALUE_SCALE`, shape (n, 3).
+
+    Values are in any unit, shape (n,); what is none is as the smallest.
+    """
+    share = np.nan_to_num(values / (np.nanmax(values, initial=0.0) or 1.0))
+    stops = [stop for stop, _ in VALUE_SCALE]
+    channels = np.array([rgb(colour) for _, colour in VALUE_SCALE], np.float64).T
+    return np.stack([np.interp(share, stops, one) for one in channels], axis=1).astype(np.uint8)
 
 
 def colour_word(colour: str) -> str:

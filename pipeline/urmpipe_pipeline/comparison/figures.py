@@ -10,6 +10,8 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
+from urmpipe_pipeline.comparison.scene import deviation_arrows
+from urmpipe_pipeline.comparison.trajectory import extent
 from urmpipe_pipeline.comparison.wording import SYMBOLS, amount_words, symbol
 from urmpipe_pipeline.palette import (
     AXIS_COLOURS,
@@ -77,6 +79,20 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
     place = one.place(one.decisive)
     if place is None:
         return
+    spots = (*ends(one.actual), Spot(place, "decides", DEVIATION_COLOUR))
+    if not one.run.timed:
+        arrows = deviation_arrows(one, extent(one.actual) / 2)
+        yield SpaceFigure(
+            "Poses in space",
+            f"Equal scale on all axes. A dot is where a pose was asked for, the arrow from it"
+            f" the {arrows.name}, in the colour of its size.",
+            f"Poses of {one.name} in three dimensions, each with its deviation as an arrow."
+            f" The verdict was decided at x, y, z = {text.point(place)} m: {amount_words(one.decisive)}.",
+            (),
+            spots[2:],
+            arrows,
+        )
+        return
     yield SpaceFigure(
         "Path in space",
         "Equal scale on all axes. The colour is the distance from the reference at the same time.",
@@ -89,7 +105,7 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
                 sample=one.sample, kept=(one.decided_at,),
             ),
         ),
-        (*ends(one.actual), Spot(place, "decides", DEVIATION_COLOUR)),
+        spots,
     )  # fmt: skip
 
 

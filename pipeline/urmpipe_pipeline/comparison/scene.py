@@ -19,13 +19,16 @@ from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.comparison.wording import amount_words
 from urmpipe_pipeline.palette import DEVIATION_COLOUR, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.parts import spot_at
-from urmpipe_pipeline.presentation.scene import Arm, Path, Scene, Spot
+from urmpipe_pipeline.presentation.scene import Arm, Arrows, Path, Scene, Spot
 
 FACTORS = (50, 20, 10, 5, 2)
 """How many times a deviation may be drawn, the usual one first."""
 
 LEAST_SEEN = 0.005
 """An enlarged deviation below this share of the scene's radius lies within the width of the lines."""
+
+MOST_ARROWS = 20_000
+"""Poses whose deviation is drawn as an arrow."""
 
 POSES = 1000
 """Poses from which the extent of the scene is told."""
@@ -40,11 +43,29 @@ def comparison_scene(result: Comparison) -> Scene:
         *_reference(result.reference, shown),
         *(_log(one, run_colour(i)) for i, one in enumerate(result.runs)),
     ]
-    if larger := _enlarged(shown, _radius(arms, paths)):
-        paths.append(larger)
+    radius, spots = _radius(arms, paths), (_decided(shown, several=several),)
     whose = f"Arm of {shown.name}" if arms and several else "Arm"
+    if not shown.run.timed:
+        arrows = deviation_arrows(shown, radius)
+        title = f"{whose} and poses [m], {arrows.name}, from light to dark the larger"
+        return Scene(title, arms, tuple(paths), spots, arrows=arrows)
+    if larger := _enlarged(shown, radius):
+        paths.append(larger)
     said = f", in crimson the {larger.name}" if larger else ""
-    return Scene(f"{whose} and paths [m]{said}", arms, tuple(paths), (_decided(shown, several=several),))
+    return Scene(f"{whose} and paths [m]{said}", arms, tuple(paths), spots)
+
+
+def deviation_arrows(one: Deviation, radius: float) -> Arrows:
+    """Return the deviation of each pose, enlarged as far as a scene of a radius in [m] allows.
+
+    Of very many poses those that deviate most are drawn.
+    """
+    factor = _factor(one.statistics["norm"].max, radius) or 1
+    size = np.asarray(one.delta[:, 3])
+    drawn = np.sort(np.argsort(-size, kind="stable")[:MOST_ARROWS])
+    start = np.asarray(one.reference)[drawn]
+    end = start + factor * (np.asarray(one.actual)[drawn] - start)
+    return Arrows(f"deviation x{factor}", start, end, size[drawn])
 
 
 def shown_log(result: Comparison) -> Deviation:
@@ -104,7 +125,7 @@ def _enlarged(one: Deviation, radius: float) -> Path | None:
     Only that of the log whose arm is drawn: a line a log would hide all of them.
     """
     factor = _factor(one.statistics["norm"].max, radius)
-    if factor is None or not one.run.timed:
+    if factor is None:
         return None
     position = one.reference + factor * (np.asarray(one.actual) - one.reference)
     kept = (one.decided_at,)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.presentation.scene import BoolArray, Path, Spot
+from urmpipe_pipeline.presentation.scene import Arrows, BoolArray, Path, Spot
 
 Shape: TypeAlias = Literal["up", "down", "cross", "diamond"]
 
@@ -167,6 +167,7 @@ class SpaceFigure:
     alt: str
     paths: tuple[Path, ...]
     spots: tuple[Spot, ...] = ()
+    arrows: Arrows | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -72,6 +72,25 @@ class Path:
     line: bool = True
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Arrows:
+    """Something at places, drawn from each as an arrow in the colour of its size.
+
+    Attributes:
+        name: What it is, and how much larger it is drawn.
+        start: Where the arrows start in [m], shape (n, 3).
+        end: Where they end in [m], shape (n, 3).
+        values: What they stand for (small to large), in `unit`, shape (n,).
+        unit: SI unit of `values`.
+    """
+
+    name: str
+    start: FloatArray
+    end: FloatArray
+    values: FloatArray
+    unit: str = "m"
+
+
 @dataclass(frozen=True, slots=True)
 class Spot:
     """A place with a word.
@@ -118,6 +137,7 @@ class Scene:
         paths: From the back to the front.
         spots: Places with a word.
         targets: What was asked for, if it was poses.
+        arrows: What is drawn at places, at all times.
     """
 
     title: str = ""
@@ -125,3 +145,4 @@ class Scene:
     paths: tuple[Path, ...] = ()
     spots: tuple[Spot, ...] = ()
     targets: Targets | None = None
+    arrows: Arrows | None = None

@@ -10,13 +10,11 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.joint_log import seconds
+from urmpipe_pipeline.palette import VALUE_SCALE
 from urmpipe_pipeline.presentation.figure import SpaceFigure
-from urmpipe_pipeline.presentation.scene import Path, Spot
+from urmpipe_pipeline.presentation.scene import Arrows, Path, Spot
 from urmpipe_pipeline.report.spec import Figure, Spec, base_layout, space_axis, typed
 from urmpipe_pipeline.report.traces import label, points_for
-
-VALUE_SCALE = ((0.0, "#8fc1e3"), (0.35, "#e69f00"), (0.7, "#d55e00"), (1.0, "#6b0f00"))
-"""Small to large: darker all the way, blue to red, legible on white and to the colour-blind."""
 
 CAMERA = {"eye": {"x": 1.5, "y": -1.5, "z": 0.86}, "center": {"x": 0.0, "y": 0.0, "z": -0.2}}
 """Looked at from the front right, a little from above; in lengths of the scene."""
@@ -33,6 +31,9 @@ scene, draws the longest axis out of view."""
 SCENE_PX = 540
 """Height of a scene."""
 
+DOT_PX = 3
+"""Width of the dot that an arrow starts from."""
+
 BACK_PX, FRONT_PX, VALUES_PX = 2, 5, 6
 """Width of a path: of those in the back, of the one in front, and of one that its values colour."""
 
@@ -40,11 +41,15 @@ BACK_PX, FRONT_PX, VALUES_PX = 2, 5, 6
 def drawn_space(figure: SpaceFigure) -> Figure:
     """Return paths and places in space."""
     traces = [_path(path, FRONT_PX if path is figure.paths[-1] else BACK_PX) for path in figure.paths]
+    places = [np.asarray(path.position[:]) for path in figure.paths]
+    if figure.arrows is not None:
+        traces += _arrows(figure.arrows)
+        places += [figure.arrows.start, figure.arrows.end]
     return Figure(
         figure.title,
         f"{figure.caption} {HANDLING}",
         figure.alt,
-        _scene([*traces, *_spots(figure.spots)], [np.asarray(path.position[:]) for path in figure.paths]),
+        _scene([*traces, *_spots(figure.spots)], places),
         SCENE_PX,
         space=True,
     )
@@ -67,6 +72,7 @@ def _path(path: Path, width: int) -> Spec:
     style = {"color": path.colour, "width": width}
     return _in_space(place) | {
         "mode": "lines" if path.line else "markers",
+        "marker": {"color": path.colour, "size": DOT_PX},
         "name": label(path.name),
         "showlegend": path.values is None,  # a line of many colours is told by its colour scale
         "customdata": typed(t if path.values is None else np.column_stack([t, shown]), "f8"),
@@ -100,6 +106,31 @@ def _by_value(name: str, values: FloatArray, unit: str) -> Spec:
             "y": 0,
             "yanchor": "top",
         },
+    }
+
+
+def _arrows(arrows: Arrows) -> Iterator[Spec]:
+    """Yield arrows as lines, a dot where each starts; both in the colour of what it stands for."""
+    unit, factor = text.SHOWN.get(arrows.unit, (arrows.unit, 1.0))
+    values, row = factor * arrows.values, np.arange(1, len(arrows.values) + 1)
+    style = _by_value(arrows.name, values, unit)
+    apart = np.full_like(arrows.start, np.nan)
+    yield _in_space(np.stack((arrows.start, arrows.end, apart), axis=1).reshape(-1, 3)) | {
+        "mode": "lines",
+        "name": label(arrows.name),
+        "showlegend": False,
+        "hoverinfo": "skip",
+        "line": style | {"color": typed(np.repeat(values, 3)), "width": FRONT_PX, "showscale": False},
+    }
+    said = "row %{customdata[0]}<br>x %{x:.4f} m<br>y %{y:.4f} m<br>z %{z:.4f} m"
+    said += f"<br>%{{customdata[1]:.{text.DIGITS}f}} {label(unit)}"
+    yield _in_space(arrows.start) | {
+        "mode": "markers",
+        "name": label(arrows.name),
+        "showlegend": False,
+        "customdata": typed(np.column_stack([row, values]), "f8"),
+        "hovertemplate": f"{said}<extra>{label(arrows.name)}</extra>",
+        "marker": {name: style[name] for name in style if name != "width"} | {"size": DOT_PX},
     }
 
 

@@ -8,8 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray
-from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR, NEUTRAL_COLOUR, REFERENCE_COLOUR, rgb
-from urmpipe_pipeline.presentation.scene import Scene, Spot
+from urmpipe_pipeline.palette import (
+    AXIS_COLOURS,
+    DEVIATION_COLOUR,
+    NEUTRAL_COLOUR,
+    REFERENCE_COLOUR,
+    rgb,
+    value_colours,
+)
+from urmpipe_pipeline.presentation.scene import Arrows, Scene, Spot
 from urmpipe_pipeline.recording.sending import ROOT, keys, shown_path, times_at
 from urmpipe_pipeline.recording.views.camera import EYE, eye_distance, seen
 from urmpipe_pipeline.recording.views.geometry import (
@@ -67,7 +74,7 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
     targets = None if scene.targets is None else drawn_targets(scene.targets)
     if arm is None and not paths and not ghosts and targets is None:
         return None
-    points = extent(arm, ghosts, paths, targets)
+    points = extent(arm, ghosts, paths, targets, scene.arrows)
     centre, size = ball(points)
     stream.log(ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     labelled = [one for one in scene.arms if one.label]
@@ -77,6 +84,8 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
         _draw_path(stream, path, key, size)
     for number, spot in enumerate(spot for spot in scene.spots if spot.always):
         _draw_spot(stream, spot, f"spot {number}", size)
+    if scene.arrows is not None:
+        _draw_arrows(stream, scene.arrows, size)
     if targets is not None:
         _draw_targets(stream, targets, size)
     for number, ghost in enumerate(ghosts):
@@ -172,6 +181,18 @@ def _draw_spot(stream: RecordingStream, spot: Spot, key: str, size: float) -> No
     entity = shown_path("scene", key, "label")
     stream.log(entity, rr.Points3D.from_fields(positions=[spot.position]), static=True)
     stream.log(entity, _label(spot.words), static=True)
+
+
+def _draw_arrows(stream: RecordingStream, arrows: Arrows, size: float) -> None:
+    """Draw arrows and the points that they start from, at all times, in the colours of their values."""
+    import rerun as rr
+
+    colours, root = value_colours(arrows.values), shown_path("scene", "arrows")
+    start = arrows.start.astype(np.float32)
+    vectors = (arrows.end - arrows.start).astype(np.float32)
+    drawn = rr.Arrows3D(origins=start, vectors=vectors, colors=colours, radii=[FRAME * size / 2])
+    stream.log(root, drawn, static=True)
+    stream.log(f"{root}/starts", rr.Points3D(start, colors=colours, radii=[AXIS * size]), static=True)
 
 
 def _label(words: str, colour: str = LABEL_COLOUR) -> Points3D:
