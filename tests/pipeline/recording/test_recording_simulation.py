@@ -120,6 +120,11 @@ def test_odd_names_are_entities_of_their_own(make_simulation: MakeSimulation, tm
     assert_comes_back(replace(simulation, signals=tuple(signals), arms=arms, verdicts=()), tmp_path)
 
 
+def test_an_odd_unit_comes_back(make_simulation: MakeSimulation, tmp_path: Path) -> None:
+    signals = (Signal("b", "v", np.arange(3.0), "\ud800"),)
+    assert_comes_back(replace(make_simulation(3), signals=signals, verdicts=()), tmp_path)
+
+
 NAMES = st.text(st.characters(exclude_categories=[]), max_size=8)
 NUMBERS = st.floats(allow_nan=False)
 

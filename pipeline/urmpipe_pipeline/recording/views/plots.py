@@ -105,7 +105,7 @@ class Plots:
         )
         legend = len(drawn.names) > 1
         self._instants(drawn, instants, f"{root}/instants")
-        said = encodable(f"{about}: {view.name}" if about else view.name) + f" [{shown_unit(panels)}]"
+        said = encodable((f"{about}: {view.name}" if about else view.name) + f" [{shown_unit(panels)}]")
         if not drawn.whole:
             return [self._view(said, drawn.entities, drawn.overrides, span, legend=legend)]
         peaks = f"{said}, every peak of {drawn.rows:,} rows"
