@@ -191,13 +191,14 @@ def loops_of(plan: Plan, folder: Path) -> dict[str, Callable[[], object]]:
     progress = Progress(rows=0, k=0, call=ELSEWHERE)
     callbacks = callbacks_with(Log(folder / "log.txt", job, progress).take)
     ours, theirs = np.zeros((job.rows, job.columns)), np.zeros((job.rows, job.columns))
-    Master(job, progress, ours, callbacks).run()
+    odd = np.zeros((3, job.recorded["Real"]))
+    Master(job, progress, ours, odd, callbacks).run()
     run_bare(job, theirs)
     if not np.array_equal(ours, theirs):
         raise RuntimeError("the two loops differ")
     return {
         "bare ctypes loop": lambda: run_bare(job, theirs),
-        "urmpipe": lambda: Master(job, progress, ours, callbacks).run(),
+        "urmpipe": lambda: Master(job, progress, ours, odd, callbacks).run(),
     }
 
 

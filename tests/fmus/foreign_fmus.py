@@ -56,6 +56,7 @@ class Foreign:
     step: str = ""
     start: str = ""
     free: str = ""
+    terminate: str = ""
     fresh: bool = True
     can_save: bool = True
     once: bool = False
@@ -76,7 +77,7 @@ class Foreign:
         (work / "model.h").write_text(
             f'#define GUID "{self.guid}"\n#define FRESH {int(self.fresh)}\n'
             f"#define VARIABLE_STEP {int(self.variable_step)}\n"
-            f"#define START {self.start}\n#define FREE {self.free}\n"
+            f"#define START {self.start}\n#define FREE {self.free}\n#define TERMINATE {self.terminate}\n"
             f"static void compute(Model *m) {{ Values *v = &m->v; (void)v; {self.compute} }}\n"
             "static fmi2Status step(Model *m, double t, double h) {\n"
             f"    Values *v = &m->v; (void)v; {self.step}\n    return fmi2OK;\n}}\n"
@@ -184,7 +185,7 @@ COUNTER = Foreign(
 TROUBLE = Foreign(
     name="trouble",
     scalars=(
-        Scalar("kind", 0, "parameter", "Integer", extra=' min="0" max="9"', start="0"),
+        Scalar("kind", 0, "parameter", "Integer", extra=' min="0" max="10"', start="0"),
         Scalar("at", 0, "parameter", start="0.05"),
         Scalar("y", 1),
     ),
@@ -202,6 +203,7 @@ TROUBLE = Foreign(
     case 7: LOG(m, fmi2Warning, "warm"); return fmi2Warning;
     case 8: return fmi2Fatal;
     case 9: for (;;) pause();
+    case 10: exit(0);
     }
     """,
     start="m->v.r[0] = 0.05;",

@@ -18,15 +18,20 @@ from numpy.typing import NDArray
 TYPES = ("Real", "Integer", "Boolean")
 """The types of numbers, in the order of the recorded columns."""
 
-JOB, RECORDED, PROGRESS, RESULT, LOG, SAID = (
+JOB, RECORDED, NOT_FINITE, PROGRESS, RESULT, LOG, SAID = (
     "job.pickle",
     "recorded.bin",
+    "not_finite.bin",
     "progress.bin",
     "result.json",
     "log.txt",
     "said.txt",
 )
-"""Files in the folder of a run; LOG holds what the FMUs log, SAID what they print."""
+"""Files in the folder of a run; LOG holds what the FMUs log, SAID what they print.
+
+NOT_FINITE has three rows of doubles with a column for each recorded Real: of its values that are not finite
+the first, the communication point of that, and how many there were.
+"""
 
 FUNCTIONS = (
     "loading",
@@ -61,9 +66,10 @@ class Progress(ctypes.Structure):
         rows: Rows recorded.
         k: The communication point.
         call: Block and function being called, see `call_code`.
+        done: Whether all is done that the process was for: an FMU can end it before, with any exit code.
     """
 
-    _fields_ = (("rows", ctypes.c_int64), ("k", ctypes.c_int64), ("call", ctypes.c_int64))
+    _fields_ = tuple((name, ctypes.c_int64) for name in ("rows", "k", "call", "done"))
 
 
 def call_code(block: int, function: str) -> int:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_fmus.cosim.job import ELSEWHERE, TYPES, ExchangeJob, Job, LoopJob, Progress, called
-from urmpipe_fmus.cosim.loops import LoopSolver
+from urmpipe_fmus.cosim.loops import LoopSolver, NoConvergence
 from urmpipe_fmus.cosim.rollback import Exchange, Member, Moved
 from urmpipe_fmus.cosim.slave import (
     DISCARD,
@@ -43,13 +43,22 @@ class Master:
         job: What is run.
         progress: How far it is, shared with the parent.
         recorded: Where it is recorded, each column in its own unit, shape (rows, columns).
+        not_finite: Where values are noted that are not finite, zeros as yet, see `NOT_FINITE`, shape (3,
+            recorded Reals).
         callbacks: What the FMUs are given: logger and memory.
 
     Attributes:
         warnings: How often each block's function returned fmi2Warning, by code.
     """
 
-    def __init__(self, job: Job, progress: Progress, recorded: NDArray[np.float64], callbacks: Any) -> None:
+    def __init__(
+        self,
+        job: Job,
+        progress: Progress,
+        recorded: NDArray[np.float64],
+        not_finite: NDArray[np.float64],
+        callbacks: Any,
+    ) -> None:
         self._job, self._progress, self._recorded, self._callbacks = job, progress, recorded, callbacks
         self._values = {kind: job.start[kind].copy() for kind in TYPES}
         self._time, self._step, self._exact = (ctypes.c_double(one) for one in (0.0, job.step, job.step))
@@ -58,6 +67,8 @@ class Master:
         self._looped: list[tuple[str, str, Exchange]] = []
         self.warnings: dict[int, int] = {}
         self._columns = self._shares(job)
+        self._reals = self._values["Real"][: job.recorded["Real"]]
+        self._not_finite = not_finite
 
     def run(self) -> None:
         """Run the whole job.
@@ -67,8 +78,12 @@ class Master:
             NoConvergence: If a loop was not solved.
             Ended: If a block ended the simulation.
         """
-        self._start()
-        self._loop()
+        try:
+            self._start()
+            self._loop()
+        except (FmuFailed, NoConvergence):  # what is not finite may be why
+            self._look(0)
+            raise
 
     def end(self) -> None:
         """Terminate and free the blocks, as far as their status lets them.
@@ -106,6 +121,7 @@ class Master:
         self._prepare()
         self._log(0)
         self._run(self._point)
+        self._look(0)
         for slave in self._slaves:
             self._once(slave, "fmi2ExitInitializationMode")
             slave.running = True
@@ -170,6 +186,7 @@ class Master:
             if log is not None:
                 log(k)
             self._run(self._point)
+            self._look(1)
             if k % job.record_every == 0:
                 self._record(k // job.record_every)
             if k == job.count:
@@ -219,6 +236,21 @@ class Master:
         """Put the values of logs at a communication point into their places."""
         for kind, values in self._job.logged.items():
             self._values[kind][: values.shape[1]] = values[k]
+
+    def _look(self, points: int) -> None:
+        """Note values that are not finite.
+
+        Args:
+            points: So many communication points this counts for: none where it is no whole one.
+        """
+        finite = np.isfinite(self._reals)
+        if finite.all():
+            return
+        value, k, count = self._not_finite
+        places = np.flatnonzero(~finite)
+        new = places[np.isfinite(value[places])]
+        value[new], k[new] = self._reals[new], self._progress.k
+        count[places] += points
 
     @staticmethod
     def _shares(job: Job) -> list[tuple[slice, str]]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import ctypes
 import json
+import math
 import mmap
 import os
 import pickle
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from urmpipe_fmus.cosim.job import (
     ELSEWHERE,
     JOB,
     LOG,
+    NOT_FINITE,
     PROGRESS,
     RECORDED,
     RESULT,
@@ -44,6 +46,21 @@ TAIL = 65_536
 """So many of the last bytes that a process printed are looked at."""
 
 
+@dataclass(frozen=True, slots=True)
+class NotFinite:
+    """Values of a scalar that are not finite.
+
+    Attributes:
+        value: The first of them: nan, inf or -inf.
+        t: When it stood there in [s].
+        count: So many there are at communication points, recorded or not.
+    """
+
+    value: float
+    t: float
+    count: int
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Recorded:
     """What a co-simulation recorded, until its end or until it failed.
@@ -56,6 +73,7 @@ class Recorded:
         values: In `units`, shape (n, columns); Integers as they are, Booleans 0 or 1.
         failed: Why it ended before its time, one line; None if it did not fail.
         notes: What is allowed but should be seen.
+        not_finite: The scalars that had values which are not finite.
     """
 
     t_ns: NDArray[np.int64]
@@ -65,6 +83,7 @@ class Recorded:
     values: NDArray[np.float64]
     failed: str | None
     notes: tuple[str, ...]
+    not_finite: Mapping[Port, NotFinite] = field(default_factory=dict)
 
     def column(self, block: str, variable: str) -> NDArray[np.float64]:
         """Return the values of a scalar in its own unit, shape (n,).
@@ -147,6 +166,7 @@ def _lay_out(job: Job, folder: Path) -> None:
     """
     (folder / JOB).write_bytes(pickle.dumps(job))
     (folder / PROGRESS).write_bytes(bytes(Progress(rows=0, k=0, call=ELSEWHERE)))
+    (folder / NOT_FINITE).write_bytes(bytes(8 * 3 * max(job.recorded["Real"], 1)))
     size = 8 * job.rows * max(job.columns, 1)
     try:
         with (folder / RECORDED).open("wb") as file:
@@ -177,7 +197,7 @@ def _recorded(
     )
     result = _result(folder)
     failed = _failure(job, folder, state, result) if result else None
-    if failed is None and exit_code:
+    if failed is None and (exit_code or not state.done):
         failed = _crash(job, folder, state, exit_code)
     points = np.arange(state.rows) * job.record_every * job.step
     return Recorded(
@@ -188,7 +208,18 @@ def _recorded(
         values=values[:, [shown[port] for port in names]],
         failed=failed,
         notes=(*plan.notes, *(_notes(job, folder, result) if result else ())),
+        not_finite=_not_finite(assembly.recorded["Real"], job, folder),
     )
+
+
+def _not_finite(ports: Sequence[Port], job: Job, folder: Path) -> dict[Port, NotFinite]:
+    """Return which of some scalars had values that are not finite."""
+    found = np.fromfile(folder / NOT_FINITE, np.float64, 3 * len(ports)).reshape(3, -1)
+    return {
+        port: NotFinite(float(value), float(k) * job.step, max(int(count), 1))
+        for port, (value, k, count) in zip(ports, found.T, strict=True)
+        if not math.isfinite(value)
+    }
 
 
 def _result(folder: Path) -> dict[str, Any] | None:
@@ -207,7 +238,7 @@ def _failure(job: Job, folder: Path, state: Progress, result: dict[str, Any]) ->
 
 
 def _crash(job: Job, folder: Path, state: Progress, exit_code: int) -> str:
-    """Return how a run failed that could not say so itself."""
+    """Return how a run failed whose process ended before all was done, with any exit code."""
     how = ending(exit_code)
     if state.call == ELSEWHERE:
         return one_line(f"the process of the co-simulation {how}" + _quoted(_said(folder)[-LAST_LINES:]))

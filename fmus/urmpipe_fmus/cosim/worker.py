@@ -21,11 +21,13 @@ from typing import Any
 
 import fmpy.fmi2  # noqa: F401 - loaded while the job is prepared
 import numpy as np
+from numpy.typing import NDArray
 
 from urmpipe_fmus.cosim.job import (
     ELSEWHERE,
     JOB,
     LOG,
+    NOT_FINITE,
     PROGRESS,
     RECORDED,
     RESULT,
@@ -78,11 +80,11 @@ def work(folder: Path) -> None:
         job: Job = pickle.load(file)
     with (folder / PROGRESS).open("r+b") as file:
         progress = Progress.from_buffer(mmap.mmap(file.fileno(), ctypes.sizeof(Progress)))
-    with (folder / RECORDED).open("r+b") as file:
-        recorded = np.frombuffer(mmap.mmap(file.fileno(), 0), np.float64).reshape(job.rows, -1)
+    recorded = _shared(folder / RECORDED).reshape(job.rows, -1)
+    not_finite = _shared(folder / NOT_FINITE)[: 3 * job.recorded["Real"]].reshape(3, -1)
     log = Log(folder / LOG, job, progress)
     callbacks = callbacks_with(log.take)
-    master = Master(job, progress, recorded, callbacks)
+    master = Master(job, progress, recorded, not_finite, callbacks)
     result: dict[str, Any] = {"failed": None, "code": ELSEWHERE, "notes": []}
     try:
         master.run()
@@ -98,6 +100,13 @@ def work(folder: Path) -> None:
     partial.write_text(json.dumps(result), encoding="utf-8")
     partial.replace(folder / RESULT)
     master.end()  # last: what an FMU does there must not hide how the run ended
+    progress.done = 1
+
+
+def _shared(path: Path) -> NDArray[np.float64]:
+    """Return the doubles of a file, where what is written outlives this process, shape (n,)."""
+    with path.open("r+b") as file:
+        return np.frombuffer(mmap.mmap(file.fileno(), 0), np.float64)
 
 
 def end_with_parent(folder: Path) -> None:
