@@ -8,7 +8,7 @@ import subprocess
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -128,7 +128,7 @@ def check_fmu(path: Path) -> Checked:
         guid=described.guid,
         generator=described.generationTool or "",
         platforms=platforms,
-        problems=(*problems, *run["problems"]),
+        problems=(*problems, *run["problems"], *_not_finite(described, run, (start, start + steps * step))),
         variables=tuple(_variables(described, run["before"], run["after"])),
         step=step,
         steps=steps,
@@ -293,6 +293,19 @@ def _problems(result: Mapping[str, Any], ended: str, log: Sequence[str]) -> list
     if not said:
         return []
     return said + [f"its log: {line}" for line in log if not line.startswith(CALL)][-LINES:]
+
+
+def _not_finite(described: Any, run: Mapping[str, Any], times: tuple[float, float]) -> Iterator[str]:
+    """Yield which outputs are not finite after the initialization and the last step, at times in [s]."""
+    ran = {"before": times[0]} if run["problems"] else dict(zip(("before", "after"), times, strict=True))
+    for when, t in ran.items():
+        odd = [
+            f"{one.name} = {value:g}"
+            for one, value in zip(described.modelVariables, run[when], strict=False)
+            if one.causality == "output" and value is not None and _finite(value) is None
+        ]
+        if odd:
+            yield f"at {t:.9g} s: found {', '.join(odd)}, allowed: outputs that are finite"
 
 
 def _variables(described: Any, before: Sequence[Any], after: Sequence[Any]) -> list[CheckedVariable]:

@@ -136,7 +136,9 @@ def main(path: Path) -> None:
     except Stopped as error:
         failed = str(error)
     result = {"failed": failed, "before": checked.before, "after": checked.after}
-    path.with_name("result.json").write_text(json.dumps(result), encoding="utf-8")
+    partial = path.with_name("result.part")
+    partial.write_text(json.dumps(result), encoding="utf-8")
+    partial.replace(path.with_name("result.json"))  # whole, whatever a thread of the FMU does meanwhile
 
 
 if __name__ == "__main__":

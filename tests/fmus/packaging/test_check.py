@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from asserting import refusal
+from foreign_fmus import Foreign, Scalar, fmu
 from urmpipe_fmus import check
 from urmpipe_fmus.archive import write_fmu
 from urmpipe_fmus.build import build_fmu
@@ -174,6 +175,33 @@ def test_an_fmu_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_an_fmu_that_ends_well_but_early_is_no_good_one(tmp_path: Path) -> None:
     found = check_fmu(built(failing("os._exit(0)"), tmp_path))
     assert found.problems == ("fmi2DoStep at 0.015 s ended the process with the exit code 0",)
+
+
+@pytest.mark.parametrize(
+    ("place", "when"),
+    [("start", "fmi2Instantiate"), ("terminate", "fmi2Terminate"), ("free", "fmi2FreeInstance")],
+)
+def test_an_fmu_that_ends_its_process_well_is_no_good_one_whenever_it_does(place: str, when: str) -> None:
+    ends = Foreign(name=place, scalars=(Scalar("y", 0),), variable_step=False)
+    found = check_fmu(fmu(replace(ends, **{place: "exit(0);"})))
+    assert found.problems[-1] == f"{when} ended the process with the exit code 0"
+    assert not found.ran
+
+
+def test_outputs_that_are_not_finite_are_a_problem_with_their_time() -> None:
+    odd = Foreign(
+        name="odd",
+        scalars=(Scalar("y", 0), Scalar("z", 1), Scalar("x", 2, "local")),
+        compute="v->r[0] = NAN; v->r[1] = v->time > 0.05 ? -INFINITY : 1; v->r[2] = NAN;",
+        variable_step=False,
+    )
+    found = check_fmu(fmu(odd))
+    assert found.problems[-2:] == (
+        "at 0 s: found y = nan, allowed: outputs that are finite",
+        "at 0.1 s: found y = nan, z = -inf, allowed: outputs that are finite",
+    )
+    assert found.ran
+    assert [(one.before, one.after) for one in found.variables] == [(None, None), (1.0, None), (None, None)]
 
 
 @pytest.mark.parametrize("folder", ["Jürgen", "100% sure", "a#b", "a%20b"])
