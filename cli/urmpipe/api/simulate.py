@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from urmpipe import __version__
-from urmpipe.keyword_checks import PathLike, public_reading
+from urmpipe.keyword_checks import PathLike, public_reading, refuse_warnings
 from urmpipe.output_files import guarded_outputs, recorded
 from urmpipe.reading import LogReading, map_files
-from urmpipe.systems.blocks import Blocks
+from urmpipe.systems.blocks import ON_PYTHON, Blocks
 from urmpipe.systems.result import check_meters, simulation_of
 from urmpipe.systems.units import Backend
 from urmpipe_datasets import LOGS
@@ -35,6 +35,7 @@ def simulate(
     step: float | None = None,
     duration: float | None = None,
     backend: Backend | None = None,
+    strict: bool = False,
     output: PathLike | None = None,
     draw: PathLike | None = None,
     told: Callable[[str], None] | None = None,
@@ -49,6 +50,7 @@ def simulate(
         step: Communication step in [s]; default: that of the system, else of the joint log that it plays.
         duration: In [s]; default: that of the system, else of the longest log that it reads.
         backend: native or python, for the FMUs of units; default: native if it can be built here.
+        strict: Whether a warning is an error, but for the one that the blocks run on Python.
         output: The recording (.rrd) to write.
         draw: An SVG file to draw the system to.
         told: Told what takes its time before the first step, a line each.
@@ -77,6 +79,8 @@ def simulate(
         if draw is not None:
             _write_drawing(parts["drawing"], svg)
         made = simulation_of(plan, run_plan(plan, progress=running, worker=worker), blocks, svg)
+        if made.failed is None:  # else that is told, and what was recorded stays
+            refuse_warnings(strict, [one for one in made.warnings if one.kind != ON_PYTHON])
         return recorded(made, output, kept, writing)
 
 

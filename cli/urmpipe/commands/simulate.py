@@ -10,7 +10,7 @@ import click
 import urmpipe
 from urmpipe.options.named import NamedType, argument_names, named_values
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.reading import row_options
+from urmpipe.options.reading import STRICT_OPTION, row_options
 from urmpipe.options.types import DURATION, SYSTEM, OneOf
 from urmpipe_models.errors import Finding, OptionError
 
@@ -52,6 +52,7 @@ if TYPE_CHECKING:
     help="What the units run as [default: native if it can be built here].",
 )
 @row_options
+@STRICT_OPTION
 @output_options
 def simulate(
     system: str | None,
@@ -79,7 +80,8 @@ def simulate(
       urmpipe simulate one-drive --write-system my-drive.toml
       urmpipe simulate my-system.toml -o run.rrd --json
 
-    Exit codes: 0 done and within tolerance, 1 a delta meter out of tolerance, 2 bad input or a failed FMU.
+    Exit codes: 0 done and within tolerance, 1 a delta meter out of tolerance or in doubt, 2 bad input or a
+    failed FMU.
     """
     if listed == (system is not None):
         found = f"{system} and --list" if listed else "neither a system nor --list"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from urmpipe.systems.blocks import CHAIN, METER, Blocks
 from urmpipe_fmus.cosim.interface import ELEMENT, Interface
 from urmpipe_fmus.cosim.plan import Plan
-from urmpipe_fmus.cosim.simulation import Recorded
+from urmpipe_fmus.cosim.simulation import NotFinite, Recorded
 from urmpipe_fmus.cosim.system import Block, Port, System
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import OptionError
@@ -42,6 +43,7 @@ def simulation_of(plan: Plan, recorded: Recorded, blocks: Blocks, svg: str) -> S
         svg: The system as a drawing.
     """
     system = plan.system
+    odd = _not_finite(plan, recorded)
     notes = (LogWarning("co-simulation", note) for note in (*recorded.notes, *_unjudged(system)))
     given = {
         "system": system.name,
@@ -59,11 +61,11 @@ def simulation_of(plan: Plan, recorded: Recorded, blocks: Blocks, svg: str) -> S
         system_text=system.path.read_text(encoding="utf-8-sig"),
         blocks=tuple(_block(plan, one, blocks) for one in system.blocks),
         failed=recorded.failed,
-        warnings=(*blocks.warnings, *blocks.between_samples(plan.step, plan.count), *notes),
+        warnings=(*blocks.warnings, *blocks.between_samples(plan.step, plan.count), *notes, *_told(odd)),
         provenance=provenance("simulate", given, _inputs([system.path, *blocks.files])),
         connections={str(one.connection.destination): str(one.connection.source) for one in plan.links},
         arms=tuple(_arms(plan, recorded, blocks)),
-        verdicts=tuple(_verdicts(plan, recorded)),
+        verdicts=tuple(_verdicts(plan, recorded, odd)),
     )
 
 
@@ -77,6 +79,26 @@ def _unjudged(system: System) -> Iterator[str]:
 def _inputs(paths: list[Path]) -> list[SourceFile]:
     """Return the files that a simulation came from, each once."""
     return [fingerprint(path) for path in dict.fromkeys(paths)]
+
+
+def _not_finite(plan: Plan, recorded: Recorded) -> dict[Port, NotFinite]:
+    """Return the variables that had values which are not finite: of an array the first and all of them."""
+    places = {port: i for i, port in enumerate(recorded.names)}
+    found: dict[Port, list[NotFinite]] = {}
+    for port, one in recorded.not_finite.items():
+        _, variable = _array(plan.interfaces[port.block], port, places)
+        found.setdefault(Port(port.block, variable), []).append(one)
+    return {
+        port: replace(min(those, key=lambda one: one.t), count=sum(one.count for one in those))
+        for port, those in found.items()
+    }
+
+
+def _told(odd: Mapping[Port, NotFinite]) -> Iterator[LogWarning]:
+    """Yield which outputs were not finite, a line each."""
+    for port, one in odd.items():
+        said = f"found {one.value:g} at t = {one.t:.9g} s; values that are not finite: {one.count}"
+        yield LogWarning("not-finite", said, about=port.block, column=port.variable)
 
 
 def _signals(plan: Plan, recorded: Recorded, blocks: Blocks) -> Iterator[Signal]:
@@ -182,11 +204,37 @@ def _meters(system: System) -> list[str]:
     return [block.name for block in system.blocks if block.unit == METER]
 
 
-def _verdicts(plan: Plan, recorded: Recorded) -> Iterator[DeltaVerdict]:
+def _verdicts(plan: Plan, recorded: Recorded, odd: Mapping[Port, NotFinite]) -> Iterator[DeltaVerdict]:
     """Yield the verdict of each delta meter."""
     for name in _meters(plan.system):
         columns = [recorded.column(name, f"delta[{i}]") for i in (1, 2, 3)]
         tolerance = {"axis": _value(plan, Port(name, TOLERANCE))}
-        found = delta_verdict(name, recorded.t_ns, np.column_stack(columns), tolerance)
+        doubts = tuple(_doubts(plan, recorded, odd, name))
+        found = delta_verdict(name, recorded.t_ns, np.column_stack(columns), tolerance, doubts)
         if found is not None:
             yield found
+
+
+def _doubts(plan: Plan, recorded: Recorded, odd: Mapping[Port, NotFinite], meter: str) -> Iterator[str]:
+    """Yield why a delta meter does not pass even where no sample is out of tolerance.
+
+    What is not finite may have reached it through any block before it, which need not show it: an FMU may
+    clip it, or keep it as a state of its own.
+    """
+    count, whole = len(recorded.t_ns), plan.count // plan.system.record_every + 1
+    if count < whole:
+        yield f"the run ended after {count} of {whole} samples"
+    before = _before(plan, meter)
+    for port, one in odd.items():
+        if port.block in before:
+            yield f"{port} was {one.value:g} at t = {one.t:.9g} s, and {meter} depends on {port.block}"
+
+
+def _before(plan: Plan, block: str) -> set[str]:
+    """Return the blocks on whose outputs a block depends, directly or through others, and itself."""
+    found: set[str] = set()
+    new = {block}
+    while new:
+        found |= new
+        new = {source.block for into, source in plan.sources.items() if into.block in new} - found
+    return found

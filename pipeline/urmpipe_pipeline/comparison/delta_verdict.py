@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -29,7 +29,8 @@ class DeltaVerdict:
         sample: Its sample, from 0.
         samples: How many were judged.
         out_of_tolerance: How many of them are out of it in any quantity; one without a value is.
-        verdict: pass if none is.
+        verdict: pass if none is, and nothing else is to be doubted.
+        doubts: What else keeps it from passing, such as "bad.y, which leads to it, is not finite".
     """
 
     block: str
@@ -42,6 +43,7 @@ class DeltaVerdict:
     samples: int
     out_of_tolerance: int
     verdict: Verdict
+    doubts: tuple[str, ...] = ()
 
     @property
     def kind(self) -> Kind:
@@ -67,12 +69,17 @@ class DeltaVerdict:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
-        told = asdict(self) | {"worst": self.worst if math.isfinite(self.worst) else None}
+        worst = self.worst if math.isfinite(self.worst) else None
+        told = asdict(self) | {"worst": worst, "doubts": list(self.doubts)}
         return {name: value for name, value in told.items() if name != "variables"}
 
 
 def delta_verdict(
-    block: str, t_ns: IntArray, delta: FloatArray, tolerance: Mapping[str, float]
+    block: str,
+    t_ns: IntArray,
+    delta: FloatArray,
+    tolerance: Mapping[str, float],
+    doubts: Sequence[str] = (),
 ) -> DeltaVerdict | None:
     """Hold the deviation of a delta meter against a tolerance; None without a sample.
 
@@ -81,6 +88,7 @@ def delta_verdict(
         t_ns: Times in integer [ns], shape (n,).
         delta: reference - actual in [m], shape (n, 3).
         tolerance: Largest absolute deviation allowed in [m]: axis, norm, or x, y, z.
+        doubts: Why it shall not pass even where no sample is out of tolerance.
 
     Raises:
         OptionError: If a tolerance is none of those, or negative.
@@ -105,7 +113,8 @@ def delta_verdict(
         sample=row,
         samples=len(t_ns),
         out_of_tolerance=int(np.count_nonzero(out)),
-        verdict="fail" if out.any() else "pass",
+        verdict="fail" if out.any() or doubts else "pass",
+        doubts=tuple(doubts),
     )
 
 

@@ -108,10 +108,11 @@ def decided_words(one: Statistics) -> str:
 
 
 def meter_words(one: DeltaVerdict) -> str:
-    """Return what a delta meter found: how much of how much, when, and how often it was too much."""
+    """Return what a delta meter found: how much of how much, when, how often it was too much; its doubts."""
     amount = "has no value" if one.used is None else f"= {held(Value(one.worst, 'm', one.allowed))}"
     said = _at(f"{size_of(one)} {amount}", used_words(one), one.t)
-    return f"{said}; out of tolerance: {out_words(one.out_of_tolerance, one.samples)}"
+    out = f"out of tolerance: {out_words(one.out_of_tolerance, one.samples)}"
+    return "; ".join((said, out, *one.doubts))
 
 
 def _at(amount: str, used: str, t: float) -> str:

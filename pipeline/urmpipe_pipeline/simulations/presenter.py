@@ -74,6 +74,8 @@ def outcome_words(simulation: Simulation) -> str:
     worst = simulation.judged_worst
     if worst is None:
         return f"{simulation.name}: {text.counted(len(simulation.t_ns), 'sample')}"
+    if worst.doubts and not worst.out_of_tolerance:
+        return f"{worst.block} of {simulation.name} within tolerance, but in doubt"
     within = "within" if worst.verdict == "pass" else "out of"
     return f"{worst.block} of {simulation.name} {within} tolerance"
 
@@ -85,7 +87,7 @@ def _decisive(simulation: Simulation) -> Iterator[Fact]:
         end = f"t = {text.seconds(float(simulation.t[-1]))} s" if len(simulation.t_ns) else "its start"
         yield Fact("Recorded until", end)
     elif (worst := simulation.judged_worst) is not None:
-        yield Fact("Furthest out" if worst.verdict == "fail" else "Closest to the limit", Ref(worst.block))
+        yield Fact("Furthest out" if worst.out_of_tolerance else "Closest to the limit", Ref(worst.block))
         yield Fact("Decided by", meter_words(worst))
 
 
@@ -116,10 +118,11 @@ def _body(simulation: Simulation) -> Section:
 
 
 def _meter_facts(one: DeltaVerdict) -> Iterator[Fact]:
-    """Yield what a delta meter found: how much, when, how often it was too much."""
+    """Yield what a delta meter found: how much, when, how often it was too much; what is to be doubted."""
     yield Fact(size_of(one), Value(one.worst, "m", one.allowed, one.verdict, one.used), used_words(one))
     yield Fact("Time", Value(one.t, "s"))
     yield Fact("Out of tolerance", out_words(one.out_of_tolerance, one.samples))
+    yield Fact("In doubt", "; ".join(one.doubts))
 
 
 def _facts(simulation: Simulation) -> Iterator[Fact]:

@@ -221,15 +221,15 @@ class Simulation(Result):
 
     @property
     def verdict(self) -> Verdict | None:
-        """Fail if it failed or a delta meter is out of tolerance; None if nothing was to be judged."""
+        """Fail if it failed or a delta meter did; None if nothing was to be judged."""
         if self.failed is not None or any(one.verdict == "fail" for one in self.verdicts):
             return "fail"
         return "pass" if self.verdicts else None
 
     @property
     def judged_worst(self) -> DeltaVerdict | None:
-        """The verdict that uses up most of its tolerance, or lacks a value; None without any."""
-        return max(self.verdicts, key=lambda one: math.inf if one.used is None else one.used, default=None)
+        """The worst verdict: one that failed, of these what uses up most or lacks a value; None without."""
+        return max(self.verdicts, key=_severity, default=None)
 
     def signal(self, name: str) -> Signal:
         """Return the signal `block.variable`.
@@ -277,6 +277,11 @@ class Simulation(Result):
             "warnings": [one.to_dict(voice) for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }
+
+
+def _severity(one: DeltaVerdict) -> tuple[bool, float]:
+    """Return how bad a verdict is, to be held against others."""
+    return one.verdict == "fail", math.inf if one.used is None else one.used
 
 
 def _scalars(signal: Signal, t: FloatArray) -> Iterator[dict[str, Any]]:

@@ -54,6 +54,16 @@ def test_a_sample_without_a_value_is_out_and_the_worst() -> None:
     )
 
 
+def test_a_doubt_keeps_it_from_passing_and_is_told() -> None:
+    found = there(delta_verdict("meter", T_NS, DELTA, {"axis": 1.0}, ("a.y was nan", "it ended early")))
+    assert (found.out_of_tolerance, found.verdict, found.used) == (0, "fail", 4e-3)
+    assert found.to_dict()["doubts"] == ["a.y was nan", "it ended early"]
+    assert meter_words(found) == (
+        "|Δy| = 4.0000 mm of 1000 mm allowed (0.4 % of the tolerance) at t = 0.005 s; out of tolerance: 0 of"
+        " 3 samples (0 %); a.y was nan; it ended early"
+    )
+
+
 def test_of_nothing_allowed_no_share_is_told() -> None:
     found = there(delta_verdict("meter", T_NS, DELTA, {"axis": 0.0}))
     assert meter_words(found) == (

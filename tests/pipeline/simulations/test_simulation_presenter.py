@@ -41,6 +41,20 @@ def test_a_delta_meter_is_a_check_and_a_judged_section(make_simulation: MakeSimu
     assert (shown.verdict, shown.opens_at_ns) == ("fail", simulation.t_ns[meter.sample])
 
 
+def test_a_meter_in_doubt_says_so_where_its_verdict_stands(make_simulation: MakeSimulation) -> None:
+    simulation = make_simulation()
+    (meter,) = simulation.verdicts
+    doubted = replace(meter, worst=1e-3, out_of_tolerance=0, doubts=("log.q was nan", "it ended early"))
+    shown = present(replace(simulation, verdicts=(doubted,)))
+    assert shown.verdict == "fail"
+    assert shown.headline == f"meter of {simulation.name} within tolerance, but in doubt"
+    assert [one.name for one in shown.facts] == ["Closest to the limit", "Decided by"]
+    section = block(shown, "meter")
+    assert facts(section)["In doubt"] == "log.q was nan; it ended early"
+    assert section.checks[0].words.endswith("; log.q was nan; it ended early")
+    assert "In doubt" not in {one.name for one in block(present(simulation), "meter").facts if one.value}
+
+
 def test_the_judged_block_is_opened_and_ranks_first(make_simulation: MakeSimulation) -> None:
     shown = present(make_simulation())
     assert [one.title for one in shown.body.sections] == ["log", "chain", "meter"]
