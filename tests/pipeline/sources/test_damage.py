@@ -137,28 +137,6 @@ def joined(*lines: str) -> str:
     return "\n".join(["t,q1 [rad],q2 [rad]", *lines]) + "\n"
 
 
-def test_a_merge_conflict_is_named_once(wrong: Wrong) -> None:
-    """The other side is not read: its times would all be errors."""
-    both = ["<<<<<<< HEAD", *rows(30, 1.0), "=======", *rows(30, 1.0), ">>>>>>> branch"]
-    side = "a merge conflict, allowed: the rows of one side, without the marks of git"
-    said = [
-        f"log.csv:102: found '<<<<<<< HEAD', {side}",
-        "log.csv:195, column q1 [rad]: found 'x', allowed: a number,"
-        " or an empty, Null or NaN cell where a sample is missing",
-    ]
-    text = joined(*rows(100), *both, *rows(30, 1.3), "1.7,x,0.5", *rows(9, 1.8))
-    assert wrong(text) == [*said, "log.csv: 1 of 203 rows cannot be read; skip_bad=True leaves them out"]
-    assert wrong(text, skip_bad=True) == said[:1]
-
-
-def test_a_conflict_from_the_first_line_on(wrong: Wrong) -> None:
-    text = "<<<<<<< HEAD\n" + joined(*rows(9)) + "=======\n" + joined(*rows(9)) + ">>>>>>> b\n"
-    assert wrong(text) == [
-        "log.csv:12: found '=======', a merge conflict, allowed: the rows of one side,"
-        " without the marks of git"
-    ]
-
-
 @pytest.mark.parametrize("behind", [30, 100_000])
 def test_a_header_again_begins_a_second_log(wrong: Wrong, behind: int) -> None:
     said = "found the header again, allowed: one log a file; a second log begins here"

@@ -212,7 +212,10 @@ WRONG = [
     Wrong("rows_too_short", [r"^log:8: found 6 cells, allowed: 7", r"^log:20: found 6 cells"]),
     Wrong("row_cut_off", [r"^log:31: found 2 cells, allowed: 7"]),
     Wrong("row_of_two_rows", [r"^log:15: found 13 cells, allowed: 7"]),
-    Wrong("merge_conflict", [r"^log:10: .*<<<<<<<.* a merge conflict"]),
+    Wrong(
+        "merge_conflict",
+        [r"^log:10: found '<<<<<<< HEAD'.* a merge", r"^log:12: found '=======", r"^log:14: found '>>>>>>>"],
+    ),
     Wrong("stray_text", [r"^log:12: found .*\[WARN\] connection lost"]),
     Wrong("nul_bytes", [r"(?i)^log:?.*found.*(NUL|zero|\\x00|binary)"]),
     Wrong("two_logs", [r"^log:17.*found.*(two|another|second) log"]),

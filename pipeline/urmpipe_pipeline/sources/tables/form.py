@@ -26,9 +26,6 @@ Value = str | list[str]
 """A plain cell, or the cells of an array."""
 
 CLOSING = {"[": "]", "(": ")"}
-CONFLICT_MARK = re.compile(r"^(?:(?:<{7}|>{7}|\|{7}) |={7}\s*$)", re.MULTILINE)
-"""What git leaves in a file whose versions it could not merge."""
-
 _WORDS = re.compile(r"\b(?:\w+\.)?(?:float|int)\d+(?=\()")
 _INNER = re.compile(r"[^\s,;\[\]()]+")
 _SHOWN = 40
@@ -100,9 +97,7 @@ class Form:
 
     def is_row(self, line: str) -> bool:
         """Return whether a line holds a row: among labelled ones, all that have none of the labels do not."""
-        if not self.labels or CONFLICT_MARK.match(line):
-            return True
-        return any(_label(label).search(line) for label in self.labels)
+        return not self.labels or any(_label(label).search(line) for label in self.labels)
 
     def values(self, text: str) -> list[Value]:
         """Return the values of a row.
@@ -233,8 +228,6 @@ class Form:
         expected = _MARKERS[: len(self.labels)] + b"\n"
         if block.translate(None, _UNMARKED) == expected * block.count(b"\n"):
             return block, 0
-        if CONFLICT_MARK.search(block.decode("latin-1")):
-            raise UnfitError
         block, left_out = _without_other_lines(block)
         if block.translate(None, _UNMARKED) != expected * block.count(b"\n"):
             raise UnfitError

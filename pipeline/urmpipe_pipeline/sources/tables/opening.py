@@ -13,6 +13,7 @@ from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables import coppeliasim
 from urmpipe_pipeline.sources.tables.arrays import sniff_arrays
+from urmpipe_pipeline.sources.tables.conflict import refuse_among_rows, refuse_conflict
 from urmpipe_pipeline.sources.tables.labels import sniff_labels
 from urmpipe_pipeline.sources.tables.ros2 import with_names
 from urmpipe_pipeline.sources.tables.sniff import Layout, across, sniff
@@ -61,7 +62,7 @@ def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff 
     """Return the tables of a log's files.
 
     Raises:
-        LogError: If a file is no text table; all files are looked at first.
+        LogError: If a file is no text table, or holds a merge conflict; all files are looked at first.
         OptionError: If there is no file, or the source is unknown.
     """
     if not files:
@@ -70,12 +71,14 @@ def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff 
         found, allowed = shown(options.source), ", ".join(source_names())
         raise OptionError(Finding(parameter="source", found=found, allowed=allowed))
     segments = for_each(lambda path: open_text(path, any_suffix=options.source is not None), files)
+    markers = for_each(refuse_conflict, segments)
     titled = [(file.stem, segment) for file, segment in zip(files, segments, strict=True)]
     forced, graphs = options.source == COPPELIASIM, []
     if len(files) == 1 and (forced or (options.source is None and coppeliasim.is_export(segments[0]))):
         graphs = coppeliasim.graphs(segments[0])
         titled, forced = graphs or titled, True
     layouts = for_each(lambda item: _layout(item[1], options, sniff_plain), titled)
+    for_each(lambda table: refuse_among_rows(*table), zip(layouts, markers, strict=False))
     if len(files) > 1:
         layouts = [across(layout) for layout in layouts]
     titles = tuple(title for title, _ in titled)

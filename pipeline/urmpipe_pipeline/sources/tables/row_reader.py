@@ -20,7 +20,7 @@ from urmpipe_pipeline.sources.cells.cell import (
     to_nanoseconds,
 )
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
-from urmpipe_pipeline.sources.tables.form import CONFLICT_MARK, RowError, Value
+from urmpipe_pipeline.sources.tables.form import RowError, Value
 from urmpipe_pipeline.sources.tables.numbers import NO_TIME, REPORTED, ClockColumn, Numbers, RowFault
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.text import COMMENTS
@@ -77,6 +77,7 @@ class RowReader:
         columns: Which columns hold numbers.
         clock: The columns of its clock.
         allowed: What a cell may hold, for messages.
+        ended: Whether the next rows are not to be read: they are those of a second log.
     """
 
     def __init__(
@@ -100,15 +101,8 @@ class RowReader:
         self._row = 0
         self._text_parts = [part for part in clock if part.forms]
         self._texts: list[list[str]] = []
-        self._in_conflict = False
-        self._other_side = False
-        self._ended = False
+        self.ended = False
         self._wanted = (*columns, *(part.column for part in clock))
-
-    @property
-    def waits(self) -> bool:
-        """Whether the next rows are not to be read: those of a second log, or of a conflict's other side."""
-        return self._ended or self._other_side
 
     def pass_over(self, rows: int, lines: int) -> None:
         """Count rows and lines that were read otherwise."""
@@ -150,23 +144,13 @@ class RowReader:
         """Yield time in [ns] and values of each row."""
         nothing = [math.nan] * len(self.columns)
         for line, text in data_lines(self.layout, lines):
-            if self._ended:
+            if self.ended:
                 return
             self._line, self._row = line, self._row + 1
-            if mark := CONFLICT_MARK.match(text):
-                self._mark(text)
-            cells = None if mark or self._other_side else self._cells(text)
+            cells = self._cells(text)
             for texts, part in zip(self._texts, self._text_parts, strict=True):
                 texts.append("" if cells is None else cells[part.column])
             yield (REPORTED, nothing) if cells is None else (self._time(cells), self._values(cells))
-
-    def _mark(self, text: str) -> None:
-        """Report a merge conflict once, at its first mark; what was merged in is not read."""
-        if text[0] == "<" or (text[0] == "=" and not self._in_conflict):
-            side = "the rows of one side, without the marks of git"
-            self._report(f"found {_shown(text)}, a merge conflict, allowed: {side}", lasting=True)
-        self._in_conflict = text[0] != ">"
-        self._other_side = text[0] in "|="
 
     def _values(self, cells: Sequence[str]) -> list[float]:
         wanted = [cells[j] for j in self.columns]
@@ -203,7 +187,7 @@ class RowReader:
             self._report(
                 "found the header again, allowed: one log a file; a second log begins here", lasting=True
             )
-            self._ended = True
+            self.ended = True
             return False
         if len(values) == width - 1 and not names[-1]:
             values.append("")  # a row without the trailing delimiter that the others have

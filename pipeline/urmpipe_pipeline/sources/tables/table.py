@@ -50,7 +50,7 @@ def _parts(reader: RowReader, block: bytes, scales: Scales) -> Iterator[Numbers]
     """Yield the numbers of some whole rows: of all at once, or of either half."""
     layout = reader.layout
     newline = layout.segment.newline
-    numbers = None if reader.waits else parse_block(layout, reader.columns, reader.clock, block, scales)
+    numbers = None if reader.ended else parse_block(layout, reader.columns, reader.clock, block, scales)
     if numbers is not None:
         signs = np.frombuffer(block, dtype=np.uint8)
         reader.pass_over(len(numbers.values), int(np.count_nonzero(signs == ord(newline))))
