@@ -19,6 +19,7 @@ from urmpipe_pipeline.sources.units.evidence import spread, turned_apart
 from urmpipe_pipeline.sources.units.unit_evidence import peak
 from urmpipe_pipeline.sources.units.unit_hints import OTHER_UNIT, unit_hints
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
+from urmpipe_pipeline.text import counted
 
 PURE = Unit("1", "ratio", 1.0)
 """The unit of quaternions and of matrices."""
@@ -80,9 +81,7 @@ def settle_rotation(
     names = ", ".join(column.name for column in columns)
     sound = [form for form in forms if _is_sound(values, form)]
     if not sound:
-        length = float(np.nanmedian(np.linalg.norm(values, axis=1)))
-        said = f"{names} hold quaternions of length {length:.4g}, allowed: 1; they are not used"
-        return Settled(warnings=(LogWarning("orientation", said),))
+        return Settled(warnings=(_about_lengths(names, np.linalg.norm(values, axis=1)),))
     choices = [(form, units) for form in sound for units in _possible_units(form, values, told)]
     found = _settled_by_kinematics(columns, choices, values, arm, given=given) if arm else None
     if found is not None:
@@ -119,6 +118,17 @@ def _is_sound(values: FloatArray, form: RotationForm) -> bool:
         return True
     length = np.linalg.norm(values, axis=1)
     return bool(np.nanmax(np.abs(length - 1.0)) <= UNIT_LENGTH)
+
+
+def _about_lengths(names: str, length: FloatArray) -> LogWarning:
+    """Return what is said of quaternions that are none, by their lengths; with the first row if few are."""
+    off = np.abs(length - 1.0) > UNIT_LENGTH
+    count, row = int(np.count_nonzero(off)), int(np.argmax(off))
+    few = 2 * count < len(off)
+    typical = length[row] if few else np.nanmedian(length)
+    where = f" in {counted(count, 'row')} of {len(off)}, first in this one" if few else ""
+    said = f"{names} hold quaternions of length {typical:.4g}{where}, allowed: 1; they are not used"
+    return LogWarning("orientation", said, row + 1 if few else None)
 
 
 def _possible_units(
