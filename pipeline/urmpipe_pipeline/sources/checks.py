@@ -16,8 +16,8 @@ from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
 from urmpipe_pipeline.sources.clocks.clock import Clock
 from urmpipe_pipeline.sources.clocks.clock_units import EVEN, EXPONENTS
 from urmpipe_pipeline.sources.clocks.quantised import behind_repeated
-from urmpipe_pipeline.sources.tables.numbers import NO_TIME, UNREADABLE, Numbers
-from urmpipe_pipeline.sources.tables.row_reader import SHOWN_FINDINGS, lines_of_rows
+from urmpipe_pipeline.sources.tables.numbers import NO_TIME, SHOWN_FINDINGS, UNREADABLE, Numbers
+from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.units.unit_hints import unit_hints
 

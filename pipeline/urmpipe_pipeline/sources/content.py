@@ -24,8 +24,9 @@ from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.numbers import Numbers
-from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
+from urmpipe_pipeline.sources.tables.row_reader import first_left_out, lines_of_rows
 from urmpipe_pipeline.sources.tables.table import read_table
+from urmpipe_pipeline.text import counted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,8 +92,10 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
     unread = f"{len(numbers.unread)} of {len(numbers.values)} rows cannot be read"
     too_many, warnings, file = None, [], layout.file
     if numbers.left_out and layout.form is not None:
-        said = f"{numbers.left_out} lines without the labels of the rows are left out"
-        warnings.append(LogWarning("other-lines", said))
+        line, text = first_left_out(layout)
+        verb = "is" if numbers.left_out == 1 else "are"
+        said = f"{counted(numbers.left_out, 'line')} without the labels of the rows {verb} left out"
+        warnings.append(LogWarning("other-lines", f"{said}, first line {line}: {text}"))
     if skip_bad and may_skip(numbers):
         numbers, skipped = without_unread(numbers)
         warnings += skipped

@@ -184,7 +184,10 @@ def test_other_lines_among_rows_are_left_out_and_counted(read: Read, wrong: Wron
     log = read("".join(lines))
     np.testing.assert_array_equal(log.q, np.round(Q, 5))
     assert [(w.kind, w.message) for w in log.warnings] == [
-        ("other-lines", "2 lines without the labels of the rows are left out")
+        (
+            "other-lines",
+            "2 lines without the labels of the rows are left out, first line 2: 'Connection quality: GOOD'",
+        )
     ]
     lines[5] = lines[5].replace("0.66434, ", "")
     assert wrong("".join(lines)) == [

@@ -103,7 +103,7 @@ def test_many_markers_are_counted(wrong: Wrong) -> None:
     lines = [line for k in range(10) for line in (BEGIN, rows[2 * k + 1], MIDDLE, rows[2 * k + 2], END)]
     found = wrong("\n".join([rows[0], *lines]))
     assert len(found) == 21
-    assert found[-1] == "log.csv: 10 more markers"
+    assert found[-1] == "log.csv: 10 more findings"
 
 
 def test_each_file_of_a_log_and_of_targets_is_looked_through(write: Write) -> None:

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
+from urmpipe_models.errors import Finding, LogError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import width
-from urmpipe_pipeline.sources.cells.cell import count_up, is_missing
+from urmpipe_pipeline.sources.cells.cell import count_up, is_missing, to_float
 from urmpipe_pipeline.sources.cells.text_clock import DATE, TIME_OF_DAY
 from urmpipe_pipeline.sources.clocks.text_times import known_forms
 from urmpipe_pipeline.sources.columns.columns import Column, find_column
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH
+from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 _EVEN = 0.01  # steps of a clock in a file without header differ by less than this share
+_FEW = 0.02  # share of its steps that a damaged clock may have otherwise
 
 
 def time_columns(
@@ -144,19 +148,44 @@ def _refuse_unclear(columns: Sequence[Column], layout: Layout, joints: int | Non
     """Raise if the first column of a table without a header may be a time, a counter or a joint.
 
     It may if it increases from row to row, and there is one column more than the robot has joints, or it
-    begins at 0, as clocks and counters do and joints seldom, and keeps near a straight line.
+    begins at 0, as clocks and counters do and joints seldom, and keeps near a straight line; or if it alone
+    runs in even steps but for a few rows, the first of which is named.
     """
     times = layout.numbers(columns[0].index)
     one_more = joints is not None and len(columns) == joints + 1
+    what = "the time or a counter" if path else "the time, a counter or a joint"
+    hints = [Hint("time", "1", "says which"), Hint("time", "none", "says which")]
+    hints += [] if path else [Hint("joints", None, "names the joint columns")]
+    odd = [_odd_row(column, layout) for column in columns]
+    if odd[0] is not None and odd.count(None) == len(odd) - 1:
+        line = lines_of_rows(layout, [odd[0] + 1]).get(odd[0] + 1)
+        found = shown(layout.cells(0)[odd[0]])
+        message = f"found {found} in a first column of otherwise even steps, which may be {what}"
+        raise LogError(Finding(message, layout.file, line, odd[0] + 1, hints=tuple(hints)))
     if columns[0].text or not _increases(times):
         return
     if not one_more and (len(times) < 3 or times[0] != 0.0 or not _keeps_near_a_line(times)):
         return
-    what = "the time or a counter" if path else "the time, a counter or a joint"
     message = f"found a first column that increases from row to row, which may be {what}"
-    hints = [Hint("time", "1", "says which"), Hint("time", "none", "says which")]
-    hints += [] if path else [Hint("joints", None, "names the joint columns")]
     raise layout.error(message, None, *hints)
+
+
+def _odd_row(column: Column, layout: Layout) -> int | None:
+    """Return the first of the few rows, from 0, that keep a column from running in even steps as a clock.
+
+    Two steps at the most, or 2 % of them, are otherwise: those to and from a wrong value, or over lost rows.
+    None if none are, or more.
+    """
+    if column.text:
+        return None
+    cells = (to_float(cell, layout.decimal) for cell in layout.cells(column.index))
+    steps = steps_of([math.nan if value is None else value for value in cells])
+    known = sorted(step for step in steps if math.isfinite(step))
+    usual = known[len(known) // 2] if known else 0.0
+    odd = [k for k, step in enumerate(steps) if not abs(step - usual) <= _EVEN * usual]
+    if usual <= 0.0 or not 0 < len(odd) <= max(2, _FEW * len(steps)) or len(odd) * 4 > len(steps):
+        return None
+    return 0 if odd[0] == 0 and odd[1:2] != [1] else odd[0] + 1
 
 
 def like_a_time(columns: Sequence[Column], layout: Layout, used: Collection[Column]) -> Column | None:

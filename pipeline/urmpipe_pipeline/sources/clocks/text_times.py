@@ -109,12 +109,20 @@ def read_columns(
             different.append(reading)
     evidence = []
     if len(readable) < len(readings):
-        evidence.append("in another form some are no times")
+        evidence.append(_no_time(columns, readings, fewest))
     if len(forwards) < len(readable):
         evidence.append("in another form they run backwards")
     if len(different) < len(forwards):
         evidence.append(f"as {forwards[-1].name} the steps are the same")
     return different, evidence
+
+
+def _no_time(columns: Sequence[TextCells], readings: Sequence[Reading], fewest: int) -> str:
+    """Return the first row that is no time in the next best form: it rules that form out."""
+    other = min((one for one in readings if one.unreadable > fewest), key=lambda one: one.unreadable)
+    row = int(np.argmax(other.times == UNREADABLE))
+    text = " ".join(cells.text(row).strip() for cells in columns)
+    return f"as {other.name} {shown(text)} in row {row + 1} is no time"
 
 
 def _read(columns: Sequence[TextCells], forms: Combination) -> Reading:

@@ -16,6 +16,7 @@ from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.pose import (
     Pose,
     chosen_pose,
+    odd_rows,
     trailing_matrix,
     trailing_quaternion,
     with_form,
@@ -31,6 +32,8 @@ from urmpipe_pipeline.sources.columns.roles import (
     path_inference,
 )
 from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables.numbers import capped
+from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import split_unit
 
@@ -115,7 +118,20 @@ def _trailing_pose(
     found = trailing_matrix(columns, layouts, some=some)
     joints = len(robot.coordinates) if robot else 0
     fits = len(columns) == 7 if robot is None else len(columns) >= joints + 7
-    return found or (trailing_quaternion(columns, layouts, some=some) if fits else None)
+    found = found or (trailing_quaternion(columns, layouts, some=some) if fits else None)
+    for count in () if found else (16, 12, *([4] if fits else [])):
+        _refuse_odd_rows(columns[-count:], layouts)
+    return found
+
+
+def _refuse_odd_rows(columns: Sequence[Column], layouts: Sequence[Layout]) -> None:
+    """Raise a `LogError` with the few rows without which columns are an orientation, if there are some."""
+    layout, odd = layouts[columns[0].table], odd_rows(columns, layouts)
+    lines, told = lines_of_rows(layout, odd), listed(columns, most=4)
+    found = f"found no orientation in columns {told}, allowed: one in every row, as in most"
+    findings = [Finding(found, layout.file, lines.get(row), row, hints=(NAME_JOINTS,)) for row in odd]
+    if findings:
+        raise LogError(*capped(findings, layout.file))
 
 
 def one_plot_a_file(

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray
+from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.orientation import FORMS, RotationForm, width
 from urmpipe_pipeline.sources.cells.cell import to_float
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.families import Family, families
 from urmpipe_pipeline.sources.options import ReadOptions
-from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.tables.sniff import FEW, Layout
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 ORTHOGONAL = 1e-2
@@ -26,6 +26,10 @@ _LIKE_JOINT = re.compile(r"q_?\d")
 """Names that quaternions and joints have."""
 
 _UNIT_LENGTH = 1e-2
+
+_PLACES = np.arange(16).reshape(4, 4)
+_ORDERS = (("row by row", _PLACES), ("column by column", _PLACES.T))
+"""The places of the entries of a homogeneous transform among its columns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,18 +141,12 @@ def matrix_pose(columns: Sequence[Column], layouts: Sequence[Layout], *, some: b
     """
     if len(columns) not in (12, 16):
         return None
-    values = _sampled(columns, layouts)
-    places = np.arange(16).reshape(4, 4)
-    for order, entries in (("row by row", places), ("column by column", places.T)):
-        if len(columns) == 12 and order != "row by row":
-            continue
-        turned = entries[:3, :3].ravel().tolist()
-        holds = _orthogonal(values[:, turned].reshape(-1, 3, 3))
-        if len(columns) == 16:
-            holds &= (values[:, entries[3]] == (0, 0, 0, 1)).all(axis=1)
-        if _enough(holds, some=some):
-            position = tuple(columns[k] for k in entries[:3, 3].tolist())
-            return Pose(position, tuple(columns[k] for k in turned), ("matrix",), f"a transform, {order}")
+    values, _ = _sampled(columns, layouts)
+    for order, entries in _ORDERS[: 1 if len(columns) == 12 else 2]:
+        if _enough(_are_transforms(values, entries), some=some):
+            position, turned = entries[:3, 3].tolist(), entries[:3, :3].ravel().tolist()
+            rotation = tuple(columns[k] for k in turned)
+            return Pose(tuple(columns[k] for k in position), rotation, ("matrix",), f"a transform, {order}")
     return None
 
 
@@ -164,21 +162,49 @@ def trailing_quaternion(
 
 def _is_unit(columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool) -> bool:
     """Return whether the numbers of three rows or more, or of some, have length 1, as quaternions have."""
-    values = _sampled(columns, layouts)
-    holds = np.abs((values**2).sum(axis=1) - 1.0) < _UNIT_LENGTH
-    return (some or len(values) > 2) and _enough(holds, some=some)
+    values, _ = _sampled(columns, layouts)
+    return (some or len(values) > 2) and _enough(_have_length_1(values), some=some)
 
 
-def _sampled(columns: Sequence[Column], layouts: Sequence[Layout]) -> FloatArray:
-    """Return the sampled rows in which all of these columns have a number."""
+def odd_rows(columns: Sequence[Column], layouts: Sequence[Layout]) -> list[int]:
+    """Return the few sampled rows, from 1, that hold no orientation although most do: they hide it.
+
+    Of 16 or 12 columns it is a transform, of 9 a matrix, of 4 a quaternion that changes in most rows.
+    """
+    values, rows = _sampled(columns, layouts)
+    if len(columns) in (12, 16):
+        laws = [_are_transforms(values, entries) for _, entries in _ORDERS[: 1 if len(columns) == 12 else 2]]
+    elif len(columns) == 9:
+        laws = [_orthogonal(values.reshape(-1, 3, 3))]
+    else:
+        changes = (np.diff(values, axis=0) != 0).any(axis=1)
+        laws = [_have_length_1(values)] if 2 * np.count_nonzero(changes) > len(changes) else []
+    few = (rows[~holds].tolist() for holds in laws if 0 < np.count_nonzero(~holds) <= FEW * len(rows))
+    return next(few, [])
+
+
+def _sampled(columns: Sequence[Column], layouts: Sequence[Layout]) -> tuple[FloatArray, IntArray]:
+    """Return the sampled rows in which all of these columns have a number, and which these are, from 1."""
     cells = [layouts[c.table].cells(c.index) for c in columns]
     decimals = [layouts[c.table].decimal for c in columns]
     rows = [
         [to_float(cell, decimal) for cell, decimal in zip(row, decimals, strict=True)]
         for row in zip(*cells, strict=False)
     ]
-    values = np.array([row for row in rows if None not in row], dtype=np.float64)
-    return values[np.isfinite(values).all(axis=1)] if len(values) else np.empty((0, len(columns)))
+    values = np.array(rows, dtype=np.float64).reshape(-1, len(columns))  # NaN for no number
+    known = np.flatnonzero(np.isfinite(values).all(axis=1))
+    return values[known], known + 1
+
+
+def _are_transforms(values: FloatArray, entries: IntArray) -> BoolArray:
+    """Return which rows are homogeneous transforms with their entries at these places; shape (n,)."""
+    holds = _orthogonal(values[:, entries[:3, :3].ravel()].reshape(-1, 3, 3))
+    return holds if values.shape[1] == 12 else holds & (values[:, entries[3]] == (0, 0, 0, 1)).all(axis=1)
+
+
+def _have_length_1(values: FloatArray) -> BoolArray:
+    """Return which rows are unit vectors; shape (n,)."""
+    return np.asarray(np.abs((values**2).sum(axis=1) - 1.0) < _UNIT_LENGTH)
 
 
 def _orthogonal(r: FloatArray) -> BoolArray:
@@ -221,7 +247,7 @@ def _rotation(
     nine = [family for family in families(rest, vocabulary().tcp_matrix, 0) if len(family.columns) == 9]
     if len(nine) == 1:
         columns = nine[0].ordered()
-        holds = _orthogonal(_sampled(columns, layouts).reshape(-1, 3, 3))
+        holds = _orthogonal(_sampled(columns, layouts)[0].reshape(-1, 3, 3))
         entries = some and "i" in vocabulary().tcp_matrix[nine[0].rank].groupindex  # r11 is no joint
         if entries or form == "matrix" or _enough(holds, some=some):
             return columns, ("matrix",)

@@ -14,7 +14,7 @@ from urmpipe_pipeline.sources.cells.cell import grouped_number
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.families import families, measured
 from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, with_form
-from urmpipe_pipeline.sources.columns.tcp_like import about_tcp
+from urmpipe_pipeline.sources.columns.tcp_like import about_odd_rows, about_tcp
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import key, vocabulary
@@ -108,7 +108,7 @@ def assign(
     for what, group in (("rates", rates), ("accelerations", accelerations)):
         if group:
             said.append(Inference(what, ", ".join(column.name for column in group), "their names"))
-    return _with_rest(roles, [*said, *about_pose(pose)], numeric)
+    return _with_rest(roles, [*said, *about_pose(pose)], numeric, layouts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,7 +324,7 @@ def _path(
         names = ", ".join(column.name for column in pose.position)
         said = [path_inference(names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
         roles = Roles(position=pose.position, rotation=pose.rotation, forms=pose.forms)
-        return _with_rest(roles, said, numeric)
+        return _with_rest(roles, said, numeric, layouts)
     _refuse_thousands(layouts, file)
     if path:
         hints = (
@@ -374,10 +374,13 @@ def _as_written(row: Sequence[str], layout: Layout) -> Iterator[str]:
     yield from (cell for sign in ";\t|" if sign in line for cell in line.split(sign))
 
 
-def _with_rest(roles: Roles, said: list[Inference], numeric: Sequence[Column]) -> Roles:
+def _with_rest(
+    roles: Roles, said: list[Inference], numeric: Sequence[Column], layouts: Sequence[Layout]
+) -> Roles:
     rest = [column for column in numeric if column not in roles.columns]
     said += not_used(rest, "no role is known for them")
-    return replace(roles, inferences=tuple(said), warnings=() if roles.position else tuple(about_tcp(rest)))
+    warnings = about_odd_rows(rest, layouts) or ([] if roles.position else about_tcp(rest))
+    return replace(roles, inferences=tuple(said), warnings=tuple(warnings))
 
 
 def not_used(rest: Sequence[Column], why: str) -> list[Inference]:

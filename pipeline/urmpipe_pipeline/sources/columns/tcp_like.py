@@ -8,7 +8,11 @@ from collections.abc import Sequence
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, listed
+from urmpipe_pipeline.sources.columns.families import families
+from urmpipe_pipeline.sources.columns.pose import odd_rows
+from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import vocabulary
+from urmpipe_pipeline.text import counted
 
 TCP_NOT_READ = "tcp-not-read"
 
@@ -39,6 +43,17 @@ def about_tcp(rest: Sequence[Column]) -> list[LogWarning]:
         Hint("log_map", None, f"says which they are: {table}"),
     )
     return [LogWarning(TCP_NOT_READ, said, hints=hints)]
+
+
+def about_odd_rows(rest: Sequence[Column], layouts: Sequence[Layout]) -> list[LogWarning]:
+    """Return a warning for columns that are called as a matrix, and are one but for a few rows."""
+    for family in families(rest, vocabulary().tcp_matrix, 0):
+        columns = family.ordered()
+        if len(columns) in (9, 12, 16) and (rows := odd_rows(columns, layouts)):
+            found = f"{listed(columns, most=4)} hold no orientation in {counted(len(rows), 'row')}, first in"
+            hints = (Hint("", does="mend the row, or leave these cells empty"),)
+            return [LogWarning(TCP_NOT_READ, f"{found} this one: none is read", rows[0], hints=hints)]
+    return []
 
 
 def _is_like(column: Column) -> bool:

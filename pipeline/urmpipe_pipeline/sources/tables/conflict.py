@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from urmpipe_models.errors import Finding, LogError, shown
-from urmpipe_pipeline.sources.tables.row_reader import SHOWN_FINDINGS
+from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.text import Segment
 
@@ -87,10 +87,7 @@ def refuse_among_rows(layout: Layout, markers: Sequence[Marker]) -> None:
 
 def _error(segment: Segment, markers: Sequence[Marker]) -> LogError:
     file = str(segment.path)
-    findings = [marker.finding(file) for marker in markers[:SHOWN_FINDINGS]]
-    if len(markers) > len(findings):
-        findings.append(Finding(f"{len(markers) - len(findings)} more markers", file))
-    return LogError(*findings)
+    return LogError(*capped([marker.finding(file) for marker in markers], file))
 
 
 def _marker(line: int, text: str) -> Marker | None:

@@ -99,6 +99,10 @@ class Form:
         """Return whether a line holds a row: among labelled ones, all that have none of the labels do not."""
         return not self.labels or any(_label(label).search(line) for label in self.labels)
 
+    def labels_in(self, line: str) -> int:
+        """Return how many of the labels stand in a line."""
+        return sum(bool(_label(label).search(line)) for label in self.labels)
+
     def values(self, text: str) -> list[Value]:
         """Return the values of a row.
 

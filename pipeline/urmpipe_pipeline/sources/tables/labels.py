@@ -45,7 +45,7 @@ def sniff_labels(segment: Segment) -> Layout | None:
     if not alike or 2 * labelled < len(lines):
         return None
     (labels, tail), rows = max(alike.items(), key=lambda item: len(item[1]))
-    return _layout(segment, rows, labels, tail) if 2 * len(rows) >= labelled else None
+    return _layout(segment, lines, rows, labels, tail) if 2 * len(rows) >= labelled else None
 
 
 def _labels(text: str) -> tuple[tuple[str, ...], str] | None:
@@ -62,7 +62,10 @@ def _labels(text: str) -> tuple[tuple[str, ...], str] | None:
     return tuple(labels), tail[0].strip()
 
 
-def _layout(segment: Segment, rows: Sequence[HeadLine], labels: tuple[str, ...], tail: str) -> Layout | None:
+def _layout(
+    segment: Segment, lines: Sequence[HeadLine], rows: Sequence[HeadLine], labels: tuple[str, ...], tail: str
+) -> Layout | None:
+    """Return how rows with labels are written; a torn row may be the first, with some of the labels."""
     opening = next((sign for sign in "[(" if all(sign in row.text for row in rows)), "")
     names = tuple(_BARE.sub(" ", label).strip() for label in labels)
     form = Form(names, (0,) * len(names), ";", opening=opening, labels=labels, tail=tail)
@@ -77,6 +80,8 @@ def _layout(segment: Segment, rows: Sequence[HeadLine], labels: tuple[str, ...],
     sample = form.sampled(form.readable(row.text for row in rows))
     if not sample or not any(is_number(cell, decimal) for cell in sample[0]):
         return None
+    torn = (line for line in lines if not line.is_comment and form.labels_in(line.text) >= FEWEST_LABELS)
+    first = next(torn, rows[0])
     shown = " ".join(label.strip(",;{ ") for label in labels)
     return Layout(
         segment=segment,
@@ -84,9 +89,9 @@ def _layout(segment: Segment, rows: Sequence[HeadLine], labels: tuple[str, ...],
         decimal=decimal,
         names=tuple(spread_names(names, lengths)),
         units=(),
-        header=rows[0].number,
-        first_line=rows[0].number,
-        offset=rows[0].offset,
+        header=first.number,
+        first_line=first.number,
+        offset=first.offset,
         sample=sample,
         inferences=(Inference("labels", shown, "they stand before the values of every row"),),
         form=form,

@@ -13,12 +13,21 @@ from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.cells.text_clock import Form
 
+SHOWN_FINDINGS = 20
+"""Findings that are told one by one; the others are counted."""
+
 NO_TIME = np.iinfo(np.int64).min
 """Stands where a row has no time."""
 REPORTED = NO_TIME + 1
 """Stands where a row has no time because of a finding that is reported already."""
 UNREADABLE = NO_TIME + 2
 """Stands where the text of a row's time is none."""
+
+
+def capped(findings: Sequence[Finding], file: str) -> list[Finding]:
+    """Return the first of many findings about a file, and one that counts the others."""
+    more = len(findings) - SHOWN_FINDINGS
+    return [*findings[:SHOWN_FINDINGS], *([Finding(f"{more} more findings", file)] if more > 0 else [])]
 
 
 @dataclass(frozen=True, slots=True)

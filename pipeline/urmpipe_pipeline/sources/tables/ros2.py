@@ -13,20 +13,27 @@ from itertools import takewhile
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import is_text, printable
+from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
 
 _FIRST_NAME = 3
 
 
 def with_names(layout: Layout) -> Layout:
-    """Return the layout with names for its columns if it is such a table, else as it is."""
+    """Return the layout with names for its columns if most rows are those of such a table, else as it is.
+
+    Raises:
+        LogError: If rows of several publishers, each with joints of its own, stand in one file.
+    """
     if layout.header is not None:
         return layout
-    _refuse_other_publishers(layout)
-    joints = _joints(layout)
-    if not joints:
+    found = [_names(row, layout.decimal) for row in layout.sample]
+    usual = max(filter(None, found), key=found.count, default=())
+    _refuse_other_publishers(layout, found, usual)
+    joints = tuple(map(printable, usual))
+    if not joints or len(set(joints)) < len(joints) or 2 * found.count(usual) <= len(found):
         return layout
-    count, row = len(joints), layout.sample[0]
+    count, row = len(joints), layout.sample[found.index(usual)]
     velocity = _FIRST_NAME + 2 * count
     has_rates = row[velocity : velocity + 1] != ("",)
     full = {
@@ -44,13 +51,6 @@ def with_names(layout: Layout) -> Layout:
     return replace(layout, names=tuple(names), header=layout.first_line, inferences=(*kept, said))
 
 
-def _joints(layout: Layout) -> tuple[str, ...]:
-    """Return the names of the joints, if each row begins with a stamp and has the same names."""
-    names = _names(layout.sample[0], layout.decimal)
-    same = all(_names(row, layout.decimal) == names for row in layout.sample)
-    return tuple(map(printable, names)) if same and len(set(names)) == len(names) else ()
-
-
 def _names(row: Sequence[str], decimal: str) -> tuple[str, ...]:
     """Return the texts behind a stamp, none if the row does not begin with one."""
     if len(row) < _FIRST_NAME + 4 or not (row[0].isdecimal() and row[1].isdecimal() and int(row[1]) < 10**9):
@@ -58,12 +58,13 @@ def _names(row: Sequence[str], decimal: str) -> tuple[str, ...]:
     return tuple(takewhile(lambda cell: is_text(cell, decimal), row[_FIRST_NAME:]))
 
 
-def _refuse_other_publishers(layout: Layout) -> None:
-    """Raise a `LogError` if rows of several publishers, each with joints of its own, stand in one file."""
-    first = _names(layout.sample[0], layout.decimal)
-    for row in layout.sample:
-        names = _names(row, layout.decimal)
-        if first and names and names != first:
-            listed, wanted = (", ".join(map(printable, group)) for group in (names, first))
-            message = f"found rows with the joints {listed} among rows with {wanted}, allowed: one publisher"
-            raise LogError(Finding(f"{message}; keep the rows of one of them", layout.file))
+def _refuse_other_publishers(
+    layout: Layout, found: Sequence[tuple[str, ...]], usual: tuple[str, ...]
+) -> None:
+    """Raise at the first row with other names than the usual ones; a text where a number belongs is none."""
+    for row, names in enumerate(found, start=1):
+        if names and names[: len(usual)] != usual:
+            listed, wanted = (", ".join(map(printable, group)) for group in (names, usual))
+            message = f"found a row with the joints {listed} among rows with {wanted}, allowed: one publisher"
+            line = lines_of_rows(layout, [row]).get(row)
+            raise LogError(Finding(f"{message}; keep the rows of one of them", layout.file, line, row))

@@ -21,13 +21,17 @@ from urmpipe_pipeline.sources.cells.cell import (
 )
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.tables.form import RowError, Value
-from urmpipe_pipeline.sources.tables.numbers import NO_TIME, REPORTED, ClockColumn, Numbers, RowFault
+from urmpipe_pipeline.sources.tables.numbers import (
+    NO_TIME,
+    REPORTED,
+    SHOWN_FINDINGS,
+    ClockColumn,
+    Numbers,
+    RowFault,
+)
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.text import COMMENTS
 from urmpipe_pipeline.text import counted
-
-SHOWN_FINDINGS = 20
-"""Findings that are told one by one; the others are counted."""
 
 _SHOWN_TEXT = 60
 
@@ -51,6 +55,14 @@ def data_lines(layout: Layout, lines: Iterable[tuple[int, str]]) -> Iterator[tup
             continue
         for row in split_line(text, layout.delimiter) if layout.across else (line,):
             yield number, row
+
+
+def first_left_out(layout: Layout) -> tuple[int, str]:
+    """Return number and beginning of the first line among labelled rows that is none."""
+    form, lines = layout.form, layout.segment.lines()
+    others = ((n, text) for n, text in lines if n >= layout.first_line and text.strip())
+    number, text = next((n, text) for n, text in others if form is not None and not form.is_row(text))
+    return number, _shown(text)
 
 
 @dataclass(slots=True)

@@ -26,12 +26,16 @@ from urmpipe_pipeline.sources.cells.cell import (
 )
 from urmpipe_pipeline.sources.cells.text_clock import looks_like_a_clock
 from urmpipe_pipeline.sources.tables.form import Form
+from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.text import HEAD_BYTES, HeadLine, Segment, head_lines
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 from urmpipe_pipeline.text import counted
 
 LEAST_FIT = 0.2
 """A delimiter that fits less than this is not believed because it makes several columns."""
+
+FEW = 0.25
+"""Share of the rows that may be damaged where the others tell how the table is written."""
 
 SCORED_LINES = 60
 """Lines that decide on the delimiter."""
@@ -151,7 +155,7 @@ def sniff(
     _refuse_prose(segment, body[first:], [len(row) for row in rows[first:]], width)
     before = [line for line in lines if line.number < body[first].number]
     header, units = _header(before, style.delimiter, width)
-    names, said = _names(segment, header, rows[first:], width)
+    names, said = _names(segment, header, body[first:], rows[first:], width)
     return Layout(
         segment=segment,
         delimiter=style.delimiter,
@@ -321,11 +325,15 @@ def _all_units(cells: Row, above: Sequence[Row]) -> bool:
 
 
 def _names(
-    segment: Segment, header: tuple[int, Row] | None, rows: Sequence[Row], width: int
+    segment: Segment,
+    header: tuple[int, Row] | None,
+    lines: Sequence[HeadLine],
+    rows: Sequence[Row],
+    width: int,
 ) -> tuple[tuple[str, ...], Inference]:
     """Return a name for every cell of a row."""
-    full = [row for row in rows if len(row) == width]
-    trailing = not any(row[-1] for row in full)
+    ends = [k for k, row in enumerate(rows) if len(row) == width and row[-1]]
+    trailing = not ends
     if header is None:
         names = tuple(str(k + 1) for k in range(width - trailing))
         said = Inference("header", "none", "the first line is numbers: columns by number")
@@ -338,13 +346,47 @@ def _names(
         return tuple(cells[:-1]), found
     if len(cells) == width - 1 and trailing:
         return (*cells, ""), Inference("header", f"line {line}", "each row ends with a delimiter")
-    if len(cells) == width - 1 and count_up([row[0] for row in full]):
+    uncounted = _uncounted(rows, width)
+    if len(cells) == width - 1 and not uncounted:
         return ("", *cells), Inference("header", f"line {line}", "the first column is an unnamed index")
+    if len(cells) == width - 1:
+        _refuse_few(segment, lines, rows, uncounted, 0, f"a count, as before what line {line} names")
+        _refuse_few(segment, lines, rows, ends, -1, f"no cell behind what line {line} names")
     number = abs(len(cells) - width)
     remedy = f"{'add' if len(cells) < width else 'take out'} {counted(number, 'name')}"
     wrong = f"found {len(cells)} names over rows of {width} cells, allowed: a name a column; {remedy}"
     wrong += f", or delete line {line}: without names the columns are taken as joints in order"
     raise LogError(Finding(wrong, file=str(segment.path), line=line))
+
+
+def _uncounted(rows: Sequence[Row], width: int) -> list[int]:
+    """Return the rows that do not count up from 0 or 1 in their first cell; others may stand between."""
+    found, last, count = [], -2, -1
+    for k, row in enumerate(rows):
+        if len(row) != width:
+            continue
+        if row[0].isdecimal() and 1 <= int(row[0]) - count <= k - last:
+            last, count = k, int(row[0])
+        else:
+            found.append(k)
+    return found
+
+
+def _refuse_few(
+    segment: Segment,
+    lines: Sequence[HeadLine],
+    rows: Sequence[Row],
+    few: Sequence[int],
+    column: int,
+    allowed: str,
+) -> None:
+    """Raise with each of some rows if they are few: it is they that keep the others from being understood."""
+    if len(few) > FEW * len(rows):
+        return
+    wrong = [(lines[k].number, shown(rows[k][column])) for k in few]
+    file = str(segment.path)
+    findings = [Finding(file=file, line=line, found=cell, allowed=allowed) for line, cell in wrong]
+    raise LogError(*capped(findings, file))
 
 
 def _refuse_prose(segment: Segment, lines: Sequence[HeadLine], widths: Sequence[int], width: int) -> None:

@@ -60,7 +60,8 @@ def read_rows(plan: Plan) -> Rows:
     which of two rows is wrong.
 
     Raises:
-        LogError: If there is no row, with what leaving out rows does not mend (the header again), or if the known times are no clock.
+        LogError: If there is no row, with what leaving out rows does not mend (the header again), or if the
+            known times are no clock.
     """
     columns = plan.roles.columns
     layout, clock = plan.tables.layouts[plan.main], plan.clocks[plan.main]
