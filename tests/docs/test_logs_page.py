@@ -111,6 +111,7 @@ SPECIMENS = {
     "no rows": "t,q1,q2\n",
     "ragged header": "t,q1\n0,1,2\n0.1,2,3\n",
     "ragged row": "t,q1,q2\n0,1,2\n0.1,1\n0.2,1,2\n",
+    "merge conflict": "t,q1,q2\n0,1,2\n<<<<<<< HEAD\n0.1,1,2\n=======\n0.1,2,3\n>>>>>>> other\n",
     "stray text": "t,q1,q2\n0,1,2\n0.1,1,2\n0.2,x,2\n0.3,1,2\n",
     "time out of order": "t,q1,q2\n0,1,2\n0.1,1,2\n0.05,1,2\n0.2,1,2\n",
     "infinite value": "t,q1,q2\n0,1,2\n0.1,inf,2\n0.2,1,2\n",
@@ -134,7 +135,7 @@ def test_an_error_stops(tmp_path: Path, kind: str) -> None:
     path.write_text(SPECIMENS[kind], encoding="utf-8")
     with pytest.raises(UrmpipeError) as error:
         ingest_log([path])
-    assert all("found" in finding.message for finding in error.value.findings)
+    assert all("found" in finding.sentence() for finding in error.value.findings)
 
 
 def test_a_log_of_another_number_of_joints_stops(tmp_path: Path) -> None:

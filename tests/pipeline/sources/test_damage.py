@@ -143,6 +143,44 @@ def test_a_header_again_begins_a_second_log(wrong: Wrong, behind: int) -> None:
     assert wrong(joined(*rows(100), "t,q1 [rad],q2 [rad]", *rows(behind))) == [f"log.csv:102: {said}"]
 
 
+@pytest.mark.parametrize("header", ["t,q1 [deg],q2 [deg]", "t,q2 [rad],q1 [rad]", "T,Q1,q2"])
+def test_another_header_begins_a_second_log_that_is_not_skipped(wrong: Wrong, header: str) -> None:
+    """Its rows may be in other units, or in another order, and go on in time."""
+    text = joined(*rows(300), header, *rows(300, 3.0))
+    said = f"found another header, {header!r}, allowed: one log a file; a second log begins here"
+    assert wrong(text, skip_bad=True) == wrong(text) == [f"log.csv:302: {said}"]
+
+
+@pytest.mark.parametrize("message", ["q1,paused,by hand", "[WARN],late,twice"])
+def test_a_message_is_no_header(read: Read, message: str) -> None:
+    assert read(joined(*rows(300), message, *rows(300, 3.0)), skip_bad=True).rows == 600
+
+
+@pytest.mark.parametrize("also", ["", "# paused\n"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_a_last_cell_that_is_cut_is_no_value(read: Read, wrong: Wrong, encoding: str, also: str) -> None:
+    """The recorder was killed while it wrote: 1.0471 became 1.0, as only the other rows tell."""
+    lines = [f"{0.01 * k:.2f},{k / 70:.4f},{1 + k / 900:.4f}" for k in range(300)]
+    text = joined(*lines[:150]) + also + "\n".join(lines[150:])
+    assert read(text, encoding=encoding).rows == 300
+    cut, line = text[:-2], 301 + bool(also)
+    said = "where the file ends, allowed: as many decimals as in the other rows"
+    assert wrong(cut, encoding=encoding) == [
+        f"log.csv:{line}: found '{cut[-4:]}' {said}",
+        "log.csv: 1 of 300 rows cannot be read; skip_bad=True leaves them out",
+    ]
+    assert read(cut, encoding=encoding, skip_bad=True).rows == 299
+    assert read(text + "\n# 0.5", encoding=encoding).rows == 300
+    uneven = joined(*(f"{0.01 * k:.2f},{k / 70!r},{1 + k / 900!r}" for k in range(300)))
+    assert read(uneven[:-9], encoding=encoding).rows == 300
+
+
+def test_a_byte_of_no_text_has_a_line(wrong: Wrong) -> None:
+    text = joined(*rows(100), "1.00,0.\0,1.5", *rows(9, 1.01))
+    assert wrong(text) == ["log.csv:102: found the byte b'\\x00', allowed: text, as in the lines above"]
+    assert wrong("GIF\0\n") == ["log.csv: found a binary file, allowed: a text table (CSV)"]
+
+
 def test_a_clock_that_begins_again_begins_a_second_log(wrong: Wrong) -> None:
     assert wrong(joined(*rows(100), *rows(30))) == [
         f"log.csv:102, column t: found 0 s after 0.99 s, {INCREASE}:"

@@ -31,9 +31,13 @@ from urmpipe_pipeline.sources.tables.numbers import (
 )
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.text import COMMENTS
+from urmpipe_pipeline.sources.vocabulary import split_unit
 from urmpipe_pipeline.text import counted
 
 _SHOWN_TEXT = 60
+_LAST_BYTES = 1 << 12
+_FIXED_ROWS = 100
+"""So many rows tell that a column is written with the same number of decimals."""
 
 MAY_BE_MISSING = "a number, or an empty, Null or NaN cell where a sample is missing"
 """What a cell of a log may hold."""
@@ -63,6 +67,23 @@ def first_left_out(layout: Layout) -> tuple[int, str]:
     others = ((n, text) for n, text in lines if n >= layout.first_line and text.strip())
     number, text = next((n, text) for n, text in others if form is not None and not form.is_row(text))
     return number, _shown(text)
+
+
+def cut_cell(layout: Layout) -> str | None:
+    """Return the last cell of a file if it is cut: no line end is behind it, and it lacks decimals."""
+    segment, usual = layout.segment, layout.cells(len(layout.names) - 1)
+    if layout.form is not None or layout.across or len(usual) < _FIXED_ROWS:
+        return None
+    with segment.path.open("rb") as file:
+        file.seek(max(segment.start, segment.end - _LAST_BYTES))
+        text = file.read(segment.end - file.tell()).decode(segment.encoding, errors="replace")
+    last = text.rpartition(segment.newline)[2]
+    cells = split_line(last, layout.delimiter)
+    if last.lstrip().startswith(COMMENTS) or len(cells) != len(layout.names):
+        return None
+    found, *others = {len(one.partition(layout.decimal)[2]) for one in usual}
+    cut = not others and len(cells[-1].partition(layout.decimal)[2]) < found
+    return cells[-1] if cut and is_number(cells[-1], layout.decimal) else None
 
 
 @dataclass(slots=True)
@@ -195,10 +216,8 @@ class RowReader:
         """Return whether a row has as many values as the others, having reported what it is if not."""
         names = self.layout.form.names if self.layout.form else self.layout.names
         width = len(names)
-        if self.layout.header is not None and tuple(values[:width]) == names and any(names):
-            self._report(
-                "found the header again, allowed: one log a file; a second log begins here", lasting=True
-            )
+        if again := self._header_again(text, values, names):
+            self._report(f"found {again}, allowed: one log a file; a second log begins here", lasting=True)
             self.ended = True
             return False
         if len(values) == width - 1 and not names[-1]:
@@ -210,6 +229,24 @@ class RowReader:
             return False
         del values[width:]
         return True
+
+    def _header_again(self, text: str, values: Sequence[Value], names: Sequence[str]) -> str | None:
+        """Return what to call a row that is the header again, perhaps in other units; None if it is none."""
+        if self.layout.header is None or not any(names):
+            return None
+        if tuple(values[: len(names)]) == tuple(names):
+            return "the header again"
+        known = {split_unit(name)[0].lower() for name in names if name}
+        alike = [str(value) for value in values if split_unit(str(value))[0].lower() in known]
+        return f"another header, {_shown(text)}" if len(alike) > 1 and 2 * len(alike) >= len(names) else None
+
+    def refuse_cut_row(self) -> None:
+        """Report the last row if the file ends within its last cell."""
+        layout = self.layout
+        cut = cut_cell(layout) if len(layout.names) - 1 in self._wanted else None
+        if cut is not None and not self.ended:
+            self._line = lines_of_rows(layout, [self._row])[self._row]
+            self._report(f"found {cut!r} where the file ends, allowed: as many decimals as in the other rows")
 
     def _time(self, cells: Sequence[str]) -> int:
         total = 0

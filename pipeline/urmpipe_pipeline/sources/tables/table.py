@@ -30,6 +30,7 @@ def read_table(
     reader = RowReader(layout, columns, clock, allowed)
     scales = clock_scales(layout, clock)
     parts = [part for block in row_blocks(layout) for part in _parts(reader, block, scales)]
+    reader.refuse_cut_row()
     values = [part.values for part in parts] or [np.empty((0, len(columns)))]
     times = [_times(part) for part in parts] or [np.empty(0, dtype=np.int64)]
     return replace(

@@ -27,6 +27,7 @@ LOGS = (".csv", ".txt", ".tsv", ".dat", ".log", ".rrd")
 """How most logs are called, and their recordings."""
 
 COMMENTS = ("#", "%", "//")
+_TITLE_LINES = 2  # a binary file may begin with as many lines of text
 _CONTROL = bytes(set(range(32)) - set(b"\t\n\v\f\r\x1a\x1b"))
 
 
@@ -126,7 +127,7 @@ def open_text(path: Path, *, any_suffix: bool = False) -> Segment:
         raise LogError(Finding("found an empty file, allowed: a table with a row a sample", file=str(path)))
     mark, encoding = _encoding(raw)
     if encoding is None:
-        raise LogError(Finding("found a binary file, allowed: a text table (CSV)", file=str(path)))
+        raise LogError(_no_text(path, raw))
     head = _decoded_head(raw[mark:], encoding, whole=size <= HEAD_BYTES)
     return Segment(path, encoding, mark, size, 1, head)
 
@@ -156,6 +157,16 @@ def _container(path: Path, raw: bytes, any_suffix: bool) -> Container | None:
         if path.suffix.lower() in container.suffixes and not any_suffix:
             return container
     return next((c for c in vocabulary().containers if raw.startswith(c.magic)), None)
+
+
+def _no_text(path: Path, raw: bytes) -> Finding:
+    """Return what is said of bytes that no text has: with their line if text stands above it."""
+    place = next(k for k, byte in enumerate(raw) if byte in _CONTROL)
+    line = raw.count(b"\n", 0, place) + 1
+    if line <= _TITLE_LINES:
+        return Finding("found a binary file, allowed: a text table (CSV)", file=str(path))
+    found = f"the byte {raw[place : place + 1]!r}"
+    return Finding(file=str(path), line=line, found=found, allowed="text, as in the lines above")
 
 
 def _encoding(raw: bytes) -> tuple[int, str | None]:
