@@ -1,0 +1,267 @@
+"""The frames of base and tool between computed and measured poses: known frames, SciPy, and what is open."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.hand_eye import HARDLY, TURN_LENGTH, HandEye, hand_eye, rotation_miss
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.orientation import FORMS, RotationForm, matrices, quaternions
+from urmpipe_models.robots.catalogue import load_robot
+
+ROUNDING = 1e-12
+"""Positions of some metres round at 1e-15, and a fit loses a few digits."""
+
+
+class Truth(NamedTuple):
+    """Frames, and poses on both sides of them."""
+
+    base: FloatArray
+    shift: FloatArray
+    tool: FloatArray
+    offset: FloatArray
+    position: FloatArray
+    rotation: FloatArray
+
+    @property
+    def measured(self) -> FloatArray:
+        return (self.position + self.rotation @ self.offset) @ self.base.T + self.shift
+
+    @property
+    def measured_rotation(self) -> FloatArray:
+        return np.asarray(self.base @ self.rotation @ self.tool)
+
+
+def random_truth(seed: int, count: int = 20, robot: str = "ur10", spread: float = np.pi) -> Truth:
+    """Poses of an arm whose joints are within a spread, and any frames."""
+    rng = np.random.default_rng(seed)
+    base, tool = Rotation.random(2, rng).as_matrix()
+    chain = load_robot(robot)
+    q = rng.uniform(-spread, spread, (count, len(chain.moving)))
+    return Truth(base, rng.uniform(-5, 5, 3), tool, rng.uniform(-0.3, 0.3, 3), *poses_over_log(chain, q))
+
+
+def placed(position: FloatArray, rotation: FloatArray) -> Truth:
+    """Some poses between two frames."""
+    base, tool = Rotation.from_rotvec([[0.3, -0.5, 0.4], [0.1, 0.2, -0.7]]).as_matrix()
+    offset, shift = np.array([0.01, -0.02, 0.15]), np.array([1.0, 2.0, 0.3])
+    return Truth(base, shift, tool, offset, position, np.broadcast_to(rotation, (len(position), 3, 3)))
+
+
+def found_in(truth: Truth, *, turned: bool) -> HandEye:
+    return hand_eye(
+        truth.position, truth.rotation, truth.measured, truth.measured_rotation if turned else None
+    )
+
+
+def misses(found: HandEye, truth: Truth, measured: FloatArray) -> FloatArray:
+    moved = (truth.position + truth.rotation @ found.tool_position) @ found.base_rotation.T
+    return measured - moved - found.base_position
+
+
+def rms(values: FloatArray) -> float:
+    return float(np.sqrt((values**2).sum() / len(values)))
+
+
+def assert_found(found: HandEye, truth: Truth, *, turned: bool) -> None:
+    assert found.untold == ()
+    np.testing.assert_allclose(found.base_rotation, truth.base, atol=ROUNDING)
+    np.testing.assert_allclose(found.base_position, truth.shift, atol=ROUNDING)
+    np.testing.assert_allclose(found.tool_position, truth.offset, atol=ROUNDING)
+    np.testing.assert_allclose(found.tool_rotation, truth.tool if turned else np.eye(3), atol=ROUNDING)
+
+
+@pytest.mark.parametrize("turned", [True, False])
+@pytest.mark.parametrize("robot", ["ur10", "ur5e", "urm6", "arm6"])
+def test_any_frames_are_found_from_exact_poses(robot: str, turned: bool) -> None:
+    for seed in range(25):
+        truth = random_truth(seed, robot=robot)
+        assert_found(found_in(truth, turned=turned), truth, turned=turned)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), count=st.integers(5, 40), spread=st.floats(0.5, np.pi))
+def test_any_frames_are_found_from_few_poses_and_small_motions(seed: int, count: int, spread: float) -> None:
+    truth = random_truth(seed, count, spread=spread)
+    found = found_in(truth, turned=True)
+    np.testing.assert_allclose(found.base_rotation, truth.base, atol=1e-9)
+    np.testing.assert_allclose(found.tool_position, truth.offset, atol=1e-9)
+
+
+def test_rows_without_a_value_count_nowhere() -> None:
+    truth = random_truth(1, 40)
+    measured, turns = truth.measured.copy(), truth.measured_rotation.copy()
+    position, rotation = truth.position.copy(), truth.rotation.copy()
+    measured[0, 1], turns[5:9], position[10], rotation[11, 2, 2] = np.nan, np.nan, np.nan, np.nan
+    assert_found(hand_eye(position, rotation, measured, turns), truth, turned=True)
+    nowhere = np.full_like(turns, np.nan)
+    assert_found(hand_eye(position, rotation, measured, nowhere), truth, turned=False)
+
+
+@pytest.mark.parametrize("turned", [True, False])
+@pytest.mark.parametrize("seed", range(5))
+def test_no_other_frames_leave_less_of_noisy_positions(seed: int, turned: bool) -> None:
+    truth = random_truth(seed, 300)
+    rng = np.random.default_rng(seed)
+    measured = truth.measured + rng.normal(0.0, 1e-3, truth.measured.shape)
+    noise = Rotation.from_rotvec(rng.normal(0.0, 0.01, (300, 3))).as_matrix()
+    turns = truth.measured_rotation @ noise
+    found = hand_eye(truth.position, truth.rotation, measured, turns if turned else None)
+
+    def miss(x: FloatArray) -> FloatArray:
+        base = Rotation.from_rotvec(x[:3]).as_matrix() @ truth.base
+        moved = (truth.position + truth.rotation @ (truth.offset + x[3:6])) @ base.T
+        return np.asarray((measured - moved - truth.shift - x[6:]).ravel())
+
+    best = least_squares(miss, np.zeros(9), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    least = np.sqrt(2 * best.cost / 300)
+    assert rms(misses(found, truth, measured)) == pytest.approx(least, rel=1e-9)  # both are at the foot
+    if turned:
+        left = (Rotation.from_matrix(found.base_rotation @ truth.rotation @ found.tool_rotation)).inv()
+        spun = (left * Rotation.from_matrix(turns)).as_rotvec()
+        assert np.abs(spun.mean(axis=0)).max() < 1e-5  # of the least squares the mean is 0, but for 0.01^2
+
+
+def test_orientations_in_a_wrong_form_move_no_position() -> None:
+    truth = random_truth(3, 100)
+    measured = truth.measured + np.random.default_rng(3).normal(0.0, 1e-3, (100, 3))
+    wrong = Rotation.random(100, np.random.default_rng(4)).as_matrix()
+    alone = hand_eye(truth.position, truth.rotation, measured)
+    found = hand_eye(truth.position, truth.rotation, measured, wrong)
+    assert rms(misses(found, truth, measured)) == pytest.approx(rms(misses(alone, truth, measured)), rel=1e-9)
+
+
+def test_orientations_tell_what_positions_on_a_line_leave_open() -> None:
+    """No frames leave less of positions and orientations together, and hardly any less of positions."""
+    rng = np.random.default_rng(5)
+    line = np.outer(rng.uniform(-0.5, 0.5, 200), [1 / 3, 2 / 3, 2 / 3])
+    spun = Rotation.from_rotvec(rng.normal(0, 0.3, (200, 3)) * [1, 0, 0]).as_matrix()
+    truth = placed(line, spun)
+    measured = truth.measured + rng.normal(0.0, 1e-3, line.shape)
+    turns = truth.measured_rotation @ Rotation.from_rotvec(rng.normal(0.0, 0.01, (200, 3))).as_matrix()
+    found = hand_eye(truth.position, truth.rotation, measured, turns)
+
+    def miss(x: FloatArray) -> FloatArray:
+        base = Rotation.from_rotvec(x[:3]).as_matrix() @ truth.base
+        tool = truth.tool @ Rotation.from_rotvec(x[9:]).as_matrix()
+        moved = (truth.position + truth.rotation @ (truth.offset + x[3:6])) @ base.T
+        apart = TURN_LENGTH / np.sqrt(2) * (turns - base @ truth.rotation @ tool)
+        return np.concatenate(((measured - moved - truth.shift - x[6:9]).ravel(), apart.ravel()))
+
+    best = least_squares(miss, np.zeros(12), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    apart = TURN_LENGTH / np.sqrt(2) * (turns - found.base_rotation @ truth.rotation @ found.tool_rotation)
+    left = (misses(found, truth, measured) ** 2).sum() + (apart**2).sum()
+    assert left == pytest.approx(2 * best.cost, rel=1e-9)
+    assert [one.part for one in found.untold] == ["tool offset"]  # along the one axis of all turns
+    np.testing.assert_allclose(np.abs(found.untold[0].axis), [1.0, 0.0, 0.0], atol=1e-9)
+
+
+RNG = np.random.default_rng(0)
+POINTS, TURNS = poses_over_log(load_robot("ur10"), RNG.uniform(-3.0, 3.0, (50, 6)))
+LINE = np.outer(RNG.uniform(-1.0, 1.0, 50), [1 / 3, 2 / 3, 2 / 3])
+POINT = np.broadcast_to(POINTS[0], POINTS.shape)
+ABOUT_Z = Rotation.from_rotvec(np.outer(RNG.uniform(-2.0, 2.0, 50), [0.0, 0.0, 1.0])).as_matrix()
+
+OPEN_SETS: list[tuple[FloatArray, FloatArray, list[str], list[str]]] = [
+    (POINTS, TURNS, [], []),
+    (POINTS, TURNS[0], ["tool offset"] * 3, ["tool offset"] * 3),
+    (POINTS, ABOUT_Z @ TURNS[0], ["tool offset"], ["tool offset"]),
+    (LINE, TURNS, [], []),
+    (LINE, TURNS[0], ["tool offset"] * 3 + ["base turn"], ["tool offset"] * 3 + ["tool turn"]),
+    (POINT, TURNS, [], []),
+    (POINT, ABOUT_Z @ TURNS[0], ["tool offset", "base turn"], ["tool offset", "tool turn"]),
+    (
+        POINT,
+        TURNS[0],
+        ["tool offset"] * 3 + ["base turn"] * 3,
+        ["tool offset"] * 3 + ["tool turn"] * 3,
+    ),
+    (POINTS[:1], TURNS[:1], ["tool offset"] * 3 + ["base turn"] * 3, ["tool offset"] * 3 + ["tool turn"] * 3),
+]
+"""Poses, what they leave open without orientations, and with them."""
+
+
+@pytest.mark.parametrize(("position", "rotation", "alone", "turned"), OPEN_SETS)
+def test_what_poses_leave_open_is_named_and_the_least_of_it_taken(
+    position: FloatArray, rotation: FloatArray, alone: list[str], turned: list[str]
+) -> None:
+    truth = placed(position, rotation)
+    for parts, with_turns in ((alone, False), (turned, True)):
+        found = found_in(truth, turned=with_turns)
+        assert [one.part for one in found.untold] == parts
+        np.testing.assert_allclose(misses(found, truth, truth.measured), 0.0, atol=1e-9)
+        for one in found.untold:
+            assert np.linalg.norm(one.axis) == pytest.approx(1.0)
+            assert one.seen < 1e-7  # the root of rounding
+            if one.part == "tool offset":
+                assert found.tool_position @ one.axis == pytest.approx(0.0, abs=1e-9)
+        if with_turns:
+            made = found.base_rotation @ truth.rotation @ found.tool_rotation
+            np.testing.assert_allclose(made, truth.measured_rotation, atol=1e-9)
+        elif not parts:
+            assert_found(found, truth, turned=False)
+
+
+def test_the_axis_of_all_turns_is_the_one_along_which_the_tool_is_open() -> None:
+    found = found_in(placed(POINTS, ABOUT_Z @ TURNS[0]), turned=False)
+    assert abs(TURNS[0, 2] @ found.untold[0].axis) == pytest.approx(1.0)
+    assert found.tool_rotation.tolist() == np.eye(3).tolist()
+
+
+def test_a_tool_that_hardly_turns_is_found_and_said_to_be_hardly_told() -> None:
+    small = Rotation.from_rotvec(RNG.normal(0.0, 0.002, (50, 3))).as_matrix()
+    truth = placed(POINTS, small @ TURNS[0])
+    found = found_in(truth, turned=True)
+    np.testing.assert_allclose(found.tool_position, truth.offset, atol=1e-9)
+    assert [one.part for one in found.untold] == ["tool offset"] * 3
+    for one in found.untold:
+        spun = truth.rotation @ one.axis
+        assert one.seen == pytest.approx(np.sqrt(3 * spun.var(axis=0).mean()), rel=0.2)
+        assert one.seen < HARDLY
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_the_form_of_orientations_is_the_one_that_leaves_no_angle(form: RotationForm) -> None:
+    truth = random_truth(7, 40)
+    made = Rotation.from_matrix(truth.measured_rotation)
+    columns = {
+        "vector": made.as_rotvec(),
+        "rpy": made.as_euler("xyz"),
+        "quat_xyzw": made.as_quat(),
+        "quat_wxyz": made.as_quat(scalar_first=True),
+        "matrix": made.as_matrix().reshape(-1, 9),
+    }.get(form)
+    if columns is None:
+        columns = made.as_euler(form.upper())
+    alike = {"zyz", "zxz"}  # these differ by quarter turns of base and tool
+    for other in (one for one in FORMS if quaternions_fit(columns, one)):
+        guess = matrices(quaternions(columns, other))
+        miss = rotation_miss(truth.rotation, guess)
+        known = rotation_miss(truth.rotation, guess, truth.base)
+        assert (miss < 1e-7) == (other == form or {form, other} == alike), other
+        assert (known < 1e-7) == (other == form), other
+        if columns.shape[1] == 3:
+            in_degrees = matrices(quaternions(np.radians(columns), other))
+            assert rotation_miss(truth.rotation, in_degrees) > 0.1
+
+
+def quaternions_fit(columns: FloatArray, form: RotationForm) -> bool:
+    return columns.shape[1] == (9 if form == "matrix" else 4 if form.startswith("quat") else 3)
+
+
+def test_the_angle_that_is_left_is_that_of_the_noise() -> None:
+    truth = random_truth(8, 500)
+    noise = Rotation.from_rotvec(np.random.default_rng(8).normal(0.0, 0.01, (500, 3)))
+    turns = truth.measured_rotation @ noise.as_matrix()
+    turns[3] = np.nan
+    expected = rms(np.delete(noise.as_rotvec(), 3, axis=0))
+    assert rotation_miss(truth.rotation, turns) == pytest.approx(expected, rel=0.01)  # 6 of 1500 are fitted
+    assert np.isnan(rotation_miss(truth.rotation, np.full_like(turns, np.nan)))
