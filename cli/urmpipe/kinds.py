@@ -126,7 +126,7 @@ LINK = Kind(_is_text, "the name of a link of the URDF")
 ROBOT_FILE = Kind(_is_path, "a name, or a TOML or URDF file")
 
 KINDS = {
-    "align": _one_of("none", "start", "rigid", "tool"),
+    "align": _one_of("none", "start", "rigid", "tool", "base+tool"),
     "arguments": Kind(_are_arguments, 'a mapping of names to texts or numbers, such as {"log": "log.csv"}'),
     "audit": PATH,
     "backend": _one_of("native", "python"),

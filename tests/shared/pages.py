@@ -81,7 +81,7 @@ def lay_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "targets.csv").write_text("x,y,z,rz,ry,rx\n0.1,0.05,0.25,0.3,0.4,0.1\n0,0,0.3,0,0,0\n")
     (folder / "poses.csv").write_text("x,y,z,qx,qy,qz,qw\n0.4,0.1,0.3,1,0,0,0\n")
     (folder / "other.toml").write_text('robot = "urm6"\n')
-    for name in ("robot_data", "monday"):
+    for name in ("robot_data", "monday", "tracker"):
         (folder / f"{name}.csv").write_text(rtde_log(), encoding="utf-8")
     (folder / "my_unit.py").write_bytes((DOCS / "examples" / "low_pass.py").read_bytes())
     (folder / "arm.urdf").write_text("\n".join(snippets("docs/robots.md", "xml")), encoding="utf-8")

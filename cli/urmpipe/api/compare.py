@@ -95,7 +95,7 @@ def compare(
             units, such as "axis=3.5mm,angle=0.5deg".
         tcp: Where a log was: fk or recorded.
         sync: How the clocks are put together: start, auto, or t_reference - t_log in [s].
-        align: How a log is moved in space first: none, start, rigid or tool.
+        align: How a log is moved in space first: none, start, rigid, tool or base+tool.
         sides: Two words in the names of the columns of one log, such as ("target", "actual"): what was asked
             for is the reference of what was done; "rest" for the columns without the other word.
         baseline: An earlier comparison, to tell what changed since.

@@ -111,10 +111,11 @@ def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command]
 )
 @click.option(
     "--align",
-    type=OneOf(["none", "start", "rigid", "tool"]),
+    type=OneOf(["none", "start", "rigid", "tool", "base+tool"]),
     default="none",
     show_default=True,
-    help="Move the log first: to the same start pose, by the best rigid motion, by the best tool offset.",
+    help="Move the log first: to the same start pose, by the best rigid motion, by the best tool offset, by"
+    " the best base and tool at once (measured from outside).",
 )
 @click.option(
     "--sides",

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.elementwise import Vector
 from urmpipe_models.errors import LogError
+from urmpipe_models.hand_eye import hand_eye
 from urmpipe_models.orientation import angle_between, best_rotation, conjugate, matrices, product, quaternions
-from urmpipe_models.transform import rpy_of, translation
+from urmpipe_models.transform import Transform, rpy_of
+from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, lacking
 from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
 from urmpipe_pipeline.runs.results import Run
@@ -23,6 +27,9 @@ TURNED = np.radians(1.0)
 """A tool that turns by less in [rad] is not told from a base: 1 mm of the base is 0.02 mm off as one of the
 tool, as much as the best arms repeat to."""
 
+LEAST_POSES = 4
+"""Three positions have the nine numbers that a base and the offset of a tool have: they fit whatever is."""
+
 IN_COMMON = 1e-9
 """Two motions across a line have nothing in common if their covariance is below this share of their sizes:
 rounding leaves as much."""
@@ -34,28 +41,45 @@ def align(matched: Matched, mode: AlignMode, run: Run) -> Matched:
     Args:
         matched: Both sides at the same times, at least one.
         mode: none, start (the first pose that both sides have agrees; without orientations the first
-            position), rigid (the best rigid motion of the positions) or tool (the best constant offset of the
-            tool centre point; samples without an orientation are left out).
+            position), rigid (the best rigid motion of the positions), tool (the best constant offset of the
+            tool centre point) or base+tool (the best base and tool at once). The last two leave out samples
+            of the log without an orientation.
         run: The log, for messages.
 
     Raises:
-        LogError: If the positions leave the rotation open, or a tool, by orientations that hardly turn.
+        LogError: If the positions leave the rotation open; a tool, by orientations that hardly turn; or
+            base and tool, by too few poses.
     """
-    if mode == "start":
-        return _moved(matched, _start(matched))
-    if mode == "rigid":
-        return _moved(matched, _rigid(matched, run))
-    return _with_tool(matched, run) if mode == "tool" else matched
+    match mode:
+        case "none":
+            return matched
+        case "start":
+            return _moved(matched, _start(matched))
+        case "rigid":
+            return _moved(matched, _rigid(matched, run))
+        case "tool":
+            return _with_tool(matched, run)
+    return _with_base_and_tool(matched, run)
 
 
-def tool_with(robot: Chain, alignment: Alignment) -> tuple[float, ...]:
-    """Return the tool of a robot moved by the offset of an alignment of the mode tool, as `tool` takes it.
+def placed(robot: Chain, alignment: Alignment) -> Chain:
+    """Return an arm whose kinematics are where an alignment put those of a robot."""
+    if alignment.mode == "none":
+        return robot
+    base, tool = (
+        Transform(cast("tuple[Vector, Vector, Vector]", rotation), position)
+        for rotation, position in (
+            (alignment.rotation, alignment.translation),
+            (alignment.tool_rotation, alignment.tool),
+        )
+    )
+    return robot.placed(base @ robot.base, robot.tool @ tool)
 
-    X, Y, Z in [m]; with RX, RY, RZ in [rad] behind them if the robot's tool is turned.
-    """
-    tool = robot.tool @ translation(*alignment.tool)
-    x, y, z = (float(value) for value in tool.translation)
-    turned = rpy_of(tool.rotation)
+
+def as_option(frame: Transform) -> tuple[float, ...]:
+    """Return a frame as `base` and `tool` take it: X, Y, Z in [m]; RX, RY, RZ in [rad] if it is turned."""
+    x, y, z = (float(value) for value in frame.translation)
+    turned = rpy_of(frame.rotation)
     return (x, y, z, *turned) if any(turned) else (x, y, z)
 
 
@@ -106,7 +130,12 @@ def _open_rotation(size: float, breadth: float) -> str:
 def _alignment(mode: AlignMode, rotation: FloatArray, shift: FloatArray) -> Alignment:
     """Return an alignment of plain numbers."""
     x, y, z = (float(value) for value in shift)
-    return Alignment(mode, tuple(tuple(row) for row in rotation.tolist()), (x, y, z))
+    return Alignment(mode, _rows(rotation), (x, y, z))
+
+
+def _rows(rotation: FloatArray) -> tuple[tuple[float, ...], ...]:
+    """Return a rotation matrix as plain numbers."""
+    return tuple(tuple(row) for row in rotation.tolist())
 
 
 def _moved(matched: Matched, alignment: Alignment) -> Matched:
@@ -121,18 +150,48 @@ def _moved(matched: Matched, alignment: Alignment) -> Matched:
 
 def _with_tool(matched: Matched, run: Run) -> Matched:
     """Move the log by the d of the least |p_reference - p - R d|^2, the mean of R^T (p_reference - p)."""
-    quat = matched.actual_quat
-    known = np.zeros(0, np.intp) if quat is None else np.flatnonzero(np.isfinite(quat).all(axis=1))
-    if quat is None or not len(known):
-        said = f"tool: found no orientation of the log, allowed: {ORIENTED}"
-        raise LogError(lacking(run, said, parameter="align"))
-    turned = float(angle_between(quat[known], np.broadcast_to(quat[known[0]], (len(known), 4))).max())
+    posed, quat = _oriented(matched, "tool", run)
+    turned = float(angle_between(quat, np.broadcast_to(quat[0], quat.shape)).max())
     if turned < TURNED:
         found = f"tool: found a tool that turns by {np.degrees(turned):.4f} deg in all"
         said = "which any offset of the base explains as well, allowed: a log that turns it; start, none"
         raise LogError(lacking(run, f"{found}, {said}", parameter="align"))
-    posed = matched if len(known) == len(quat) else matched.at(known)
-    rotation = matrices(quat[known])
+    rotation = matrices(quat)
     x, y, z = np.einsum("nji,nj->ni", rotation, posed.reference - posed.actual).mean(axis=0).tolist()
     moved = posed.actual + rotation @ np.array((x, y, z))
     return replace(posed, actual=moved, alignment=Alignment("tool", tool=(x, y, z)))
+
+
+def _with_base_and_tool(matched: Matched, run: Run) -> Matched:
+    """Move the log by the base and the tool of the least misses: p' = Z (p + R d), R' = Z R X."""
+    posed, quat = _oriented(matched, "base+tool", run)
+    if len(quat) < LEAST_POSES:
+        few = text.counted(len(quat), "compared pose")
+        said = f"base+tool: found {few}, which some base and tool fit, allowed: {LEAST_POSES} or more"
+        raise LogError(lacking(run, said, parameter="align"))
+    rotation, wanted = matrices(quat), posed.reference_quat
+    found = hand_eye(posed.actual, rotation, posed.reference, None if wanted is None else matrices(wanted))
+    moved = _alignment("base+tool", found.base_rotation, found.base_position)
+    x, y, z = found.tool_position.tolist()
+    alignment = replace(moved, tool=(x, y, z), tool_rotation=_rows(found.tool_rotation), untold=found.untold)
+    tool = np.broadcast_to(found.tool_rotation.reshape(1, 9), (len(quat), 9))
+    with_tool = replace(
+        posed,
+        actual=posed.actual + rotation @ found.tool_position,
+        actual_quat=product(quat, quaternions(tool, "matrix")),
+    )
+    return _moved(with_tool, alignment)
+
+
+def _oriented(matched: Matched, mode: AlignMode, run: Run) -> tuple[Matched, FloatArray]:
+    """Return the samples of which the log has an orientation, and these.
+
+    Raises:
+        LogError: If there is none.
+    """
+    quat = matched.actual_quat
+    known = np.zeros(0, np.intp) if quat is None else np.flatnonzero(np.isfinite(quat).all(axis=1))
+    if quat is None or not len(known):
+        said = f"{mode}: found no orientation of the log, allowed: {ORIENTED}"
+        raise LogError(lacking(run, said, parameter="align"))
+    return matched if len(known) == len(quat) else matched.at(known), quat[known]

@@ -33,6 +33,7 @@ from urmpipe_pipeline.comparison.warnings import (
     exchanged,
     large_tolerances,
     left_out_warnings,
+    open_frames,
     recorded_apart,
     thin_evidence,
 )
@@ -60,7 +61,7 @@ class CompareOptions:
         tcp: Where a log was: by forward kinematics of its joints, or as it recorded itself.
         sync: How the clocks are put together: start (both start together), auto (by the motion), or
             the offset in [s]: t_reference = t_log + offset, both from their first samples.
-        align: How a log is moved in space before it is compared: none, start, rigid or tool.
+        align: How a log is moved in space before it is compared: none, start, rigid, tool or base+tool.
         with_unit: Kinds whose tolerance was given with its unit: however large it is, it is meant.
     """
 
@@ -159,12 +160,12 @@ def _compared_roles(run: Run, options: CompareOptions) -> set[Role]:
     """Return the roles of what is compared of a run: joints, or recorded positions and orientations."""
     by_joints = bool(run.log.joints) and options.tcp == "fk"
     roles: set[Role] = {"joint"} if by_joints or "joint" in options.tolerance else set()
-    return roles if by_joints else roles | _recorded_roles(options)
+    return roles if by_joints else roles | _recorded_roles(options, "start", "tool", "base+tool")
 
 
-def _recorded_roles(options: CompareOptions) -> set[Role]:
-    """Return what a verdict on recorded poses rests on."""
-    turned = "angle" in options.tolerance or options.align in ("start", "tool")
+def _recorded_roles(options: CompareOptions, *turning: AlignMode) -> set[Role]:
+    """Return what a verdict on recorded poses rests on, if some alignments go by their orientations."""
+    turned = "angle" in options.tolerance or options.align in turning
     return {"position", "rotation"} if turned else {"position"}
 
 
@@ -217,11 +218,11 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
         raise LogError(lacking(run, said), *(replace(one, file=file_of(run)) for one in doubts))
     recorded = replace(as_recorded(run), name=f"{run.name} (recorded)", joints=(), joint_units=(), q=None)
     computed = replace(by_kinematics(run), joints=(), joint_units=(), q=None)
-    assumed = assumptions([(run, {"joint", *_recorded_roles(chosen)})])
+    assumed = assumptions([(run, {"joint", *_recorded_roles(chosen, "start")})])  # others go by the joints'
     found = _comparison(
         recorded, [_deviation(run.name, run, recorded, computed, chosen)], chosen, (), assumed
     )
-    lacks = lacking_tool(run.robot, log) if found.verdict == "fail" else []
+    lacks = lacking_tool(run.robot, log) if found.verdict == "fail" and "tool" not in chosen.align else []
     return replace(found, warnings=(*found.warnings, *lacks))
 
 
@@ -237,7 +238,7 @@ def _comparison(
     for one in deviations:
         warnings += sync_doubts(one.name, one.sync, one.run.tsp)
         warnings += left_out_warnings(one, reference)
-        warnings += thin_evidence(one)
+        warnings += [*thin_evidence(one), *open_frames(one)]
         if reference.joints and one.run.log.joints and one.joint_delta is None:
             said = f"no joint is compared: {unheld(reference, one.run)}"
             warnings.append(LogWarning("joints-not-compared", said, about=one.name))

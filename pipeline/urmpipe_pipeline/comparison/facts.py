@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.messages import Hint
+from urmpipe_models.transform import Transform
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.alignment import tool_with
+from urmpipe_pipeline.comparison.alignment import as_option, placed
 from urmpipe_pipeline.comparison.causes import causes
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
-from urmpipe_pipeline.comparison.trajectory import Sync
+from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.comparison.wording import decided_words, out_words, size_of, stretch_words, used_words
 from urmpipe_pipeline.presentation.section import Advice, Fact, Place, Ref, Value
 from urmpipe_pipeline.runs.parts import log_facts
@@ -90,12 +91,29 @@ def alignment_words(one: Deviation) -> tuple[str, str]:
             moved = text.quantity(float(np.linalg.norm(alignment.tool)), "m")
             by = f"{_vector(alignment.tool)} mm in the tool's frame"
             return f"tool centre point moved by {moved}", f"the constant offset that fits best: {by}"
+        case "base+tool":
+            return _base_and_tool_words(alignment)
     turned = text.quantity(alignment.angle, "rad")
     moved = text.quantity(float(alignment.moved(one.actual).max()), "m")
     first = alignment.mode == "start"
     rule = "the first compared poses agree" if first else "the rigid motion that fits best"
     about = f"turned about the origin, then moved by {_vector(alignment.translation)} mm"
     return f"{alignment.mode}: moved by up to {moved}, turned by {turned}", f"{rule}: {about}"
+
+
+def _base_and_tool_words(alignment: Alignment) -> tuple[str, str]:
+    """Return how base and tool were moved, by how much and to where."""
+    sides = (
+        ("base", alignment.translation, alignment.angle),
+        ("tool", alignment.tool, alignment.tool_angle),
+    )
+    moved = (
+        f"{name} by {text.quantity(float(np.linalg.norm(shift)), 'm')} and {text.quantity(turn, 'rad')}"
+        for name, shift, turn in sides
+    )
+    base, tool = _vector(alignment.translation), _vector(alignment.tool)
+    by = f"base at {base} mm, tool at {tool} mm in the tool's frame"
+    return f"moved and turned: {', '.join(moved)}", f"the base and the tool that fit best: {by}"
 
 
 def _vector(metres: tuple[float, ...]) -> str:
@@ -131,11 +149,20 @@ def _turns(one: Deviation) -> str:
 
 def _alignment(one: Deviation) -> Iterator[Fact]:
     """Yield how a log was moved in space, and the option that does so permanently."""
-    moved = one.alignment.mode != "none"
-    yield Fact("Alignment", *alignment_words(one), brief=moved)
-    if one.alignment.mode == "tool" and one.run.robot is not None:
-        values = [round(value, 7) + 0.0 for value in tool_with(one.run.robot, one.alignment)]  # no -0.0
-        yield Fact("To apply this permanently", Advice(hints=(Hint("tool", values),)))
+    mode = one.alignment.mode
+    yield Fact("Alignment", *alignment_words(one), brief=mode != "none")
+    if mode in ("tool", "base+tool") and one.run.robot is not None:
+        arm = placed(one.run.robot, one.alignment)
+        hints = [Hint("tool", _given(arm.tool))]
+        if mode == "base+tool":
+            moved = Hint("base", _given(arm.base), "moves the arm")
+            hints = [moved, replace(hints[0], does="moves its tool as well")]
+        yield Fact("To apply this permanently", Advice(hints=tuple(hints)))
+
+
+def _given(frame: Transform) -> list[float]:
+    """Return a frame as an option takes it, to a tenth of a micrometre."""
+    return [round(value, 7) + 0.0 for value in as_option(frame)]  # + 0.0: no -0.0
 
 
 def _sliding(one: Deviation) -> str:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import cast
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.elementwise import Vector
 from urmpipe_models.kinematics.forward import points_over_log
-from urmpipe_models.transform import Transform, translation
 from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.alignment import placed
 from urmpipe_pipeline.comparison.comparison import Comparison, by_tolerance
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import Trajectory
@@ -81,17 +78,7 @@ def _arm(one: Deviation, colour: str) -> Iterator[Arm]:
         return
     decided = int(one.t_ns[one.decided_at])
     row = min(int(np.searchsorted(run.t_ns, decided)), len(run.t_ns) - 1)
-    yield Arm(_placed(run.robot, one), run.q, run.t_ns, colour, kept=(row,))
-
-
-def _placed(robot: Chain, one: Deviation) -> Chain:
-    """Return an arm where the alignment puts it."""
-    alignment = one.alignment
-    if alignment.mode == "none":
-        return robot
-    rotation = cast("tuple[Vector, Vector, Vector]", alignment.rotation)
-    base = Transform(rotation, alignment.translation) @ robot.base
-    return robot.placed(base, robot.tool @ translation(*alignment.tool))
+    yield Arm(placed(run.robot, one.alignment), run.q, run.t_ns, colour, kept=(row,))
 
 
 def _reference(reference: Trajectory, shown: Deviation) -> Iterator[Path]:

@@ -113,8 +113,9 @@ def line_at(view: View, found: Rates, offset_ns: int) -> Line:
     energy = float((parts[2][both] ** 2).sum())
     reference, log, rate, *nuisance = (part[both] - part[both].mean(axis=0) for part in parts)
     if view.turned:
-        log = log @ best_rotation(reference.T @ log)[0].T
-        nuisance = [np.cross(axis, log) for axis in np.eye(3)]
+        turn = best_rotation(reference.T @ log)[0].T
+        log = log @ turn
+        nuisance = [*(np.cross(axis, log) for axis in np.eye(3)), *(part @ turn for part in nuisance)]
     residual, rate = (_without(part, nuisance) for part in (reference - log, rate))
     return Line(residual, rate, energy)
 

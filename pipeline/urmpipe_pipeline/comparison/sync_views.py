@@ -40,13 +40,14 @@ def views(reference: Trajectory, log: Trajectory, align: AlignMode) -> Iterator[
     """Yield the views of two trajectories, the one that assumes least about their frames and tools first.
 
     Joints do not depend on frames, structure or tools. Positions do: they are taken as they stand, unless the
-    alignment that follows would turn the log anyway (start, rigid), and at last as if the frames were turned;
-    of the alignment `tool` the tool is unknown.
+    alignment that follows would turn the log anyway (start, rigid, base+tool), and at last as if the frames
+    were turned; of the alignments `tool` and `base+tool` the tool is unknown.
     """
     order = joint_order(reference.joints, log.joints)
     if order is not None and reference.q is not None and log.q is not None:
         yield View("joints", False, reference.t_ns, reference.q[:, order], log.t_ns, log.q)
+    axes = None if "tool" not in align or log.quat_xyzw is None else matrices(log.quat_xyzw)
     if align in ("none", "tool"):
-        axes = None if align == "none" or log.quat_xyzw is None else matrices(log.quat_xyzw)
         yield View("position", False, reference.t_ns, reference.position, log.t_ns, log.position, axes)
-    yield View("position", True, reference.t_ns, reference.position, log.t_ns, log.position)
+    both = axes if align == "base+tool" else None
+    yield View("position", True, reference.t_ns, reference.position, log.t_ns, log.position, both)

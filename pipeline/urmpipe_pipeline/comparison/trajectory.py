@@ -8,11 +8,14 @@ from typing import Any, Literal
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.hand_eye import Untold
 from urmpipe_models.orientation import angle_between, quaternions
 from urmpipe_pipeline.joint_log import SourceFile, seconds
 
 SyncMode = Literal["start", "given", "auto"]
-AlignMode = Literal["none", "start", "rigid", "tool"]
+AlignMode = Literal["none", "start", "rigid", "tool", "base+tool"]
+
+IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,29 +79,40 @@ class Sync:
 class Alignment:
     """How the log was moved in space before it was compared: p' = rotation p + translation + R' tool.
 
-    R' is the log's orientation after the rotation.
+    R' is the log's orientation after the rotation, and R' tool_rotation its orientation in the end.
 
     Attributes:
-        mode: none, start (the first compared poses agree), rigid (the best rigid motion) or tool (the best
-            constant offset of the tool centre point).
+        mode: none, start (the first compared poses agree), rigid (the best rigid motion), tool (the best
+            constant offset of the tool centre point) or base+tool (the best base and the best tool at once).
         rotation: Rotation matrix [-], row by row, 3 by 3.
         translation: In [m].
         tool: In the frame of the log's tool, in [m].
+        tool_rotation: In the frame of the log's tool, rotation matrix [-], row by row, 3 by 3.
+        untold: What the compared poses do not tell of base and tool, or hardly.
     """
 
     mode: AlignMode = "none"
-    rotation: tuple[tuple[float, ...], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    rotation: tuple[tuple[float, ...], ...] = IDENTITY
     translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tool: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tool_rotation: tuple[tuple[float, ...], ...] = IDENTITY
+    untold: tuple[Untold, ...] = ()
 
     @property
     def angle(self) -> float:
         """Angle of the rotation in [rad], 0 to pi."""
-        quat = quaternions(np.reshape(self.rotation, (1, 9)), "matrix")
-        return float(angle_between(quat, np.array([[0.0, 0.0, 0.0, 1.0]]))[0])
+        return _angle(self.rotation)
+
+    @property
+    def tool_angle(self) -> float:
+        """Angle of the tool's rotation in [rad], 0 to pi."""
+        return _angle(self.tool_rotation)
 
     def moved(self, aligned: FloatArray) -> FloatArray:
-        """Return how far the log's positions, now in [m], shape (m, 3), were moved, in [m], shape (m,)."""
+        """Return how far the log's positions, now in [m], shape (m, 3), were moved, in [m], shape (m,).
+
+        Of base+tool: how far the base took them.
+        """
         if self.mode == "tool":
             return np.full(len(aligned), np.linalg.norm(self.tool))
         before = (aligned - np.array(self.translation)) @ np.array(self.rotation)  # R^T (p' - t)
@@ -107,6 +121,11 @@ class Alignment:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
         return asdict(self)
+
+
+def _angle(rotation: tuple[tuple[float, ...], ...]) -> float:
+    quat = quaternions(np.reshape(rotation, (1, 9)), "matrix")
+    return float(angle_between(quat, np.array([[0.0, 0.0, 0.0, 1.0]]))[0])
 
 
 def extent(values: FloatArray) -> float:

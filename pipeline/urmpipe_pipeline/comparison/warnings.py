@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from urmpipe_models.hand_eye import OPEN, Part, Untold
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation
@@ -32,6 +33,11 @@ AT_REST = 3e-4
 CALIBRATION = 5e-3
 """A controller's own calibration moves the tool by up to this in [m] from where those of the data sheet have
 it: 1.6 mm and 3.7 mm in the logs of two UR5e."""
+
+DIMENSIONS = 3
+
+STRAIGHT = 0.9999
+"""A larger component of a unit vector makes it an axis of the frame: it is off by less than a degree."""
 
 LARGE_LENGTH = 0.1
 """A larger tolerance in [m] was meant in mm: no arm misses by a tenth of a metre and is accepted."""
@@ -77,6 +83,41 @@ def _beyond(one: Deviation, reference: Trajectory) -> int:
     at_ns = one.run.on_rows.t_ns + round(one.sync.offset * 1e9)
     before, after = at_ns < reference.t_ns[0] - ROUNDING_NS, at_ns > reference.t_ns[-1] + ROUNDING_NS
     return int(np.count_nonzero(before | after))
+
+
+def open_frames(one: Deviation) -> Iterator[LogWarning]:
+    """Yield what the compared poses of a log do not tell of the base and the tool that were fitted."""
+    untold = one.alignment.untold
+    nothing, little = ([it for it in untold if (it.seen < OPEN) is told] for told in (True, False))
+    said = []
+    if nothing:
+        said.append(f"do not tell {_parts(nothing)}, of which the least is taken")
+    if little:
+        said.append(f"hardly tell {_parts(little)}, of which a small error of the log makes a large one")
+    if said:
+        told = f"the compared poses {', and '.join(said)}"
+        yield LogWarning("frames-open", told, about=one.name, parameter="align")
+
+
+def _parts(untold: Sequence[Untold]) -> str:
+    """Return what is not told: the whole of a part, or its directions."""
+    parts = dict.fromkeys(one.part for one in untold)
+    return " and ".join(_part(part, [one for one in untold if one.part == part]) for part in parts)
+
+
+def _part(part: Part, untold: Sequence[Untold]) -> str:
+    what, turn = part.split()
+    said = f"the {turn} of the {what}"
+    if len(untold) == DIMENSIONS:
+        return said
+    axes = " and ".join(_axis(one.axis) for one in untold)
+    return f"{said} {'along' if turn == 'offset' else 'about'} {axes}"
+
+
+def _axis(axis: tuple[float, float, float]) -> str:
+    """Return an axis by its letter, or as a vector."""
+    most = max(range(DIMENSIONS), key=lambda k: abs(axis[k]))
+    return "xyz"[most] if abs(axis[most]) > STRAIGHT else f"({', '.join(f'{part:.2f}' for part in axis)})"
 
 
 def thin_evidence(one: Deviation) -> Iterator[LogWarning]:

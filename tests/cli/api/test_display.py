@@ -89,7 +89,9 @@ def test_of_many_logs_the_worst_is_shown_first(results: dict[str, Any]) -> None:
     largest = replace(good.statistics["x"], max=0.0758, tolerance=0.0035, verdict="fail")
     bad = replace(good, name="<run 7>", verdict="fail", statistics={**good.statistics, "x": largest})
     every = replace(one, name="ten", runs=(*(replace(good, name=f"run {k}") for k in range(9)), bad))
-    assert repr(every).startswith("<Comparison ten: fail (1 of 10 logs), on 2 assumptions: <run 7> fail (0.0758 m), run ")
+    assert repr(every).startswith(
+        "<Comparison ten: fail (1 of 10 logs), on 2 assumptions: <run 7> fail (0.0758 m), run "
+    )
     html = every._repr_html_()
     ranking = html.split("<table>")[2].split("</table>")[0]
     cells = [row.split("<td>")[1:3] for row in ranking.split("<tr>")[2:]]

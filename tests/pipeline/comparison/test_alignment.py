@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,14 +18,18 @@ from urmpipe_models.errors import LogError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import Transform, from_offset, from_rpy
-from urmpipe_pipeline.comparison.alignment import RESOLVED, tool_with
+from urmpipe_pipeline.comparison.alignment import RESOLVED, as_option, placed
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.facts import deviation_facts
 from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
+from urmpipe_pipeline.presentation.section import Advice
 from urmpipe_pipeline.runs.results import Run
 
 ROUNDING = 1e-12
 """Positions of some metres round at 1e-15, a fit over hundreds of them at some tens of that."""
+
+TRACKER = Path(__file__).resolve().parents[4] / "shared/logs/ur10-laser-tracker/measurements_grid.csv"
 
 FRAME = Rotation.from_rotvec([0.3, -0.5, 0.4])
 SHIFT = np.array([0.2, -0.1, 0.4])
@@ -204,13 +209,14 @@ def test_samples_without_an_orientation_cannot_carry_a_tool_and_are_left_out() -
     assert [w.message for w in result.warnings] == ["2 of 200 samples have no reference or no value"]
 
 
+@pytest.mark.parametrize("mode", ["tool", "base+tool"])
 @pytest.mark.parametrize("quat", [None, np.full((200, 4), np.nan)])
-def test_a_tool_without_an_orientation_is_refused(quat: FloatArray | None) -> None:
+def test_a_tool_without_an_orientation_is_refused(quat: FloatArray | None, mode: AlignMode) -> None:
     position, turn = motion()
     with pytest.raises(LogError) as error:
-        aligned(path_run(position, turn.as_quat()), path_run(position, quat, name="log"), "tool")
+        aligned(path_run(position, turn.as_quat()), path_run(position, quat, name="log"), mode)
     assert str(error.value) == (
-        "log.csv: align: tool: found no orientation of the log, allowed: joints with a robot, or a"
+        f"log.csv: align: {mode}: found no orientation of the log, allowed: joints with a robot, or a"
         " recorded orientation"
     )
 
@@ -241,7 +247,7 @@ def test_the_tool_that_is_advised_takes_the_deviation_away(own: tuple[float, ...
     run = arm_run(recorded_with, from_offset(own) if own else None)
     found = compare_recorded(run, CompareOptions(align="tool")).runs[0]
     assert found.statistics["norm"].max < ROUNDING
-    advised = tool_with(there(run.robot), found.alignment)
+    advised = as_option(placed(there(run.robot), found.alignment).tool)
     np.testing.assert_allclose(advised, (0.02, -0.01, 0.17, *own[3:]), atol=ROUNDING)
     told = arm_run(recorded_with, from_offset(advised))
     assert compare_recorded(told).runs[0].statistics["norm"].max < ROUNDING
@@ -270,3 +276,126 @@ def test_orientations_turn_with_the_log() -> None:
     )  # turned in place only, not in orientation
     found = aligned(path_run(position, turn.as_quat()), log, "rigid")
     np.testing.assert_allclose(there(found.angle), FRAME.magnitude(), atol=ROUNDING)
+
+
+OFFICE = from_offset((2.0, -1.5, 0.7, 0.4, -0.3, 2.5))
+"""The base of an arm, as a tracker sees it."""
+
+PROBE = from_offset((0.02, -0.01, 0.17, 0.3, 0.2, -1.4))
+"""What the tracker sees, in the frame of the tool."""
+
+
+def measured_run(noise: float = 0.0, *, turned: bool = True, base: Transform = OFFICE) -> Run:
+    """A log of a UR5e whose probe was measured by a device that stands elsewhere, with noise in [m]."""
+    bare, run = load_robot("ur5e"), arm_run(Transform())
+    position, rotation = poses_over_log(bare.placed(base @ bare.base, bare.tool @ PROBE), run.q)
+    position = position + np.random.default_rng(2).normal(0.0, noise, position.shape)
+    return run_of(run.q, bare, position, rotation.reshape(-1, 9) if turned else None, "matrix")
+
+
+@pytest.mark.parametrize("turned", [True, False])
+def test_base_and_tool_are_found_at_once(turned: bool) -> None:
+    found = compare_recorded(measured_run(turned=turned), CompareOptions(align="base+tool")).runs[0]
+    np.testing.assert_allclose(found.alignment.rotation, OFFICE.rotation, atol=1e-9)
+    np.testing.assert_allclose(found.alignment.translation, OFFICE.translation, atol=1e-9)
+    np.testing.assert_allclose(found.alignment.tool, PROBE.translation, atol=1e-9)
+    wanted = PROBE.rotation if turned else np.eye(3)
+    np.testing.assert_allclose(found.alignment.tool_rotation, wanted, atol=1e-9)
+    assert found.alignment.untold == ()
+    assert found.statistics["norm"].max < 1e-9
+    assert (found.angle is not None) == turned
+    if turned:
+        assert found.statistics["angle"].max < 1e-7  # half a rounding error of 1 is an angle of 1e-8
+
+
+def test_a_log_is_moved_onto_the_pose_that_a_reference_measured() -> None:
+    run = measured_run()
+    reference = path_run(there(run.log.tcp_position), there(run.log.tcp_rotation), "matrix")
+    log = replace(run, log=replace(run.log, tcp_position=None, tcp_rotation=None), tcp_recorded=None)
+    found = aligned(reference, log, "base+tool")
+    np.testing.assert_allclose(found.actual, there(run.log.tcp_position), atol=1e-9)
+    np.testing.assert_allclose(found.alignment.translation, OFFICE.translation, atol=1e-9)
+    assert found.statistics["angle"].max < 1e-7
+
+
+def test_the_base_and_the_tool_that_are_advised_give_the_same_deviation() -> None:
+    run = measured_run(1e-3)
+    result = compare_recorded(run, CompareOptions(align="base+tool"))
+    found = result.runs[0]
+    assert found.statistics["norm"].rms == pytest.approx(np.sqrt(3) * 1e-3, rel=0.1)
+    facts = {fact.name: fact.value for fact in deviation_facts(found, result)}
+    advice = facts["To apply this permanently"]
+    assert isinstance(advice, Advice)
+    base, tool = (from_offset(there(hint.value)) for hint in advice.hints)
+    assert [hint.parameter for hint in advice.hints] == ["base", "tool"]
+    told = replace(run, robot=there(run.robot).placed(base, tool))
+    after = compare_recorded(told).runs[0]
+    np.testing.assert_allclose(after.delta, found.delta, atol=5e-7)  # 7 digits, of angles on an arm of 1 m
+    np.testing.assert_allclose(there(after.angle), there(found.angle), atol=5e-7)
+
+
+@pytest.mark.parametrize(("rows", "found"), [(1, "1 compared pose"), (3, "3 compared poses")])
+def test_poses_that_any_base_and_tool_fit_are_refused(rows: int, found: str) -> None:
+    run = measured_run()
+    position, rotation = there(run.log.tcp_position), there(run.log.tcp_rotation)
+    few = run_of(run.q[:rows], run.robot, position[:rows], rotation[:rows], "matrix")
+    assert refusal(LogError, compare_recorded, few, CompareOptions(align="base+tool")) == (
+        f"log.csv: align: base+tool: found {found}, which some base and tool fit, allowed: 4 or more"
+    )
+
+
+@pytest.mark.parametrize(
+    ("turns", "said"),
+    [
+        (np.zeros((200, 3)), "do not tell the offset of the tool, of which the least is taken"),
+        (
+            np.outer(np.linspace(-1.0, 1.0, 200), [0.0, 0.0, 1.0]),
+            "do not tell the offset of the tool along z, of which the least is taken",
+        ),
+        (
+            np.outer(np.linspace(-1.0, 1.0, 200), [0.0, 0.6, 0.8])
+            + np.outer(np.cos(np.arange(200)), [0.0, -0.008, 0.006]),
+            "hardly tell the offset of the tool along (0.00, 0.60, 0.80), of which a small error of the log"
+            " makes a large one",
+        ),
+    ],
+)
+def test_what_poses_do_not_tell_of_base_and_tool_is_said(turns: FloatArray, said: str) -> None:
+    position, _ = motion()
+    turn = Rotation.from_rotvec(turns)
+    measured = FRAME.apply(position + turn.apply(OFFSET)) + SHIFT
+    log = path_run(position, turn.as_quat(), name="log")
+    result = compare_runs(path_run(measured), [log], CompareOptions(align="base+tool"))
+    assert result.runs[0].statistics["norm"].max < ROUNDING
+    told = [(one.kind, str(one)) for one in result.warnings]
+    assert told == [("frames-open", f"log: align: the compared poses {said}")]
+    assert (result.runs[0].alignment.untold[0].seen < 1e-4) == ("do not" in said)
+
+
+def test_samples_without_an_orientation_carry_no_tool_between_base_and_probe() -> None:
+    position, turn = motion()
+    quat = turn.as_quat()
+    quat[[0, 50]] = np.nan
+    measured = FRAME.apply(position + turn.apply(OFFSET)) + SHIFT
+    found = aligned(path_run(measured), path_run(position, quat, name="log"), "base+tool")
+    assert (found.left_out, len(found.sample), found.sample[0]) == (2, 198, 1)
+    np.testing.assert_allclose(found.alignment.tool, OFFSET, atol=ROUNDING)
+
+
+@pytest.mark.skipif(not TRACKER.is_file(), reason="no logs of others beside the checkout")
+def test_a_probe_at_the_flange_of_a_real_arm_is_found_by_a_laser_tracker() -> None:
+    """A fit of base and tool leaves 0.75 to 1.1 mm of a nominal UR10, as its README says."""
+    text = TRACKER.read_text().replace(",", ".").splitlines()
+    names, values = text[0].split(";"), np.array([row.split(";") for row in text[1:]], dtype=np.float64)
+    first, probe = names.index("shoulder_pan_joint"), names.index("measurement_x")
+    q, position = values[:, first : first + 6], values[:, probe : probe + 3] / 1e3
+    angles = np.radians(values[:, probe + 3 : probe + 6])
+    for rotation in (angles, None):
+        run = run_of(q, load_robot("ur10"), position, rotation, "xyz")
+        result = compare_recorded(run, CompareOptions(align="base+tool"))
+        found = result.runs[0]
+        assert len(found.sample) == 11911
+        assert result.warnings == ()
+        assert 0.75e-3 < found.statistics["norm"].rms < 1.1e-3
+        if rotation is not None:
+            assert found.statistics["angle"].rms < np.radians(0.2)

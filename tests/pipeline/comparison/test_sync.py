@@ -179,9 +179,12 @@ def test_a_tool_that_is_not_known_does_not_move_the_offset() -> None:
     late = replace(path(flange[700:], t[700:]), quat_xyzw=quat[700:])
     assert abs(synchronise(path(tip, t), late, "auto", "tool").offset - 3.5) < 1e-8  # exact but for rounding
     assert abs(synchronise(path(tip, t), late, "auto", "none").offset - 3.5) > CLEAN
+    elsewhere = path(np.roll(tip, 1, axis=1) + np.array([3.0, 1.0, 2.0]), t)
+    # The turn of the base is the best one without a tool: a small tool leaves little of it, squared.
+    assert abs(synchronise(elsewhere, late, "auto", "base+tool").offset - 3.5) < 1e-5
 
 
-@pytest.mark.parametrize("align", ["none", "start", "tool"])
+@pytest.mark.parametrize("align", ["none", "start", "tool", "base+tool"])
 def test_the_rate_is_the_derivative_of_the_residual_by_the_offset(align: AlignMode) -> None:
     """Of a motion at the true offset: what is left over is small, and so is what its turn and tool change."""
     t = times(0.0, 20.0, 0.002)
@@ -191,7 +194,7 @@ def test_the_rate_is_the_derivative_of_the_residual_by_the_offset(align: AlignMo
     motion = smooth(4, 3)(t)
     log = replace(path(motion[700:9000], t[700:9000]), quat_xyzw=quat[700:9000])
     view = next(views(path(motion, t), log, align))
-    assert (view.turned, view.tool_axes is not None) == (align == "start", align == "tool")
+    assert (view.turned, view.tool_axes is not None) == (align in ("start", "base+tool"), "tool" in align)
     found = there(mean_rates(view))
     offset_ns, step_ns = 1_400_000_000, 1_000_000
     before, at, after = (line_at(view, found, offset_ns + k * step_ns) for k in (-1, 0, 1))
@@ -378,7 +381,7 @@ def test_the_offsets_of_the_demo_logs_are_found(demo: dict[str, Trajectory]) -> 
     def offset(name: str, align: AlignMode = "none") -> float:
         return synchronise(demo["path"], demo[name], "auto", align).offset
 
-    for align in ("none", "rigid", "tool"):
+    for align in ("none", "rigid", "tool", "base+tool"):
         # The path is written to the nanometre, the log to 15 digits: 4 ms come back to a microsecond.
         assert abs(offset("matlab", align) + 0.004) < 1e-6
         assert abs(offset("solidworks", align)) < 1e-6  # 2.5 mm to the side, and rounded to 1e-4 deg

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import made_runs
 from same_results import assert_same
 from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.comparison.baseline import against_baseline
@@ -179,6 +180,15 @@ def test_a_comparison_of_poses_and_joints_comes_back_as_it_was(
     assert set(first.statistics) == {"x", "y", "z", "norm", "path", "angle"}
     assert list(first.joint_statistics) == list(log.log.joints)
     assert first.alignment.mode == align
+    assert_same(round_trip(comparison, tmp_path), comparison)
+
+
+def test_what_poses_do_not_tell_of_base_and_tool_comes_back_as_it_was(tmp_path: Path) -> None:
+    still = np.tile([0.0, 0.0, 0.0, 1.0], (40, 1))
+    position = np.random.default_rng(0).normal(size=(40, 3))
+    reference, log = made_runs.path_run(position), made_runs.path_run(position, still, name="log")
+    comparison = compare_runs(reference, [log], CompareOptions(align="base+tool"))
+    assert [one.part for one in comparison.runs[0].alignment.untold] == ["tool offset"] * 3
     assert_same(round_trip(comparison, tmp_path), comparison)
 
 
