@@ -23,6 +23,7 @@ from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.facts import deviation_facts
 from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
+from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.section import Advice
 from urmpipe_pipeline.runs.results import Run
 
@@ -332,6 +333,19 @@ def test_the_base_and_the_tool_that_are_advised_give_the_same_deviation() -> Non
     after = compare_recorded(told).runs[0]
     np.testing.assert_allclose(after.delta, found.delta, atol=5e-7)  # 7 digits, of angles on an arm of 1 m
     np.testing.assert_allclose(there(after.angle), there(found.angle), atol=5e-7)
+
+
+@pytest.mark.parametrize(("align", "asked"), [("start", True), ("tool", False), ("base+tool", False)])
+def test_a_doubtful_recorded_orientation_is_asked_for_where_the_alignment_goes_by_it(
+    align: AlignMode, asked: bool
+) -> None:
+    doubt = LogWarning("form", "rx may be a rotation vector", assumption="so", role="rotation", asks=True)
+    run = replace(measured_run(base=Transform()), warnings=(doubt,))
+    options = CompareOptions(align=align)
+    if asked:
+        assert "rx may be a rotation vector" in refusal(LogError, compare_recorded, run, options)
+    else:
+        assert compare_recorded(run, options).assumptions == ()
 
 
 @pytest.mark.parametrize(("rows", "found"), [(1, "1 compared pose"), (3, "3 compared poses")])
