@@ -1,9 +1,9 @@
 """Two thousand random logs, some of which lie about themselves: no verdict on a guess.
 
-A log is made from arrays that are known, so is the verdict on them. What is written may lie: a unit in a header is the
-other one, or there is none, or no header at all; clocks are uneven; joints wrap; rows are still poses in random order.
-The verdict that comes out is the one on the true arrays, or the reading was asked for, or the line of the verdict says
-what it assumes. A log that is written well is never asked about.
+A log is made from arrays that are known, so is the verdict on them. What is written may lie: a unit in a
+header is the other one, or there is none, or no header at all; clocks are uneven; joints wrap; rows are still
+poses in random order. The verdict that comes out is the one on the true arrays, or the reading was asked for,
+or the line of the verdict says what it assumes. A log that is written well is never asked about.
 """
 
 from __future__ import annotations

@@ -27,11 +27,11 @@ def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
     yield Fact("Decided by", decided_words(held))
     if not held.missing:
         yield Fact("Data row", Value(one.row(held)))
-    yield Fact("Position", placed(one, held))
+    yield Fact("Position", place_of(one, held))
     yield from _furthest_joint(one)
 
 
-def placed(one: Deviation, held: Statistics) -> Place | None:
+def place_of(one: Deviation, held: Statistics) -> Place | None:
     """Return where a log was when a quantity of it was largest; None where joints alone are compared."""
     place = one.place(held)
     return None if place is None else Place(place)
@@ -50,7 +50,7 @@ def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     yield Fact(size_of(held), largest(held), used_words(held), brief=False)
     yield Fact("Time", Value(held.t_max, "s"), brief=False)
     yield Fact("Data row", Value(one.row(held)), brief=False)
-    yield Fact("Position", placed(one, held), brief=False)
+    yield Fact("Position", place_of(one, held), brief=False)
     yield from (replace(fact, brief=False) for fact in _furthest_joint(one))
     compared = f"{text.counted(len(one.sample), 'sample')} over {text.seconds(one.duration)} s"
     yield Fact("Compared", compared)

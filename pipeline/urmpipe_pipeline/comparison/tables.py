@@ -9,7 +9,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.baseline_section import quantities
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
-from urmpipe_pipeline.comparison.facts import alignment_words, largest, placed
+from urmpipe_pipeline.comparison.facts import alignment_words, largest, place_of
 from urmpipe_pipeline.comparison.wording import size_of, symbol
 from urmpipe_pipeline.palette import run_colour
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, minute, rows_table
@@ -71,7 +71,7 @@ def _conditions(result: Comparison, names: Heads[Deviation]) -> Iterator[Column]
     heads: Heads[Deviation] = {
         **names,
         "t": ("decided at t", lambda one: Value(one.decisive.t_max, "s")),
-        "place": ("log there at x, y, z", lambda one: placed(one, one.decisive)),
+        "place": ("log there at x, y, z", lambda one: place_of(one, one.decisive)),
         "longest_out": ("longest out", lambda one: _stretch(one, "duration")),
         "longest_out_t": ("longest out from t", lambda one: _stretch(one, "t")),
         "sync_offset": ("offset", lambda one: Value(one.sync.offset, "s", signed=True)),
