@@ -108,7 +108,8 @@ def test_the_command_prints_system_verdict_and_signals(urmpipe: RunCommand, tmp_
     ran = urmpipe("simulate", "log-to-delta", "--duration", "0.1")
     lines = ran.out.splitlines()
     assert ran.code == 0
-    assert lines[0] == "PASS  delta of log-to-delta within tolerance"
+    assumed = "assuming the positions are in m (path)"
+    assert lines[0] == f"PASS  delta of log-to-delta within tolerance, {assumed}"
     assert lines[2].strip() == (
         "Decided by: |Δy| = 0.4174 mm of 3.5 mm allowed (11.9 % of the tolerance) at t = 0.085 s;"
         " out of tolerance: 0 of 21 samples (0 %)"

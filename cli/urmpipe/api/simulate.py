@@ -74,7 +74,7 @@ def simulate(
     with guarded_outputs(named, kept) as parts, Worker() as worker:  # it loads what it needs meanwhile
         blocks = Blocks(loaded, bundled=bundled, backend=backend, reading=reading, told=told)
         plan = prepare(loaded, blocks.make, column=blocks.column, duration=blocks.end, period=blocks.period)
-        check_meters(plan)
+        check_meters(plan, blocks)
         svg = system_svg(plan)
         if draw is not None:
             _write_drawing(parts["drawing"], svg)

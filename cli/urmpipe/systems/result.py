@@ -15,7 +15,7 @@ from urmpipe_fmus.cosim.plan import Plan
 from urmpipe_fmus.cosim.simulation import NotFinite, Recorded
 from urmpipe_fmus.cosim.system import Block, Port, System
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.errors import OptionError
+from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict, delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.provenance import provenance
@@ -26,11 +26,20 @@ TOLERANCE = "tolerance"
 """The parameter of a delta meter that its verdict rests on."""
 
 
-def check_meters(plan: Plan) -> None:
-    """Raise an `OptionError` if a delta meter has no tolerance to judge by: before the first step."""
-    wrong = [name for name in _meters(plan.system) if not _value(plan, Port(name, TOLERANCE)) > 0.0]
+def check_meters(plan: Plan, blocks: Blocks) -> None:
+    """Refuse what delta meters cannot judge by, before the first step.
+
+    Raises:
+        OptionError: If one has no tolerance.
+        LogError: With each reading of a log that has to be told before a verdict rests on it.
+    """
+    meters = list(_meters(plan.system))
+    wrong = [name for name in meters if not _value(plan, Port(name, TOLERANCE)) > 0.0]
     if wrong:
         raise OptionError(*(f"block {name}: tolerance: found 0, allowed: above 0, in m" for name in wrong))
+    asked = [one.as_finding() for one in blocks.warnings if one.asks]
+    if meters and asked:
+        raise LogError(*asked)
 
 
 def simulation_of(plan: Plan, recorded: Recorded, blocks: Blocks, svg: str) -> Simulation:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 
 from urmpipe_pipeline import text
+from urmpipe_pipeline.assumptions import assuming
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation, Statistics, Stretch
@@ -26,7 +27,7 @@ def verdict_words(one: Comparison) -> str:
     said += f" against {one.reference.name}{_points(one)}{_part(one)}"
     if one.baseline and one.baseline.verdict == "fail":
         said += f", {'and' if failed else 'but'} worse than the baseline {one.baseline.name}"
-    return said + (f", assuming {' and '.join(one.assumptions)}" if one.assumptions else "")
+    return said + assuming(one.assumptions)
 
 
 def _who(runs: Sequence[Deviation], total: int) -> str:

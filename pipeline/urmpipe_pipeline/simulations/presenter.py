@@ -8,6 +8,7 @@ from functools import partial
 from itertools import groupby
 
 from urmpipe_pipeline import text
+from urmpipe_pipeline.assumptions import assuming
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.comparison.wording import meter_words, out_words, size_of, used_words
@@ -74,10 +75,10 @@ def outcome_words(simulation: Simulation) -> str:
     worst = simulation.judged_worst
     if worst is None:
         return f"{simulation.name}: {text.counted(len(simulation.t_ns), 'sample')}"
-    if worst.doubts and not worst.out_of_tolerance:
-        return f"{worst.block} of {simulation.name} within tolerance, but in doubt"
-    within = "within" if worst.verdict == "pass" else "out of"
-    return f"{worst.block} of {simulation.name} {within} tolerance"
+    within = "out of" if worst.out_of_tolerance else "within"
+    doubted = ", but in doubt" if worst.doubts and not worst.out_of_tolerance else ""
+    assumptions = assuming(simulation.assumptions)
+    return f"{worst.block} of {simulation.name} {within} tolerance{doubted}{assumptions}"
 
 
 def _decisive(simulation: Simulation) -> Iterator[Fact]:

@@ -16,6 +16,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.display import line_of, number_of
 from urmpipe_models.errors import CosimulationError
 from urmpipe_models.spelling import Voice
+from urmpipe_pipeline.assumptions import assumed
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
@@ -227,6 +228,13 @@ class Simulation(Result):
         return "pass" if self.verdicts else None
 
     @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What the verdict takes for granted of the logs that were played; nothing without one."""
+        if not self.verdicts:
+            return ()
+        return assumed((one.assumption, one.about or "a log") for one in self.warnings if one.assumption)
+
+    @property
     def judged_worst(self) -> DeltaVerdict | None:
         """The worst verdict: one that failed, of these what uses up most or lacks a value; None without."""
         return max(self.verdicts, key=_severity, default=None)
@@ -273,6 +281,7 @@ class Simulation(Result):
             "signals": [scalar for one in self.signals for scalar in _scalars(one, t)],
             "failed": self.failed,
             "verdict": self.verdict,
+            "assumptions": list(self.assumptions),
             "verdicts": [one.to_dict() for one in self.verdicts],
             "warnings": [one.to_dict(voice) for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
