@@ -114,17 +114,17 @@ def load_sides(
 
 
 def _told_apart(operands: Sequence[Path | MadeRun], runs: Sequence[Run]) -> list[Run]:
-    """Return runs of which no two have one name: those of files by their folders, too."""
-    names = [run.name for run in runs]
+    """Return runs of which no two have one name: those of files by these, or by their folders, too."""
+    files = [one.resolve() if isinstance(one, Path) else None for one in operands]
+    stems = [None if path is None else path.name if path.is_dir() else path.stem for path in files]
 
-    def named(operand: Path | MadeRun, run: Run) -> Run:
+    def named(run: Run, path: Path | None, stem: str | None) -> Run:
         """Return a run under a name of its own."""
-        if names.count(run.name) == 1 or not isinstance(operand, Path):
+        if path is None or stem is None or [one.name for one in runs].count(run.name) == 1:
             return run
-        path = operand.resolve()
-        return replace(run, name=f"{path.name if path.is_dir() else path.stem} ({path.parent.name})")
+        return replace(run, name=stem if stems.count(stem) == 1 else f"{stem} ({path.parent.name})")
 
-    return [named(*pair) for pair in zip(operands, runs, strict=True)]
+    return [named(*each) for each in zip(runs, files, stems, strict=True)]
 
 
 def _recorded(operand: Path) -> MadeRun:

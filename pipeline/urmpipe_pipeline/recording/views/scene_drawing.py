@@ -190,9 +190,9 @@ def _draw_arrows(stream: RecordingStream, arrows: Arrows, size: float) -> None:
     colours, root = value_colours(arrows.values), shown_path("scene", "arrows")
     start = arrows.start.astype(np.float32)
     vectors = (arrows.end - arrows.start).astype(np.float32)
-    drawn = rr.Arrows3D(origins=start, vectors=vectors, colors=colours, radii=[FRAME * size / 2])
+    drawn = rr.Arrows3D(origins=start, vectors=vectors, colors=colours, radii=[FRAME * size])
     stream.log(root, drawn, static=True)
-    stream.log(f"{root}/starts", rr.Points3D(start, colors=colours, radii=[AXIS * size]), static=True)
+    stream.log(f"{root}/starts", rr.Points3D(start, colors=colours, radii=[TARGET * size]), static=True)
 
 
 def _label(words: str, colour: str = LABEL_COLOUR) -> Points3D:
