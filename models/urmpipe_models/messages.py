@@ -12,7 +12,7 @@ would change it, are fields. Who prints chooses the voice, so that a stored mess
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import groupby
 from typing import Any
 
@@ -31,12 +31,14 @@ class Hint:
         value: What to give it; None where that is the reader's own.
         does: What it does, as the end of a sentence that the parameter begins: "reads it so".
         call: The command and public function that takes it, where it is another than the one that ran.
+        robot: The robot to give with it, which it is refused without, where its name says which.
     """
 
     parameter: str
     value: Value = None
     does: str = ""
     call: str = ""
+    robot: str = ""
 
     def __hash__(self) -> int:
         return hash((self.parameter, self.does))  # a mapping has no hash
@@ -45,6 +47,9 @@ class Hint:
         """Return the parameter with its value: `--unit q1=deg`, `unit={"q1": "deg"}`."""
         if not self.parameter:
             return ""
+        if self.robot:
+            joined = " " if voice == "command line" else ", "
+            return joined.join((spelled("robot", self.robot, voice), replace(self, robot="").spelled(voice)))
         if not self.call:
             return spelled(self.parameter, self.value, voice)
         if voice == "python":

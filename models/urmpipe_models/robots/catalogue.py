@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from functools import cache
 from pathlib import Path
 
 from urmpipe_datasets import ROBOTS
@@ -44,12 +45,18 @@ def load_robot(
         return read_robot_file(path)
     names = robot_names()
     if (name := str(name_or_path).lower()) in names:
-        return read_robot_file(ROBOTS / f"{name}.toml")
+        return _of_catalogue(name)
     hint = did_you_mean(str(name_or_path), names)
     raise RobotError(
         f"unknown robot {shown(str(name_or_path))}{hint};"
         f" allowed: {', '.join(names)}, or a .toml or .urdf file"
     )
+
+
+@cache
+def _of_catalogue(name: str) -> Chain:
+    """Return a robot of the catalogue, read once: a log may be held against all of them."""
+    return read_robot_file(ROBOTS / f"{name}.toml")
 
 
 def parse_offset(text: str) -> Transform:

@@ -222,7 +222,8 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     found = _comparison(
         recorded, [_deviation(run.name, run, recorded, computed, chosen)], chosen, (), assumed
     )
-    lacks = lacking_tool(run.robot, log) if found.verdict == "fail" and "tool" not in chosen.align else []
+    asked, turned = found.verdict == "fail" and "tool" not in chosen.align, "angle" in chosen.tolerance
+    lacks = lacking_tool(run.robot, log, turned=turned) if asked else []
     return replace(found, warnings=(*found.warnings, *lacks))
 
 

@@ -13,11 +13,12 @@ from urmpipe_pipeline.meshes import VISUAL_MISSING
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
 from urmpipe_pipeline.runs.ingest import EULER_SINGULAR, kinematics
 from urmpipe_pipeline.runs.plausibility import JOINT_LIMIT, SPEED_LIMIT, implausible
+from urmpipe_pipeline.runs.recorded_start import RECORDED_START
 from urmpipe_pipeline.runs.recorded_tcp import FAR_RECORDED, far_from_recorded
 from urmpipe_pipeline.runs.results import Run
 
 BY_LIMITS = (JOINT_LIMIT, SPEED_LIMIT)
-OF_ROBOT = (EULER_SINGULAR, VISUAL_MISSING, FAR_RECORDED, *BY_LIMITS)
+OF_ROBOT = (EULER_SINGULAR, VISUAL_MISSING, FAR_RECORDED, RECORDED_START, *BY_LIMITS)
 """The kinds of the warnings that rest on the robot."""
 
 

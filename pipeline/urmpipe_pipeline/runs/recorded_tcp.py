@@ -5,17 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import best_rotation
-from urmpipe_models.transform import Transform, rpy_of
+from urmpipe_models.robots.catalogue import load_robot, robot_names
+from urmpipe_models.transform import Transform, from_offset
+from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning
-from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, fit, spread
+from urmpipe_pipeline.runs.recorded_poses import FINEST, FINEST_TURN, Apart, RecordedPoses
+from urmpipe_pipeline.runs.recorded_start import start_warning
+from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, Fit
 from urmpipe_pipeline.sources.vocabulary import split_unit
 
 LACKING_TOOL = "recorded-tcp-tool"
@@ -26,54 +29,111 @@ FAR_RECORDED = "recorded-tcp-far"
 FAR = 0.03
 """Root mean square distance in [m] that no calibration and no rounding explain."""
 
-FINEST = 1e-4
-"""Options are told to a tenth of a millimetre: where kinematics are nearer than this in [m], none helps."""
+EXPLAINED = 1.0 / 25.0
+"""What explains a motion leaves no more of it: a wrong arm and some tool leave a fifth by chance."""
+
+
+class _Other(NamedTuple):
+    """What else a log may be of, and how it is given."""
+
+    said: str
+    hint: Hint
+    robot: Chain
+    q: FloatArray
+    apart: Apart = Apart(np.inf, np.inf)
 
 
 def far_from_recorded(robot: Chain | None, log: JointLog) -> list[LogWarning]:
-    """Return a warning if the kinematics of a robot do not come near the recorded tool centre point.
+    """Return warnings if the kinematics of a robot do not come near the recorded tool centre point.
 
-    A constant tool is allowed for. What would bring them together is said: two joints exchanged, one that
-    turns the other way, another base. A log that hardly moves tells nothing, since some tool always fits.
+    A constant tool is allowed for, unless the log hardly moves. The robot is held against what else the log
+    may be of: another robot of the catalogue, a joint that counts the other way, two joints exchanged,
+    another base. What comes clearly nearer is said, however near the robot is; so is a robot that is far off
+    where nothing does. The first rows may be outliers: they are told of, and left out.
     """
-    if robot is None or log.tcp_position is None or log.q.shape[1] != len(robot.moving):
-        return []
-    rows = spread(log.rows)
-    q, recorded = log.q[rows], log.tcp_position[rows]
-    found = fit(robot, q, recorded)
-    if found is None or not np.isfinite(found.with_tool) or min(found.distance, found.with_tool) <= FAR:
-        return []
-    said = (
-        f"the kinematics of {robot.name} stay {found.distance * 1e3:.1f} mm (rms) from the recorded TCP"
-        f" ({found.with_tool * 1e3:.1f} mm with the tool that fits best)"
-    )
-    unknown = "robot, base, units, zeros, signs or order of the joints may differ"
-    remedy, *hints = next(_remedies(robot, log, q, recorded), (unknown,))
-    return [LogWarning(FAR_RECORDED, f"{said}: {remedy}", hints=tuple(hints))]
+    warnings = start_warning(robot, log)
+    poses = RecordedPoses.of(robot, log)
+    if robot is None or poses is None:
+        return warnings
+    own, found = poses.apart(robot, tool=True), poses.fit(robot)
+    others = _clearly_nearer(robot, log, poses, own)
+    turned = own.angle > FINEST_TURN and any(CLEARLY * one.apart.angle <= own.angle for one in others)
+    said = _stays(robot, poses.apart(robot, tool=False), turned=turned)
+    if np.isfinite(found.with_tool):
+        said += f" ({own.said(turned=turned)} with the tool that fits best)"
+    if others:
+        said += f": {', or '.join(f'{one.said} within {one.apart.said(turned=turned)}' for one in others)}"
+        warnings.append(LogWarning(FAR_RECORDED, said, hints=tuple(one.hint for one in others)))
+    elif np.isfinite(found.with_tool) and min(found.distance, found.with_tool) > FAR:
+        said += ": robot, base, units, zeros, signs or order of the joints may differ"
+        warnings.append(LogWarning(FAR_RECORDED, said))
+    return warnings
 
 
-def lacking_tool(robot: Chain | None, log: JointLog) -> list[LogWarning]:
-    """Return a warning if kinematics and recorded positions lie apart by what a tool or a base explains."""
-    if robot is None or log.tcp_position is None:
+def lacking_tool(robot: Chain | None, log: JointLog, *, turned: bool = False) -> list[LogWarning]:
+    """Return a warning if kinematics and recorded poses lie apart by what a tool or a base explains.
+
+    There is none where something else does: `far_from_recorded` says so.
+
+    Args:
+        robot: The arm.
+        log: The log.
+        turned: Whether orientations are judged, too.
+    """
+    poses = RecordedPoses.of(robot, log)
+    if robot is None or poses is None:
         return []
-    rows = spread(log.rows)
-    q, recorded = log.q[rows], log.tcp_position[rows]
-    found, bare = fit(robot, q, recorded), fit(replace(robot, tool=Transform()), q, recorded)
-    if found is None or bare is None or found.distance <= FINEST:
+    own = _judged(poses.apart(robot, tool=False), turned=turned)
+    if own.distance <= FINEST and own.angle <= FINEST_TURN:
         return []
-    apart = f"the kinematics of {robot.name} stay {found.distance * 1e3:.1f} mm (rms) from the recorded TCP"
-    if not np.isfinite(found.with_tool):
-        said = f"{apart}, and the log moves too little to tell why: {_asked(robot)}"
+    if _clearly_nearer(robot, log, poses, poses.apart(robot, tool=True)):
+        return []
+    said = _stays(robot, own, turned=turned)
+    if not np.isfinite(poses.fit(robot).with_tool):
+        said = f"{said}, and the log moves too little to tell why: {_asked(robot)}"
         return [LogWarning(LACKING_TOOL, said)]
-    base, distance = _base(robot, q, recorded)
-    near = min(CLOSE_WITH_TOOL, found.distance / CLEARLY)
-    remedies = (("tool", _frame(bare.tool), found.with_tool), ("base", base, distance))
-    hints = tuple(
-        Hint(name, frame, f"brings them within {left * 1e3:.2f} mm")
-        for name, frame, left in remedies
-        if left <= near
-    )
-    return [LogWarning(LACKING_TOOL, apart, hints=hints)] if hints else []
+    hints = tuple(_placing(robot, poses, own, turned=turned))
+    return [LogWarning(LACKING_TOOL, said, hints=hints)] if hints else []
+
+
+def _placing(robot: Chain, poses: RecordedPoses, own: Apart, *, turned: bool) -> Iterator[Hint]:
+    """Yield the tool and the base with which an arm comes near, each if it does."""
+    bare = replace(robot, tool=Transform())
+    tool = _frame((*poses.fit(bare).tool, *poses.tool_turn(bare)))
+    if poses.apart(bare, tool=False).angle <= CLEARLY * poses.apart(bare, tool=True).angle:
+        tool = tool[:3]  # its turn is no more than what a calibration leaves
+    base = _frame(poses.base(robot))
+    placed = (("tool", tool, replace(robot, tool=from_offset(tool))),
+              ("base", base, replace(robot, base=from_offset(base))))  # fmt: skip
+    for name, frame, arm in placed:
+        left = poses.apart(arm, tool=False)
+        if _judged(left, turned=turned).clearly_nearer(own) and left.distance <= CLOSE_WITH_TOOL:
+            does = f"brings them within {left.said(turned=turned or (len(frame) > 3 and name == 'tool'))}"
+            yield Hint(name, frame, does, robot=_in_catalogue(robot, name))
+
+
+def _judged(apart: Apart, *, turned: bool) -> Apart:
+    """Return how far poses lie apart in what is judged."""
+    return apart if turned else replace(apart, angle=0.0)
+
+
+def _in_catalogue(robot: Chain, placing: str) -> str:
+    """Return the name that gives an arm but for its tool or its base; empty if it is from elsewhere.
+
+    Where the log singled it out, or a recording holds it, it has to be named together with them.
+    """
+    if robot.name not in robot_names():
+        return ""
+    bare = load_robot(robot.name)
+    same = replace(bare, **{placing: getattr(robot, placing)})
+    return robot.name if same == robot else ""
+
+
+def _stays(robot: Chain, apart: Apart, *, turned: bool) -> str:
+    """Say how far an arm stays from what was recorded."""
+    angle = f" and {text.quantity(apart.angle, 'rad')}" if turned else ""
+    far = f"{apart.distance * 1e3:.1f} mm{angle}"
+    return f"the kinematics of {robot.name} stay {far} (rms) from the recorded TCP"
 
 
 def _asked(robot: Chain) -> str:
@@ -84,29 +144,59 @@ def _asked(robot: Chain) -> str:
     return f"is the tool, {length * 1e3:.1f} mm long, the right one, or a base missing?"
 
 
-def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) -> Iterator[tuple[str, Hint]]:
-    """Yield what brings kinematics and recorded points together, and what to give then."""
+def _clearly_nearer(robot: Chain, log: JointLog, poses: RecordedPoses, own: Apart) -> list[_Other]:
+    """Return what explains the poses clearly better than a robot does: the best, and what is like it.
 
-    def agrees(changed: FloatArray) -> bool:
-        found = fit(robot, changed, recorded)
-        return found is not None and min(found.distance, found.with_tool) <= CLOSE_WITH_TOOL
+    A base comes last: it explains a part of what anything else does.
+    """
+    if own.distance <= FINEST and own.angle <= FINEST_TURN:
+        return []
+    moves = np.isfinite(poses.fit(robot).with_tool)
+    most = EXPLAINED * poses.spread if moves else CLOSE_WITH_TOOL
+    every = [*_other_robots(robot, poses), *_other_joints(robot, log, poses)]
+    if moves and own.distance > FAR:  # less of it a base explains by chance
+        every.append(_other_base(robot, poses))
+    near = [one for one in every if _distance(poses.fit(one.robot, one.q)) <= most]
+    found = [one._replace(apart=poses.apart(one.robot, one.q, tool=True)) for one in near]
+    found = sorted((o for o in found if o.apart.clearly_nearer(own)), key=lambda o: o.apart.distance)
+    like_best = [one for one in found if not found[0].apart.clearly_nearer(one.apart)]
+    return sorted(like_best, key=lambda one: one.hint.parameter == "base")
 
-    columns = [column for column in log.columns if column.role == "joint"]
-    for first, second in combinations(range(q.shape[1]), 2):
-        order = list(range(q.shape[1]))
-        order[first], order[second] = second, first
-        if agrees(q[:, order]):
-            names = _called([columns[j] for j in order]) if columns else [log.joints[j] for j in order]
-            said = f"with {log.joints[first]} and {log.joints[second]} exchanged they agree"
-            yield said, Hint("joints", names, "exchanges them")
+
+def _distance(found: Fit) -> float:
+    """Return how far an arm stays in [m] with the tool that fits best, or as it is where that is not told."""
+    return found.with_tool if np.isfinite(found.with_tool) else found.distance
+
+
+def _other_robots(robot: Chain, poses: RecordedPoses) -> Iterator[_Other]:
+    """Yield the other robots with as many joints, on the same base and with the same tool."""
+    for name in robot_names():
+        other = load_robot(name).placed(robot.base, robot.tool)
+        if name != robot.name and len(other.moving) == poses.q.shape[1]:
+            yield _Other(f"those of {name} agree", Hint("robot", name, "takes it"), other, poses.q)
+
+
+def _other_joints(robot: Chain, log: JointLog, poses: RecordedPoses) -> Iterator[_Other]:
+    """Yield the robot with each joint counted the other way, and with each two exchanged."""
+    count, q = len(log.joints), poses.q
     for j, name in enumerate(log.joints):
-        if agrees(q * np.where(np.arange(q.shape[1]) == j, -1.0, 1.0)):
-            said = f"with {name} counted the other way they agree"
-            yield said, Hint("log_map", None, "says so with sign = -1 for its column")
-    base, distance = _base(robot, q, recorded)
-    if distance <= CLOSE_WITH_TOOL:
-        said = f"on another base they agree within {distance * 1e3:.2f} mm"
-        yield said, Hint("base", base, "puts the arm there")
+        hint = Hint("log_map", None, f"says so with sign = -1 for {name}")
+        said = f"with {name} counted the other way they agree"
+        yield _Other(said, hint, robot, q * np.where(np.arange(count) == j, -1.0, 1.0))
+    columns = [column for column in log.columns if column.role == "joint"]
+    for first, second in combinations(range(count), 2):
+        order = list(range(count))
+        order[first], order[second] = second, first
+        names = _called([columns[j] for j in order]) if columns else [log.joints[j] for j in order]
+        said = f"with {log.joints[first]} and {log.joints[second]} exchanged they agree"
+        yield _Other(said, Hint("joints", names, "exchanges them"), robot, q[:, order])
+
+
+def _other_base(robot: Chain, poses: RecordedPoses) -> _Other:
+    """Return the robot where it stands best."""
+    frame = _frame(poses.base(robot))
+    hint = Hint("base", frame, "puts the arm there", robot=_in_catalogue(robot, "base"))
+    return _Other("on another base they agree", hint, replace(robot, base=from_offset(frame)), poses.q)
 
 
 def _called(columns: Sequence[LogColumn]) -> list[str]:
@@ -114,19 +204,6 @@ def _called(columns: Sequence[LogColumn]) -> list[str]:
     names = [split_unit(column.header)[0] if column.header else "" for column in columns]
     told = [name if name and "," not in name and names.count(name) == 1 else "" for name in names]
     return [name or str(column.number) for name, column in zip(told, columns, strict=True)]
-
-
-def _base(robot: Chain, q: FloatArray, recorded: FloatArray) -> tuple[list[float], float]:
-    """Return the base with which the points agree best, in [m] and [rad], and the rms left in [m]."""
-    known = np.isfinite(q).all(axis=1) & np.isfinite(recorded).all(axis=1)
-    computed, wanted = positions_over_log(replace(robot, base=Transform()), q[known]), recorded[known]
-    middle, target = computed.mean(axis=0), wanted.mean(axis=0)
-    turn, _ = best_rotation((wanted - target).T @ (computed - middle))
-    shift = target - turn @ middle
-    miss = computed @ turn.T + shift - wanted
-    x, y, z = (tuple(row) for row in turn.tolist())
-    numbers = (*shift.tolist(), *rpy_of((x, y, z)))
-    return _frame(numbers), float(np.sqrt((miss**2).sum(axis=1).mean()))
 
 
 def _frame(numbers: Sequence[float]) -> list[float]:

@@ -54,10 +54,12 @@ def _said(name: str, fits: dict[str, Fit], needs_tool: bool) -> Inference:
     distance = {robot: one.with_tool if needs_tool else one.distance for robot, one in fits.items()}
     others = {robot: value for robot, value in distance.items() if robot != name}
     said = f"its kinematics come within {distance[name] * 1e3:.2f} mm (rms) of the recorded TCP"
+    hints = [Hint("robot")]
     if needs_tool:
-        x, y, z = fits[name].tool
+        x, y, z = tool = [round(value, 4) + 0.0 for value in fits[name].tool]  # + 0.0: no -0.0
         said += f" with the tool {x:.4f},{y:.4f},{z:.4f}, which is not applied"
+        hints.append(Hint("tool", tool, "applies it", robot=name))
     if others:
         second = min(others, key=others.__getitem__)
         said += f", those of {second} within {others[second] * 1e3:.2f} mm"
-    return Inference("robot", name, said, hints=(Hint("robot"),))
+    return Inference("robot", name, said, hints=tuple(hints))

@@ -16,7 +16,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.orientation import angle_between, product
+from urmpipe_models.orientation import angle_between, conjugate, product
 
 Key = TypeVar("Key", bound=Hashable)
 
@@ -65,16 +65,28 @@ def spread(rows: int) -> slice:
 def fit(robot: Chain, q: FloatArray, recorded: FloatArray) -> Fit | None:
     """Return how near a robot comes to recorded points; None if no row has both.
 
+    A point of three zeros was not recorded: a controller writes it before it knows one.
+
     Joint values are in [rad] or [m], shape (n, joints), recorded positions in [m], shape (n, 3).
     """
-    known = np.isfinite(q).all(axis=1) & np.isfinite(recorded).all(axis=1)
+    known = np.isfinite(q).all(axis=1) & np.isfinite(recorded).all(axis=1) & recorded.any(axis=1)
     q, recorded = q[known], recorded[known]
     if not len(q):
         return None
-    position, rotation = poses_over_log(robot, q)
+    return tool_fit(*poses_over_log(robot, q), recorded)
+
+
+def tool_fit(position: FloatArray, rotation: FloatArray, recorded: FloatArray) -> Fit:
+    """Return how near poses come to recorded points, and with which tool.
+
+    Args:
+        position: Computed positions in [m], shape (n, 3).
+        rotation: Computed orientations [-], shape (n, 3, 3).
+        recorded: Recorded positions in [m], shape (n, 3).
+    """
     miss = recorded - position
     distance = _rms(miss)
-    if len(q) < _LEAST_ROWS or _rms(recorded - recorded.mean(axis=0)) < LEAST_MOTION:
+    if len(recorded) < _LEAST_ROWS or _rms(recorded - recorded.mean(axis=0)) < LEAST_MOTION:
         return Fit(distance, np.inf, (0.0, 0.0, 0.0))
     tool = (rotation.transpose(0, 2, 1) @ miss[:, :, np.newaxis]).mean(axis=0)  # least squares: R^T R = I
     x, y, z = tool[:, 0].tolist()
@@ -101,14 +113,21 @@ def _rms(vectors: FloatArray) -> float:
 def turned_apart(computed: FloatArray, recorded: FloatArray, *, tool: bool) -> float:
     """Return the rms angle between orientations in [rad], with a tool after its constant turn that fits best.
 
-    The turn is the mean of the relative quaternions: the eigenvector of sum(q q^T) with the largest
-    eigenvalue (Markley et al. 2007, "Averaging quaternions", eq. 12). Computed and recorded orientations are
-    unit quaternions x, y, z, w [-], shape (n, 4).
+    Computed and recorded orientations are unit quaternions x, y, z, w [-], shape (n, 4).
     """
     if not tool:
         return float(np.sqrt(np.mean(angle_between(computed, recorded) ** 2)))
-    conjugate = computed * np.array([-1.0, -1.0, -1.0, 1.0])
-    relative = product(conjugate, recorded)
-    _, vectors = np.linalg.eigh(relative.T @ relative)
-    mean = np.broadcast_to(vectors[:, -1], relative.shape)
+    relative = product(conjugate(computed), recorded)
+    mean = np.broadcast_to(mean_turn(computed, recorded), relative.shape)
     return float(np.sqrt(np.mean(angle_between(mean, relative) ** 2)))
+
+
+def mean_turn(computed: FloatArray, recorded: FloatArray) -> FloatArray:
+    """Return the constant turn from computed to recorded orientations that fits best, shape (4,) [-].
+
+    It is the mean of the relative quaternions: the eigenvector of sum(q q^T) with the largest eigenvalue
+    (Markley et al. 2007, "Averaging quaternions", eq. 12). Computed and recorded orientations are unit
+    quaternions x, y, z, w [-], shape (n, 4).
+    """
+    relative = product(conjugate(computed), recorded)
+    return np.asarray(np.linalg.eigh(relative.T @ relative)[1][:, -1])
