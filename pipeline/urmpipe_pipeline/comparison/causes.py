@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+from numpy.typing import NDArray
+
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
@@ -14,7 +17,10 @@ from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.presentation.section import Advice
 
 IN_SPACE = 0.1
-"""Share of the largest norm that a log may be off the path by, and still be late rather than elsewhere."""
+"""Share of the norm that a log may be off the path by, and still be late rather than elsewhere."""
+
+THROUGHOUT = 0.25
+"""Share of the way on which a late log is off by a tenth of what it is off where it is out of tolerance."""
 
 STEADY = 0.1
 """Share of its mean that a joint's deviation may spread by (std), and still be constant."""
@@ -28,8 +34,8 @@ def causes(run: Deviation, reference: Trajectory) -> Iterator[Advice]:
     """Yield what a log that is out of tolerance looks like, and what may be done; nothing of one that passes.
 
     Late or early: out of a tolerance of position at the same time, but off the path by at most a tenth of
-    that. The zero of a joint: its deviation is the same throughout, no joint's is larger, and it is large
-    enough for what decides.
+    that; and so on much of its way, not in some rows. The zero of a joint: its deviation is the same
+    throughout, no joint's is larger, and it is large enough for what decides.
     """
     if run.verdict == "fail":
         yield from _late(run, reference) if run.statistics else ()
@@ -37,14 +43,31 @@ def causes(run: Deviation, reference: Trajectory) -> Iterator[Advice]:
 
 
 def _late(run: Deviation, reference: Trajectory) -> Iterator[Advice]:
-    norm, path = run.statistics["norm"], run.statistics["path"]
-    position = (run.statistics[axis] for axis in AXES)
-    beyond = any(one.tolerance is not None and one.max > one.tolerance for one in position)
-    if beyond and path.max <= IN_SPACE * norm.max and path.verdict != "fail":
+    held = [(name, run.statistics[name].tolerance) for name in AXES]
+    beyond = [np.abs(run.delta[:, AXES.index(name)]) > most for name, most in held if most is not None]
+    if not np.any(beyond) or run.statistics["path"].verdict == "fail":
+        return
+    out = np.any(beyond, axis=0)
+    norm, path = run.delta[:, 3], run.path
+    off, beside = float(np.median(norm[out])), float(np.nanmedian(path[out]))
+    if beside <= IN_SPACE * off and _share_of_way(run, norm >= IN_SPACE * off) >= THROUGHOUT:
         hint = Hint("sync", "auto", "finds an offset of the clocks")
-        most, least = text.quantity(norm.max, "m"), text.quantity(path.max, "m")
-        said = f"on the path but not in time (‖Δ‖ {most}, path {least}): late or early"
+        most, least = text.quantity(off, "m"), text.quantity(beside, "m")
+        said = (
+            f"on the path but not in time (‖Δ‖ {most}, path {least}, where out of tolerance, by the median)"
+        )
+        said = f"{said}: late or early"
         yield Advice(said, (hint,) if _has_own_clock(run, reference) else ())
+
+
+def _share_of_way(run: Deviation, samples: NDArray[np.bool_]) -> float:
+    """Return at which share of the way some samples are, 0..1: where the arm rests, nothing is late.
+
+    The way is what log and reference both go: an outlier of one of them is none.
+    """
+    sides = [np.linalg.norm(np.diff(side, axis=0), axis=1) for side in (run.reference, run.actual)]
+    way = np.nan_to_num(np.min(sides, axis=0))
+    return float(way[samples[1:]].sum() / way.sum()) if way.any() else 0.0
 
 
 def _has_own_clock(run: Deviation, reference: Trajectory) -> bool:

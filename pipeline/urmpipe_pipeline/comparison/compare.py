@@ -125,7 +125,7 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     if chosen.tcp == "fk":
         told += _differing_robots([reference, *runs])
     if chosen.tcp == "fk" and wanted.joints:
-        told += [one for run in (reference, *runs) for one in recorded_apart(run, RECORDED_APART)]
+        told += recorded_apart((reference, *runs), RECORDED_APART)
     elif chosen.tcp == "fk":
         failed = [one for one in deviations if one.verdict == "fail"]
         told += [hint.of(one.name) for one in failed for hint in lacking_tool(one.run.robot, one.run.log)]

@@ -15,6 +15,7 @@ from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
 from urmpipe_pipeline.comparison.trajectory import Trajectory, extent
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
+from urmpipe_pipeline.runs.recorded_start import outlying_start
 from urmpipe_pipeline.runs.results import Run
 
 EXCHANGED = "path-as-log"
@@ -122,11 +123,15 @@ def _axis(axis: tuple[float, float, float]) -> str:
 
 def thin_evidence(one: Deviation) -> Iterator[LogWarning]:
     """Yield what a verdict on a log rests on, where that is little: missing values, or one pose."""
+    partly: dict[int, list[str]] = {}
     for found in one.all_statistics:
         if found.tolerance is not None and found.missing:
-            said = f"{found.quantity}: judged at {found.samples} of {len(one.sample)} compared samples"
-            told = f"{said}; a sample without a value is out of tolerance"
-            yield LogWarning("partly-judged", told, about=one.name)
+            partly.setdefault(found.samples or 0, []).append(found.quantity)
+    for samples, quantities in partly.items():
+        said = f"{text.enumerated(quantities)}: judged at {samples} of {len(one.sample)} compared samples"
+        yield LogWarning(
+            "partly-judged", f"{said}; a sample without a value is out of tolerance", about=one.name
+        )
     if one.run.timed and _rests(one):
         said = f"{text.counted(len(one.sample), 'sample')} compared, all in one pose"
         yield LogWarning("one-pose", f"{said}: the verdict is on that pose alone", about=one.name)
@@ -173,18 +178,41 @@ def exchanged(reference: Run, runs: Iterable[Run]) -> Iterator[LogWarning]:
             yield LogWarning(EXCHANGED, f"{said}: the reference comes first, then the logs", about=run.name)
 
 
-def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:
-    """Yield a warning if a log that is compared by its joints recorded a tool centre point elsewhere.
+def recorded_apart(runs: Sequence[Run], allowed: float) -> Iterator[LogWarning]:
+    """Yield a warning if logs that are compared by their joints recorded tool centre points elsewhere.
 
-    The distance that is allowed is in [m].
+    There is one for those that a calibration explains, and one for the others. First rows that are outliers
+    have their own, of their log.
+
+    Args:
+        runs: The logs.
+        allowed: The distance that is allowed, in [m].
     """
+    kind = "recorded-tcp-apart"
+    found = [(run, most) for run in runs if (most := _furthest_recorded(run)) > allowed]
+    for usual in (True, False):
+        alike = [(run, most) for run, most in found if (most <= CALIBRATION) == usual]
+        if len(alike) == 1:
+            ((run, most),) = alike
+            far = (
+                f"by its joints it is up to {text.quantity(most, 'm')} from the tool centre point it recorded"
+            )
+            remedy = f"this verdict does not judge it, a comparison of {run.name} alone does"
+            yield LogWarning("recorded-tcp-apart", f"{far}, {_cause(most)}; {remedy}", about=run.name)
+        elif alike:
+            far = text.enumerated([f"{run.name} is up to {text.quantity(most, 'm')}" for run, most in alike])
+            said = f"by their joints {far} from the tool centre points that they recorded"
+            remedy = "this verdict does not judge that, a comparison of each alone does"
+            yield LogWarning(kind, f"{said}, {_cause(alike[0][1])}; {remedy}")
+
+
+def _furthest_recorded(run: Run) -> float:
+    """Return how far a log is by its joints from where it recorded itself, in [m]; 0 if it did not."""
     if run.tcp is None or run.log.tcp_position is None:
-        return
-    apart = np.linalg.norm(by_kinematics(run).position - run.log.tcp_position, axis=1)
-    if (known := apart[np.isfinite(apart)]).size and (most := float(known.max())) > allowed:
-        said = f"by its joints it is up to {text.quantity(most, 'm')} from the tool centre point it recorded"
-        remedy = f"this verdict does not judge it, a comparison of {run.name} alone does"
-        yield LogWarning("recorded-tcp-apart", f"{said}, {_cause(most)}; {remedy}", about=run.name)
+        return 0.0
+    start, _ = outlying_start(run.robot, run.log)
+    apart = np.linalg.norm(by_kinematics(run).position - run.log.tcp_position, axis=1)[start:]
+    return float(apart[np.isfinite(apart)].max(initial=0.0))
 
 
 def _cause(apart: float) -> str:

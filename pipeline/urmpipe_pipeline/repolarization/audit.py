@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -15,16 +14,14 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.in_between import beside_wraps, off_line, repair
 from urmpipe_models.messages import Hint
 from urmpipe_models.repolarizer import FULL_TURN, Repolarized, repolarize
+from urmpipe_pipeline import text
 from urmpipe_pipeline.gaps import MISSED_SAMPLE
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogWarning, seconds
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
 from urmpipe_pipeline.repolarization.interval import Interval, double_turns, given_periods, said_intervals
 
-LISTED = 8
-"""Warnings of a kind that are told one by one; the others are counted, and listed by the audit."""
-
 ALL = (Hint("audit", None, "lists all", call="ingest"),)
-"""Where the others are."""
+"""Where those are of which a warning gives the number."""
 
 MOST = 10_000
 """Entries of a kind that are no wraps: a log with more of them is none of joints; a warning counts all."""
@@ -69,6 +66,11 @@ class _Places(NamedTuple):
     def steps(self) -> IntArray:
         """Row before, row after and joint index, shape (m, 3)."""
         return np.column_stack((self.before, self.rows, self.joints))
+
+    @property
+    def worst(self) -> int:
+        """Index of the largest."""
+        return int(np.argmax(np.abs(self.figures)))
 
 
 def audit_log(
@@ -277,43 +279,60 @@ def _turns_at(
 
 
 def _warn_unexplained(log: JointLog, odd: _Places, periods: FloatArray) -> Iterator[LogWarning]:
-    """Warn of steps above a quarter period that are no repolarization."""
-    for row, j in zip(odd.rows[:LISTED].tolist(), odd.joints[:LISTED].tolist(), strict=True):
+    """Warn once of the steps above a quarter period that are no repolarization."""
+    if not len(odd.rows):
+        return
+    joints, worst = _joints(log, odd), odd.worst
+    quarter = f"{np.degrees(periods[odd.joints].min() / 4.0):.0f} deg"
+    if len(odd.rows) == 1:
+        to = log.q[odd.rows[0], odd.joints[0]]
         said = (
-            f"{log.joints[j]} steps by more than {np.degrees(periods[j] / 4.0):.0f} deg from the value"
-            f" before, to {log.q[row, j]:.6g} rad, which is no wrap: it stays"
+            f"{joints} steps by more than {quarter} from the value before, to {to:.6g} rad, which is no wrap:"
         )
-        yield LogWarning("large-step", said, row + 1)
-    if len(odd.rows) > LISTED:
-        yield LogWarning("large-step", f"{len(odd.rows) - LISTED} more steps that are no wraps", hints=ALL)
+        yield LogWarning("large-step", f"{said} it stays", int(odd.rows[0]) + 1)
+        return
+    said = f"{len(odd.rows)} steps of {joints} by more than {quarter} are no wraps, and stay"
+    by = f"of {log.joints[odd.joints[worst]]} by {np.degrees(abs(odd.figures[worst])):.4g} deg"
+    said = f"{said}; the largest, {by}, is to row {odd.rows[worst] + 1}"
+    yield LogWarning("large-step", said, int(odd.rows[0]) + 1, hints=ALL)
 
 
 def _warn_in_between(log: JointLog, between: _Places) -> Iterator[LogWarning]:
-    """Warn of samples that a linear resampling left on a wrap."""
-    for row, j, _, off in zip(*(part[:LISTED].tolist() for part in between), strict=True):
-        said = (
-            f"{log.joints[j]} lies between the ends of a wrap, {abs(off):.4g} rad off the line of its"
-            " neighbours, where a linear resampling left it"
-        )
-        yield LogWarning("in-between", said, row + 1, hints=(Hint("repair", True, "puts it there"),))
-    if len(between.rows) > LISTED:
-        yield LogWarning("in-between", f"{len(between.rows) - LISTED} more samples on wraps", hints=ALL)
+    """Warn once of the samples that a linear resampling left on wraps."""
+    if not len(between.rows):
+        return
+    joints, worst = _joints(log, between), between.worst
+    off, row = f"{abs(between.figures[worst]):.4g} rad", int(between.rows[0]) + 1
+    if len(between.rows) == 1:
+        said = f"{joints} lies between the ends of a wrap, {off} off the line of its neighbours, where a"
+        hints: tuple[Hint, ...] = (Hint("repair", True, "puts it there"),)
+        yield LogWarning("in-between", f"{said} linear resampling left it", row, hints=hints)
+        return
+    said = f"{len(between.rows)} samples of {joints} lie between the ends of wraps, where a linear resampling"
+    by = f"of {log.joints[between.joints[worst]]} in row {between.rows[worst] + 1} by {off}"
+    said = f"{said} left them, off the line of their neighbours, at most that {by}"
+    yield LogWarning("in-between", said, row, hints=(Hint("repair", True, "puts them there"), *ALL))
 
 
 def _warn_ambiguous(log: JointLog, unsure: _Places, speeds: FloatArray) -> Iterator[LogWarning]:
-    """Warn of gaps in which joints can have turned, of each gap once."""
-    places = zip(
-        *(part.tolist() for part in (unsure.before, unsure.rows, unsure.joints, speeds)), strict=True
-    )
-    gaps = [(ends, list(found)) for ends, found in groupby(places, key=lambda place: place[:2])]
-    for (before, row), found in gaps[:LISTED]:
-        passed = float(log.t_ns[row] - log.t_ns[before]) / 1e9
-        joints = ", ".join(f"{log.joints[j]} (at {speed:.3g} rad/s)" for _, _, j, speed in found)
-        said = (
-            f"no value for {passed:.6g} s before this row: {joints} can have turned by more than half a"
-            " period; the nearest turn is taken"
-        )
-        yield LogWarning("ambiguous-turn", said, row + 1)
-    if len(gaps) > LISTED:
-        left = len(gaps) - LISTED
-        yield LogWarning("ambiguous-turn", f"{left} more gaps in which joints can have turned", hints=ALL)
+    """Warn once of the gaps in which joints can have turned."""
+    if not len(unsure.rows):
+        return
+    gaps = np.unique(np.column_stack((unsure.rows, unsure.before)), axis=0)
+    passed = seconds(log.t_ns[gaps[:, 0]] - log.t_ns[gaps[:, 1]])
+    longest, row = int(np.argmax(passed)), int(gaps[0, 0]) + 1
+    fastest = {log.joints[j]: speeds[unsure.joints == j].max() for j in np.unique(unsure.joints).tolist()}
+    joints = ", ".join(f"{name} (at {speed:.3g} rad/s)" for name, speed in fastest.items())
+    turned = f"{joints} can have turned by more than half a period"
+    if len(gaps) == 1:
+        said = f"no value for {passed[0]:.6g} s before this row: {turned}; the nearest turn is taken"
+        yield LogWarning("ambiguous-turn", said, row)
+        return
+    ends = f"the longest, {passed[longest]:.6g} s, ends at row {gaps[longest, 0] + 1}"
+    said = f"in {len(gaps)} gaps without values {turned}; {ends}; the nearest turns are taken"
+    yield LogWarning("ambiguous-turn", said, row, hints=ALL)
+
+
+def _joints(log: JointLog, places: _Places) -> str:
+    """Return the joints that some places are of, each once."""
+    return text.enumerated([log.joints[j] for j in np.unique(places.joints).tolist()])

@@ -6,12 +6,15 @@ of the file or a clock that hurries would explain what it sees.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.messages import Hint
+from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.repolarization.joint_motion import JointMotion, over_rows
 from urmpipe_pipeline.sources.units.unit_evidence import FASTEST
@@ -174,13 +177,13 @@ def _in_one_go(q: FloatArray, changes: NDArray[np.int64]) -> bool:
 
 
 def beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
-    """Return a warning for each joint that leaves its limits: how often, where first, where worst."""
+    """Return a warning if joints leave their limits: which, how often, where first, where worst."""
     q, slack = motion.q, ROUNDED_LIMIT + motion.fineness
     lower, upper = np.array([(joint.lower, joint.upper) for joint in robot.moving]).T
     if not np.isfinite((lower, upper)).any():
         return []
     kept = (over_rows(np.minimum, q) >= lower - slack) & (over_rows(np.maximum, q) <= upper + slack)
-    warnings = []
+    found = []
     for j in np.flatnonzero(~kept).tolist():  # also the columns where values are missing: NaN
         beyond = np.maximum(lower[j] - q[:, j], q[:, j] - upper[j])
         rows = np.flatnonzero(beyond > slack[j])
@@ -188,9 +191,9 @@ def beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
             worst = int(rows[np.argmax(beyond[rows])])
             limits = f"its limits of {lower[j]:.6g} to {upper[j]:.6g} {motion.units[j]}"
             where = f"in {len(rows)} of {len(q)} rows, at worst {q[worst, j]:.6g} in row {worst + 1}"
-            said = f"{motion.names[j]} is beyond {limits} {where}: check robot, unit, sign and zero"
-            warnings.append(LogWarning(JOINT_LIMIT, said, int(rows[0]) + 1))
-    return warnings
+            said = f"{motion.names[j]} is beyond {limits} {where}"
+            found.append(_OfJoint(motion.names[j], rows, float(beyond[worst]), said))
+    return _in_one(JOINT_LIMIT, found, "so are", "rows", "check robot, unit, sign and zero")
 
 
 def speed_limits(robot: Chain | None, turning: NDArray[np.bool_]) -> FloatArray:
@@ -208,7 +211,7 @@ def speed_limits(robot: Chain | None, turning: NDArray[np.bool_]) -> FloatArray:
 def too_fast(
     motion: JointMotion, limits: FloatArray, told: NDArray[np.int64], period: float
 ) -> list[LogWarning]:
-    """Return a warning for each joint that steps faster than it can: how often, where first, where worst.
+    """Return a warning if joints step faster than they can: which, how often, where first, where worst.
 
     Rows closer in time than the usual period in [s] are taken to be that far apart: it is their clock that
     hurries. Limits are in [rad/s] or [m/s], shape (joints,); steps that a warning speaks of already are row
@@ -218,7 +221,7 @@ def too_fast(
     largest = np.max([motion.inner, *(np.abs(q[row] - q[beside]) for row, beside in motion.ends)], axis=0)
     suspects = np.flatnonzero(~(largest <= OVERSHOOT * limits * period + motion.fineness)).tolist()
     dt = np.maximum(np.diff(motion.t_ns) / 1e9, period) if suspects else np.empty(0)
-    warnings = []
+    found = []
     for j in suspects:
         steps = np.abs(np.diff(q[:, j]))
         fast = steps > OVERSHOOT * limits[j] * dt + motion.fineness[j] + _noise(q[:, j])
@@ -228,9 +231,28 @@ def too_fast(
             speeds = steps[rows] / dt[rows]
             worst = f"at worst at {speeds.max():.4g} {motion.units[j]}/s to row {rows[np.argmax(speeds)] + 2}"
             said = f"{motion.names[j]} moves faster than {limits[j]:.4g} {motion.units[j]}/s"
-            said = f"{said} in {len(rows)} of {len(steps)} steps, {worst}: check robot, unit and clock"
-            warnings.append(LogWarning(SPEED_LIMIT, said, int(rows[0]) + 2))
-    return warnings
+            said = f"{said} in {len(rows)} of {len(steps)} steps, {worst}"
+            found.append(_OfJoint(motion.names[j], rows + 1, float(speeds.max() / limits[j]), said))
+    return _in_one(SPEED_LIMIT, found, "so do", "steps", "check robot, unit and clock")
+
+
+class _OfJoint(NamedTuple):
+    """What is odd of a joint: in which rows, how odd at worst, and said in words."""
+
+    name: str
+    rows: NDArray[np.int64]
+    worst: float
+    said: str
+
+
+def _in_one(kind: str, found: list[_OfJoint], so: str, what: str, check: str) -> list[LogWarning]:
+    """Return one warning for all joints: the worst in words, the others by name; none if there is none."""
+    if not found:
+        return []
+    worst = max(found, key=lambda one: one.worst)
+    others = text.enumerated([f"{one.name} in {len(one.rows)}" for one in found if one is not worst])
+    said = f"{worst.said}; {so} {others} {what}" if others else worst.said
+    return [LogWarning(kind, f"{said}: {check}", min(int(one.rows[0]) for one in found) + 1)]
 
 
 def _noise(column: FloatArray) -> float:

@@ -142,13 +142,26 @@ def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told(ar
     assert run.tcp is not None
     for away, expected in ((0.0005, []), (0.005, ["recorded-tcp-apart"])):
         beside = replace(run, log=replace(run.log, tcp_position=run.tcp.position + np.array((0, 0, away))))
-        assert [one.kind for one in recorded_apart(beside, 1e-3)] == expected
+        assert [one.kind for one in recorded_apart([beside], 1e-3)] == expected
     usual = "usual up to 5 mm where a controller knows its arm's calibration, which the robot here lacks"
     more = "more than a calibration makes (5 mm): another robot, tool or base?"
     for away, shown, cause in ((0.00104, "1.0400", usual), (0.0051, "5.1000", more)):
         beside = replace(run, log=replace(run.log, tcp_position=run.tcp.position + np.array((0, 0, away))))
-        assert next(recorded_apart(beside, 1e-3)).message == (
+        assert next(recorded_apart([beside], 1e-3)).message == (
             f"by its joints it is up to {shown} mm from the tool centre point it recorded, {cause};"
             " this verdict does not judge it, a comparison of bad alone does"
         )
-    assert list(recorded_apart(run, 1e-3)) == []
+    assert list(recorded_apart([run], 1e-3)) == []
+    (both,) = recorded_apart([beside, replace(beside, name="worse")], 1e-3)
+    assert both.message == (
+        "by their joints bad is up to 5.1000 mm and worse is up to 5.1000 mm from the tool centre points that"
+        f" they recorded, {more}; this verdict does not judge that, a comparison of each alone does"
+    )
+
+
+def test_first_rows_that_recorded_another_tool_are_not_told_of_as_another_robot(arms: Compared) -> None:
+    run = arms({"bad": np.zeros((50, 6))}).runs[0].run
+    assert run.tcp is not None
+    position = run.tcp.position + np.array((0, 0, 0.0005))
+    position[:4] = 0.0
+    assert list(recorded_apart([replace(run, log=replace(run.log, tcp_position=position))], 1e-3)) == []

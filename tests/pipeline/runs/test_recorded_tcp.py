@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from asserting import there
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.kinematics.forward import positions_over_log
-from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.kinematics.forward import poses_over_log, positions_over_log
+from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.transform import from_offset, translation
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
+from urmpipe_pipeline.runs.recorded_start import outlying_start
 from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded, lacking_tool
+from urmpipe_pipeline.runs.robot_inference import infer_robot
 
 UR5E = load_robot("ur5e")
 T = np.linspace(0, 1, 60)[:, None]
@@ -42,9 +46,9 @@ def test_an_unknown_tool_is_no_reason(tool: tuple[float, float, float]) -> None:
 def test_exchanged_joints_are_found() -> None:
     message = said(Q[:, [0, 2, 1, 3, 4, 5]], positions_over_log(UR5E, Q))
     assert re.match(
-        r"the kinematics of ur5e stay \d+\.\d mm \(rms\) from the recorded TCP \(\d+\.\d mm ", message
+        r"the kinematics of ur5e stay \d+\.\d mm \(rms\) from the recorded TCP \(\d+\.\d\d mm ", message
     )
-    assert message.endswith(": with q2 and q3 exchanged they agree")
+    assert message.endswith(": with q2 and q3 exchanged they agree within 0.00 mm")
 
 
 def test_exchanged_joints_are_named_as_the_file_names_its_columns() -> None:
@@ -66,7 +70,7 @@ def test_exchanged_joints_are_named_as_the_file_names_its_columns() -> None:
 
 def test_a_joint_that_is_counted_the_other_way_is_found() -> None:
     message = said(Q * np.array([1, 1, -1, 1, 1, 1]), positions_over_log(UR5E, Q))
-    assert message.endswith(": with q3 counted the other way they agree")
+    assert message.endswith(": with q3 counted the other way they agree within 0.00 mm")
 
 
 def test_another_base_is_found_and_its_option_helps() -> None:
@@ -111,7 +115,9 @@ def test_a_small_shift_of_the_base_is_found(base: tuple[float, ...], said: str) 
     recorded = positions_over_log(UR5E.placed(base=from_offset(base)), Q)
     (warning,) = lacking_tool(UR5E, log(Q, recorded))
     told = warning.words("command line")
-    assert told.endswith(f" mm (rms) from the recorded TCP; --base {said} brings them within 0.00 mm")
+    assert told.endswith(
+        f" mm (rms) from the recorded TCP; --robot ur5e --base {said} brings them within 0.00 mm"
+    )
 
 
 def test_no_tool_is_found_for_a_log_that_hardly_moves_or_needs_more_than_a_tool() -> None:
@@ -128,6 +134,166 @@ def test_no_tool_is_found_for_a_log_that_hardly_moves_or_needs_more_than_a_tool(
         " little to tell why: is the tool, 100.0 mm long, the right one, or a base missing?"
     )
     assert lacking_tool(UR5E, log(Q, 1.3 * positions_over_log(UR5E, Q) + np.sin(9 * T))) == []
+
+
+def turning(robot: Chain, q: FloatArray) -> dict[str, Any]:
+    """What a log holds of the orientations of an arm."""
+    _, rotation = poses_over_log(robot, q)
+    return {"tcp_rotation": rotation.reshape(-1, 9), "rotation_form": "matrix"}
+
+
+SIX = [name for name in robot_names() if len(load_robot(name).moving) == 6]
+TWINS = {"ur3": "ur3e", "ur3e": "ur3"}
+
+
+@pytest.mark.parametrize("true", SIX)
+def test_another_robot_of_the_catalogue_is_found_behind_a_tool_and_a_calibration(true: str) -> None:
+    rng = np.random.default_rng(SIX.index(true))
+    tool = translation(0.02, 0.0, 0.15)
+    recorded = positions_over_log(calibrated(load_robot(true).placed(tool=tool), 3e-4, rng), Q)
+    for given in sorted({*SIX} - {true, TWINS.get(true)}):
+        (warning,) = far_from_recorded(load_robot(given), log(Q, recorded))
+        assert ("robot", true) in [(hint.parameter, hint.value) for hint in warning.hints]
+        assert far_from_recorded(load_robot(true), log(Q, recorded)) == []
+
+
+def test_a_still_arm_tells_of_another_robot_that_needs_no_tool() -> None:
+    still = np.repeat(Q[:1], len(Q), axis=0)
+    recorded = positions_over_log(UR5E, still) + np.array([0.001, 0.0, 0.001])
+    (warning,) = far_from_recorded(load_robot("ur5"), log(still, recorded))
+    assert re.fullmatch(
+        r"the kinematics of ur5 stay \d+\.\d mm \(rms\) from the recorded TCP:"
+        r" those of ur5e agree within 1.41 mm",
+        warning.message,
+    )
+    assert lacking_tool(load_robot("ur5"), log(still, recorded)) == []  # one line a cause
+    assert far_from_recorded(UR5E, log(still, recorded)) == []
+
+
+def test_a_sign_shows_in_a_small_motion_too() -> None:
+    """By less than 8 mm rms, which a threshold in mm would let pass."""
+    q = Q[0] + 0.1 * (Q - Q[0])
+    recorded = positions_over_log(UR5E, q)
+    (warning,) = far_from_recorded(UR5E, log(q * [1, 1, -1, 1, 1, 1], recorded))
+    left = float(warning.message.partition("TCP (")[2].partition(" mm")[0])
+    assert left < 8.0
+    assert "with q3 counted the other way they agree within 0.00 mm" in warning.message
+
+
+def test_the_orientation_tells_of_a_joint_that_moves_no_point() -> None:
+    recorded = positions_over_log(UR5E, Q)
+    backwards = replace(log(Q * [1, 1, 1, 1, 1, -1], recorded), **turning(UR5E, Q))
+    (warning,) = far_from_recorded(UR5E, backwards)
+    assert "with q6 counted the other way they agree within 0.00 mm and" in warning.message
+    assert far_from_recorded(UR5E, replace(log(Q, recorded), **turning(UR5E, Q))) == []
+
+
+def calibrated(robot: Chain, size: float, rng: np.random.Generator) -> Chain:
+    """An arm as it was built: its frames are off by so much in [m], and in [rad] per half a metre."""
+    frames = [
+        replace(
+            joint, origin=joint.origin @ from_offset([*rng.normal(0, size, 3), *rng.normal(0, 2 * size, 3)])
+        )
+        for joint in robot.joints
+    ]
+    return replace(robot, joints=tuple(frames))
+
+
+def any_motion(rng: np.random.Generator) -> FloatArray:
+    """Joints that swing, some of them or all, little or much, about any pose or a square one."""
+    t = np.linspace(0, 1, int(rng.choice([12, 60, 300])))[:, None]
+    about = rng.choice(np.pi / 2 * np.arange(-2, 3), 6) if rng.random() < 0.5 else rng.uniform(-3, 3, 6)
+    wide = rng.uniform(0, 1.5, 6) * rng.choice([0.02, 0.1, 0.5, 1.0]) * (rng.random(6) < rng.choice([0.3, 1]))
+    return np.asarray(about + wide * np.sin(t * rng.uniform(0.5, 6, 6) + rng.uniform(0, 6, 6)))
+
+
+def test_nothing_is_said_of_logs_that_are_right() -> None:
+    """With the calibration of a real arm, noise and rounding, a tool that was given or not."""
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        robot, q = load_robot(SIX[seed % len(SIX)]), any_motion(rng)
+        tool = from_offset([*rng.uniform(-0.1, 0.2, 3), *rng.uniform(-1, 1, 3)])
+        held = calibrated(robot.placed(tool=tool), rng.choice([0.0, 3e-4, 6e-4]), rng)
+        noisy = positions_over_log(held, q) + rng.normal(0, rng.choice([0, 1e-4, 1e-3]), (len(q), 3))
+        one = log(q, np.round(noisy, rng.choice([4, 9])))
+        if seed % 2:
+            one = replace(one, **turning(held, q))
+        given = robot.placed(tool=tool) if seed % 3 else robot
+        assert far_from_recorded(given, one) == [], f"seed {seed}"
+
+
+def test_the_rotation_of_a_tool_is_in_the_hint_and_helps() -> None:
+    tool = from_offset((0.02, 0.0, 0.15, 0.3, -0.2, np.pi / 2))
+    recorded = replace(
+        log(Q, positions_over_log(UR5E.placed(tool=tool), Q)), **turning(UR5E.placed(tool=tool), Q)
+    )
+    for turned in (False, True):
+        (warning,) = lacking_tool(UR5E, recorded, turned=turned)
+        (hint,) = warning.hints
+        assert hint.spelled("command line") == "--robot ur5e --tool 0.02,0,0.15,0.3,-0.2,1.5708"
+        assert isinstance(hint.value, list)
+        given = UR5E.placed(tool=from_offset([float(value) for value in hint.value]))
+        assert lacking_tool(given, recorded, turned=turned) == []
+
+
+def test_only_a_turned_tool_is_found_where_orientations_are_judged() -> None:
+    tool = from_offset((0.0, 0.0, 0.0, 0.0, 0.0, 0.5))
+    recorded = replace(log(Q, positions_over_log(UR5E, Q)), **turning(UR5E.placed(tool=tool), Q))
+    assert lacking_tool(UR5E, recorded) == []
+    (warning,) = lacking_tool(UR5E, recorded, turned=True)
+    assert warning.words("command line") == (
+        "the kinematics of ur5e stay 0.0 mm and 28.6479 deg (rms) from the recorded TCP;"
+        " --robot ur5e --tool 0,0,0,0,0,0.5 brings them within 0.00 mm and 0.0000 deg"
+    )
+
+
+def test_an_arm_from_a_file_is_not_called_by_a_name_of_the_catalogue() -> None:
+    own = replace(UR5E, tip=translation(0.0, 0.0, 0.01))
+    recorded = positions_over_log(own.placed(tool=translation(0.0, 0.0, 0.15)), Q)
+    (warning,) = lacking_tool(own, log(Q, recorded))
+    assert warning.hints[0].spelled("python") == "tool=[0, 0, 0.15]"
+
+
+# The first rows
+
+
+TOOLED = UR5E.placed(tool=translation(0.0, 0.02, 0.15))
+
+
+@pytest.mark.parametrize("rows", [1, 7, 25])
+def test_first_rows_without_a_tool_are_told_and_count_nowhere_else(rows: int) -> None:
+    recorded = positions_over_log(TOOLED, Q)
+    recorded[:rows] = positions_over_log(UR5E, Q)[:rows]
+    first = "the first row" if rows == 1 else f"the first {rows} rows"
+    (told,) = far_from_recorded(TOOLED, log(Q, recorded))
+    assert (told.kind, told.row, told.message) == (
+        "recorded-tcp-start",
+        1,
+        f"{first} of 60 recorded the TCP 151.3275 mm from where the others have it: no tool or pose known"
+        " yet? They stay, and are judged with the others",
+    )
+    assert lacking_tool(TOOLED, log(Q, recorded)) == []
+    (lacking,) = lacking_tool(UR5E, log(Q, recorded))
+    assert lacking.hints[0].value == [0.0, 0.02, 0.15]
+
+
+def test_first_points_of_zeros_are_told_without_a_robot_and_hide_none() -> None:
+    recorded = positions_over_log(TOOLED, Q)
+    recorded[:12] = 0.0
+    for robot in (None, TOOLED, UR5E):
+        (told,) = far_from_recorded(robot, log(Q, recorded))
+        assert told.message.startswith("the first 12 rows of 60 recorded the TCP as 0, 0, 0: ")
+    found = infer_robot(log(Q, positions_over_log(UR5E, Q) * (np.arange(60) > 11)[:, None]))
+    assert found is not None
+    assert found[0] == UR5E
+
+
+def test_the_last_outlying_row_of_a_long_log_is_found_between_those_looked_at() -> None:
+    t = np.linspace(0, 1, 50_000)[:, None]
+    q = 0.4 + np.arange(6) * 0.3 + 0.5 * np.sin(t * (1 + 0.4 * np.arange(6)))
+    recorded = positions_over_log(TOOLED, q)
+    recorded[:3210] = positions_over_log(UR5E, q)[:3210]
+    assert outlying_start(TOOLED, log(q, recorded))[0] == 3210
 
 
 def test_a_recorded_rotation_vector_goes_on_past_pi() -> None:
