@@ -10,15 +10,25 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 import pytest
 
 import urmpipe
 from make_specimens import paths
 from specimen import SPECIMENS
 from urmpipe.main import cli, run
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.messages import Hint, Message
+from urmpipe_models.orientation import quaternions
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.transform import from_offset
 
 ROBOTS = (None, "ur5e")
+
+TRUTH = 0.4 + np.arange(6) * 0.3 + 0.5 * np.sin(np.linspace(0, 1, 60)[:, None] * (1 + 0.4 * np.arange(6)))
+"""Joint values of a UR5e in [rad], shape (60, 6)."""
 
 
 class Offer(NamedTuple):
@@ -47,6 +57,11 @@ def complaint(told: Mapping[str, Any], sentence: str) -> tuple[Any, ...]:
 
 def of_message(one: Message) -> tuple[Any, ...]:
     return complaint(one.to_dict(), one.message)
+
+
+def given_by(hint: Hint) -> dict[str, Any]:
+    """Return the keywords of a hint."""
+    return {hint.parameter: hint.value} | ({"robot": hint.robot} if hint.robot else {})
 
 
 def has_value(hint: Hint) -> bool:
@@ -87,8 +102,8 @@ def test_the_specimens_provoke_hints_of_many_kinds() -> None:
 def test_a_hint_that_is_followed_helps(
     offer: Offer, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    given: Any = {offer.hint.parameter: offer.hint.value}
-    told = ingested(offer.specimen, offer.robot, **given)
+    given: Any = {"robot": offer.robot} | given_by(offer.hint)
+    told = ingested(offer.specimen, given.pop("robot"), **given)
     assert offer.complaint not in map(of_message, told)
 
     robot = ["--robot", offer.robot] if offer.robot else []
@@ -98,6 +113,76 @@ def test_a_hint_that_is_followed_helps(
     answer = json.loads(capfd.readouterr().out)
     printed = answer.get("errors", answer.get("warnings", []))
     assert [one["message"] for one in printed] == [one.sentence("command line") for one in told]
+
+
+def recorded_beside(path: Path, q: FloatArray, held: Chain) -> Path:
+    """Write a log of joint values in [rad], with the poses in which an arm is truly held."""
+    position, rotation = poses_over_log(held, TRUTH)
+    names = ["t [s]", *(f"q{k} [rad]" for k in range(1, 7)), *(f"tcp_{axis} [m]" for axis in "xyz")]
+    names += ["tcp_qx", "tcp_qy", "tcp_qz", "tcp_qw"]
+    quat = quaternions(rotation.reshape(-1, 9), "matrix")
+    table = np.column_stack((0.008 * np.arange(len(q)), q, position, quat))
+    np.savetxt(path, table, "%.9f", ",", header=",".join(names), comments="")
+    return path
+
+
+UR5E = load_robot("ur5e")
+TURNED = UR5E.placed(tool=from_offset((0.02, 0.0, 0.15, 0.3, -0.2, 1.5)))
+SHIFTED = UR5E.placed(base=from_offset((0.0, 0.02, -0.005)))
+BEHIND = UR5E.placed(base=from_offset((0.5, -0.3, 0.8, 0.0, 0.0, 1.2)))
+
+
+@pytest.mark.parametrize(
+    ("order", "held", "robot", "kind", "parameter"),
+    [
+        ([0, 1, 2, 3, 4, 5], TURNED, None, "recorded-tcp-tool", "tool"),
+        ([0, 1, 2, 3, 4, 5], TURNED, "ur5e", "recorded-tcp-tool", "tool"),
+        ([0, 1, 2, 3, 4, 5], SHIFTED, "ur5e", "recorded-tcp-tool", "base"),
+        ([0, 1, 2, 3, 4, 5], BEHIND, "ur5e", "recorded-tcp-far", "base"),
+        ([0, 1, 2, 3, 4, 5], TURNED, "ur5", "recorded-tcp-far", "robot"),
+        ([0, 2, 1, 3, 4, 5], TURNED, "ur5e", "recorded-tcp-far", "joints"),
+    ],
+)
+def test_what_a_comparison_with_the_recorded_poses_advises_helps(
+    order: list[int], held: Chain, robot: str | None, kind: str, parameter: str,
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """Followed as printed, once each, until nothing is advised: then place and angle agree."""
+    monkeypatch.chdir(tmp_path)  # where the recording goes
+    log = recorded_beside(tmp_path / "log.csv", TRUTH[:, order], held)
+    words = ["--robot", robot] if robot else []
+    for step in range(3):
+        run(["compare", str(log), *words, "--tolerance", "axis=1mm,angle=0.2deg", "--json", "-q"])
+        answer = json.loads(capfd.readouterr().out)
+        told = [*answer["runs"][0]["warnings"], *answer["warnings"]]
+        advised = [
+            (one, hint) for one in told for hint in one["hints"] if one["kind"].startswith("recorded-tcp")
+        ]
+        if not advised:
+            break
+        (message, hint), *_ = advised
+        if step == 0:
+            assert (message["kind"], hint["parameter"]) == (kind, parameter)
+        spelled = Hint(**hint).spelled("command line")
+        assert spelled in message["message"]
+        words += shlex.split(spelled)
+    assert answer["verdict"] == "pass"
+
+
+def test_the_tool_of_a_recorded_run_is_advised_with_its_robot(tmp_path: Path) -> None:
+    log = recorded_beside(tmp_path / "log.csv", TRUTH, TURNED)
+    run_of = urmpipe.ingest(log, "ur5e")
+    (told,) = urmpipe.compare(run_of).warnings
+    (hint,) = told.hints
+    assert urmpipe.compare(run_of, **given_by(hint)).warnings == ()
+
+
+def test_a_robot_that_was_singled_out_is_named_with_its_tool(tmp_path: Path) -> None:
+    log = recorded_beside(tmp_path / "log.csv", TRUTH, UR5E.placed(tool=from_offset((0.02, 0.0, 0.15))))
+    (found,) = [one for one in urmpipe.ingest(log).log.inferences if one.kind == "robot"]
+    assert found.otherwise("command line") == (
+        "--robot NAME|FILE, or --robot ur5e --tool 0.02,0,0.15 applies it"
+    )
 
 
 def test_the_same_call_gives_the_same_message_on_any_thread_and_within_a_command(tmp_path: Path) -> None:

@@ -53,10 +53,8 @@ def _late(run: Deviation, reference: Trajectory) -> Iterator[Advice]:
     if beside <= IN_SPACE * off and _share_of_way(run, norm >= IN_SPACE * off) >= THROUGHOUT:
         hint = Hint("sync", "auto", "finds an offset of the clocks")
         most, least = text.quantity(off, "m"), text.quantity(beside, "m")
-        said = (
-            f"on the path but not in time (‖Δ‖ {most}, path {least}, where out of tolerance, by the median)"
-        )
-        said = f"{said}: late or early"
+        medians = f"medians out of tolerance: ‖Δ‖ {most}, path {least}"
+        said = f"on the path but not in time ({medians}): late or early"
         yield Advice(said, (hint,) if _has_own_clock(run, reference) else ())
 
 

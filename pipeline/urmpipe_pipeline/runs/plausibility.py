@@ -193,7 +193,7 @@ def beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
             where = f"in {len(rows)} of {len(q)} rows, at worst {q[worst, j]:.6g} in row {worst + 1}"
             said = f"{motion.names[j]} is beyond {limits} {where}"
             found.append(_OfJoint(motion.names[j], rows, float(beyond[worst]), said))
-    return _in_one(JOINT_LIMIT, found, "so are", "rows", "check robot, unit, sign and zero")
+    return _in_one(JOINT_LIMIT, found, "row", "check robot, unit, sign and zero")
 
 
 def speed_limits(robot: Chain | None, turning: NDArray[np.bool_]) -> FloatArray:
@@ -233,7 +233,7 @@ def too_fast(
             said = f"{motion.names[j]} moves faster than {limits[j]:.4g} {motion.units[j]}/s"
             said = f"{said} in {len(rows)} of {len(steps)} steps, {worst}"
             found.append(_OfJoint(motion.names[j], rows + 1, float(speeds.max() / limits[j]), said))
-    return _in_one(SPEED_LIMIT, found, "so do", "steps", "check robot, unit and clock")
+    return _in_one(SPEED_LIMIT, found, "step", "check robot, unit and clock")
 
 
 class _OfJoint(NamedTuple):
@@ -245,13 +245,13 @@ class _OfJoint(NamedTuple):
     said: str
 
 
-def _in_one(kind: str, found: list[_OfJoint], so: str, what: str, check: str) -> list[LogWarning]:
+def _in_one(kind: str, found: list[_OfJoint], place: str, check: str) -> list[LogWarning]:
     """Return one warning for all joints: the worst in words, the others by name; none if there is none."""
     if not found:
         return []
     worst = max(found, key=lambda one: one.worst)
-    others = text.enumerated([f"{one.name} in {len(one.rows)}" for one in found if one is not worst])
-    said = f"{worst.said}; {so} {others} {what}" if others else worst.said
+    others = [f"{one.name} ({text.counted(len(one.rows), place)})" for one in found if one is not worst]
+    said = f"{worst.said}; also {text.enumerated(others)}" if others else worst.said
     return [LogWarning(kind, f"{said}: {check}", min(int(one.rows[0]) for one in found) + 1)]
 
 

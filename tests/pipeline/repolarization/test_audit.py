@@ -14,7 +14,7 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.repolarizer import FULL_TURN
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
-from urmpipe_pipeline.repolarization.audit import LISTED, Audited, audit_log
+from urmpipe_pipeline.repolarization.audit import Audited, audit_log
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.derivatives import Method, derivatives
 from urmpipe_pipeline.runs.ingest import ingest_log
@@ -121,12 +121,47 @@ def test_missing_values_are_a_gap_of_their_own_joint() -> None:
     assert found.unresolved.tolist() == [[99, 300, 1]]
 
 
-def test_findings_are_capped_and_counted() -> None:
-    q = np.tile([0.0, 2.0], 50)
-    found = audit_log(log_of(q))
-    assert len(found.entries) == 99
-    assert len(found.warnings) == LISTED + 1
-    assert found.warnings[-1].message == "91 more steps that are no wraps"
+def test_steps_of_one_kind_are_one_warning_and_all_in_the_audit() -> None:
+    q = np.tile([0.0, 2.0], 97)[:193]
+    q[121] = 2.2
+    found = audit_log(log_of(np.column_stack((q, np.zeros(193), q))))
+    assert len(found.entries) == 384
+    (warning,) = found.warnings
+    assert (warning.kind, warning.row) == ("large-step", 2)
+    assert warning.words("command line") == (
+        "row 2: 384 steps of q1 and q3 by more than 90 deg are no wraps, and stay; the largest, of q1 by"
+        " 126.1 deg, is to row 122; urmpipe ingest --audit FILE.csv lists all"
+    )
+
+
+def test_samples_on_wraps_are_one_warning() -> None:
+    q = np.pi + 0.05 * (np.arange(400) - 19.5)
+    wrapped = wrap(q)
+    wraps = np.flatnonzero(np.abs(np.diff(wrapped)) > 3) + 1
+    for k, row in enumerate(wraps.tolist()):
+        wrapped[row] = (0.4 - 0.1 * k) * wrapped[row - 1] + (0.6 + 0.1 * k) * wrapped[row + 1]
+    found = audit_log(log_of(wrapped))
+    off = [entry for entry in found.entries if entry.kind == "in-between"]
+    assert [entry.row for entry in off] == (wraps + 1).tolist()
+    worst = max(off, key=lambda entry: abs(entry.step))
+    (warning,) = found.warnings
+    assert (warning.kind, warning.row) == ("in-between", wraps[0] + 1)
+    assert warning.words("command line") == (
+        f"row {wraps[0] + 1}: {len(wraps)} samples of q1 lie between the ends of wraps, where a linear"
+        f" resampling left them, off the line of their neighbours, at most that of q1 in row {worst.row} by"
+        f" {abs(worst.step):.4g} rad; --repair puts them there; urmpipe ingest --audit FILE.csv lists all"
+    )
+
+
+def test_gaps_in_which_joints_can_have_turned_are_one_warning() -> None:
+    t = 5 * MS * np.r_[0:20, 120:140, 250:260].astype(np.int64)
+    found = audit_log(log_of(np.full((50, 2), 1.0), t), arm(6.3, 7.0))
+    (warning,) = found.warnings
+    assert (warning.kind, warning.row) == ("ambiguous-turn", 21)
+    assert warning.message == (
+        "in 2 gaps without values q1 (at 6.3 rad/s), q2 (at 7 rad/s) can have turned by more than half a"
+        " period; the longest, 0.555 s, ends at row 41; the nearest turns are taken"
+    )
 
 
 @pytest.mark.parametrize(

@@ -153,8 +153,14 @@ def test_a_log_with_other_joints_than_the_robot_is_refused(tmp_path: Path) -> No
 def test_real_jumps_that_are_no_wraps_stay() -> None:
     run = ingest_log([SHARED / "logs" / "plotjuggler" / "fake_joints.csv"], read=RAD)
     assert run.repolarizations == ()
-    large = [(w.row, w.message.split()[0]) for w in run.warnings if w.kind == "large-step"]
+    large = [(one.row, one.joint) for one in run.audit if one.kind == "unexplained"]
     assert large == [(row, f"field.position.joint_{j}") for row, j in ((2, 0), (1412, 3), (1413, 3))]
+    (told,) = [one for one in run.warnings if one.kind == "large-step"]
+    assert (told.row, told.message) == (
+        2,
+        "3 steps of field.position.joint_0 and field.position.joint_3 by more than 90 deg are no wraps, and"
+        " stay; the largest, of field.position.joint_3 by 682.7 deg, is to row 1412",
+    )
     assert "recorded-rates" in [w.kind for w in run.warnings]  # its velocity columns are all 0
 
 

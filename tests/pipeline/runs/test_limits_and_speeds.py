@@ -29,6 +29,27 @@ def test_a_joint_beyond_its_limits_is_counted() -> None:
     ]
 
 
+def test_several_joints_beyond_their_limits_are_one_warning() -> None:
+    q, t = swing()
+    (warning,) = found(q, t, arm(3, lower=-0.5, upper=0.5))
+    beyond = [np.flatnonzero(np.abs(column) > 0.505) for column in q.T]
+    worst = int(np.argmax(np.abs(q).max(axis=0)))
+    others = " and ".join(f"q{j + 1} ({len(beyond[j])} rows)" for j in range(3) if j != worst)
+    assert (warning.kind, warning.row) == ("joint-limit", min(int(rows[0]) for rows in beyond) + 1)
+    assert warning.message.startswith(f"q{worst + 1} is beyond its limits of -0.5 to 0.5 rad in ")
+    assert warning.message.endswith(f"; also {others}: check robot, unit, sign and zero")
+
+
+def test_several_joints_that_are_too_fast_are_one_warning() -> None:
+    q, t = swing()
+    q[200:, 1] += 0.3
+    q[100:, 2] -= 0.4
+    (warning,) = found(q, t)
+    assert (warning.kind, warning.row) == ("speed-limit", 101)
+    assert warning.message.startswith("q3 moves faster than 20 rad/s in 1 of 399 steps, at worst at ")
+    assert warning.message.endswith(" rad/s to row 101; also q2 (1 step): check robot, unit and clock")
+
+
 def test_limits_hold_after_the_repolarization() -> None:
     t = clock(2000, 0.005)
     turned = np.column_stack([1.0 * t, 0.1 * t])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,9 +17,14 @@ from urmpipe_models.kinematics.forward import poses_over_log, positions_over_log
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.transform import from_offset, translation
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
+from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.recorded_start import outlying_start
 from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded, lacking_tool
 from urmpipe_pipeline.runs.robot_inference import infer_robot
+from urmpipe_pipeline.sources import ReadOptions
+
+SHARED = Path(__file__).parents[4] / "shared" / "logs"
+needs_shared = pytest.mark.skipif(not SHARED.is_dir(), reason="the folder shared is not beside the checkout")
 
 UR5E = load_robot("ur5e")
 T = np.linspace(0, 1, 60)[:, None]
@@ -170,14 +176,15 @@ def test_a_still_arm_tells_of_another_robot_that_needs_no_tool() -> None:
     assert far_from_recorded(UR5E, log(still, recorded)) == []
 
 
-def test_a_sign_shows_in_a_small_motion_too() -> None:
-    """By less than 8 mm rms, which a threshold in mm would let pass."""
-    q = Q[0] + 0.1 * (Q - Q[0])
-    recorded = positions_over_log(UR5E, q)
-    (warning,) = far_from_recorded(UR5E, log(q * [1, 1, -1, 1, 1, 1], recorded))
-    left = float(warning.message.partition("TCP (")[2].partition(" mm")[0])
-    assert left < 8.0
-    assert "with q3 counted the other way they agree within 0.00 mm" in warning.message
+@pytest.mark.parametrize("joint", range(5))
+def test_a_sign_shows_in_a_small_motion_too(joint: int) -> None:
+    """The arm comes within 20 mm of it by some tool, in a motion of 22 mm rms."""
+    q = Q[0] + 0.15 * (Q - Q[0])
+    (warning,) = far_from_recorded(
+        UR5E, log(q * np.where(np.arange(6) == joint, -1, 1), positions_over_log(UR5E, q))
+    )
+    assert float(warning.message.partition("TCP (")[2].partition(" mm")[0]) < 20.0
+    assert warning.message.endswith(f"with q{joint + 1} counted the other way they agree within 0.00 mm")
 
 
 def test_the_orientation_tells_of_a_joint_that_moves_no_point() -> None:
@@ -294,6 +301,35 @@ def test_the_last_outlying_row_of_a_long_log_is_found_between_those_looked_at() 
     recorded = positions_over_log(TOOLED, q)
     recorded[:3210] = positions_over_log(UR5E, q)[:3210]
     assert outlying_start(TOOLED, log(q, recorded))[0] == 3210
+
+
+REAL = {
+    "ur5e-rtde-static/robot_data.csv": ("ur5e", None),
+    "ur-rtde-10rows/robot_data.csv": ("ur5e", None),
+    "ur5-factory-calibration/joint-eef-data.csv": ("ur5e", None),
+    "pybotics-ur10-fk/ur10-joints-poses.csv": ("ur10", {"": "deg"}),
+}
+
+
+@needs_shared
+@pytest.mark.parametrize("file", REAL)
+def test_real_logs_are_of_their_robot(file: str) -> None:
+    robot, unit = REAL[file]
+    run = ingest_log([SHARED / file], robot=load_robot(robot), read=ReadOptions(unit=unit or {}))
+    assert [one for one in run.warnings if one.kind.startswith("recorded-tcp")] == []
+
+
+@needs_shared
+@pytest.mark.parametrize(
+    ("file", "given"),
+    [(file, given) for file in REAL for given in SIX if given != REAL[file][0] and "10rows" not in file],
+)
+def test_real_logs_tell_their_robot_from_any_other(file: str, given: str) -> None:
+    robot, unit = REAL[file]
+    log = ingest_log([SHARED / file], robot=load_robot(robot), read=ReadOptions(unit=unit or {})).log
+    (warning,) = far_from_recorded(load_robot(given), log)
+    assert [(hint.parameter, hint.value) for hint in warning.hints] == [("robot", robot)]
+    assert f": those of {robot} agree within " in warning.message
 
 
 def test_a_recorded_rotation_vector_goes_on_past_pi() -> None:
