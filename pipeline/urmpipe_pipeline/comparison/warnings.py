@@ -27,6 +27,8 @@ BEYOND = "sync-left-out"
 LARGE_NOISE = "large-noise"
 """The kind of a doubt about the noise of a baseline: another baseline has its own."""
 
+TCP_APART = "recorded-tcp-apart"
+
 AT_REST = 3e-4
 """What moves by less in [m] or [rad] rests: three times what a UR5e at rest was logged to span in 25 s,
 0.10 mrad and 0.10 mm."""
@@ -188,7 +190,6 @@ def recorded_apart(runs: Sequence[Run], allowed: float) -> Iterator[LogWarning]:
         runs: The logs.
         allowed: The distance that is allowed, in [m].
     """
-    kind = "recorded-tcp-apart"
     found = [(run, most) for run in runs if (most := _furthest_recorded(run)) > allowed]
     for usual in (True, False):
         alike = [(run, most) for run, most in found if (most <= CALIBRATION) == usual]
@@ -203,7 +204,7 @@ def recorded_apart(runs: Sequence[Run], allowed: float) -> Iterator[LogWarning]:
             far = text.enumerated([f"{run.name} is up to {text.quantity(most, 'm')}" for run, most in alike])
             said = f"by their joints {far} from the tool centre points that they recorded"
             remedy = "this verdict does not judge that, a comparison of each alone does"
-            yield LogWarning(kind, f"{said}, {_cause(alike[0][1])}; {remedy}")
+            yield LogWarning(TCP_APART, f"{said}, {_cause(alike[0][1])}; {remedy}")
 
 
 def _furthest_recorded(run: Run) -> float:

@@ -193,7 +193,8 @@ def beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
             where = f"in {len(rows)} of {len(q)} rows, at worst {q[worst, j]:.6g} in row {worst + 1}"
             said = f"{motion.names[j]} is beyond {limits} {where}"
             found.append(_OfJoint(motion.names[j], rows, float(beyond[worst]), said))
-    return _in_one(JOINT_LIMIT, found, "row", "check robot, unit, sign and zero")
+    check = "check robot, unit, sign and zero"
+    return [LogWarning(JOINT_LIMIT, *_in_one(found, "row", check))] if found else []
 
 
 def speed_limits(robot: Chain | None, turning: NDArray[np.bool_]) -> FloatArray:
@@ -233,7 +234,7 @@ def too_fast(
             said = f"{motion.names[j]} moves faster than {limits[j]:.4g} {motion.units[j]}/s"
             said = f"{said} in {len(rows)} of {len(steps)} steps, {worst}"
             found.append(_OfJoint(motion.names[j], rows + 1, float(speeds.max() / limits[j]), said))
-    return _in_one(SPEED_LIMIT, found, "step", "check robot, unit and clock")
+    return [LogWarning(SPEED_LIMIT, *_in_one(found, "step", "check robot, unit and clock"))] if found else []
 
 
 class _OfJoint(NamedTuple):
@@ -245,14 +246,12 @@ class _OfJoint(NamedTuple):
     said: str
 
 
-def _in_one(kind: str, found: list[_OfJoint], place: str, check: str) -> list[LogWarning]:
-    """Return one warning for all joints: the worst in words, the others by name; none if there is none."""
-    if not found:
-        return []
+def _in_one(found: list[_OfJoint], place: str, check: str) -> tuple[str, int]:
+    """Return what is odd of some joints in one sentence, the worst in words, and the first row from 1."""
     worst = max(found, key=lambda one: one.worst)
     others = [f"{one.name} ({text.counted(len(one.rows), place)})" for one in found if one is not worst]
     said = f"{worst.said}; also {text.enumerated(others)}" if others else worst.said
-    return [LogWarning(kind, f"{said}: {check}", min(int(one.rows[0]) for one in found) + 1)]
+    return f"{said}: {check}", min(int(one.rows[0]) for one in found) + 1
 
 
 def _noise(column: FloatArray) -> float:

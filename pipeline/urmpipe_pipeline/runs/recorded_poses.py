@@ -89,7 +89,12 @@ class RecordedPoses:
         return float(np.sqrt(((self.position - self.position.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
     def fit(self, robot: Chain, q: FloatArray | None = None) -> Fit:
-        """Return how near an arm comes to the points, with other joint values in [rad] or [m] if given."""
+        """Return how near an arm comes to the points.
+
+        Args:
+            robot: The arm.
+            q: Other joint values in [rad] or [m], shape (n, joints).
+        """
         return tool_fit(*poses_over_log(robot, self.q if q is None else q), self.position)
 
     def apart(self, robot: Chain, q: FloatArray | None = None, *, tool: bool) -> Apart:

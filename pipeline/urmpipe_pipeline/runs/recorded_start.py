@@ -26,8 +26,8 @@ def outlying_start(robot: Chain | None, log: JointLog) -> tuple[int, float]:
     """
     if log.tcp_position is None or log.rows < LEAST_ROWS:
         return 0, 0.0
-    recorded = log.tcp_position.any(axis=1)
-    zeros = int(np.argmax(recorded)) if recorded.any() else 0
+    first = log.tcp_position[0]
+    zeros = 0 if first.any() else int(np.argmax(log.tcp_position.any(axis=1)))
     if robot is None or log.q.shape[1] != len(robot.moving):
         return zeros, np.inf
     rows, apart = _by_tool(robot, log, zeros)

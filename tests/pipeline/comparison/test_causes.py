@@ -21,7 +21,7 @@ Compared = Callable[..., Comparison]
 
 WANTED = Trajectory("wanted", np.zeros(1, dtype=np.int64), np.zeros((1, 3)))
 
-T = 0.005 * np.arange(1000)
+T: FloatArray = 0.005 * np.arange(1000.0)
 
 
 def with_maxima(run: Deviation, **maxima: float) -> Deviation:
