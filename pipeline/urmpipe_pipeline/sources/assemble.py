@@ -12,7 +12,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_models.orientation import RotationForm
-from urmpipe_pipeline.joint_log import ROLES, Inference, JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.joint_log import ROLES, ROW_NS, Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.sources.cells.cell import significant_digits
 from urmpipe_pipeline.sources.checks import gaps, missing_samples, refuse_empty
 from urmpipe_pipeline.sources.clocks.clock import even_clock
@@ -75,7 +75,8 @@ def assemble(
         LogError: If a column has no value, or its unit cannot be told.
         OptionError: If an option does not fit the log.
     """
-    roles, layout, clock = content.roles, plan.tables.layouts[plan.main], plan.clock
+    roles, layout = content.roles, plan.tables.layouts[plan.main]
+    clock = plan.clock.as_label if content.still else plan.clock
     t_ns, start, timed, noticed = _times(content, plan, options)
     signs, offsets = _corrections(options, len(roles.joints))
     measured = _measured(plan, content, robot, t_ns, signs, offsets)
@@ -96,7 +97,7 @@ def assemble(
         tcp_position=position.recorded,
         tcp_rotation=rotation.recorded,
         rotation_form=measured.form,
-        columns=(*_time_columns(plan), *_used_columns(plan, measured.groups, signs, offsets)),
+        columns=(*(() if content.still else _time_columns(plan)), *_used_columns(plan, measured.groups, signs, offsets)),
         digits=digits,
         inferences=(
             *(one for found in (plan.tables, layout, clock) for one in found.inferences),
@@ -114,6 +115,7 @@ def assemble(
             *missing_samples(measured.named),
             *gaps(t_ns),
         ),
+        timed=not content.still,
     )
 
 
@@ -170,7 +172,12 @@ def _measured(
 def _times(
     content: Content, plan: Plan, options: ReadOptions
 ) -> tuple[IntArray, int, tuple[Inference, ...], Sequence[LogWarning]]:
-    """Return the rows' times in [ns] from the first, the clock there in [ns], and what there is to say."""
+    """Return the rows' times in [ns] from the first, the clock there in [ns], and what there is to say.
+
+    Of still poses their numbers stand for times.
+    """
+    if content.still:
+        return np.arange(content.rows, dtype=np.int64) * ROW_NS, 0, (), ()
     if content.clock is None:
         like = None if options.time else _like_a_time(plan, content.roles.columns)
         t_ns, said, noticed = even_clock(content.rows, options.period, like=like.called if like else "")

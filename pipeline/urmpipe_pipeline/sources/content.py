@@ -23,6 +23,7 @@ from urmpipe_pipeline.sources.clocks.text_times import timed
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.plan import Plan
+from urmpipe_pipeline.sources.poses import as_poses
 from urmpipe_pipeline.sources.tables.numbers import Numbers
 from urmpipe_pipeline.sources.tables.row_reader import first_left_out, lines_of_rows
 from urmpipe_pipeline.sources.tables.table import read_table
@@ -38,6 +39,7 @@ class Content:
         numbers: Their numbers, by table.
         clock: Times of the rows in [ns] on the file's clock, shape (n,); None without one.
         rows: How many rows there are.
+        still: Whether they are still poses.
         roles: The columns, without those that could not be joined.
         inferences: What was found out while reading the times and joining.
         warnings: What was left out, and what a person should know about the times.
@@ -47,6 +49,7 @@ class Content:
     numbers: Mapping[int, Numbers]
     clock: IntArray | None
     rows: int
+    still: bool
     roles: Roles
     inferences: tuple[Inference, ...]
     warnings: tuple[LogWarning, ...]
@@ -81,7 +84,7 @@ def read_content(plan: Plan, *, skip_bad: bool = False) -> Content:
     main = numbers[plan.main]
     said = (*main.inferences, *said)
     warnings = tuple(dict.fromkeys(warning for one in numbers.values() for warning in one.warnings))
-    return Content(columns, numbers, main.clock, len(main.values), roles, said, warnings)
+    return Content(columns, numbers, main.clock, len(main.values), main.still, roles, said, warnings)
 
 
 def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) -> Numbers:
@@ -103,7 +106,7 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
         too_many = Finding(unread, file, parameter="skip_bad", allowed=f"{MOST_SKIPPED:.0%} of them")
     elif may_skip(numbers):
         too_many = Finding(unread, file, hints=(Hint("skip_bad", True, "leaves them out"),))
-    numbers = rebuilt(trimmed(timed(layout, clock.parts, numbers)))
+    numbers = as_poses(plan, columns, rebuilt(trimmed(timed(layout, clock.parts, numbers))))
     if not len(numbers.values) and not numbers.findings:
         message = "found no row with a time or a number in the columns that are used, allowed: at least one"
         raise LogError(Finding(message, file))

@@ -40,6 +40,7 @@ class ReadOptions:
             a table that holds both what was asked for and what was done.
         repair: Whether samples that a linear resampling left on a wrap are put on the line through their
             neighbours.
+        poses: Whether the rows are still poses, which no motion joins: a clock of theirs is a label.
     """
 
     source: str | None = None
@@ -59,6 +60,7 @@ class ReadOptions:
     interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     repair: bool = False
     side: tuple[str, str] | None = None
+    poses: bool = False
 
     def __post_init__(self) -> None:
         """Take lists as tuples and numbers of columns as text; refuse what is of a wrong kind.
@@ -142,6 +144,7 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
         lambda value: _are(_is_word)(value) and len(value) == 2,
         "two words, such as ('target', 'actual')",
     ),
+    "poses": _FLAG,
 }
 """What each field takes, and what to say of anything else."""
 

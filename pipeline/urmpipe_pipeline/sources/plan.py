@@ -34,6 +34,7 @@ class Plan:
         roles: The columns that matter.
         units: Units given by the user, by the column's number; by 0 that of all joints that turn.
         time_file: Index of the table that holds the times of the others, if one does nothing else.
+        poses: Whether the rows are still poses; None where they are to tell.
     """
 
     tables: Tables
@@ -41,6 +42,7 @@ class Plan:
     roles: Roles
     units: Mapping[int, Unit]
     time_file: int | None = None
+    poses: bool | None = False
 
     @property
     def clock(self) -> Clock:
@@ -71,7 +73,7 @@ def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan
     if apart is None:
         clocks = find_clocks(tables, columns, options, units, len(robot.coordinates) if robot else None)
     else:
-        found = clock_of_file(tables, columns, apart, units)
+        found = clock_of_file(tables, columns, apart, units, label=options.poses)
         clocks = tuple(found if table == apart else Clock() for table in (0, 1))
     for i, clock in enumerate(() if options.time or apart is not None else clocks):
         own = [column for column in columns if column.table == i]
@@ -81,7 +83,10 @@ def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan
     rest = of_side(rest, options.side, tables.layouts[0].file)
     only = None if apart is None else 1 - apart
     roles = _renamed(_roles(rest, tables, options, robot, only), options.names)
-    return Plan(tables, clocks, roles, units, apart)
+    if options.poses:
+        return Plan(tables, clocks, roles, units, poses=True)
+    told = options.period is not None or options.time not in (None, "none") or apart is not None
+    return Plan(tables, clocks, roles, units, apart, False if told else None)
 
 
 def _renamed(roles: Roles, names: Sequence[str]) -> Roles:

@@ -242,6 +242,17 @@ FORMS: Sequence[Form] = (*_dates(), *_times())
 """All forms, the usual ones first."""
 
 
+DENSE_DATE = Form(
+    "date and time, digits alone",
+    DATE,
+    _compiled(
+        r"(?P<year>\d{4})(?P<month>\d\d)(?P<day>\d\d)"
+        rf"(?P<hour>\d\d){_MINUTES}(?P<second>\d\d){_DECIMALS}"
+    ),
+)
+"""The form of a number that is a date, YYYYMMDDhhmmss: taken where a whole column holds nothing else."""
+
+
 def looks_like_a_clock(cell: str) -> bool:
     """Return whether the text of a cell may be a time."""
     if len(cell) >= LONGEST_CELL or cell[:1] not in "+-0123456789":

@@ -13,14 +13,15 @@ from urmpipe_models.arrays import IntArray
 from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference, LogWarning
-from urmpipe_pipeline.sources.cells.cell import LONGEST_NS
-from urmpipe_pipeline.sources.cells.text_clock import DATE, SECOND_NS, TIME_OF_DAY
+from urmpipe_pipeline.sources.cells.cell import LONGEST_NS, is_missing
+from urmpipe_pipeline.sources.cells.text_cells import TextCells
+from urmpipe_pipeline.sources.cells.text_clock import DATE, DENSE_DATE, SECOND_NS, TIME_OF_DAY
 from urmpipe_pipeline.sources.clocks.clock_columns import time_columns
 from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS, unit_of
-from urmpipe_pipeline.sources.clocks.text_times import known_forms
+from urmpipe_pipeline.sources.clocks.text_times import known_forms, read_cells
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.options import ReadOptions
-from urmpipe_pipeline.sources.tables.numbers import ClockColumn
+from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, ClockColumn
 from urmpipe_pipeline.sources.tables.opening import Tables
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit
@@ -61,6 +62,16 @@ class Clock:
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
     by_source: bool = False
+
+    @property
+    def exponent(self) -> int:
+        """Power of ten from its unit to [ns]; of text that of s."""
+        return EXPONENTS.get(self.unit, 9)
+
+    @property
+    def as_label(self) -> Clock:
+        """The same as what still poses have for one: columns whose times are not read."""
+        return Clock(self.columns, inferences=self.inferences[:1])
 
     @property
     def units(self) -> dict[str, str]:
@@ -104,7 +115,8 @@ def find_clocks(
     clocks = []
     for table, layout in enumerate(tables.layouts):
         own = [column for column in columns if column.table == table]
-        clocks.append(clock_of(*time_columns(own, layout, options, joints), layout, tables.known, units))
+        chosen = time_columns(own, layout, options, joints)
+        clocks.append(clock_of(*chosen, layout, tables.known, units, label=options.poses))
     return tuple(clocks)
 
 
@@ -114,8 +126,10 @@ def clock_of(
     layout: Layout,
     source: KnownSource | None,
     units: Mapping[int, Unit],
+    *,
+    label: bool = False,
 ) -> Clock:
-    """Return the clock that columns make.
+    """Return the clock that columns make; as a label it has no times.
 
     Raises:
         LogError: If the time is text in no form that is known, or its unit cannot be told.
@@ -125,7 +139,9 @@ def clock_of(
         return Clock(inferences=(Inference("time column", "none", why, hints=_OTHER_TIME),))
     names = tuple(column.name for column in chosen)
     found = Inference("time column", " and ".join(names), why, columns=names, hints=_OTHER_TIME)
-    if chosen[0].text:
+    if label:
+        return Clock(chosen, inferences=(found,))
+    if chosen[0].text or _is_dense(chosen[0], layout, source, units):
         parts = tuple(_text_part(column, layout, units) for column in chosen)
         return Clock(chosen, parts, _unit_of(parts[0]), inferences=(found,))
     if len(chosen) == 2:
@@ -142,10 +158,21 @@ def clock_of(
     return Clock(chosen, parts, unit, told, said, warnings, by_source)
 
 
+def _is_dense(
+    column: Column, layout: Layout, source: KnownSource | None, units: Mapping[int, Unit]
+) -> bool:
+    """Return whether a column of numbers whose unit nobody tells holds dates: 20210411222721.5."""
+    told = column.number in units or column.unit_text or (source is not None and "time" in source.units)
+    times = () if told else layout.numbers(column.index)
+    cells = TextCells.of([cell for cell in layout.cells(column.index) if not is_missing(cell)])
+    dated = bool(times) and all(_DATES[0] <= time < _DATES[1] for time in times)
+    return dated and bool((read_cells(cells, DENSE_DATE) > UNREADABLE).all())
+
+
 def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> ClockColumn:
     """Return a column of text for the reader: the forms that it may have."""
     cells, given = layout.cells(column.index), units.get(column.number)
-    forms = known_forms(cells)
+    forms = known_forms(cells) if column.text else (DENSE_DATE,)
     if not forms:
         raise layout.error(f"found {shown(cells[0])}, allowed: {FORMS_TOLD}", column.header)
     wanted = given or column.unit

@@ -34,8 +34,10 @@ def time_file(tables: Tables, columns: Sequence[Column]) -> int | None:
     return even[0] if len(single) == len(even) == 1 else None
 
 
-def clock_of_file(tables: Tables, columns: Sequence[Column], index: int, units: dict[int, Unit]) -> Clock:
-    """Return the clock that a file of times makes.
+def clock_of_file(
+    tables: Tables, columns: Sequence[Column], index: int, units: dict[int, Unit], *, label: bool = False
+) -> Clock:
+    """Return the clock that a file of times makes; as a label it has no times.
 
     Raises:
         LogError: If the other table has a time as well, or the unit of the times cannot be told.
@@ -49,7 +51,7 @@ def clock_of_file(tables: Tables, columns: Sequence[Column], index: int, units: 
             raise LogError(Finding(message, file, other.header, column=column.header, hints=hints))
     own = tuple(column for column in columns if column.table == index)
     form = "one row" if layout.across else "one column"
-    found = clock_of(own, f"{title} holds nothing but {form} of times", layout, tables.known, units)
+    found = clock_of(own, f"{title} holds nothing but {form} of times", layout, tables.known, units, label=label)
     first, *others = found.inferences
     return replace(found, inferences=(replace(first, kind=TIME_FILE), *others))
 

@@ -80,6 +80,7 @@ class Numbers:
         texts: The cells of the clock's columns, if they are text.
         inferences: What the clock's rows told about it.
         warnings: What a person should know about it.
+        still: Whether the rows are still poses, and a clock of theirs was a label.
     """
 
     values: FloatArray
@@ -93,6 +94,7 @@ class Numbers:
     texts: tuple[TextCells, ...] = ()
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
+    still: bool = False
 
     def at(self, rows: IntArray | slice) -> Numbers:
         """Return some of the rows alone; by index, shape (k,), or as a slice from the first one on."""

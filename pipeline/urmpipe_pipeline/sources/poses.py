@@ -1,0 +1,132 @@
+"""Rows that are still poses: calibration grids, random configurations, points that were measured one by one.
+
+No motion joins them, so a clock of them is a label. They are known by their steps, which no joint makes in the
+time that passes and which go on from each other in no direction; a motion is smooth, however coarse its clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.messages import Hint
+from urmpipe_models.repolarizer import FULL_TURN
+from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.sources.clocks.clock import PAPER_PERIOD
+from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.plan import Plan
+from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, Numbers
+from urmpipe_pipeline.sources.units.unit_evidence import FASTEST, peak
+from urmpipe_pipeline.sources.vocabulary import vocabulary
+
+STEP = FASTEST * PAPER_PERIOD
+"""The median step in [rad] or [m] of still poses is larger: no joint makes it in the period that is assumed."""
+
+TURNED = 0.8
+"""Still poses change their steps by this share of them at least: of a motion with n samples in its shortest
+period it is 2 sin(pi / n), of random configurations 1.4 or more."""
+
+TURNING = 0.75
+"""The quantile at which that is told: a grid goes straight on for some poses, a log has single spikes."""
+
+APART = 2e9
+"""Rows so many [ns] apart, in the median, are no samples of a motion that steps so."""
+
+IMPOSSIBLE = 0.1
+"""Share of the times that repeat or run backwards from which a clock is a label; a damaged one has less."""
+
+LEAST_ROWS = 6
+"""Fewer rows tell nothing."""
+
+SAMPLED = 4000
+"""Places, spread evenly over the rows, that decide."""
+
+
+def as_poses(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> Numbers:
+    """Return the numbers as still poses without a clock, if the user says so or they show it; else as they are.
+
+    Args:
+        plan: What is read: `poses` says whether they are, or None where the rows are to tell.
+        columns: The columns of the numbers.
+        numbers: The rows of a table.
+    """
+    why = "given as an option" if plan.poses else _evidence(plan, columns, numbers)
+    if not why:
+        return numbers
+    clock = plan.clock.columns
+    moving = Hint("time", clock[0].called) if clock else Hint("period")
+    hints = () if plan.poses else (replace(moving, does="reads them as a motion"),)
+    found = Inference("rows", "still poses", why, hints=hints)
+    return replace(numbers, clock=None, texts=(), still=True, inferences=(found,), warnings=())
+
+
+def _evidence(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> str:
+    """Return why the rows of a table are still poses; empty if they are not, or it cannot be told."""
+    joints = [columns.index(joint) for joint in plan.roles.joints if joint in columns]
+    count = len(numbers.values)
+    if plan.poses is False or not joints or len(joints) < len(plan.roles.joints) or count < LEAST_ROWS:
+        return ""
+    at = np.arange(0, count - 2, max(1, count // SAMPLED))
+    rows = np.stack([at, at + 1, at + 2])
+    q = numbers.values[rows[:, :, np.newaxis], joints]
+    q, turns = _in_si(plan, q)
+    known = np.isfinite(q).all(axis=(0, 2))
+    if np.count_nonzero(known) < LEAST_ROWS - 2:
+        return ""
+    steps = np.diff(q[:, known], axis=0)
+    steps -= np.rint(steps / FULL_TURN) * turns
+    size = np.abs(steps[0]).max(axis=1)
+    turned, usual = (np.linalg.norm(one, axis=1) for one in (steps[1] - steps[0], steps[0]))
+    if _quantile(size, 0.5) <= STEP or _quantile(turned, TURNING) < TURNED * _quantile(usual, TURNING):
+        return ""
+    unit = "rad" if turns.any() else "m"
+    said = f"the joints step by up to {size.max():.2g} {unit} from row to row, in no direction"
+    if numbers.clock is None:
+        return f"no clock, and {said}"
+    return _label(plan, numbers.clock[rows[:2, known]], size, said)
+
+
+def _label(plan: Plan, times: FloatArray, size: FloatArray, said: str) -> str:
+    """Return why a clock is a label; empty if it may be that of a motion.
+
+    Its times before and after some steps of the joints in [rad] or [m], shape (n,), are in integer [ns], shape
+    (2, n).
+    """
+    timed = (times > UNREADABLE).all(axis=0)
+    passed, name = np.diff(times[:, timed], axis=0)[0], plan.clock.columns[0].name
+    if not len(passed):
+        return ""
+    stands = float(np.mean(passed <= 0))
+    if stands >= IMPOSSIBLE:
+        return f"{said}, and {name} repeats or runs backwards in {stands:.0%} of them"
+    apart = _quantile(np.abs(passed), 0.5)
+    if not plan.clock.told and _quantile(size[timed] / np.abs(passed), 0.5) > FASTEST / 1e9:
+        apart *= 10.0 ** (9 - plan.clock.exponent)  # in s: the unit that its steps told is none of a motion
+    return f"{said}, and {name} says that {apart / 1e9:.3g} s pass" if apart >= APART else ""
+
+
+def _in_si(plan: Plan, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return joint values, shape (..., joints), in [rad] or [m], and a turn of each, shape (joints,).
+
+    A joint that slides has a turn of 0.
+
+    By the units that the columns tell; without one beyond a turn in rad they are taken as deg.
+    """
+    source = plan.tables.known.units.get("angle") if plan.tables.known else None
+    beyond = peak(values.reshape(-1, values.shape[-1])) > FULL_TURN
+    usual = vocabulary().units["deg" if beyond else "rad"]
+    units = [
+        plan.units.get(one.number) or plan.units.get(0) or one.unit or source or usual
+        for one in plan.roles.joints
+    ]
+    slides = np.array([unit.quantity == "length" for unit in units])
+    return values * [unit.factor for unit in units], np.where(slides, 0.0, FULL_TURN)
+
+
+def _quantile(values: FloatArray, share: float) -> float:
+    """Return a quantile of some values (np.quantile imports numpy.ma)."""
+    at = int(share * (len(values) - 1))
+    return float(np.partition(values, at)[at])
