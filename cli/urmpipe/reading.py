@@ -60,10 +60,15 @@ class Reading(LogReading, total=False):
         interval: LOW, HIGH that the environment limits all joints that turn to, in the file's own unit; or by
             joint, such as {"q1": (-180, 180)}.
         repair: Put samples that a linear resampling left on a wrap on the line of their neighbours.
+        poses: The rows are still poses, which no motion joins: they have no time, and a clock is a label.
+        measured: Columns of the tool centre point as it was measured from outside, in a frame of its own: x,
+            y, z, and perhaps those of the orientation; names or numbers (from 1).
     """
 
     interval: tuple[float, float] | Mapping[str, tuple[float, float]] | None
     repair: bool
+    poses: bool
+    measured: Sequence[str | int] | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -185,6 +185,8 @@ class JointLog(Shown):
         inferences: What the reader found out.
         warnings: What a person should know.
         timed: Whether the rows have times; else they are poses that no motion joins.
+        measured: Whether the recorded tool centre point was measured from outside: it stands in a frame of its
+            own, which nothing joins to the arm's base yet.
     """
 
     name: str
@@ -205,6 +207,7 @@ class JointLog(Shown):
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
     timed: bool = True
+    measured: bool = False
 
     @property
     def t(self) -> FloatArray:
@@ -220,6 +223,11 @@ class JointLog(Shown):
     def units(self) -> dict[str, str]:
         """The file's unit of every column used, by its name: rad, deg, m, mm, s, ..."""
         return {column.name: column.unit for column in self.columns}
+
+    @property
+    def tcp_in_base(self) -> FloatArray | None:
+        """Recorded tool centre point in the frame of the arm's base in [m], shape (n, 3); None without one."""
+        return None if self.measured else self.tcp_position
 
     @property
     def tcp_quat_xyzw(self) -> FloatArray | None:
@@ -250,8 +258,8 @@ class JointLog(Shown):
 
     @property
     def period(self) -> float:
-        """Median time between rows in [s]; 0 for a log of one row."""
-        return float(np.median(np.diff(self.t_ns))) / 1e9 if self.rows > 1 else 0.0
+        """Median time between rows in [s]; 0 for a log of one row, and without times."""
+        return float(np.median(np.diff(self.t_ns))) / 1e9 if self.rows > 1 and self.timed else 0.0
 
     def _headline(self) -> str:
         """Return its name, its source and how long it is."""
@@ -260,10 +268,13 @@ class JointLog(Shown):
         return line_of(self.name, self.source, joints, rows)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row a row of the file: t [s], the joints, and what else was recorded, in SI."""
+        """Return one row a row of the file: t [s], the joints, and what else was recorded, in SI.
+
+        Without times the number of the row stands for t, from 1.
+        """
         import pandas as pd
 
-        columns: dict[str, Any] = {"t": self.t}
+        columns: dict[str, Any] = {"t": self.t} if self.timed else {"row": np.arange(1, self.rows + 1)}
         for prefix, values in (("", self.q), ("d_", self.qd), ("dd_", self.qdd)):
             if values is not None:
                 columns |= {f"{prefix}{name}": values[:, i] for i, name in enumerate(self.joints)}
@@ -280,8 +291,8 @@ class JointLog(Shown):
             "source": self.source,
             "files": [asdict(one) for one in self.files],
             "samples": self.rows,
-            "period": self.period,
-            "clock_start": self.clock_start,
+            "period": self.period if self.timed else None,
+            "clock_start": self.clock_start if self.timed else None,
             "joints": list(self.joints),
             "units": self.units,
             "inferences": [one.to_dict(voice) for one in self.inferences],

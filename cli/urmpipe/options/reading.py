@@ -102,6 +102,12 @@ JOINTS = (
     click.option(
         "--repair", is_flag=True, help="Put samples that were left on a wrap on the line of their neighbours."
     ),
+    click.option("--poses", is_flag=True, default=None, help="The rows are still poses: they have no time."),
+    click.option(
+        "--measured",
+        type=NamesType(),
+        help="Columns of the tool measured from outside: x, y, z[, orientation].",
+    ),
     click.option("--tsp", type=DURATION, help="Period of the grid [default: the log's own]."),
     click.option(
         "--derivative",
@@ -112,7 +118,7 @@ JOINTS = (
 
 OF_LOGS = {
     "log_map", "rotation", "delimiter", "decimal", "time", "unit", "source", "joints", "period", "skip_bad",
-    "interval", "repair", "tsp", "derivative",
+    "interval", "repair", "poses", "measured", "tsp", "derivative",
 }  # fmt: skip
 """Parameters that say how a log becomes a run: a recording is one already."""
 

@@ -85,6 +85,13 @@ class Table:
             self._refuse(key, value, allowed)
         return (0.0,) * (count or 0)
 
+    def flag(self, key: str) -> bool:
+        """Return true or false; false where the key is missing."""
+        value = self._get(key, default=False)
+        if not isinstance(value, bool):
+            self._refuse(key, value, "true or false")
+        return value is True
+
     def texts(self, key: str) -> tuple[str, ...]:
         """Return a list of strings; the key is required."""
         value = self._get(key)

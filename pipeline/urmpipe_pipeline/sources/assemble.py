@@ -19,12 +19,15 @@ from urmpipe_pipeline.sources.clocks.clock import even_clock
 from urmpipe_pipeline.sources.clocks.clock_columns import like_a_time
 from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of
+from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.content import Content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.opening import PATH, TABLE
 from urmpipe_pipeline.sources.units.kinematic_units import by_kinematics
+from urmpipe_pipeline.sources.units.measured import length_by_spread
 from urmpipe_pipeline.sources.units.rotation import settle_rotation
+from urmpipe_pipeline.sources.units.unit_hints import unit_inference
 from urmpipe_pipeline.sources.units.units import UnitFinder
 from urmpipe_pipeline.sources.vocabulary import Unit
 
@@ -97,7 +100,10 @@ def assemble(
         tcp_position=position.recorded,
         tcp_rotation=rotation.recorded,
         rotation_form=measured.form,
-        columns=(*(() if content.still else _time_columns(plan)), *_used_columns(plan, measured.groups, signs, offsets)),
+        columns=(
+            *(() if content.still else _time_columns(plan)),
+            *_used_columns(plan, measured.groups, signs, offsets),
+        ),
         digits=digits,
         inferences=(
             *(one for found in (plan.tables, layout, clock) for one in found.inferences),
@@ -116,6 +122,7 @@ def assemble(
             *gaps(t_ns),
         ),
         timed=not content.still,
+        measured=roles.measured,
     )
 
 
@@ -142,31 +149,46 @@ def _measured(
     q, qd, qdd, tcp, rotation = (content.values(group) for group in roles.groups)
     refuse_empty(q if roles.joints else tcp, [c.header for c in roles.joints or roles.position], file)
     q, qd, qdd = _corrected(q, signs, offsets), _corrected(qd, signs), _corrected(qdd, signs)
-    finder = UnitFinder(plan.units, plan.tables.known, file, by_kinematics(robot, q, tcp))
+    fitting = None if roles.measured else by_kinematics(robot, q, tcp)
+    finder = UnitFinder(plan.units, plan.tables.known, file, fitting)
     units = (
         finder.joints(roles.joints, q, None if content.clock is None else t_ns, robot) if roles.joints else []
     )
     rates = finder.derivatives(roles.rates, units, 1)
     seconds = finder.derivatives(roles.accelerations, units, 2)
-    lengths = finder.positions(roles.position, tcp) if roles.position else []
     q = _in_si(q, units)
+    lengths, why = _lengths(plan, finder, roles, robot, q, tcp)
+    tcp = _in_si(tcp, lengths)
     told = finder.rotations(roles.rotation, roles.forms)
     arm = (robot, q) if robot and roles.joints else None
     given = any(column.number in plan.units for column in roles.rotation)
-    turned = settle_rotation(roles.rotation, roles.forms, rotation, told, arm, given=given)
+    measured = tcp if roles.measured else None
+    turned = settle_rotation(roles.rotation, roles.forms, rotation, told, arm, given=given, measured=measured)
     return _Measured(
         groups=(
             _Group(roles.joints, q, units),
             _Group(roles.rates, _in_si(qd, rates), rates),
             _Group(roles.accelerations, _in_si(qdd, seconds), seconds),
-            _Group(roles.position, _in_si(tcp, lengths), lengths),
+            _Group(roles.position, tcp, lengths),
             _Group(roles.rotation if turned.form else (), _in_si(rotation, turned.units), turned.units),
         ),
         form=turned.form,
-        inferences=(*finder.inferences, *turned.inferences),
+        inferences=(*finder.inferences, *why, *turned.inferences),
         warnings=(*finder.warnings, *turned.warnings),
         by_source=finder.by_source,
     )
+
+
+def _lengths(
+    plan: Plan, finder: UnitFinder, roles: Roles, robot: Chain | None, q: FloatArray, position: FloatArray
+) -> tuple[Sequence[Unit], Sequence[Inference]]:
+    """Return the units of x, y, z; of measured ones whose columns tell none by how far the joints move them."""
+    told = any(column.number in plan.units or column.unit_text for column in roles.position)
+    if roles.measured and robot and roles.joints and not told:
+        found = length_by_spread(robot, q, position)
+        if found is not None:
+            return [found[0]] * 3, [unit_inference(roles.position, found[0].name, found[1])]
+    return (finder.positions(roles.position, position) if roles.position else []), ()
 
 
 def _times(

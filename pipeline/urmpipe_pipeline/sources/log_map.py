@@ -67,6 +67,9 @@ def read_map(path: Path) -> LogMap:
     time = _given(clock, "column", clock.text)
     _note_unit(clock, time or None, units)
     robot = _given(table, "robot", table.text)
+    position = _given(tcp, "position", tcp.texts) or ()
+    orientation = _given(tcp, "orientation", tcp.texts) or ()
+    outside = tcp.flag("measured")
     result = LogMap(
         ReadOptions(
             source=_given(table, "source", table.text),
@@ -78,11 +81,13 @@ def read_map(path: Path) -> LogMap:
             names=names,
             signs=tuple(sign for _, _, sign, _ in columns),
             offsets=tuple(offset for _, _, _, offset in columns),
-            position=_given(tcp, "position", tcp.texts) or (),
-            orientation=_given(tcp, "orientation", tcp.texts) or (),
+            position=() if outside else position,
+            orientation=() if outside else orientation,
+            measured=(*position, *orientation) if outside else (),
             rotation=tcp.choice("form", FORMS) if tcp.has("form") else None,  # type: ignore[arg-type]
             unit=units,
             interval={name: interval for name, interval in intervals if interval},
+            poses=clock.flag("poses"),
         ),
         robot=_beside(path, robot) if robot else None,
         base=_frame(table, "base"),
@@ -137,7 +142,8 @@ def map_of(
     if position:
         said = {"position": [_called(log, column) for column in position]}
         turned = {"orientation": [_called(log, column) for column in orientation], "form": log.rotation_form}
-        lines += ["", "[tcp]", *toml_lines(said | turned if orientation else said)]
+        said |= turned if orientation else {}
+        lines += ["", "[tcp]", *toml_lines(said | ({"measured": True} if log.measured else {}))]
     units = {_called(log, c): c.unit for c in (*position, *orientation) if c.unit != PURE.name}
     clock = {name for c in _of(log, "time") for name in (c.name, c.header, str(c.number)) if name}
     units |= {name: unit for name, unit in asked.get("unit", {}).items() if name in clock}
@@ -207,6 +213,9 @@ def _clock(log: JointLog, found: Mapping[str, str]) -> dict[str, Any]:
     The unit is left out where the cells or the name of the column say it.
     """
     columns = _of(log, "time")
+    if not log.timed:
+        labels = next((one.columns for one in log.inferences if one.what == "time column"), ())
+        return {"column": labels[0] if len(labels) == 1 else None if labels else "none", "poses": True}
     if not columns:
         return {"column": "none", "period": log.period or None}
     apart = any(one.kind == TIME_FILE for one in log.inferences)

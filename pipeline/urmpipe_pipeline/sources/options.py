@@ -41,6 +41,8 @@ class ReadOptions:
         repair: Whether samples that a linear resampling left on a wrap are put on the line through their
             neighbours.
         poses: Whether the rows are still poses, which no motion joins: a clock of theirs is a label.
+        measured: Names or numbers of the x, y, z of the tool as it was measured from outside, in a frame of its
+            own, and behind them of its orientation, if it was.
     """
 
     source: str | None = None
@@ -61,6 +63,7 @@ class ReadOptions:
     repair: bool = False
     side: tuple[str, str] | None = None
     poses: bool = False
+    measured: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Take lists as tuples and numbers of columns as text; refuse what is of a wrong kind.
@@ -81,7 +84,7 @@ class ReadOptions:
         ]
         if wrong:
             raise OptionError(*wrong)
-        for name in ("joints", "names", "position", "orientation"):
+        for name in ("joints", "names", "position", "orientation", "measured"):
             object.__setattr__(self, name, tuple(map(str, getattr(self, name))))
         for name in ("signs", "offsets"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
@@ -145,6 +148,7 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
         "two words, such as ('target', 'actual')",
     ),
     "poses": _FLAG,
+    "measured": _COLUMNS,
 }
 """What each field takes, and what to say of anything else."""
 

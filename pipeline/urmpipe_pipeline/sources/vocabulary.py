@@ -96,6 +96,8 @@ class Vocabulary:
     other: frozenset[str]
     commanded: frozenset[str]
     tcp_position: Patterns
+    measured: Patterns
+    outside: frozenset[str]
     tcp_pose_vector: Patterns
     tcp_matrix: Patterns
     tcp_rotations: tuple[RotationWords, ...]
@@ -142,6 +144,8 @@ def vocabulary() -> Vocabulary:
         other=frozenset(joint["other"]),
         commanded=frozenset(joint["commanded"]),
         tcp_position=_compiled(tcp["position"]),
+        measured=_compiled(tcp["measured"]),
+        outside=frozenset(tcp["outside"]),
         tcp_pose_vector=_compiled(tcp["pose_vector"]),
         tcp_matrix=_compiled(tcp["matrix"]),
         tcp_rotations=tuple(

@@ -30,7 +30,7 @@ DAY = 86_400 * SECOND
 
 
 def clocked(*times: str, name: str = "timestamp", delimiter: str = ",") -> str:
-    rows = [f"{time}{delimiter}{k % 3 / 100}{delimiter}1" for k, time in enumerate(times)]
+    rows = [f"{time}{delimiter}{k // 100}{delimiter}1" for k, time in enumerate(times)]
     return "\n".join([delimiter.join([name, "q1", "q2"]), *rows, ""])
 
 

@@ -158,9 +158,7 @@ def clock_of(
     return Clock(chosen, parts, unit, told, said, warnings, by_source)
 
 
-def _is_dense(
-    column: Column, layout: Layout, source: KnownSource | None, units: Mapping[int, Unit]
-) -> bool:
+def _is_dense(column: Column, layout: Layout, source: KnownSource | None, units: Mapping[int, Unit]) -> bool:
     """Return whether a column of numbers whose unit nobody tells holds dates: 20210411222721.5."""
     told = column.number in units or column.unit_text or (source is not None and "time" in source.units)
     times = () if told else layout.numbers(column.index)

@@ -51,7 +51,9 @@ def clock_of_file(
             raise LogError(Finding(message, file, other.header, column=column.header, hints=hints))
     own = tuple(column for column in columns if column.table == index)
     form = "one row" if layout.across else "one column"
-    found = clock_of(own, f"{title} holds nothing but {form} of times", layout, tables.known, units, label=label)
+    found = clock_of(
+        own, f"{title} holds nothing but {form} of times", layout, tables.known, units, label=label
+    )
     first, *others = found.inferences
     return replace(found, inferences=(replace(first, kind=TIME_FILE), *others))
 

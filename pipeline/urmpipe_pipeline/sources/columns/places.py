@@ -108,7 +108,7 @@ def _path_by_place(
     rest = [column for column in columns if column not in (*pose.position, *pose.rotation)]
     said = [path_inference(listed(pose.position), pose.evidence), *about_pose(pose)[1:]]
     said += not_used(rest, NO_HEADER)
-    return Roles(position=pose.position, rotation=pose.rotation, forms=pose.forms, inferences=tuple(said))
+    return Roles((), (), (), pose.position, pose.rotation, pose.forms, tuple(said), measured=pose.measured)
 
 
 def _trailing_pose(
@@ -201,7 +201,8 @@ def _by_place(
     warnings = (_about_rest(robot, joints, rest),) if robot and rest and evidence != GIVEN else ()
     names = robot.coordinates if robot else [f"q{k + 1}" for k in range(len(joints))]
     named = tuple(replace(column, name=name) for column, name in zip(joints, names, strict=True))
-    return Roles(named, (), (), pose.position, pose.rotation, pose.forms, tuple(said), warnings)
+    place = pose.position, pose.rotation, pose.forms
+    return Roles(named, (), (), *place, tuple(said), warnings, pose.measured)
 
 
 def _about_rest(robot: Chain, joints: Sequence[Column], rest: Sequence[Column]) -> LogWarning:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os.path
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -41,12 +42,14 @@ class Pose:
         rotation: The columns of its orientation, in the order of the form, or none.
         forms: What these may be; one if it is known.
         evidence: Why.
+        measured: Whether it was measured from outside, in a frame of its own.
     """
 
     position: tuple[Column, ...] = ()
     rotation: tuple[Column, ...] = ()
     forms: tuple[RotationForm, ...] = ()
     evidence: str = "their names"
+    measured: bool = False
 
 
 def find_pose(
@@ -77,10 +80,15 @@ def find_pose(
         pose = matrix_pose(family.ordered(), layouts, some=some)
         if pose is not None:
             return pose
-    position = _position(numeric, file)
+    position = _position([column for column in numeric if not column.words & vocabulary().outside], file)
+    measured = not position
+    position = position or _xyz(families(numeric, vocabulary().measured, 0))
     rest = [column for column in numeric if column not in position]
+    if measured and position:
+        stem = os.path.commonprefix([column.key for column in position])  # noqa: RUF071 (names, not paths)
+        rest = [column for column in rest if stem and column.key.startswith(stem)]
     rotation, forms = _rotation(rest, layouts, form, some=some) if position else ((), ())
-    return Pose(position, rotation, forms)
+    return Pose(position, rotation, forms, measured=measured and bool(position))
 
 
 def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
@@ -90,6 +98,8 @@ def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
         LogError: If there is no such column.
         OptionError: If there are too few or too many for a position or for the form of the orientation.
     """
+    if options.measured:
+        return _measured_pose(columns, options)
     if not options.position:
         if options.orientation:
             raise OptionError("orientation: found without a position, allowed: beside x, y, z")
@@ -98,11 +108,29 @@ def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
     rotation = tuple(find_column(columns, text, about="orientation") for text in options.orientation)
     if len(position) != 3:
         raise OptionError(f"position: found {len(position)} columns, allowed: x, y, z")
-    forms = tuple(form for form in FORMS if width(form) == len(rotation) and options.rotation in (None, form))
+    forms = _forms_of(rotation, options)
     if rotation and not forms:
         allowed = f"{width(options.rotation)}, as {options.rotation} has" if options.rotation else "3, 4 or 9"
         raise OptionError(f"orientation: found {len(rotation)} columns, allowed: {allowed}")
     return Pose(position, rotation, forms if rotation else (), "given as an option")
+
+
+def _measured_pose(columns: Sequence[Column], options: ReadOptions) -> Pose:
+    """Return the pose that the user names as measured from outside."""
+    named = tuple(find_column(columns, text, parameter="measured") for text in options.measured)
+    position, rotation = named[:3], named[3:]
+    forms = _forms_of(rotation, options)
+    if len(position) != 3 or (rotation and not forms):
+        widths = f"{width(options.rotation)}" if options.rotation else "3, 4 or 9"
+        allowed = f"x, y, z, and {widths} of the orientation behind them, or none"
+        raise OptionError(Finding(parameter="measured", found=f"{len(named)} columns", allowed=allowed))
+    return Pose(position, rotation, forms, "given as an option", measured=True)
+
+
+def _forms_of(rotation: Sequence[Column], options: ReadOptions) -> tuple[RotationForm, ...]:
+    """Return the forms that so many columns of an orientation may have; none of none."""
+    many = len(rotation)
+    return tuple(form for form in FORMS if many and width(form) == many and options.rotation in (None, form))
 
 
 def with_form(pose: Pose, form: RotationForm | None) -> Pose:
@@ -223,7 +251,12 @@ def _position(numeric: Sequence[Column], file: str | None) -> tuple[Column, ...]
     """Return the columns x, y, z; none if there are several and these need not be known."""
     forces = any(column.key in ("fx", "f_x") for column in numeric)  # tx, ty, tz beside them are torques
     numeric = [c for c in numeric if not (forces and c.key.startswith("t") and len(c.key) <= len("t_x"))]
-    found = [f for f in families(numeric, vocabulary().tcp_position, 0) if _numbers(f) == range(3)]
+    return _xyz(families(numeric, vocabulary().tcp_position, 0), file)
+
+
+def _xyz(found: Sequence[Family], file: str | None = None) -> tuple[Column, ...]:
+    """Return the columns of the only one of the surest families that is x, y, z."""
+    found = [family for family in found if _numbers(family) == range(3)]
     best = [family for family in found if family.rank == found[0].rank]
     if len(best) > 1 and file is not None:
         groups = "; ".join(listed(family.ordered()) for family in best)

@@ -37,6 +37,7 @@ class Roles:
         forms: The forms that the orientation may have; one if it is known.
         inferences: What was found out.
         warnings: What a person should know.
+        measured: Whether the tool centre point was measured from outside, in a frame of its own.
     """
 
     joints: tuple[Column, ...] = ()
@@ -47,6 +48,7 @@ class Roles:
     forms: tuple[RotationForm, ...] = ()
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
+    measured: bool = False
 
     @property
     def groups(self) -> tuple[tuple[Column, ...], ...]:
@@ -103,7 +105,9 @@ def assign(
     check_count(found.columns, file, robot)
     rates = _derivative("rate", numeric, found)
     accelerations = _derivative("acceleration", numeric, found)
-    roles = Roles(found.columns, rates, accelerations, pose.position, pose.rotation, pose.forms)
+    roles = Roles(
+        found.columns, rates, accelerations, pose.position, pose.rotation, pose.forms, measured=pose.measured
+    )
     said = [joint_inference(found.columns, found.evidence)]
     for what, group in (("rates", rates), ("accelerations", accelerations)):
         if group:
@@ -298,13 +302,13 @@ def path_inference(names: str, evidence: str) -> Inference:
 
 def about_pose(pose: Pose) -> list[Inference]:
     """Say which columns hold the recorded tool centre point."""
-    said = []
+    said, whose = [], "measured" if pose.measured else "recorded"
     groups = {"TCP": ("position", pose.position), "orientation": ("orientation", pose.rotation)}
     for what, (where, group) in groups.items():
         names = tuple(column.name for column in group)
         hints = (Hint("log_map", None, f"with tcp.{where} in it"),)
         if names:
-            said.append(Inference(f"recorded {what}", ", ".join(names), pose.evidence, "", names, hints))
+            said.append(Inference(f"{whose} {what}", ", ".join(names), pose.evidence, "", names, hints))
     return said
 
 
@@ -323,7 +327,7 @@ def _path(
     if pose.position:
         names = ", ".join(column.name for column in pose.position)
         said = [path_inference(names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
-        roles = Roles(position=pose.position, rotation=pose.rotation, forms=pose.forms)
+        roles = Roles((), (), (), pose.position, pose.rotation, pose.forms, measured=pose.measured)
         return _with_rest(roles, said, numeric, layouts)
     _refuse_thousands(layouts, file)
     if path:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.hand_eye import hand_eye, rotation_miss
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import RotationForm, angles, quaternions
+from urmpipe_models.orientation import RotationForm, angles, matrices, quaternions
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.units.evidence import spread, turned_apart
@@ -62,6 +64,7 @@ def settle_rotation(
     arm: tuple[Chain, FloatArray] | None,
     *,
     given: bool = False,
+    measured: FloatArray | None = None,
 ) -> Settled:
     """Return form and units of the columns of a recorded orientation.
 
@@ -75,6 +78,8 @@ def settle_rotation(
         told: The unit that each column tells, if it does.
         arm: The robot and the joint values in SI, shape (n, joints); None without a robot.
         given: Whether the user told the units.
+        measured: Where the tool was measured from outside in [m], shape (n, 3): the orientations stand in a
+            frame of their own as well.
     """
     if not columns or np.isnan(values).any(axis=1).all():
         return Settled()
@@ -83,7 +88,7 @@ def settle_rotation(
     if not sound:
         return Settled(warnings=(_about_lengths(names, np.linalg.norm(values, axis=1)),))
     choices = [(form, units) for form in sound for units in _possible_units(form, values, told)]
-    found = _settled_by_kinematics(columns, choices, values, arm, given=given) if arm else None
+    found = _settled_by_kinematics(columns, choices, values, arm, measured, given=given) if arm else None
     if found is not None:
         return found
     if len(choices) == 1:
@@ -150,6 +155,7 @@ def _settled_by_kinematics(
     choices: Sequence[Choice],
     values: FloatArray,
     arm: tuple[Chain, FloatArray],
+    measured: FloatArray | None,
     *,
     given: bool,
 ) -> Settled | None:
@@ -157,7 +163,7 @@ def _settled_by_kinematics(
     others = [] if given else [one for one in _in_other_units(choices) if one not in choices]
     if len(choices) + len(others) == 1:
         return None
-    best = _by_kinematics([*choices, *others], values, arm)
+    best = _by_kinematics([*choices, *others], values, arm, measured)
     if best is None or best[0] in choices:
         return best and _settled(columns, *best)
     told, better = choices[0][1][0].name, best[0][1][0].name
@@ -178,7 +184,10 @@ def _in_other_units(choices: Sequence[Choice]) -> list[Choice]:
 
 
 def _by_kinematics(
-    choices: Sequence[Choice], values: FloatArray, arm: tuple[Chain, FloatArray]
+    choices: Sequence[Choice],
+    values: FloatArray,
+    arm: tuple[Chain, FloatArray],
+    measured: FloatArray | None,
 ) -> tuple[Choice, str] | None:
     """Return the choice with which the kinematics agree, and by how much; None if none stands out."""
     robot, q = arm
@@ -187,11 +196,10 @@ def _by_kinematics(
     known = np.isfinite(q).all(axis=1) & np.isfinite(values).all(axis=1)
     if not known.any():
         return None
-    _, rotation = poses_over_log(robot, q[known])
-    computed = quaternions(rotation.reshape(-1, 9), "matrix")
+    position, rotation = poses_over_log(robot, q[known])
     recorded = [quaternions(values[known] * [unit.factor for unit in units], form) for form, units in choices]
-    for tool in (False, True):
-        distances = [turned_apart(computed, one, tool=tool) for one in recorded]
+    for apart in _apart(position, rotation, None if measured is None else measured[rows][known]):
+        distances = [apart(one) for one in recorded]
         order = np.argsort(distances)
         best, second = (distances[k] for k in order[:2])
         if best <= CLOSE and second >= CLEARLY * best and second >= best + CLOSE:
@@ -200,3 +208,20 @@ def _by_kinematics(
             said += f", as {form} in {units[0].name} within {np.degrees(second):.2f} deg"
             return choices[order[0]], said
     return None
+
+
+def _apart(
+    position: FloatArray, rotation: FloatArray, measured: FloatArray | None
+) -> Iterator[Callable[[FloatArray], float]]:
+    """Yield what tells how far orientations stay from those of the kinematics in [rad], the strictest first.
+
+    In the frame of the base as they are, then with a tool that is turned; of those that were measured from
+    outside, at positions in [m], shape (n, 3), with the frames of base and tool that fit best.
+    """
+    if measured is None:
+        computed = quaternions(rotation.reshape(-1, 9), "matrix")
+        yield partial(turned_apart, computed, tool=False)
+        yield partial(turned_apart, computed, tool=True)
+    elif np.isfinite(measured).all(axis=1).any():
+        base = hand_eye(position, rotation, measured).base_rotation
+        yield lambda recorded: rotation_miss(rotation, matrices(recorded), base)
