@@ -147,7 +147,7 @@ position = "x"
         "lab.toml: key tool: found 2 numbers, allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad",
         "lab.toml: key delimeter: unknown (did you mean delimiter?); allowed: clock, tcp, joints, units,"
         " robot, source, delimiter, decimal, base, tool",
-        "lab.toml: key clock.colum: unknown (did you mean column?); allowed: column, unit, period",
+        "lab.toml: key clock.colum: unknown (did you mean column?); allowed: column, unit, period, poses",
     ]
 
 
