@@ -22,6 +22,10 @@ ROW_NS = 1_000_000_000
 """How much of `t_ns` a row without a time counts: `t` is then the number of the row from 0, and no time."""
 
 
+SOLVED = "ik"
+"""The source of a log that inverse kinematics made: a reader's name stands in others."""
+
+
 def seconds(nanoseconds: IntArray) -> FloatArray:
     """Return integer `nanoseconds` as [s], each rounded once, of the same shape."""
     return np.true_divide(nanoseconds, 1e9, dtype=np.float64)
@@ -185,8 +189,8 @@ class JointLog(Shown):
         inferences: What the reader found out.
         warnings: What a person should know.
         timed: Whether the rows have times; else they are poses that no motion joins.
-        measured: Whether the recorded tool centre point was measured from outside: it stands in a frame of its
-            own, which nothing joins to the arm's base yet.
+        measured: Whether the recorded tool centre point was measured from outside: it stands in a frame of
+            its own.
     """
 
     name: str
@@ -223,11 +227,6 @@ class JointLog(Shown):
     def units(self) -> dict[str, str]:
         """The file's unit of every column used, by its name: rad, deg, m, mm, s, ..."""
         return {column.name: column.unit for column in self.columns}
-
-    @property
-    def tcp_in_base(self) -> FloatArray | None:
-        """Recorded tool centre point in the frame of the arm's base in [m], shape (n, 3); None without one."""
-        return None if self.measured else self.tcp_position
 
     @property
     def tcp_quat_xyzw(self) -> FloatArray | None:

@@ -82,6 +82,10 @@ def _motion(path: Path, robot: Chain | None, read: ReadOptions | None) -> LogTab
     """Return the motion that a log holds."""
     files = log_files(path)
     log = read_log(files, read, robot)
+    if not log.timed:
+        said = "found still poses, allowed: a motion, which has times"
+        hint = Hint("period", None, "reads the rows as one")
+        raise LogError(Finding(said, str(files[0]), hints=(hint,)))
     parts = list(_parts(log))
     _refuse_missing(str(files[0]), parts)
     columns = tuple(Quantity(name, unit, values.shape[1]) for name, unit, values in parts)

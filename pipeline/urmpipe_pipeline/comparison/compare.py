@@ -37,7 +37,7 @@ from urmpipe_pipeline.comparison.warnings import (
     recorded_apart,
     thin_evidence,
 )
-from urmpipe_pipeline.joint_log import LogWarning, Role
+from urmpipe_pipeline.joint_log import SOLVED, LogWarning, Role
 from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.runs.recorded_tcp import lacking_tool
@@ -87,9 +87,14 @@ def trajectory(run: Run, tcp: Tcp = "fk", *, alone: bool = False) -> Trajectory:
     Raises:
         LogError: If the run has neither kinematics nor a recorded position to go by.
     """
-    if not run.log.joints or tcp == "recorded":
+    if _goes_by_record(run, tcp):
         return as_recorded(run)
     return by_joints_alone(run) if alone else by_kinematics(run)
+
+
+def _goes_by_record(run: Run, tcp: Tcp) -> bool:
+    """Tell whether a run is where it recorded itself."""
+    return not run.log.joints or tcp == "recorded"
 
 
 def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | None = None) -> Comparison:
@@ -105,8 +110,9 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
 
     Raises:
         LogError: If a run has no position to go by, shares no time with the reference, or lacks what a
-            tolerance is for; if solved targets without times are held against a motion.
-        OptionError: If the clocks of targets without times are to be put together.
+            tolerance is for; if still poses are held against a motion, or against more or fewer of them; if
+            a side was measured in a frame of its own, and nothing joins it to the other's.
+        OptionError: If the clocks of still poses are to be put together.
 
     Source: [UrmArm2021]_ eq. 19-23.
     """
@@ -114,6 +120,7 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     if not runs:
         raise OptionError("compare: no log to hold against the reference; at least one is needed")
     _refuse_poses_as_motion(reference, runs, chosen.sync)
+    _refuse_frames_apart([(run, _goes_by_record(run, chosen.tcp)) for run in (reference, *runs)], chosen)
     alone = _joints_alone(reference, runs, chosen)
     wanted = trajectory(reference, chosen.tcp, alone=alone)
     names = text.unique([reference.name, *(run.name for run in runs)])[1:]
@@ -170,18 +177,48 @@ def _recorded_roles(options: CompareOptions, *turning: AlignMode) -> set[Role]:
 
 
 def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], sync: SyncOption) -> None:
-    """Raise if single poses are held against a motion: the second between two of them is no time.
+    """Raise if still poses are held against a motion, or against more or fewer poses.
 
-    Single poses are held against single poses row by row; any other offset would interpolate between them.
+    Still poses are held against still poses row by row; any other offset would interpolate between them.
     """
     single = [run for run in (reference, *runs) if not run.timed]
-    if single and len(single) <= len(runs):
-        said = "found targets without times, which are no motion, allowed: a log or a path of its own times"
-        hint = Hint("tsp", None, "gives the targets some", call="ik")
-        raise LogError(*(lacking(run, said, hint) for run in single))
-    if single and sync != "start":
-        found = f"{sync} of targets without times"
+    if not single:
+        return
+    if len(single) <= len(runs):
+        raise LogError(*map(_no_motion, single))
+    wanted = reference.log.rows
+    if others := [run for run in runs if run.log.rows != wanted]:
+        allowed = f"{wanted}, as {reference.name} has: still poses are compared row by row"
+        raise LogError(*(lacking(run, f"found {run.log.rows} rows, allowed: {allowed}") for run in others))
+    if sync != "start":
+        found = f"{sync} of still poses"
         raise OptionError(Finding(parameter="sync", found=found, allowed="start, row by row"))
+
+
+def _no_motion(run: Run) -> Finding:
+    """Return that still poses are held against a motion."""
+    if run.log.source == SOLVED:
+        said = "found targets without times, which are no motion, allowed: a log or a path of its own times"
+        return lacking(run, said, Hint("tsp", None, "gives the targets some", call="ik"))
+    said = "found still poses beside a motion, allowed: still poses on both sides, or motions"
+    return lacking(run, said, Hint("poses", True, "takes the rows of every log as still poses"))
+
+
+def _refuse_frames_apart(sides: Sequence[tuple[Run, bool]], options: CompareOptions) -> None:
+    """Raise if some sides stand in a frame of their own, others in the base's, and nothing joins them.
+
+    Each side is a run, and whether it is where it recorded itself.
+    """
+    apart = [run for run, recorded in sides if recorded and run.log.measured]
+    if not apart or len(apart) == len(sides) or options.align not in ("none", "tool"):
+        return
+    hint, findings = Hint("align", "base+tool", "finds the frames of base and tool"), []
+    for run in apart:
+        names = ", ".join(column.name for column in run.log.columns if column.role == "position")
+        found = f"a tool that was measured in a frame of its own ({names})"
+        finding = lacking(run, "", hint, parameter="align")
+        findings.append(replace(finding, found=found, allowed="base+tool, rigid, start"))
+    raise LogError(*findings)
 
 
 def _differing_robots(runs: Sequence[Run]) -> list[LogWarning]:
@@ -216,6 +253,7 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
         said = "one log, which recorded no tool centre point; allowed: a reference before the log"
         doubts = [one.as_finding() for one in log.warnings if one.kind == TCP_NOT_READ]
         raise LogError(lacking(run, said), *(replace(one, file=file_of(run)) for one in doubts))
+    _refuse_frames_apart([(run, True), (run, False)], chosen)
     recorded = replace(as_recorded(run), name=f"{run.name} (recorded)", joints=(), joint_units=(), q=None)
     computed = replace(by_kinematics(run), joints=(), joint_units=(), q=None)
     assumed = assumptions([(run, {"joint", *_recorded_roles(chosen, "start")})])  # others go by the joints'

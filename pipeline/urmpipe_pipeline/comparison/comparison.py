@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -100,7 +100,8 @@ class Comparison(Result):
         """Yield one row a log and quantity: the offset of the clocks, the statistics and the verdict."""
         for run in self.runs:
             for one in run.all_statistics:
-                yield {"run": run.name, "sync_offset": run.sync.offset, **asdict(one)}
+                offset = run.sync.offset if run.run.timed else None
+                yield {"run": run.name, "sync_offset": offset, **one.fields()}
 
     def _headline(self) -> str:
         """Return its verdict, and that of each log: the worst first, so that it is not what is cut."""

@@ -48,7 +48,7 @@ class Statistics:
         mean: Mean.
         std: Standard deviation about the mean, of the samples themselves (n, not n - 1).
         p95: 95th percentile of the absolute values.
-        t_max: When the largest stands, in [s] of the log.
+        t_max: When the largest stands, in [s] of the log; NaN without times.
         sample_max: Row of the log with the largest, from 0.
         tolerance: Largest absolute value allowed, or None.
         out_of_tolerance: Compared samples above it or without a value; None without a tolerance.
@@ -84,7 +84,11 @@ class Statistics:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
-        return {key: value for key, value in asdict(self).items() if key not in ("quantity", "kind")}
+        return {key: value for key, value in self.fields().items() if key not in ("quantity", "kind")}
+
+    def fields(self) -> dict[str, Any]:
+        """Return every field by its name; without times there is no `t_max`."""
+        return asdict(self) | {"t_max": None if math.isnan(self.t_max) else self.t_max}
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,14 +98,14 @@ class Stretch:
     Attributes:
         samples: How many.
         sample: The first of them, by its row of the log from 0.
-        t: When it begins, in [s] of the log.
-        duration: From its first to its last sample in [s].
+        t: When it begins, in [s] of the log; None without times.
+        duration: From its first to its last sample in [s]; None without times.
     """
 
     samples: int
     sample: int
-    t: float
-    duration: float
+    t: float | None
+    duration: float | None
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -165,6 +169,11 @@ class Deviation(Shown):
         return seconds(self.t_ns)
 
     @property
+    def axis_ns(self) -> IntArray | None:
+        """What it is drawn over: times of the compared samples in [ns], shape (m,); None for the rows."""
+        return self.t_ns if self.run.timed else None
+
+    @property
     def duration(self) -> float:
         """From the first to the last compared sample in [s]."""
         return float(self.t_ns[-1] - self.t_ns[0]) / 1e9
@@ -191,8 +200,11 @@ class Deviation(Shown):
         if not lengths[longest]:
             return None
         first, last = int(starts[longest]), int(ends[longest]) - 1
+        count, sample = last - first + 1, int(self.sample[first])
+        if not self.run.timed:
+            return Stretch(count, sample, None, None)
         lasts = float(self.t_ns[last] - self.t_ns[first]) / 1e9
-        return Stretch(last - first + 1, int(self.sample[first]), float(self.t[first]), lasts)
+        return Stretch(count, sample, float(self.t[first]), lasts)
 
     @property
     def all_statistics(self) -> tuple[Statistics, ...]:
@@ -249,16 +261,18 @@ class Deviation(Shown):
     def to_frame(self) -> pd.DataFrame:
         """Return one row a compared sample: t [s], then every quantity, in [m] or [rad].
 
-        Its columns are called as its statistics: x, y, z, norm, path, angle where there is one, the joints.
+        Of still poses the number of the row stands for t, from 1. Its columns are called as
+        its statistics: x, y, z, norm, path, angle where there is one, the joints.
         """
         import pandas as pd
 
         names = [one.quantity for one in self.all_statistics]
-        return pd.DataFrame({"t": self.t, **dict(zip(names, self.values, strict=True))})
+        axis = {"t": self.t} if self.run.timed else {"row": self.sample + 1}
+        return pd.DataFrame({**axis, **dict(zip(names, self.values, strict=True))})
 
     def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the JSON object of one run."""
-        worst, longest = self.worst, self.longest_out
+        worst, longest, timed = self.worst, self.longest_out, self.run.timed
         told = {name: one.to_dict() for name, one in self.statistics.items()}
         norm = float(self.delta[worst, 3]) if told else None
         return {
@@ -266,9 +280,9 @@ class Deviation(Shown):
             "samples": len(self.sample),
             "left_out": self.left_out,
             "reference_left_out": self.reference_left_out,
-            "duration": self.duration,
-            "sync_offset": self.sync.offset,
-            "sync": self.sync.to_dict(),
+            "duration": self.duration if timed else None,
+            "sync_offset": self.sync.offset if timed else None,
+            "sync": self.sync.to_dict() if timed else None,
             "alignment": self.alignment.to_dict(),
             "delta": {axis: told[axis] for axis in AXES if told},
             "path": told.get("path"),
@@ -276,7 +290,11 @@ class Deviation(Shown):
             "joints": {name: one.to_dict() for name, one in self.joint_statistics.items()},
             "joint_turns": dict(zip(self.joint_statistics, self.joint_turns, strict=True)),
             "start": dict(zip(AXES, self.start, strict=True)) if told else {},
-            "worst": {"t": float(self.t[worst]), "sample": int(self.sample[worst]), "norm": norm},
+            "worst": {
+                "t": float(self.t[worst]) if timed else None,
+                "sample": int(self.sample[worst]),
+                "norm": norm,
+            },
             "out_of_tolerance": int(np.count_nonzero(self.outside)),
             "share_out": self.share_out,
             "longest_out": None if longest is None else asdict(longest),

@@ -20,7 +20,7 @@ from urmpipe_pipeline.presentation.exports import (
     Times,
     columns_of,
 )
-from urmpipe_pipeline.runs.exports import provenance_of
+from urmpipe_pipeline.runs.exports import provenance_of, stamps
 from urmpipe_pipeline.text import encodable
 
 NO_ORIENTATION = LogWarning(
@@ -52,8 +52,10 @@ def delta_table(comparison: Comparison) -> ExportTable:
     columns = [
         ExportColumn("run", "", names),
         ExportColumn("sample", "", np.concatenate([run.sample for run in runs])),
-        ExportColumn("t [s]", "s", Times(np.concatenate([run.t_ns for run in runs]), "s")),
     ]
+    timed = all(run.run.timed for run in runs)
+    if timed:
+        columns.append(ExportColumn("t [s]", "s", Times(np.concatenate([run.t_ns for run in runs]), "s")))
     placed = all(run.statistics for run in runs)
     if not placed:
         joints = [f"delta_{name}" for name in runs[0].joint_statistics]
@@ -65,7 +67,7 @@ def delta_table(comparison: Comparison) -> ExportTable:
     outside = np.concatenate([run.outside for run in runs]).astype(np.int64)
     columns.append(ExportColumn("out_of_tolerance", "", outside))
     clock = np.concatenate([run.run.log.clock_start_ns + run.t_ns for run in runs])
-    return ExportTable(tuple(columns), clock)
+    return ExportTable(tuple(columns), clock if timed else None)
 
 
 def _fields(comparison: Comparison) -> dict[str, Any]:
@@ -80,12 +82,13 @@ def _fields(comparison: Comparison) -> dict[str, Any]:
 
 
 def _deviation(run: Deviation) -> dict[str, Any]:
+    timed, nothing = run.run.timed, np.empty((0, 0))
     return {
         "name": encodable(run.name),
         "verdict": run.verdict,
         "sample": run.sample,
-        "t": run.t,
-        "clock_ns": run.run.log.clock_start_ns + run.t_ns,
+        "t": run.t if timed else nothing,
+        "clock_ns": run.run.log.clock_start_ns + run.t_ns if timed else nothing,
         "delta": run.delta,
         "reference": run.reference,
         "actual": run.actual,
@@ -104,7 +107,7 @@ def _poses(comparison: Comparison) -> list[Poses]:
         raise RecordingError(Finding("a comparison of joints alone, so no pose", where))
     found = []
     for one in comparison.runs:
-        clock = one.run.log.clock_start_ns + one.t_ns
+        clock = stamps(one.run, one.t_ns)
         upright = np.tile([0.0, 0.0, 0.0, 1.0], (len(clock), 1))
         prefix = "" if len(comparison.runs) == 1 else f"{one.name}-"
         found.append(Poses(f"{prefix}reference", clock, one.reference, upright))

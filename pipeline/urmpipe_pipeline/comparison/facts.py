@@ -25,7 +25,7 @@ def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
     held = one.decisive
     yield Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", Ref(one.name, colour))
     yield Fact("Decided by", decided_words(held))
-    if not held.missing:
+    if not held.missing and one.run.timed:
         yield Fact("Data row", Value(one.row(held)))
     yield Fact("Position", place_of(one, held))
     yield from _furthest_joint(one)
@@ -48,17 +48,20 @@ def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     """Yield what is to be known of a compared log, what decided first."""
     held, covered = one.decisive, result.covered(one)
     yield Fact(size_of(held), largest(held), used_words(held), brief=False)
-    yield Fact("Time", Value(held.t_max, "s"), brief=False)
+    timed = one.run.timed
+    if timed:
+        yield Fact("Time", Value(held.t_max, "s"), brief=False)
     yield Fact("Data row", Value(one.row(held)), brief=False)
     yield Fact("Position", place_of(one, held), brief=False)
     yield from (replace(fact, brief=False) for fact in _furthest_joint(one))
     compared = f"{text.counted(len(one.sample), 'sample')} over {text.seconds(one.duration)} s"
-    yield Fact("Compared", compared)
+    yield Fact("Compared", compared if timed else f"{text.counted(len(one.sample), 'pose')}, row by row")
     share = "share of the reference within the log's time"
     yield Fact("Covered", Value(covered, "%"), share, covered < WHOLE)
     yield _left_out(one, len(result.reference.t_ns))
     yield from _out_of_tolerance(one)
-    yield Fact("Clocks", *sync_words(one.sync))
+    if timed:
+        yield Fact("Clocks", *sync_words(one.sync))
     yield Fact("Turns removed", _turns(one), "whole turns counted differently at the start")
     yield from _alignment(one)
     yield Fact("Joint tolerance", _sliding(one))

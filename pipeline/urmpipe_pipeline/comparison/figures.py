@@ -12,7 +12,7 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
 from urmpipe_pipeline.comparison.scene import deviation_arrows
 from urmpipe_pipeline.comparison.trajectory import extent
-from urmpipe_pipeline.comparison.wording import SYMBOLS, amount_words, symbol
+from urmpipe_pipeline.comparison.wording import SYMBOLS, amount_words, symbol, when
 from urmpipe_pipeline.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
@@ -46,8 +46,9 @@ def overview_figure(comparison: Comparison) -> Iterator[Figure]:
         f"{name}: at most {text.quantity(one.statistics['norm'].max, 'm')}, {one.verdict}"
         for name, one in placed
     )
+    own = "its own time" if all(one.run.timed for one in ranking) else "the rows"
     lines = tuple(
-        Line(column(one.delta, 3), (name,), (run_colour(comparison.runs.index(one)),), t_ns=one.t_ns)
+        _line(one, column(one.delta, 3), (name,), (run_colour(comparison.runs.index(one)),))
         for name, one in placed
     )
     panel = Panel(
@@ -57,8 +58,8 @@ def overview_figure(comparison: Comparison) -> Iterator[Figure]:
     scale = " The axis is logarithmic." if logarithmic else ""
     yield Figure(
         "Deviation of all logs",
-        f"The norm of each log's deviation over its own time, from best to worst.{scale}",
-        f"Norm of the deviation of {len(ranking)} logs over time, from best to worst. {order}.",
+        f"The norm of each log's deviation over {own}, from best to worst.{scale}",
+        f"Norm of the deviation of {len(ranking)} logs over {own}, from best to worst. {order}.",
         (View("‖Δ‖ of all logs", (panel,)),),
     )
 
@@ -146,24 +147,35 @@ def column(values: FloatArray, index: int) -> FloatArray:
 def _deviation(one: Deviation) -> Figure:
     """Return delta, its norm, the distance from the path and the angle, with what is allowed of each."""
     delta = tuple(
-        _panel(one, one.statistics[axis], Line(column(one.delta, i), (SYMBOLS[axis],), (AXIS_COLOURS[axis],)))
+        _panel(
+            one,
+            one.statistics[axis],
+            _line(one, column(one.delta, i), (SYMBOLS[axis],), (AXIS_COLOURS[axis],)),
+        )
         for i, axis in enumerate(AXES)
     )
-    path = _panel(one, one.statistics["path"], Line(one.path, ("path",), (AXIS_COLOURS["norm"],)))
+    path = _panel(one, one.statistics["path"], _line(one, one.path, ("path",), (AXIS_COLOURS["norm"],)))
     views = [View("delta = reference - log", delta), View("Distance from the path", (path,))]
     if one.angle is not None:
-        line = Line(one.angle, ("angle",), (AXIS_COLOURS["norm"],))
+        line = _line(one, one.angle, ("angle",), (AXIS_COLOURS["norm"],))
         views.append(View("Angle between the orientations", (_panel(one, one.statistics["angle"], line),)))
     largest = ", ".join(
-        f"{symbol(held)} {text.quantity(held.max, held.unit)} at {text.seconds(held.t_max)} s"
+        f"{symbol(held)} {text.quantity(held.max, held.unit)} {when(held)}"
         for held in one.statistics.values()
     )
+    said = "Δ is reference minus actual at the same time; path is the distance from the reference's path,"
+    said += " regardless of time; angle is that between the two orientations."
+    if not one.run.timed:
+        said = (
+            "Δ is reference minus actual in the same row; path is the distance from the reference's nearest"
+        )
+        said += " pose; angle is that between the two orientations."
+    over = "time" if one.run.timed else "the rows"
     return Figure(
-        "Deviation over time",
-        "Δ is reference minus actual at the same time; path is the distance from the reference's path,"
-        " regardless of time; angle is that between the two orientations. Dashed: the tolerance; tinted: out"
-        " of it. Diamonds: the largest value of each. Dotted: the instant that decided the verdict.",
-        f"Deviation of {one.name} from the reference over time. Largest absolute values: {largest}."
+        f"Deviation over {over}",
+        f"{said} Dashed: the tolerance; tinted: out of it. Diamonds: the largest value of each. Dotted: what"
+        " decided the verdict.",
+        f"Deviation of {one.name} from the reference over {over}. Largest absolute values: {largest}."
         f" {_out_words(one)}",
         tuple(views),
         _instant(one),
@@ -198,18 +210,29 @@ def _joint_panel(one: Deviation, delta: FloatArray, held: Sequence[Statistics], 
     own = [j for j, joint in enumerate(held) if joint.unit == unit]
     values = delta if len(own) == len(held) else delta[:, own]
     names, colours = tuple(held[j].quantity for j in own), tuple(map(joint_colour, own))
-    line, allowed = Line(values, names, colours), held[own[0]].tolerance
-    return Panel("Δ joints", unit, (line,), one.t_ns, allowed, small=True, share=1.9)
+    line, allowed = _line(one, values, names, colours), held[own[0]].tolerance
+    return Panel("Δ joints", unit, (line,), one.axis_ns, allowed, small=True, share=1.9)
 
 
 def _panel(one: Deviation, held: Statistics, line: Line) -> Panel:
     """Return one quantity over time with its tolerance and its largest value."""
-    signed, peaks = held.kind == "axis", (one.peak(held),)
-    return Panel(symbol(held), held.unit, (line,), one.t_ns, held.tolerance, signed, peaks, small=True)
+    signed, peaks = held.kind == "axis", (one.peak(held) if one.run.timed else held.sample_max,)
+    return Panel(symbol(held), held.unit, (line,), one.axis_ns, held.tolerance, signed, peaks, small=True)
+
+
+def _line(one: Deviation, values: FloatArray, names: tuple[str, ...], colours: tuple[str, ...]) -> Line:
+    """Return what was compared as a line over its times; of still poses as points, one a row of the log."""
+    if one.run.timed:
+        return Line(values, names, colours, t_ns=one.t_ns)
+    every = np.full((one.run.log.rows, *values.shape[1:]), np.nan)
+    every[one.sample] = values
+    return Line(every, names, colours, points=True)
 
 
 def _instant(one: Deviation) -> dict[int, str]:
     """Return when the verdict was decided."""
+    if not one.run.timed:
+        return {one.decisive.sample_max: f"decides {when(one.decisive)}"}
     return {int(one.t_ns[one.decided_at]): f"decides at {text.seconds(one.decisive.t_max)} s"}
 
 

@@ -45,12 +45,15 @@ def measure(
     values = np.column_stack(delta(_columns(matched.reference), _columns(matched.actual)))
     placed, path, angle = bool(np.isfinite(values).any()), values[:, 3], _angle(matched)
     if placed:
-        path = distance_from_path(matched.actual, reference.position, ~gaps_behind(reference.t_ns))
+        joined = ~gaps_behind(reference.t_ns) & run.timed  # nothing joins still poses
+        path = distance_from_path(matched.actual, reference.position, joined)
         path = np.minimum(path, values[:, 3])  # the reference of that time is on its path, but for rounding
     joint_delta, turns = _joint_delta(run, matched)
     _refuse_unheld(run, reference, tolerance, angle, joint_delta)
     in_space, of_joints = _in_space(values, path, angle) if placed else [], _of_joints(run, joint_delta)
     t, sample = seconds(matched.t_ns), matched.sample
+    if not run.timed:
+        t = np.full_like(t, np.nan)
     statistics, joint_statistics = (
         {one.quantity: describe(one, t, sample, tolerance) for one in measured}
         for measured in (in_space, of_joints)
@@ -157,6 +160,8 @@ def _refuse_unheld(
 
 def _speed(run: Run, matched: Matched) -> FloatArray:
     """Return the speed of the log's tool centre point in [m/s]: by kinematics, else by its positions."""
+    if not run.timed:
+        return np.full(len(matched.sample), np.nan)
     if run.tcp is not None:
         speed = np.linalg.norm(run.tcp.velocity, axis=1, keepdims=True)
         return interpolate(matched.t_ns, run.t_ns, speed)[:, 0]

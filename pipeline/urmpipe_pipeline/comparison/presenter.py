@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -27,6 +26,7 @@ from urmpipe_pipeline.comparison.wording import (
     quantity_name,
     tolerance_words,
     verdict_words,
+    when,
 )
 from urmpipe_pipeline.palette import run_colour
 from urmpipe_pipeline.presentation.parts import inputs_table, minute, provenance_table, recording_fact
@@ -54,7 +54,8 @@ def present(result: Comparison) -> Presentation:
         verdict=result.verdict,
         facts=(*decisive_facts(worst, colour), *_against(result)),
         body=_body(result),
-        opens_at_ns=int(worst.t_ns[worst.decided_at]),
+        opens_at_ns=int(worst.t_ns[worst.decided_at]) if worst.run.timed else 0,
+        opens_at_row=None if worst.run.timed else worst.decisive.sample_max,
         scene=partial(comparison_scene, result) if worst.statistics else None,
         lines=tuple(comparison_lines(result)),
         rows=partial(statistics_rows, result),
@@ -125,7 +126,7 @@ def _checks(result: Comparison, one: Deviation) -> Iterator[Check]:
     """Yield the checks of a log: its tolerances, then its quantities against the baseline."""
     for held in one.all_statistics:
         if held.verdict is not None:
-            row = "" if held.missing else f" (row {one.row(held)})"
+            row = "" if held.missing or not one.run.timed else f" (row {one.row(held)})"
             out = out_words(held.out_of_tolerance or 0, len(one.sample))
             said = f"{decided_words(held)}{row}; out of tolerance: {out}"
             yield Check(quantity_name(held), held.verdict, said if held.verdict == "fail" else "", one.name)
@@ -140,18 +141,18 @@ def _properties(result: Comparison, one: Deviation) -> dict[str, Any]:
         "reference": result.reference.name,
         "verdict": one.verdict,
         "assumptions": "; ".join(result.assumptions),
-        "duration": one.duration,
+        "duration": one.duration if one.run.timed else None,
         "samples": len(one.sample),
         "left_out": one.left_out,
         "reference_left_out": one.reference_left_out,
-        "sync_offset": one.sync.offset,
+        "sync_offset": one.sync.offset if one.run.timed else None,
         "share_out": one.share_out,
         "longest_out": 0.0 if longest is None else longest.duration,
         "speed_correlation": one.speed_correlation,
     } | {
         f"{quantity_name(held)}.{field}": value
         for held in one.all_statistics
-        for field, value in asdict(held).items()
+        for field, value in held.fields().items()
     }
 
 
@@ -165,7 +166,7 @@ def _page(one: Deviation) -> Iterator[Block]:
 
 def _events(one: Deviation) -> Iterator[Event]:
     """Yield how a log was put beside the reference, what was found in it, and where it deviates most."""
-    start = int(one.t_ns[0])
+    start = int(one.t_ns[0]) if one.run.timed else None
     if one.sync.mode != "start":
         yield Event(start, f"clocks: {', '.join(sync_words(one.sync))}")
     if one.alignment.mode != "none":
@@ -175,14 +176,16 @@ def _events(one: Deviation) -> Iterator[Event]:
         yield Event(start, f"{one.left_out} of {whole} samples left out: no reference or no value", "warning")
     yield from log_events(one.run)
     level: Level = "info" if one.verdict == "pass" else "error"
-    if (longest := one.longest_out) is not None:
+    if (longest := one.longest_out) is not None and longest.t is not None and longest.duration is not None:
         lasts = f"{longest.samples} samples, {text.seconds(longest.duration)} s"
         yield Event(round(longest.t * 1e9), f"longest stretch out of tolerance begins: {lasts}", level)
-    held = one.decisive
+    held, timed = one.decisive, one.run.timed
     if held.tolerance is not None:
-        yield Event(round(held.t_max * 1e9), f"decides: {amount_words(held)}", level)
+        at = round(held.t_max * 1e9) if timed else None
+        yield Event(at, f"decides: {amount_words(held)}{'' if timed else f' {when(held)}'}", level)
     if not one.statistics:
         return
     x, y, z, norm = (text.quantity(float(value), "m") for value in one.delta[one.worst])
     said = f"largest deviation: {norm} (x {x}, y {y}, z {z})"
-    yield Event(int(one.t_ns[one.worst]), said, level)
+    row = "" if timed else f" in row {one.sample[one.worst] + 1}"
+    yield Event(int(one.t_ns[one.worst]) if timed else None, f"{said}{row}", level)

@@ -8,15 +8,15 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import points_over_log
-from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import placed
 from urmpipe_pipeline.comparison.comparison import Comparison, by_tolerance
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import Trajectory
-from urmpipe_pipeline.comparison.wording import amount_words
+from urmpipe_pipeline.comparison.wording import amount_words, when
 from urmpipe_pipeline.palette import DEVIATION_COLOUR, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.parts import spot_at
 from urmpipe_pipeline.presentation.scene import Arm, Arrows, Path, Scene, Spot
+from urmpipe_pipeline.runs.figures import times_of
 
 FACTORS = (50, 20, 10, 5, 2)
 """How many times a deviation may be drawn, the usual one first."""
@@ -78,7 +78,7 @@ def _arm(one: Deviation, colour: str) -> Iterator[Arm]:
         return
     decided = int(one.t_ns[one.decided_at])
     row = min(int(np.searchsorted(run.t_ns, decided)), len(run.t_ns) - 1)
-    yield Arm(placed(run.robot, one.alignment), run.q, run.t_ns, colour, kept=(row,))
+    yield Arm(placed(run.robot, one.alignment), run.q, times_of(run), colour, kept=(row,))
 
 
 def _reference(reference: Trajectory, shown: Deviation) -> Iterator[Path]:
@@ -86,7 +86,7 @@ def _reference(reference: Trajectory, shown: Deviation) -> Iterator[Path]:
     if shown.run.timed:
         yield Path(reference.name, reference.position, None, REFERENCE_COLOUR, asked=True)
     yield Path(
-        reference.name, shown.reference, shown.t_ns, REFERENCE_COLOUR, asked=True, sample=shown.sample,
+        reference.name, shown.reference, shown.axis_ns, REFERENCE_COLOUR, asked=True, sample=shown.sample,
         kept=(shown.decided_at,), line=False,
     )  # fmt: skip
 
@@ -94,7 +94,7 @@ def _reference(reference: Trajectory, shown: Deviation) -> Iterator[Path]:
 def _log(one: Deviation, colour: str) -> Path:
     """Return where a compared log was."""
     return Path(
-        one.name, one.actual, one.t_ns, colour, sample=one.sample, kept=(one.decided_at,),
+        one.name, one.actual, one.axis_ns, colour, sample=one.sample, kept=(one.decided_at,),
         line=one.run.timed,
     )  # fmt: skip
 
@@ -102,7 +102,7 @@ def _log(one: Deviation, colour: str) -> Path:
 def _decided(one: Deviation, *, several: bool) -> Spot:
     """Return where the verdict on a log was decided: by what, how much and when."""
     whose = f", {one.name}" if several else ""
-    said = f"{amount_words(one.decisive)} at t = {text.seconds(one.decisive.t_max)} s{whose}"
+    said = f"{amount_words(one.decisive)} {when(one.decisive)}{whose}"
     return Spot(spot_at(one.actual[one.decided_at]), said, DEVIATION_COLOUR)
 
 

@@ -80,6 +80,13 @@ def _conditions(result: Comparison, names: Heads[Deviation]) -> Iterator[Column]
         "warnings": ("warnings", lambda one: Value(len(result.warnings_of(one)))),
         "alignment": ("alignment", lambda one: alignment_words(one)[0]),
     }
+    if not all(one.run.timed for one in runs):
+        row = ("decided in row", lambda one: Value(one.row(one.decisive)))
+        heads = {
+            **names,
+            "t": row,
+            **{key: heads[key] for key in ("place", "left_out", "warnings", "alignment")},
+        }
     brief = {"run", "t", "longest_out", "longest_out_t", "speed_correlation"}
     brief |= {"sync_offset"} if any(one.sync.offset for one in runs) else set()
     brief |= {"left_out"} if any(one.left_out for one in runs) else set()
@@ -117,9 +124,10 @@ def statistics_tables(one: Deviation) -> Iterator[Table]:
         own = [held for held in one.all_statistics if held.unit == unit]
         if own:
             about = text.enumerated(list(dict.fromkeys(ABOUT[held.kind] for held in own)))
+            start = f"t = {text.seconds(float(one.t_ns[0]) / 1e9)} s" if one.run.timed else "the first row"
             note = (
                 "max, rms and p95 are of absolute values, mean and std signed. At start: the difference of"
-                f" the start poses (mutual calibration) at t = {text.seconds(float(one.t_ns[0]) / 1e9)} s."
+                f" the start poses (mutual calibration) at {start}."
             )
             yield Table(f"Statistics of {about}", _statistics(one, own, starts), note)
 
@@ -136,7 +144,9 @@ def _statistics(one: Deviation, own: list[Statistics], starts: Mapping[int, floa
         "verdict": ("Verdict", lambda held: Judged(held.verdict)),
         "tolerance": ("tolerance", lambda held: Value(held.tolerance, held.unit, given=True)),
         "max": ("max", lambda held: largest(held, most=held is joint and held.max > 0.0)),
-        "t_max": ("at t", lambda held: Value(held.t_max, "s")),
+        "t_max": ("at t", lambda held: Value(held.t_max, "s"))
+        if one.run.timed
+        else ("in row", lambda held: Value(one.row(held))),
         **{key: number(key) for key in ("rms", "p95", "mean", "std")},
         "start": ("at start", lambda held: Value(starts[id(held)], held.unit)),
         "out_of_tolerance": ("samples out", lambda held: Value(held.out_of_tolerance)),

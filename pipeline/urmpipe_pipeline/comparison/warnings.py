@@ -209,7 +209,7 @@ def recorded_apart(runs: Sequence[Run], allowed: float) -> Iterator[LogWarning]:
 
 def _furthest_recorded(run: Run) -> float:
     """Return how far a log is by its joints from where it recorded itself, in [m]; 0 if it did not."""
-    if run.tcp is None or run.log.tcp_position is None:
+    if run.tcp is None or run.log.tcp_position is None or run.log.measured:
         return 0.0
     start, _ = outlying_start(run.robot, run.log)
     apart = np.linalg.norm(by_kinematics(run).position - run.log.tcp_position, axis=1)[start:]

@@ -105,19 +105,23 @@ def decided_words(one: Statistics) -> str:
     As in "|Δx| = 4.2000 mm of 3.5 mm allowed (1.2 times the tolerance) at t = 1.250 s".
     """
     lacks = one.tolerance is not None and one.missing
-    return amount_words(one) if lacks else _at(amount_words(one), used_words(one), one.t_max)
+    used = used_words(one)
+    return amount_words(one) if lacks else f"{amount_words(one)}{f' ({used})' if used else ''} {when(one)}"
+
+
+def when(one: Statistics) -> str:
+    """Return when a quantity was largest: "at t = 1.250 s"; of still poses in which row: "in row 3"."""
+    timed = not math.isnan(one.t_max)
+    return f"at t = {text.seconds(one.t_max)} s" if timed else f"in row {one.sample_max + 1}"
 
 
 def meter_words(one: DeltaVerdict) -> str:
     """Return what a delta meter found: how much of how much, when, how often it was too much; its doubts."""
     amount = "has no value" if one.used is None else f"= {held(Value(one.worst, 'm', one.allowed))}"
-    said = _at(f"{size_of(one)} {amount}", used_words(one), one.t)
+    used = used_words(one)
+    said = f"{size_of(one)} {amount}{f' ({used})' if used else ''} at t = {text.seconds(one.t)} s"
     out = f"out of tolerance: {out_words(one.out_of_tolerance, one.samples)}"
     return "; ".join((said, out, *one.doubts))
-
-
-def _at(amount: str, used: str, t: float) -> str:
-    return f"{amount}{f' ({used})' if used else ''} at t = {text.seconds(t)} s"
 
 
 def out_words(out: int, of: int) -> str:
@@ -127,6 +131,8 @@ def out_words(out: int, of: int) -> str:
 
 def stretch_words(found: Stretch) -> str:
     """Return how long and from when a log was out of tolerance: "0.500 s from t = 1.250 s"."""
+    if found.t is None or found.duration is None:
+        return f"{text.counted(found.samples, 'row')} from row {found.sample + 1}"
     lasts = "1 sample at" if found.samples == 1 else f"{text.seconds(found.duration)} s from"
     return f"{lasts} t = {text.seconds(found.t)} s"
 

@@ -56,6 +56,7 @@ class Path:
         kept: Rows that are drawn in any case.
         vanishes: True if there is no moving point where there is no position.
         line: False if only the moving point is drawn: nothing joins its places, or another path is its line.
+            Without times all of them are drawn then.
     """
 
     name: str

@@ -59,7 +59,8 @@ def _path(path: Path, width: int) -> Spec:
     """Return a path; the pointer tells its time or row, its place and its value."""
     position = np.asarray(path.position[:])
     timed = path.t_ns is not None
-    t = seconds(path.t_ns[:]) if path.t_ns is not None else np.arange(len(position), dtype=np.float64)
+    rows = np.arange(len(position)) if path.sample is None else np.asarray(path.sample)
+    t = np.asarray(rows + 1.0, np.float64) if path.t_ns is None else seconds(path.t_ns[:])
     unit, factor = text.SHOWN.get(path.unit, (path.unit, 1.0))
     values = np.full(len(position), np.nan) if path.values is None else factor * np.asarray(path.values[:])
     columns = position if path.values is None else np.column_stack([position, values])

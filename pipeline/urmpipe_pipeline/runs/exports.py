@@ -15,6 +15,7 @@ from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.messages import Hint
+from urmpipe_pipeline.joint_log import ROW_NS
 from urmpipe_pipeline.presentation.exports import (
     ExportColumn,
     Exports,
@@ -36,8 +37,8 @@ def exports(run: Run) -> Exports:
         "source": run.log.source,
         "robot": run.robot.name if run.robot else None,
         "joints": list(run.log.joints),
-        "tsp": run.tsp,
-        "clock_start_ns": run.log.clock_start_ns,
+        "tsp": run.tsp if run.timed else None,
+        "clock_start_ns": run.log.clock_start_ns if run.timed else None,
         "repolarizations": len(run.repolarizations),
     }
     rows = {
@@ -132,7 +133,7 @@ def _file_fields(run: Run, table: ExportTable) -> dict[str, Any]:
     return {
         "name": encodable(run.name),
         "rows": "file",
-        "t": run.log.t,
+        "t": run.log.t if run.timed else np.empty((0, 0)),
         "clock_ns": np.empty((0, 0)) if table.clock_ns is None else table.clock_ns,
         "values": np.column_stack([np.asarray(column.values) for column in columns]),
         "names": [column.name for column in columns],
@@ -172,7 +173,12 @@ def run_poses(run: Run, rows: str) -> list[Poses]:
         recorded = Hint("tcp", "recorded", "takes what the log recorded")
         raise _lacking(run, f"no {lacks}, so no pose", at_ingest, recorded)
     t_ns, q = (run.t_ns, run.q) if rows == "grid" else (run.log.t_ns, run.log.q)
-    return [poses_by_kinematics("", run.robot, run.log.clock_start_ns + t_ns, q, _where(run))]
+    return [poses_by_kinematics("", run.robot, stamps(run, t_ns), q, _where(run))]
+
+
+def stamps(run: Run, t_ns: IntArray) -> IntArray:
+    """Return the clock of a run at times in [ns], shape (n,); of still poses the rows' numbers as seconds."""
+    return t_ns + (run.log.clock_start_ns if run.timed else ROW_NS)
 
 
 def recorded_poses(run: Run) -> Poses:
@@ -189,8 +195,9 @@ def recorded_poses(run: Run) -> Poses:
     there = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(quat).all(axis=1))
     if not len(there):
         raise _lacking(run, "no row with a pose")
-    clock = run.log.clock_start_ns + run.log.t_ns[there]
-    return Poses("", clock, position[there], quat[there], len(position) - len(there))
+    return Poses(
+        "", stamps(run, run.log.t_ns[there]), position[there], quat[there], len(position) - len(there)
+    )
 
 
 def _lacking(run: Run, message: str, *hints: Hint) -> RecordingError:

@@ -126,6 +126,8 @@ def motion_figure(run: Run) -> Iterator[Figure]:
     if run.tcp is None:
         caption = "As the log recorded it: without a robot there are no kinematics."
         alt = f"Motion over time, as the log {run.name} recorded it."
+        if not run.timed:
+            title, alt = "Poses of the tool centre point", f"Poses as the log {run.name} recorded them."
     elif not run.timed:
         title, caption = "Poses of the tool centre point", f"{point} and its {angles}"
         alt = f"Poses of {point} of {run.name} by forward kinematics."
@@ -182,13 +184,15 @@ def _angles(tcp: PointLog, singular: BoolArray | None, *, follows: bool) -> Floa
 
 def _recorded(run: Run) -> Iterator[View]:
     """Yield position and orientation as a log without kinematics recorded them itself."""
+    t_ns, points = times_of(run), not run.timed
     if run.tcp_recorded is not None:
-        yield View("Recorded TCP", (Panel("p", "m", (coordinates(run.tcp_recorded),), run.t_ns),))
+        position = replace(coordinates(run.tcp_recorded), points=points)
+        yield View("Recorded TCP", (Panel("p", "m", (position,), t_ns),))
     if (values := run.rotation_recorded) is not None:
         names = run.rotation_names  # a quaternion has no unit
-        line = Line(values, names, tuple(map(joint_colour, range(len(names)))))
+        line = Line(values, names, tuple(map(joint_colour, range(len(names)))), points=points)
         unit = "" if len(names) == 4 else "rad"
-        yield View("Recorded orientation", (Panel("orientation", unit, (line,), run.t_ns),))
+        yield View("Recorded orientation", (Panel("orientation", unit, (line,), t_ns),))
 
 
 def _singular_words(tcp: PointLog) -> str:

@@ -21,12 +21,12 @@ from urmpipe_pipeline.provenance import Provenance, provenance
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
 from urmpipe_pipeline.runs.derivatives import Method, derivatives, other_unit, recorded_agree
 from urmpipe_pipeline.runs.grid import Grid, make_grid
-from urmpipe_pipeline.runs.plausibility import implausible
+from urmpipe_pipeline.runs.plausibility import beyond_limits, implausible
 from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded
 from urmpipe_pipeline.runs.results import RowJoints, Run
 from urmpipe_pipeline.runs.robot_inference import infer_robot
 from urmpipe_pipeline.sources import ReadOptions, read_log
-from urmpipe_pipeline.sources.clocks.clock import unused_period
+from urmpipe_pipeline.sources.clocks.clock import unused_for_poses, unused_period
 
 QUANTISED_DIGITS = 5
 """Joint values with this many significant digits or fewer are differentiated with smoothing."""
@@ -90,7 +90,7 @@ def run_of(
     """Return the run of a log that is there: what `ingest_log` does once it has read it.
 
     Args:
-        log: The log, its times strictly increasing.
+        log: The log, its times strictly increasing, or still poses.
         robot: The arm, with base and tool; None for no kinematics.
         options: How it was read: `interval`, `repair` and `period` matter here.
         made: How to repeat it.
@@ -102,6 +102,10 @@ def run_of(
         LogError: If the log's joints are not the robot's, or its times need a grid without end.
         OptionError: If an interval makes no sense.
     """
+    if not log.timed:
+        unused = {name: getattr(options, name) for name in ("period", "interval", "repair")}
+        told = unused_for_poses(unused | {"tsp": tsp, "derivative": derivative})
+        return _of_poses(replace(log, name=name or log.name), robot, made, told)
     found = audit_log(log, robot, interval=options.interval, repaired=options.repair)
     log = replace(log, inferences=(*log.inferences, *found.inferences))
     clocked = any(column.role == "time" for column in log.columns)
@@ -121,6 +125,18 @@ def run_of(
         name=name or log.name, log=log, robot=robot, tsp=grid.tsp, t_ns=grid.t_ns, q=q, qd=qd, qdd=qdd,
         tcp=tcp, tcp_recorded=recorded, audit=found.entries, warnings=(*warnings, *noticed), provenance=made,
         rows=None if grid.own else RowJoints(grid.source_ns, found.q),
+    )  # fmt: skip
+
+
+def _of_poses(log: JointLog, robot: Chain | None, made: Provenance, told: Sequence[LogWarning] = ()) -> Run:
+    """Return the run of still poses, a row each: no motion joins them, so there are no turns and no rates."""
+    none = np.full_like(log.q, np.nan)
+    tcp, noticed = kinematics(robot, log.q, none, none)
+    limits = [] if robot is None or not log.joints else beyond_limits(log, log.q, robot)
+    return Run(
+        name=log.name, log=log, robot=robot, tsp=0.0, t_ns=log.t_ns, q=log.q, qd=none, qdd=none, tcp=tcp,
+        tcp_recorded=log.tcp_position, audit=(), provenance=made,
+        warnings=(*log.warnings, *told, *far_from_recorded(robot, log), *limits, *noticed),
     )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.meshes import VISUAL_MISSING
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
 from urmpipe_pipeline.runs.ingest import EULER_SINGULAR, kinematics
-from urmpipe_pipeline.runs.plausibility import JOINT_LIMIT, SPEED_LIMIT, implausible
+from urmpipe_pipeline.runs.plausibility import JOINT_LIMIT, SPEED_LIMIT, beyond_limits, implausible
 from urmpipe_pipeline.runs.recorded_start import RECORDED_START
 from urmpipe_pipeline.runs.recorded_tcp import FAR_RECORDED, far_from_recorded
 from urmpipe_pipeline.runs.results import Run
@@ -61,8 +61,10 @@ def _unit(turns: np.bool_) -> str:
 
 def _beyond_limits(run: Run, robot: Chain) -> list[LogWarning]:
     """Return what the log's rows say against the arm's limits of place and speed."""
-    if not run.log.joints or not run.timed:
+    if not run.log.joints:
         return []
+    if not run.timed:
+        return beyond_limits(run.log, run.q, robot)
     read = run.provenance.options.get("read") or {}
     repaired = bool(read.get("repair"))
     found = audit_log(run.log, robot, interval=read.get("interval"), repaired=repaired)

@@ -81,7 +81,7 @@ def implausible(
     held = pace(motion)
     warnings = [*outlier_warnings(motion, outliers), *repeated_samples(motion, held, tsp)]
     if robot is not None:
-        warnings += beyond_limits(motion, robot)
+        warnings += _beyond_limits(motion, robot)
     if timed:
         steps = np.maximum(outliers, (1, 0))  # a step belongs to the row that it ends in
         limits = speed_limits(robot, turning)
@@ -176,7 +176,13 @@ def _in_one_go(q: FloatArray, changes: NDArray[np.int64]) -> bool:
     return bool(together or large > 1.5 * small)
 
 
-def beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
+def beyond_limits(log: JointLog, q: FloatArray, robot: Chain) -> list[LogWarning]:
+    """Return a warning for each joint of a log that leaves the limits of an arm; q as in `implausible`."""
+    turning = np.array([joint.kind == "revolute" for joint in robot.moving])
+    return _beyond_limits(JointMotion.of(log, q, turning), robot)
+
+
+def _beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
     """Return a warning if joints leave their limits: which, how often, where first, where worst."""
     q, slack = motion.q, ROUNDED_LIMIT + motion.fineness
     lower, upper = np.array([(joint.lower, joint.upper) for joint in robot.moving]).T

@@ -38,12 +38,13 @@ def present(run: Run) -> Presentation:
     )
     return Presentation(
         name=run.name,
-        headline=f"{run.name}: {text.counted(run.log.rows, 'row')}, {audit_words(run)}",
+        headline=f"{run.name}: {_headline(run)}",
         verdict=None,
         facts=(),
         body=body,
         word="ingested",
-        opens_at_ns=int(run.t_ns[0]),
+        opens_at_ns=int(run.t_ns[0]) if run.timed else 0,
+        opens_at_row=None if run.timed else 0,
         scene=partial(run_scene, run),
         lines=(
             {
@@ -61,6 +62,13 @@ def present(run: Run) -> Presentation:
         rows=partial(audit_rows, run),
         created=run.provenance.created,
     )
+
+
+def _headline(run: Run) -> str:
+    """Return how many rows a log has, and what the repolarizer found; of still poses that they are such."""
+    if not run.timed:
+        return text.counted(run.log.rows, "still pose")
+    return f"{text.counted(run.log.rows, 'row')}, {audit_words(run)}"
 
 
 def audit_rows(run: Run) -> Table:

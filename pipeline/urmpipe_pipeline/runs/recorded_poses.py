@@ -71,7 +71,7 @@ class RecordedPoses:
 
         Those at its start that are outliers are left out.
         """
-        if robot is None or log.tcp_position is None or log.q.shape[1] != len(robot.moving):
+        if robot is None or log.tcp_position is None or log.measured or log.q.shape[1] != len(robot.moving):
             return None
         start, _ = outlying_start(robot, log)
         rows = np.arange(start, log.rows)[spread(log.rows - start)]

@@ -24,7 +24,7 @@ def outlying_start(robot: Chain | None, log: JointLog) -> tuple[int, float]:
     `CLEARLY` times further from the usual one than in any row that follows, and further than a calibration
     makes. It is told in [m] as the median of these rows; inf of points of three zeros, which are none.
     """
-    if log.tcp_position is None or log.rows < LEAST_ROWS:
+    if log.tcp_position is None or log.measured or log.rows < LEAST_ROWS:
         return 0, 0.0
     first = log.tcp_position[0]
     zeros = 0 if first.any() else int(np.argmax(log.tcp_position.any(axis=1)))

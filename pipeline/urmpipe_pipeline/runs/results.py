@@ -109,8 +109,8 @@ class Run(Result):
 
     @property
     def duration(self) -> float:
-        """From the first to the last row, in [s]."""
-        return float(self.log.t_ns[-1] - self.log.t_ns[0]) / 1e9
+        """From the first to the last row, in [s]; 0 without times."""
+        return float(self.log.t_ns[-1] - self.log.t_ns[0]) / 1e9 if self.timed else 0.0
 
     @property
     def timed(self) -> bool:
@@ -122,10 +122,11 @@ class Run(Result):
         """The orientation that the log itself recorded, on the grid, shape (g, k); None without one.
 
         In its own form (of a matrix as a quaternion x, y, z, w) in [rad] or [-], without jumps between the
-        names of one rotation, and so linear between the rows.
+        names of one rotation, and so linear between the rows; of still poses as the log has it.
         """
         form = self.log.rotation_form
-        values = self.log.tcp_quat_xyzw if form == "matrix" else self.log.tcp_rotation_continuous
+        follows = self.log.tcp_rotation_continuous if self.timed else self.log.tcp_rotation
+        values = self.log.tcp_quat_xyzw if form == "matrix" else follows
         if form is None or values is None:
             return None
         if not np.array_equal(self.t_ns, self.log.t_ns):
@@ -160,16 +161,20 @@ class Run(Result):
         return line_of(self.name, arm, f"{rows} in {self.duration:g} s", grid)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row a grid sample: t [s], the joints, their rates, and the TCP where there is one."""
+        """Return one row a grid sample: t [s], the joints, their rates, and the TCP where there is one.
+
+        Of still poses the number of the row stands for t, from 1, and there is nothing per second.
+        """
         import pandas as pd
 
-        columns: dict[str, Any] = {"t": self.t}
-        for prefix, values in (("", self.q), ("d_", self.qd), ("dd_", self.qdd)):
+        columns: dict[str, Any] = {"t": self.t} if self.timed else {"row": np.arange(1, len(self.q) + 1)}
+        kinds = 3 if self.timed else 1
+        for prefix, values in (("", self.q), ("d_", self.qd), ("dd_", self.qdd))[:kinds]:
             columns |= {f"{prefix}{name}": values[:, i] for i, name in enumerate(self.log.joints)}
         if self.tcp is not None:
             for name, values in (
                 ("p", self.tcp.position), ("v", self.tcp.velocity), ("a", self.tcp.acceleration),
-            ):  # fmt: skip
+            )[:kinds]:  # fmt: skip
                 columns |= {f"{name}{axis}": values[:, i] for i, axis in enumerate("xyz")}
             columns |= {name: self.tcp.euler_zyx[:, i] for i, name in enumerate(("rz", "ry", "rx"))}
         return pd.DataFrame(columns)
@@ -180,11 +185,11 @@ class Run(Result):
             "schema": SCHEMA,
             "name": self.name,
             "samples": self.log.rows,
-            "duration": self.duration,
-            "period": self.log.period,
-            "tsp": self.tsp,
+            "duration": self.duration if self.timed else None,
+            "period": self.log.period if self.timed else None,
+            "tsp": self.tsp if self.timed else None,
             "grid_samples": len(self.t_ns),
-            "clock_start": self.log.clock_start,
+            "clock_start": self.log.clock_start if self.timed else None,
             "joints": list(self.log.joints),
             "source": self.log.source,
             "robot": self.robot.name if self.robot else None,

@@ -37,7 +37,7 @@ def _shared_words(names: Sequence[str]) -> frozenset[str]:
 
 def _by_kinematics(log: JointLog, robots: Sequence[Chain]) -> tuple[Chain, Inference] | None:
     """Return the robot whose forward kinematics come out at the recorded points."""
-    if log.tcp_position is None:
+    if log.tcp_position is None or log.measured:
         return None
     rows = spread(log.rows)
     found = {robot.name: fit(robot, log.q[rows], log.tcp_position[rows]) for robot in robots}

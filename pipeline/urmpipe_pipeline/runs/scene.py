@@ -25,29 +25,31 @@ def run_scene(run: Run) -> Scene | None:
 
 def path_figure(run: Run) -> Iterator[SpaceFigure]:
     """Yield the path of a tool centre point in space, by kinematics and as the log recorded it, if known."""
-    if not run.timed:
-        return
-    paths = []
-    if run.tcp_recorded is not None:
-        paths.append(Path("recorded by the log", run.tcp_recorded, run.t_ns, REFERENCE_COLOUR, asked=True))
+    paths, timed, t_ns = [], run.timed, times_of(run)
+    if run.tcp_recorded is not None and not (run.tcp is not None and run.log.measured):
+        recorded = Path(
+            "recorded by the log", run.tcp_recorded, t_ns, REFERENCE_COLOUR, asked=True, line=timed
+        )
+        paths.append(recorded)
     if run.tcp is not None:
-        paths.append(Path("forward kinematics", run.tcp.position, run.t_ns, AXIS_COLOURS["norm"]))
+        paths.append(Path("forward kinematics", run.tcp.position, t_ns, AXIS_COLOURS["norm"], line=timed))
     if not paths or not np.isfinite(known := np.asarray(paths[-1].position)).any():
         return
+    what = "Path" if timed else "Poses"
     yield SpaceFigure(
-        "Path in space",
+        f"{what} in space",
         "The tool centre point, equal scale on all axes.",
-        f"Path of {run.name} in three dimensions, {within_words(known)}.",
+        f"{what} of {run.name} in three dimensions, {within_words(known)}.",
         tuple(paths),
-        ends(known),
+        ends(known) if timed else (),
     )
 
 
 def _paths(run: Run) -> Iterator[Path]:
     """Yield where the log recorded itself, and where it was by its joints."""
-    if run.tcp_recorded is not None:
-        by_joints = run.tcp is not None
+    by_joints, timed, t_ns = run.tcp is not None, run.timed, times_of(run)
+    if run.tcp_recorded is not None and not (by_joints and run.log.measured):  # no frame joins both
         colour = REFERENCE_COLOUR if by_joints else run_colour(0)
-        yield Path("recorded by the log", run.tcp_recorded, run.t_ns, colour, asked=by_joints)
-    if run.tcp is not None and run.timed:
-        yield Path(run.name, run.tcp.position, run.t_ns, run_colour(0))
+        yield Path("recorded by the log", run.tcp_recorded, t_ns, colour, asked=by_joints, line=timed)
+    if run.tcp is not None:
+        yield Path(run.name, run.tcp.position, t_ns, run_colour(0), line=timed)

@@ -12,14 +12,11 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_pipeline.joint_log import ROW_NS, JointLog, LogColumn, LogWarning
+from urmpipe_pipeline.joint_log import ROW_NS, SOLVED, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.ingest import kinematics, run_of
+from urmpipe_pipeline.runs.ingest import run_of
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import ReadOptions
-
-SOURCE = "ik"
-"""What such a run says where another says which reader read it."""
 
 
 def run_of_solutions(
@@ -48,12 +45,12 @@ def run_of_solutions(
     """
     timed = t_ns is not None
     log = JointLog(
-        name=name, source=SOURCE, files=made.inputs, joints=chain.coordinates, q=q,
+        name=name, source=SOLVED, files=made.inputs, joints=chain.coordinates, q=q,
         t_ns=np.arange(len(q), dtype=np.int64) * ROW_NS if t_ns is None else t_ns,
         clock_start_ns=clock_start_ns, columns=tuple(_columns(chain, timed=timed)), warnings=warnings,
         timed=timed,
     )  # fmt: skip
-    return run_of(log, chain, ReadOptions(), made=made) if timed else _poses(log, chain, made)
+    return run_of(log, chain, ReadOptions(), made=made)
 
 
 def _columns(chain: Chain, *, timed: bool) -> Iterator[LogColumn]:
@@ -63,13 +60,3 @@ def _columns(chain: Chain, *, timed: bool) -> Iterator[LogColumn]:
     for j, joint in enumerate(chain.moving):
         unit = "rad" if joint.kind == "revolute" else "m"
         yield LogColumn(joint.name, f"{joint.name} [{unit}]", "joint", j, unit, number=j + 1 + timed)
-
-
-def _poses(log: JointLog, chain: Chain, made: Provenance) -> Run:
-    """Return the run of solutions without times: poses without rates."""
-    none = np.full_like(log.q, np.nan)
-    tcp, noticed = kinematics(chain, log.q, none, none)
-    return Run(
-        name=log.name, log=log, robot=chain, tsp=0.0, t_ns=log.t_ns, q=log.q, qd=none, qdd=none, tcp=tcp,
-        tcp_recorded=None, audit=(), warnings=(*log.warnings, *noticed), provenance=made,
-    )  # fmt: skip

@@ -182,7 +182,7 @@ def _measured(
 def _lengths(
     plan: Plan, finder: UnitFinder, roles: Roles, robot: Chain | None, q: FloatArray, position: FloatArray
 ) -> tuple[Sequence[Unit], Sequence[Inference]]:
-    """Return the units of x, y, z; of measured ones whose columns tell none by how far the joints move them."""
+    """Return the units of x, y, z; of measured ones that tell none by how far the joints move them."""
     told = any(column.number in plan.units or column.unit_text for column in roles.position)
     if roles.measured and robot and roles.joints and not told:
         found = length_by_spread(robot, q, position)

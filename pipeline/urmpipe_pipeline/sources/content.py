@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -152,7 +153,8 @@ def _without(roles: Roles, table: int) -> Roles:
     """Return the roles without the groups that have a column in a table: half a group has no meaning."""
     names = ("rates", "accelerations", "position", "rotation")
     partly = [name for name in names if any(column.table == table for column in getattr(roles, name))]
-    return replace(roles, **dict.fromkeys(partly, ()))
+    none: dict[str, Any] = dict.fromkeys(partly, ())
+    return replace(roles, **none)
 
 
 def _difference(plan: Plan, numbers: Mapping[int, Numbers], table: int) -> Finding | None:

@@ -41,8 +41,8 @@ class ReadOptions:
         repair: Whether samples that a linear resampling left on a wrap are put on the line through their
             neighbours.
         poses: Whether the rows are still poses, which no motion joins: a clock of theirs is a label.
-        measured: Names or numbers of the x, y, z of the tool as it was measured from outside, in a frame of its
-            own, and behind them of its orientation, if it was.
+        measured: Names or numbers of the x, y, z of the tool as it was measured from outside, in a frame of
+            its own, and behind them of its orientation, if it was.
     """
 
     source: str | None = None

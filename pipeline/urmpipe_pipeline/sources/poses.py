@@ -1,7 +1,7 @@
-"""Rows that are still poses: calibration grids, random configurations, points that were measured one by one.
+"""Rows that are still poses: calibration grids, random configurations, points measured one by one.
 
-No motion joins them, so a clock of them is a label. They are known by their steps, which no joint makes in the
-time that passes and which go on from each other in no direction; a motion is smooth, however coarse its clock.
+No motion joins them, so a clock of theirs is a label. They are known by their steps: no joint makes them in
+the time that is assumed, and they go on in no direction. A motion is smooth, however coarse its clock.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.messages import Hint
 from urmpipe_models.repolarizer import FULL_TURN
 from urmpipe_pipeline.joint_log import Inference
@@ -23,7 +23,7 @@ from urmpipe_pipeline.sources.units.unit_evidence import FASTEST, peak
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 STEP = FASTEST * PAPER_PERIOD
-"""The median step in [rad] or [m] of still poses is larger: no joint makes it in the period that is assumed."""
+"""The median step of still poses, in [rad] or [m], is larger: none is made in the period that is assumed."""
 
 TURNED = 0.8
 """Still poses change their steps by this share of them at least: of a motion with n samples in its shortest
@@ -46,7 +46,7 @@ SAMPLED = 4000
 
 
 def as_poses(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> Numbers:
-    """Return the numbers as still poses without a clock, if the user says so or they show it; else as they are.
+    """Return numbers as still poses without a clock, if the user says so or they show it; else as they are.
 
     Args:
         plan: What is read: `poses` says whether they are, or None where the rows are to tell.
@@ -89,11 +89,11 @@ def _evidence(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> str:
     return _label(plan, numbers.clock[rows[:2, known]], size, said)
 
 
-def _label(plan: Plan, times: FloatArray, size: FloatArray, said: str) -> str:
+def _label(plan: Plan, times: IntArray, size: FloatArray, said: str) -> str:
     """Return why a clock is a label; empty if it may be that of a motion.
 
-    Its times before and after some steps of the joints in [rad] or [m], shape (n,), are in integer [ns], shape
-    (2, n).
+    Its times before and after some steps of the joints, in [rad] or [m], shape (n,), are in integer [ns],
+    shape (2, n).
     """
     timed = (times > UNREADABLE).all(axis=0)
     passed, name = np.diff(times[:, timed], axis=0)[0], plan.clock.columns[0].name

@@ -107,9 +107,10 @@ class DrawnLabel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnPath:
-    """A path: its lines in [m], shape (any, 3) each, and the point that moves, shape (m, 3)."""
+    """A path in [m]: its lines, shape (any, 3) each, or single places, and the point that moves, (m, 3)."""
 
     path: Path
+    places: FloatArray
     strips: tuple[FloatArray, ...]
     moving: Moving
     position: FloatArray
@@ -201,10 +202,13 @@ def drawn_path(path: Path) -> DrawnPath:
     there = whole_rows(position)
     strips = lines_of(position, path.sample, path.kept) if path.line else ()
     none = np.empty(0, dtype=np.int64)
-    moving = Moving(None, none, none)
+    moving, places = Moving(None, none, none), np.empty((0, 3))
+    if path.t_ns is None and not path.line:
+        known = np.flatnonzero(there)
+        places = position[known[:: math.ceil(len(known) / MOST) or 1]]
     if path.t_ns is not None:
         moving = _moving(path.t_ns, there, path.kept, vanishes=path.vanishes)
-    return DrawnPath(path, dashed(strips) if path.asked else strips, moving, position[moving.rows])
+    return DrawnPath(path, places, dashed(strips) if path.asked else strips, moving, position[moving.rows])
 
 
 def drawn_targets(targets: Targets) -> DrawnTargets:
@@ -238,7 +242,7 @@ def extent(
 
     Targets that are missed by far are not: they would make the arm small.
     """
-    points = [part for one in paths for part in (*one.strips, one.position) if len(part)]
+    points = [part for one in paths for part in (*one.strips, one.places, one.position) if len(part)]
     points += [] if arm is None else [arm.skeleton.reshape(-1, 3)]
     points += [] if arrows is None else [arrows.start, arrows.end]
     points += [ends.reshape(-1, 3) for ghost in ghosts for ends in (ghost.start, ghost.end)]

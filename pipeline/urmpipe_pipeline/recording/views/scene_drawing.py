@@ -158,6 +158,9 @@ def _draw_path(stream: RecordingStream, drawn: DrawnPath, key: str, size: float)
         strips = [strip.astype(np.float32) for strip in drawn.strips]
         lines = rr.LineStrips3D(strips, colors=[colour], radii=[(ASKED if path.asked else DONE) * size])
         stream.log(shown_path("scene", "path", key), lines, static=True)
+    if len(drawn.places):
+        points = rr.Points3D(drawn.places.astype(np.float32), colors=[colour], radii=[TARGET * size])
+        stream.log(shown_path("scene", "path", key), points, static=True)
     if not len(drawn.moving.rows):
         return
     entities = [shown_path("scene", "point", key)]

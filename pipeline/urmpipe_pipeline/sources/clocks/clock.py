@@ -199,6 +199,12 @@ def unused_period(keyword: str) -> LogWarning:
     return LogWarning("period-not-used", "no effect: the log has a clock", parameter=keyword, hints=hints)
 
 
+def unused_for_poses(given: Mapping[str, object]) -> list[LogWarning]:
+    """Return a warning for each keyword with a value, all about motions, since the rows are still poses."""
+    said = "no effect: the rows are still poses, which have no time"
+    return [LogWarning("not-for-poses", said, parameter=name) for name, value in given.items() if value]
+
+
 def even_clock(
     rows: int, period: float | None, given_by: str = "period", like: str = ""
 ) -> tuple[IntArray, tuple[Inference, ...], list[LogWarning]]:
