@@ -177,7 +177,10 @@ def _in_one_go(q: FloatArray, changes: NDArray[np.int64]) -> bool:
 
 
 def beyond_limits(log: JointLog, q: FloatArray, robot: Chain) -> list[LogWarning]:
-    """Return a warning for each joint of a log that leaves the limits of an arm; q as in `implausible`."""
+    """Return a warning for each joint of a log that leaves the limits of an arm.
+
+    Its joint values are in [rad] or [m], shape (n, joints).
+    """
     turning = np.array([joint.kind == "revolute" for joint in robot.moving])
     return _beyond_limits(JointMotion.of(log, q, turning), robot)
 

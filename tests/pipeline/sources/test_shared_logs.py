@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import urmpipe
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import LogError
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.sources import ReadOptions, read_log
 
 Arm = Callable[..., Chain]
@@ -172,3 +174,32 @@ def test_fri_text(
 def test_text_that_is_no_log(name: str, said: str) -> None:
     with pytest.raises(LogError, match=said):
         read_log([LOGS / name])
+
+
+def test_eighteen_measured_points_are_poses_of_a_ur5e() -> None:
+    result = urmpipe.compare(LOGS / "ur5-factory-calibration" / "joint-eef-data.csv")
+    (one,) = result.runs
+    assert (one.run.log.rows, one.run.timed, one.run.robot and one.run.robot.name) == (18, False, "ur5e")
+    assert {one.run.log.units[name] for name in one.run.log.joints} == {"deg"}
+    assert one.run.log.units["X"] == "mm"
+    norm = one.statistics["norm"]
+    assert (round(1e3 * norm.mean, 2), round(1e3 * norm.max, 2)) == (1.08, 1.72)
+    assert not result.warnings and not result.assumptions
+
+
+def test_a_grid_that_a_laser_tracker_measured() -> None:
+    """Its clock is a label: dates of digits alone, which run backwards in nine places."""
+    path = LOGS / "ur10-laser-tracker" / "measurements_grid.csv"
+    log = read_log([path])
+    assert (log.rows, log.timed, log.measured) == (11_911, False, True)
+    assert not [column for column in log.columns if column.role == "time"]
+    known = read_log([path], robot=load_robot("ur10"))
+    assert known.rotation_form == "xyz"
+    assert {known.units[f"measurement_{axis}"] for axis in "xyz"} == {"mm"}
+    assert {known.units[f"measurement_r{axis}"] for axis in "xyz"} == {"deg"}
+
+
+def test_random_poses_without_a_header() -> None:
+    path = LOGS / "pybotics-ur10-fk" / "ur10-joints-poses.csv"
+    log = read_log([path], ReadOptions(unit={"": "deg"}), load_robot("ur10"))
+    assert (log.rows, log.timed) == (20, False)
