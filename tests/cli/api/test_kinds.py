@@ -45,7 +45,7 @@ RIGHT = {
         "period",
         "time",
     },
-    "a list": {"logs", "inputs", "platforms", "formats", "joints"},
+    "a list": {"logs", "inputs", "platforms", "formats", "joints", "measured"},
     "a mapping": {"arguments", "options", "unit", "interval"},
 }
 """Which keywords take what is odd elsewhere; each takes its default."""
