@@ -150,6 +150,7 @@ class LogColumn:
         sign: 1, or -1 where the file counts the other way.
         offset: Added before the factor, in the file's unit.
         number: Its number among the columns of all tables of the log, from 1.
+        doubt: Why its unit is only assumed; empty where it is given or proved.
     """
 
     name: str
@@ -161,6 +162,7 @@ class LogColumn:
     sign: int = 1
     offset: float = 0.0
     number: int = 0
+    doubt: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -227,6 +229,12 @@ class JointLog(Shown):
     def units(self) -> dict[str, str]:
         """The file's unit of every column used, by its name: rad, deg, m, mm, s, ..."""
         return {column.name: column.unit for column in self.columns}
+
+    @property
+    def joint_units(self) -> tuple[str, ...]:
+        """The SI unit of each joint by its column: m if that is a length, else rad."""
+        columns = {column.index: column.unit for column in self.columns if column.role == "joint"}
+        return tuple("m" if columns.get(j) in ("m", "mm", "cm") else "rad" for j in range(len(self.joints)))
 
     @property
     def tcp_quat_xyzw(self) -> FloatArray | None:

@@ -105,7 +105,7 @@ def _columns(path: Path, names: Sequence[str], read: ReadOptions | None) -> LogT
 
 def _parts(log: JointLog) -> Iterator[tuple[str, str, FloatArray]]:
     """Yield name, unit and values of each variable of a log."""
-    turns = np.array([log.units.get(name, "rad") in ("rad", "deg") for name in log.joints], dtype=np.bool_)
+    turns = np.array([unit == "rad" for unit in log.joint_units], dtype=np.bool_)
     recorded = {"": log.q if log.joints else None, "d": log.qd, "dd": log.qdd}
     per = {"": "", "d": "/s", "dd": "/s2"}
     for suffix, values in recorded.items():

@@ -143,7 +143,7 @@ def turning(log: JointLog, robot: Chain | None) -> NDArray[np.bool_]:
     """Tell which joints turn, by the robot or else the unit of their columns, shape (joints,)."""
     if robot is not None and log.joints:
         return np.array([joint.kind == "revolute" for joint in robot.moving])
-    return np.array([log.units.get(name) in ("rad", "deg") for name in log.joints], dtype=np.bool_)
+    return np.array([unit == "rad" for unit in log.joint_units], dtype=np.bool_)
 
 
 def _steps_to(log: JointLog, rows: IntArray, joints: IntArray) -> _Places:

@@ -25,8 +25,9 @@ from urmpipe_pipeline.runs.plausibility import beyond_limits, implausible
 from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded
 from urmpipe_pipeline.runs.results import RowJoints, Run
 from urmpipe_pipeline.runs.robot_inference import infer_robot
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.sources.clocks.clock import unused_for_poses, unused_period
+from urmpipe_pipeline.sources.read import read_numbers
 
 QUANTISED_DIGITS = 5
 """Joint values with this many significant digits or fewer are differentiated with smoothing."""
@@ -65,10 +66,11 @@ def ingest_log(
     """
     options = read or ReadOptions()
     _refuse_senseless(tsp, derivative)
-    log = read_log(files, options, robot)
-    inferred = infer_robot(log) if robot is None else None
-    if inferred:
-        robot, because = inferred
+    numbers = read_numbers(files, options, robot)
+    inferred = infer_robot(numbers.recorded) if robot is None else None
+    robot, because = inferred or (robot, None)
+    log = numbers.log(robot)
+    if because:
         log = replace(log, inferences=(*log.inferences, because))
     usual = asdict(ReadOptions())
     read_by = {name: value for name, value in asdict(options).items() if value != usual[name]}

@@ -144,8 +144,7 @@ class Run(Result):
         """The SI unit of each joint, rad or m: by the robot, else by the unit of its column."""
         if self.robot is not None and self.log.joints:
             return ["rad" if joint.kind == "revolute" else "m" for joint in self.robot.moving]
-        told = (self.log.units.get(name, "rad") for name in self.log.joints)
-        return ["rad" if unit in ("rad", "deg") else "m" for unit in told]
+        return list(self.log.joint_units)
 
     def as_run(self) -> Run:
         """Return this run: what results that have a run return of it."""

@@ -25,6 +25,7 @@ from urmpipe_pipeline.sources.targets.row_faults import Rows, read_rows
 from urmpipe_pipeline.sources.targets.sniff_targets import sniff_targets
 from urmpipe_pipeline.sources.targets.target_rotation import rotation_units, target_form, target_rotations
 from urmpipe_pipeline.sources.units.rotation import form_inference
+from urmpipe_pipeline.sources.units.told import Tellers
 from urmpipe_pipeline.sources.units.units import LONGEST_REACH, UnitFinder
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
 
@@ -134,7 +135,7 @@ class _Poses:
 
 def _poses(plan: Plan, rows: Rows, form: RotationForm | None) -> _Poses:
     """Return the poses that rows hold, all NaN in a row with a fault."""
-    finder = UnitFinder(plan.units, plan.tables.known, str(plan.tables.paths[plan.main]))
+    finder = UnitFinder(Tellers(plan.units, plan.tables.known, str(plan.tables.paths[plan.main])))
     values = rows.values.copy()
     values[[row - 1 for row in rows.faults]] = np.nan
     lengths, warnings = _length_units(plan, finder, values[:, :3])
@@ -142,7 +143,7 @@ def _poses(plan: Plan, rows: Rows, form: RotationForm | None) -> _Poses:
     if form is None:
         return _Poses(position, None, rows.faults, finder.inferences, warnings)
     columns, turned = plan.roles.rotation, values[:, 3:]
-    told = [unit or plan.units.get(0) for unit in finder.rotations(columns, (form,))]
+    told = [one.unit if one else None for one in finder.rotations(columns, (form,))]
     units, assumed = rotation_units(columns, form, _finite(turned), told)
     rotation, none = target_rotations(columns, form, turned * [unit.factor for unit in units])
     position[list(none)] = np.nan
@@ -155,8 +156,7 @@ def _poses(plan: Plan, rows: Rows, form: RotationForm | None) -> _Poses:
 def _length_units(plan: Plan, finder: UnitFinder, values: FloatArray) -> tuple[list[Unit], list[LogWarning]]:
     """Return the units of x, y, z, m where none is told, and a warning if no row can be in m then.
 
-    A log without a unit is taken as mm where it reaches further than an arm in m. Here that is a target out
-    of reach, which is to be said.
+    What reaches further than an arm in m is a target out of reach.
     """
     columns = plan.roles.position
     units = finder.positions(columns, np.zeros((1, 3)))

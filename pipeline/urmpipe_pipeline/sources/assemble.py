@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -24,11 +24,12 @@ from urmpipe_pipeline.sources.content import Content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.opening import PATH, TABLE
-from urmpipe_pipeline.sources.units.kinematic_units import by_kinematics
+from urmpipe_pipeline.sources.units.kinematic_units import Recorded, by_kinematics
 from urmpipe_pipeline.sources.units.measured import length_by_spread
 from urmpipe_pipeline.sources.units.rotation import settle_rotation
+from urmpipe_pipeline.sources.units.told import Tellers
 from urmpipe_pipeline.sources.units.unit_hints import unit_inference
-from urmpipe_pipeline.sources.units.units import UnitFinder
+from urmpipe_pipeline.sources.units.units import UnitFinder, told_joints, told_lengths
 from urmpipe_pipeline.sources.vocabulary import Unit
 
 
@@ -56,6 +57,7 @@ class _Measured:
     form: RotationForm | None
     inferences: Sequence[Inference]
     warnings: Sequence[LogWarning]
+    doubts: Mapping[int, str]
     by_source: bool
 
     @property
@@ -82,7 +84,7 @@ def assemble(
     clock = plan.clock.as_label if content.still else plan.clock
     t_ns, start, timed, noticed = _times(content, plan, options)
     signs, offsets = _corrections(options, len(roles.joints))
-    measured = _measured(plan, content, robot, t_ns, signs, offsets)
+    measured = _measured(plan, content, robot, t_ns, options)
     joints, rates, seconds, position, rotation = measured.groups
     written = (plan.tables.layouts[column.table].number_texts(column.index) for column in roles.joints)
     digits, coarse = significant_digits(chain(*written)), "every joint value is written with as many"
@@ -102,7 +104,7 @@ def assemble(
         rotation_form=measured.form,
         columns=(
             *(() if content.still else _time_columns(plan)),
-            *_used_columns(plan, measured.groups, signs, offsets),
+            *_used_columns(plan, measured, signs, offsets),
         ),
         digits=digits,
         inferences=(
@@ -136,24 +138,44 @@ def _not_used(plan: Plan, options: ReadOptions, *, by_source: bool) -> Iterator[
         yield LogWarning("rotation-not-used", said, parameter="rotation")
 
 
+def recorded(plan: Plan, content: Content, options: ReadOptions, robot: Chain | None = None) -> Recorded:
+    """Return joints and recorded positions before their units are known, with what is told of these.
+
+    Raises:
+        LogError: If a unit that is told is not known, or does not fit.
+        OptionError: If an option does not fit the log.
+    """
+    roles, tellers = content.roles, _tellers(plan, options)
+    q = _corrected(content.values(roles.joints), *_corrections(options, len(roles.joints)))
+    position = () if roles.measured else roles.position  # from outside, it says nothing in the base's frame
+    told = (told_joints(tellers, roles.joints, robot), told_lengths(tellers, position))
+    joints, lengths = (tuple(one.unit if one else None for one in group) for group in told)
+    names = tuple(column.name for column in roles.joints)
+    return Recorded(names, q, content.values(position), joints, lengths)
+
+
+def _tellers(plan: Plan, options: ReadOptions) -> Tellers:
+    file, given = plan.tables.layouts[plan.main].file, options.source is not None
+    return Tellers(plan.units, plan.tables.known, file, given)
+
+
 def _measured(
     plan: Plan,
     content: Content,
     robot: Chain | None,
     t_ns: IntArray,
-    signs: Sequence[int],
-    offsets: Sequence[float],
+    options: ReadOptions,
 ) -> _Measured:
     """Return what was recorded in SI: the units of the joints first, since others rest on them."""
-    roles, file = content.roles, plan.tables.layouts[plan.main].file
+    roles, tellers = content.roles, _tellers(plan, options)
+    signs, _ = _corrections(options, len(roles.joints))
     q, qd, qdd, tcp, rotation = (content.values(group) for group in roles.groups)
-    refuse_empty(q if roles.joints else tcp, [c.header for c in roles.joints or roles.position], file)
-    q, qd, qdd = _corrected(q, signs, offsets), _corrected(qd, signs), _corrected(qdd, signs)
-    fitting = None if roles.measured else by_kinematics(robot, q, tcp)
-    finder = UnitFinder(plan.units, plan.tables.known, file, fitting)
-    units = (
-        finder.joints(roles.joints, q, None if content.clock is None else t_ns, robot) if roles.joints else []
-    )
+    refuse_empty(q if roles.joints else tcp, [c.header for c in roles.joints or roles.position], tellers.file)
+    raw = recorded(plan, content, options, robot)
+    q, qd, qdd = raw.q, _corrected(qd, signs), _corrected(qdd, signs)
+    finder = UnitFinder(tellers, by_kinematics(robot, raw))
+    clock = None if content.clock is None or content.still else t_ns
+    units = finder.joints(roles.joints, q, clock, robot) if roles.joints else []
     rates = finder.derivatives(roles.rates, units, 1)
     seconds = finder.derivatives(roles.accelerations, units, 2)
     q = _in_si(q, units)
@@ -161,20 +183,24 @@ def _measured(
     tcp = _in_si(tcp, lengths)
     told = finder.rotations(roles.rotation, roles.forms)
     arm = (robot, q) if robot and roles.joints else None
-    given = any(column.number in plan.units for column in roles.rotation)
+    given = options.rotation is not None
     measured = tcp if roles.measured else None
     turned = settle_rotation(roles.rotation, roles.forms, rotation, told, arm, given=given, measured=measured)
+    finder.tell_reach(roles.rotation, told, turned.units, "rotation", "the orientation is")
+    turning = [roles.rotation[k] for k in turned.order]
+    doubts = finder.doubts | {column.number: turned.doubt for column in turning if turned.doubt}
     return _Measured(
         groups=(
             _Group(roles.joints, q, units),
             _Group(roles.rates, _in_si(qd, rates), rates),
             _Group(roles.accelerations, _in_si(qdd, seconds), seconds),
             _Group(roles.position, tcp, lengths),
-            _Group(roles.rotation if turned.form else (), _in_si(rotation, turned.units), turned.units),
+            _Group(turning, _in_si(rotation[:, turned.order], turned.units), turned.units),
         ),
         form=turned.form,
         inferences=(*finder.inferences, *why, *turned.inferences),
         warnings=(*finder.warnings, *turned.warnings),
+        doubts=doubts,
         by_source=finder.by_source,
     )
 
@@ -187,7 +213,7 @@ def _lengths(
     if roles.measured and robot and roles.joints and not told:
         found = length_by_spread(robot, q, position)
         if found is not None:
-            return [found[0]] * 3, [unit_inference(roles.position, found[0].name, found[1])]
+            return [found[0]] * 3, [unit_inference(roles.position, found[0].name, found[1], every=False)]
     return (finder.positions(roles.position, position) if roles.position else []), ()
 
 
@@ -254,15 +280,17 @@ def _time_columns(plan: Plan) -> Iterator[LogColumn]:
 
 
 def _used_columns(
-    plan: Plan, groups: Sequence[_Group], signs: Sequence[int], offsets: Sequence[float]
+    plan: Plan, measured: _Measured, signs: Sequence[int], offsets: Sequence[float]
 ) -> Iterator[LogColumn]:
     """Yield the columns of each group with their units; signs and offsets are those of the joints."""
-    for role, group in zip(ROLES[1:], groups, strict=True):
+    for role, group in zip(ROLES[1:], measured.groups, strict=True):
         for i, (column, unit) in enumerate(zip(group.columns, group.units, strict=True)):
             sign = signs[i] if role in ("joint", "rate", "acceleration") else 1
             offset = offsets[i] if role == "joint" else 0.0
             header = _header(plan, column)
-            yield LogColumn(column.name, header, role, i, unit.name, unit.factor, sign, offset, column.number)
+            doubt = measured.doubts.get(column.number, "")
+            read = (unit.name, unit.factor, sign, offset)
+            yield LogColumn(column.name, header, role, i, *read, column.number, doubt)
 
 
 def _in_si(values: FloatArray, units: Sequence[Unit]) -> FloatArray:

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.files.tables import Table
 from urmpipe_models.files.toml_text import parse_toml, toml_lines, toml_text
+from urmpipe_models.messages import one_line
 from urmpipe_models.orientation import FORMS
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, Role
 from urmpipe_pipeline.outputs import MAP_HEADER
@@ -132,23 +133,27 @@ def map_of(
     lines = [MAP_HEADER, "", *toml_lines(top), "", "[clock]", *toml_lines(_clock(log, found))]
     lines += ["", *CORRECTIONS] if log.joints else []
     for column, name in zip(_of(log, "joint"), log.joints, strict=True):
-        said: dict[str, Any] = {"column": _called(log, column), "name": name, "unit": column.unit}
+        said: dict[str, Any] = {"column": _called(log, column), "name": name}
+        said |= {} if column.doubt else {"unit": column.unit}
         corrected = {"sign": column.sign, "offset": column.offset}
         said |= corrected if corrected != {"sign": 1, "offset": 0.0} else {}
         interval = intervals.get(name, intervals.get(""))
         said |= {"interval": list(interval)} if interval and column.unit in TURNING else {}
         lines += ["", "[[joints]]", *toml_lines(said)]
+        lines += [_assumed("unit", column.unit, column.doubt)] if column.doubt else []
     position, orientation = _of(log, "position"), _of(log, "rotation")
     if position:
         said = {"position": [_called(log, column) for column in position]}
         turned = {"orientation": [_called(log, column) for column in orientation], "form": log.rotation_form}
         said |= turned if orientation else {}
         lines += ["", "[tcp]", *toml_lines(said | ({"measured": True} if log.measured else {}))]
-    units = {_called(log, c): c.unit for c in (*position, *orientation) if c.unit != PURE.name}
+    measured = [column for column in (*position, *orientation) if column.unit != PURE.name]
+    units = {_called(log, column): column.unit for column in measured if not column.doubt}
     clock = {name for c in _of(log, "time") for name in (c.name, c.header, str(c.number)) if name}
     units |= {name: unit for name, unit in asked.get("unit", {}).items() if name in clock}
-    if units:
-        lines += ["", "[units]", *(f"{toml_text(one)} = {toml_text(unit)}" for one, unit in units.items())]
+    told = [f"{toml_text(one)} = {toml_text(unit)}" for one, unit in units.items()]
+    told += [_assumed(toml_text(_called(log, c)), c.unit, c.doubt) for c in measured if c.doubt]
+    lines += ["", "[units]", *told] if told else []
     return "\n".join(lines) + "\n"
 
 
@@ -207,19 +212,27 @@ def _called(log: JointLog, column: LogColumn) -> str:
     return column.header if column.header and len(twins) == 1 else str(column.number)
 
 
+def _assumed(key: str, unit: str, doubt: str) -> str:
+    """Return the comment that stands for a unit that is only assumed: read by a map it would be given."""
+    return f"# {key} = {toml_text(unit)}  # {one_line(doubt)}"
+
+
 def _clock(log: JointLog, found: Mapping[str, str]) -> dict[str, Any]:
     """Return what the table of the clock says; a stamp in halves and a file of times are found by themselves.
 
-    The unit is left out where the cells or the name of the column say it.
+    The unit is left out where the cells or the name of the column say it, and where it or the period is only
+    assumed: read by a map that would be given.
     """
+    assumed = any(one.assumption and one.role == "time" for one in log.warnings)
     columns = _of(log, "time")
     if not log.timed:
         labels = next((one.columns for one in log.inferences if one.what == "time column"), ())
         return {"column": labels[0] if len(labels) == 1 else None if labels else "none", "poses": True}
     if not columns:
-        return {"column": "none", "period": log.period or None}
+        return {"column": "none", "period": None if assumed else log.period or None}
     apart = any(one.kind == TIME_FILE for one in log.inferences)
     if len(columns) > 1 or apart:
         return {}
     named = vocabulary().unit(split_unit(columns[0].header)[1] or "") is not None
-    return {"column": _called(log, columns[0]), "unit": None if named else found.get("unit of the time")}
+    unit = None if named or assumed else found.get("unit of the time")
+    return {"column": _called(log, columns[0]), "unit": unit}

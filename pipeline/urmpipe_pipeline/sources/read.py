@@ -5,16 +5,60 @@ from __future__ import annotations
 import os.path
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
 from urmpipe_models.chains.chain import Chain
-from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources.assemble import assemble
-from urmpipe_pipeline.sources.content import read_content
+from urmpipe_pipeline.joint_log import JointLog, SourceFile
+from urmpipe_pipeline.sources.assemble import assemble, recorded
+from urmpipe_pipeline.sources.content import Content, read_content
 from urmpipe_pipeline.sources.options import ReadOptions
-from urmpipe_pipeline.sources.plan import make_plan
+from urmpipe_pipeline.sources.plan import Plan, make_plan
 from urmpipe_pipeline.sources.tables.opening import open_tables
 from urmpipe_pipeline.sources.tables.text import fingerprint
+from urmpipe_pipeline.sources.units.kinematic_units import Recorded
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reading:
+    """The numbers of a log as its files have them, before their units are known."""
+
+    plan: Plan
+    content: Content
+    options: ReadOptions
+    name: str
+    files: tuple[SourceFile, ...]
+
+    @property
+    def recorded(self) -> Recorded:
+        """Joints and recorded positions in the file's own units, which tell the arm."""
+        return recorded(self.plan, self.content, self.options)
+
+    def log(self, robot: Chain | None) -> JointLog:
+        """Return the log in SI, once: the numbers become those of the log.
+
+        Args:
+            robot: The arm: it tells which joints slide, and by its kinematics the units.
+
+        Raises:
+            LogError: If a column has no value, or its unit cannot be told.
+            OptionError: If an option does not fit the log.
+        """
+        return assemble(self.plan, self.content, self.options, robot, self.name, self.files)
+
+
+def read_numbers(
+    paths: Sequence[Path], options: ReadOptions | None = None, robot: Chain | None = None
+) -> Reading:
+    """Return the numbers of a log; arguments and errors are those of `read_log`."""
+    options = options or ReadOptions()
+    files = [Path(path) for path in paths]
+    tables = open_tables(files, options)
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        hashed = [beside.submit(fingerprint, file) for file in files]
+        plan = make_plan(tables, options, robot)
+        content = read_content(plan, skip_bad=options.skip_bad)
+        return Reading(plan, content, options, _name(files), tuple(future.result() for future in hashed))
 
 
 def read_log(
@@ -31,14 +75,7 @@ def read_log(
         LogError: With everything that is wrong with the files, each with its file, line and column.
         OptionError: If an option's value makes no sense.
     """
-    options = options or ReadOptions()
-    files = [Path(path) for path in paths]
-    tables = open_tables(files, options)
-    with ThreadPoolExecutor(max_workers=1) as beside:
-        hashed = [beside.submit(fingerprint, file) for file in files]
-        plan = make_plan(tables, options, robot)
-        content = read_content(plan, skip_bad=options.skip_bad)
-        return assemble(plan, content, options, robot, _name(files), [future.result() for future in hashed])
+    return read_numbers(paths, options, robot).log(robot)
 
 
 def _name(files: Sequence[Path]) -> str:

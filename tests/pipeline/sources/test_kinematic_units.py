@@ -72,8 +72,21 @@ def test_a_header_that_says_degrees_over_radians(read: Read) -> None:
     )
 
 
-def test_the_user_has_the_last_word(read: Read) -> None:
-    log = read(text([*joints(), "x [m]", "y [m]", "z [m]"], Q, FLANGE), UR5E, unit={"": "deg"})
+def test_a_unit_given_for_every_angle_does_not_reach_what_the_kinematics_give(read: Read) -> None:
+    table = text([*joints(), "x [m]", "y [m]", "z [m]"], Q, FLANGE)
+    log = read(table, UR5E, unit={"": "deg"})
+    np.testing.assert_allclose(log.q, Q, atol=PRINTED)
+    (warning,) = log.warnings
+    assert (warning.kind, warning.assumption) == ("unit-not-reached", "")
+    every = ", ".join(f'"q{k}": "deg"' for k in range(1, 7))
+    assert str(warning) == (
+        "q1, q2, q3, q4, q5, q6: deg does not reach them: the kinematics give rad; unit={" + every + "} does"
+    )
+
+
+def test_the_user_has_the_last_word_on_a_column(read: Read) -> None:
+    given = {f"q{k}": "deg" for k in range(1, 7)}
+    log = read(text([*joints(), "x [m]", "y [m]", "z [m]"], Q, FLANGE), UR5E, unit=given)
     np.testing.assert_allclose(log.q, np.radians(Q), atol=PRINTED)
     (warning,) = log.warnings
     assert warning.kind == "unit-contradiction"
@@ -92,12 +105,12 @@ def test_a_unit_that_the_data_contradict_is_asked_for(
     (said,) = wrong(table)
     assert re.fullmatch(
         rf"log\.csv: found q1, .*, q6 in {unit} by name or source, but \d+ steps? of about {turn} from one"
-        rf" row to the next, allowed: a unit that fits the data; unit=\"{other}\" or"
-        rf" unit=\"{unit}\" says which",
+        rf" row to the next, allowed: a unit that fits the data; unit={{\"q1\": \"{other}\", .*}} or"
+        rf" unit={{\"q1\": \"{unit}\", .*}} says which",
         said,
     )
-    assert set(read(table, unit={"": other}).units.values()) == {"s", other}
-    assert set(read(table, unit={"": unit}).units.values()) == {"s", unit}
+    for name in (other, unit):
+        assert set(read(table, unit=dict.fromkeys(joints(), name)).units.values()) == {"s", name}
 
 
 def test_a_static_log_cannot_tell_its_units_by_a_tool(read: Read) -> None:

@@ -122,7 +122,7 @@ def test_one_file_may_hold_all_plots(write: Write) -> None:
 
 
 def test_degrees_are_the_default_of_the_source(write: Write) -> None:
-    text = "Time;Angular Displacement1\n0,00;1,5\n0,01;1,6\n"
+    text = "Time;Angular Displacement1\n0,00;31,5\n0,01;31,6\n"
     log = read_log([write(text)])
     assert log.units["Angular Displacement1"] == "deg"
     assert not log.warnings

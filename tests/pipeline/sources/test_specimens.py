@@ -125,7 +125,7 @@ GOOD = [
     Good("mixed_units", unit=("mm", "rad", "deg", "deg", "deg", "deg"), joints=Q[:6]),
     Good("joint_names_any_order", joints=UR),
     Good("cad_path_mm", options=NO_TIME),
-    Good("cad_path_no_header", options={**NO_TIME, "source": "path"}),
+    Good("cad_path_no_header", options={**NO_TIME, "source": "path", "unit": {"1": "mm"}}),
     # clocks
     Good("clock_ms", joints=Q[:6]),
     Good("clock_us", joints=Q[:6]),

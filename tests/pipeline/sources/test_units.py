@@ -42,8 +42,9 @@ def evidence(log: JointLog, what: str) -> str:
     ],
 )  # fmt: skip
 def test_units_in_names(read: Read, name: str, unit: str) -> None:
-    log = read(f"t,{name}\n0,30\n0.1,31\n")
-    assert log.q[0, 0] == 30 * (DEG if unit == "deg" else 1.0)
+    value = 30 if unit == "deg" else 3
+    log = read(f"t,{name}\n0,{value}\n0.1,{value + 1}\n")
+    assert log.q[0, 0] == value * (DEG if unit == "deg" else 1.0)
     assert list(log.units.values()) == ["s", unit]
     assert not log.warnings
 
@@ -156,7 +157,12 @@ def test_speeds_that_no_joint_reaches_tell_degrees(read: Read) -> None:
     swinging = 40 * np.sin(2 * np.pi * 0.5 * np.arange(400) * 0.01)  # up to 126 a second
     log = read(csv_of(swinging[:, np.newaxis]))
     assert log.units["q1"] == "deg"
-    assert evidence(log, "unit of q1") == "as rad it would turn at 124 rad/s for a tenth of the time"
+    said = (
+        "no unit is given for q1: the joints are taken as deg: as rad it would turn at 124 rad/s for a tenth"
+    )
+    assert [(w.message, w.assumption) for w in log.warnings] == [
+        (f"{said} of the time", "the joints are in deg")
+    ]
 
 
 def test_the_robots_limits_tell_degrees(read: Read, arm: Arm, wrong: Wrong) -> None:
@@ -198,11 +204,37 @@ def test_a_joint_without_unit_is_like_the_others(read: Read) -> None:
     assert evidence(log, "unit of q2") == "as the other joint columns"
 
 
-def test_positions_in_mm(read: Read) -> None:
-    log = read("x,y,z\n350,-659,625\n351,-658,625\n")
+def test_positions_are_not_rescaled_because_they_look_too_far(read: Read) -> None:
+    table = "x,y,z\n350,-659,625\n351,-658,625\n"
+    log = read(table)
     assert log.tcp_position is not None
-    np.testing.assert_array_equal(log.tcp_position[0], np.array([350, -659, 625]) * 1e-3)
-    assert evidence(log, "unit of x, y, z") == "values up to 659 reach further than any arm in m"
+    np.testing.assert_array_equal(log.tcp_position[0], [350, -659, 625])
+    (warning,) = [one for one in log.warnings if one.role == "position"]
+    assert (warning.kind, warning.assumption, warning.asks) == (
+        "assumed-unit",
+        "the positions are in m",
+        True,
+    )
+    assert str(warning) == (
+        "no unit is given for x, y, z: the positions are taken as m, though values of 658 reach further than any"
+        ' arm; unit={"x": "mm", "y": "mm", "z": "mm"} or unit={"x": "m", "y": "m", "z": "m"} says which'
+    )
+    for hint, per_m in zip(warning.hints, (1e3, 1.0), strict=True):
+        told = read(table, unit=hint.value)
+        assert told.tcp_position is not None
+        np.testing.assert_allclose(told.tcp_position[0], np.array([350, -659, 625]) / per_m, rtol=1e-15)
+        assert not [one for one in told.warnings if one.role == "position"]
+
+
+def test_a_spike_among_positions_changes_no_unit(read: Read) -> None:
+    rows = "".join(f"{k / 100},0.1,0.2,{9000 if k == 50 else 0.3}\n" for k in range(300))
+    log = read(f"t,x,y,z\n{rows}")
+    assert log.tcp_position is not None
+    assert log.tcp_position[0].tolist() == [0.1, 0.2, 0.3]
+    assert [one.asks for one in log.warnings] == [False]
+
+
+def test_positions_in_mm_by_their_names(read: Read) -> None:
     log = read("t;X_Act[mm];Y_Act[mm];Z_Act[mm]\n0;1;2;3\n0,1;1;2;3\n")
     assert log.tcp_position is not None
     np.testing.assert_array_equal(log.tcp_position[0], np.array([1, 2, 3]) * 1e-3)
@@ -247,7 +279,7 @@ def test_recorded_rotation_vectors_follow_their_unit(read: Read, wrong: Wrong) -
     assert np.isnan(log.tcp_quat_xyzw[1, 0])
     assert [warning.kind for warning in log.warnings].count("missing") == 1
     said = wrong("timestamp,actual_q_0," + header.replace("{}", " [mm]") + "\n" + rows)
-    assert said == ["log.csv, column actual_TCP_pose_3 [mm]: found the unit mm, allowed: rad, deg"]
+    assert said == ["log.csv, column actual_TCP_pose_3 [mm]: found the unit mm (its name), allowed: rad, deg"]
 
 
 @pytest.mark.filterwarnings("error")
@@ -260,12 +292,30 @@ def test_huge_numbers_are_read_without_a_warning_of_numpy(read: Read, wrong: Wro
     ]
 
 
-def test_a_unit_given_for_all_joints_against_their_names_is_told(read: Read) -> None:
-    log = read("t,q1 [deg],q2 [deg],q3\n0,1,2,3\n0.1,1,2,3\n", unit={"": "rad"})
-    assert log.units == {"t": "s", "q1": "rad", "q2": "rad", "q3": "rad"}
-    assert [(warning.kind, warning.message) for warning in log.warnings] == [
-        ("unit-contradiction", "q1, q2: taken as rad (given as an option), though their names say deg")
+def test_a_unit_given_for_every_angle_does_not_reach_columns_whose_names_tell_another(read: Read) -> None:
+    table = "t,q1 [deg],q2 [deg],q3\n0,1,2,3\n0.1,1,2,3\n"
+    log = read(table, unit={"": "rad"})
+    assert log.units == {"t": "s", "q1": "deg", "q2": "deg", "q3": "rad"}
+    assert [(one.kind, str(one), one.assumption, one.role) for one in log.warnings] == [
+        (
+            "unit-not-reached",
+            'q1, q2: rad does not reach them: their names say deg; unit={"q1": "rad", "q2": "rad"} does',
+            "q1, q2 are in deg",
+            "joint",
+        )
     ]
+    told = read(table, unit={"": "rad", **log.warnings[0].hints[0].value})  # type: ignore[dict-item]
+    assert set(told.units.values()) == {"s", "rad"}
+    assert not told.warnings
+
+
+def test_a_unit_given_for_every_angle_reaches_what_the_source_tells_and_the_orientation(read: Read) -> None:
+    names = [*(f"actual_q_{k}" for k in range(6)), *(f"actual_TCP_pose_{k}" for k in range(6))]
+    rows = "".join(f"{k},{','.join(map(str, range(10 + k, 22 + k)))}\n" for k in range(2))
+    log = read(f"timestamp,{','.join(names)}\n{rows}", unit={"": "deg"})
+    assert log.source == "ur-rtde"
+    assert (log.units["actual_q_5"], log.units["actual_TCP_pose_5"]) == ("deg", "deg")
+    assert not log.warnings
 
 
 def test_numbers_name_columns_and_what_is_no_list_is_refused(read: Read) -> None:

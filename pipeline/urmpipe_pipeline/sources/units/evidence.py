@@ -7,7 +7,7 @@ p_recorded = p + R d, with the d that fits best.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Container, Hashable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -56,6 +56,10 @@ class Fit:
     with_tool: float
     tool: tuple[float, float, float]
 
+    def of(self, *, tool: bool) -> float:
+        """Return the distance in [m], with the tool that fits best or without."""
+        return self.with_tool if tool else self.distance
+
 
 def spread(rows: int) -> slice:
     """Return the rows that decide."""
@@ -71,9 +75,7 @@ def fit(robot: Chain, q: FloatArray, recorded: FloatArray) -> Fit | None:
     """
     known = np.isfinite(q).all(axis=1) & np.isfinite(recorded).all(axis=1) & recorded.any(axis=1)
     q, recorded = q[known], recorded[known]
-    if not len(q):
-        return None
-    return tool_fit(*poses_over_log(robot, q), recorded)
+    return tool_fit(*poses_over_log(robot, q), recorded) if len(q) else None
 
 
 def tool_fit(position: FloatArray, rotation: FloatArray, recorded: FloatArray) -> Fit:
@@ -93,17 +95,26 @@ def tool_fit(position: FloatArray, rotation: FloatArray, recorded: FloatArray) -
     return Fit(distance, _rms(miss - (rotation @ tool)[:, :, 0]), (x, y, z))
 
 
-def single_out(fits: Mapping[Key, Fit]) -> tuple[Key, bool] | None:
-    """Return the only explanation that agrees with the recorded points, and whether it needs a tool."""
+def single_out(fits: Mapping[Key, Fit], told: Container[Key] = ()) -> tuple[Key, bool] | None:
+    """Return the only explanation that agrees with the recorded points, and whether it needs a tool.
+
+    Of several that cannot be told apart it is the only one that is told already.
+    """
     for needs_tool, close in ((False, CLOSE), (True, CLOSE_WITH_TOOL)):
-        ranked = sorted(
-            (one.with_tool if needs_tool else one.distance, k) for k, one in enumerate(fits.values())
-        )
-        best, number = ranked[0]
-        second = ranked[1][0] if len(ranked) > 1 else np.inf
-        if best <= close and second >= CLEARLY * best and second >= best + APART:
-            return list(fits)[number], needs_tool
+        distances = {key: one.of(tool=needs_tool) for key, one in fits.items()}
+        best = min(distances.values())
+        if best > close:
+            continue
+        rivals = [key for key, distance in distances.items() if not clearly_worse(distance, best)]
+        chosen = [key for key in rivals if key in told] or rivals
+        if len(chosen) == 1:
+            return chosen[0], needs_tool
     return None
+
+
+def clearly_worse(distance: float, best: float) -> bool:
+    """Return whether an explanation at a distance in [m] is excluded by the best one."""
+    return distance >= CLEARLY * best and distance >= best + APART
 
 
 def _rms(vectors: FloatArray) -> float:

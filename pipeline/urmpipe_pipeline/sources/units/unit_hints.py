@@ -17,9 +17,20 @@ def unit_hints(columns: Sequence[Column], unit: str, does: str = "reads them oth
     return (Hint("unit", {column.called: unit for column in columns}, does),)
 
 
-def unit_inference(columns: Sequence[Column], unit: str, evidence: str) -> Inference:
-    """Return what is said of the unit of some columns, and why; with the other unit that it may be."""
+def which_unit(columns: Sequence[Column], unit: str, *, every: bool) -> tuple[Hint, ...]:
+    """Return the hints that give some columns the other unit or confirm theirs, as every angle's or each."""
+    given = [
+        {"": one} if every else {column.called: one for column in columns} for one in (OTHER_UNIT[unit], unit)
+    ]
+    return tuple(Hint("unit", one, "says which") for one in given)
+
+
+def unit_inference(columns: Sequence[Column], unit: str, evidence: str, *, every: bool) -> Inference:
+    """Return what is said of the unit of some columns, and why; with the other unit that it may be.
+
+    What is given for every angle reaches some columns, and others are given one by one, as the first is.
+    """
     names, other = tuple(column.name for column in columns), OTHER_UNIT.get(unit)
-    turning = len(columns) > 1 and unit in ("rad", "deg")
-    hints = (Hint("unit", {"" if turning else columns[0].called: other}),) if other else ()
+    every = every and len(columns) > 1 and unit in ("rad", "deg")
+    hints = (Hint("unit", {"" if every else columns[0].called: other}),) if other else ()
     return Inference(f"unit of {', '.join(names)}", unit, evidence, "unit", names, hints)

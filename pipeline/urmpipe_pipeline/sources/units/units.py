@@ -1,38 +1,78 @@
-"""Units of the columns: given, in the name, known of the source, told by the data, or assumed and said so.
+"""Units of the columns: told, by the data, by the kinematics, or assumed and said so.
 
-Where the log recorded its tool centre point the arm's kinematics decide, whatever the name says.
+A unit that a name or the source tells is evidence, no proof. Where the log recorded its tool centre point the
+arm's kinematics decide. Else values that can only be in the other unit are asked for, and those that may be
+in either are doubted: a verdict that rests on them says so.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain, JointKind
-from urmpipe_models.errors import Finding, LogError, OptionError, shown
+from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import RotationForm, angles
 from urmpipe_pipeline.joint_log import Inference, LogWarning, Role
 from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.units.doubts import assumed, contradiction, doubt, not_reached
 from urmpipe_pipeline.sources.units.kinematic_units import KinematicUnits
-from urmpipe_pipeline.sources.units.unit_evidence import Bounds, degrees_evidence, peak, radians_evidence
-from urmpipe_pipeline.sources.units.unit_hints import OTHER_UNIT, unit_hints, unit_inference
-from urmpipe_pipeline.sources.vocabulary import KnownSource, Quantity, Unit, vocabulary
-
-GIVEN = "given as an option"
-
-JOINTS = "prismatic joints"
-"""Columns whose units do not follow from each other's."""
-
-POSITIONS = "positions"
+from urmpipe_pipeline.sources.units.told import GIVEN, Tellers, Told
+from urmpipe_pipeline.sources.units.unit_evidence import (
+    Bounds,
+    degrees_proof,
+    peak,
+    radians_proof,
+    too_fast,
+    usual_peak,
+)
+from urmpipe_pipeline.sources.units.unit_hints import OTHER_UNIT, unit_hints, unit_inference, which_unit
+from urmpipe_pipeline.sources.vocabulary import Quantity, Unit, vocabulary
 
 MOST_TURNS = 4
 """A joint value of more turns than this is not taken as rad without being told."""
 
 LONGEST_REACH = 10.0
-"""A coordinate above this in [m] is in mm: no arm reaches so far."""
+"""A coordinate above this in [m] is hardly one: no arm reaches so far."""
+
+POSITIONS = "positions"
+
+_ALLOWED: dict[JointKind | None, tuple[Quantity, ...]] = {
+    "revolute": ("angle",),
+    "prismatic": ("length",),
+    None: ("angle", "length"),
+}
+"""What a joint may be in, the likely quantity first."""
+
+
+def told_joints(tellers: Tellers, columns: Sequence[Column], robot: Chain | None) -> list[Told | None]:
+    """Return the units that are told of the joint columns.
+
+    Raises:
+        LogError: If a unit is not known, or does not fit the robot.
+        OptionError: If one that the user gave does not.
+    """
+    kinds = [robot.moving[j].kind if robot else None for j in range(len(columns))]
+    return [tellers.of(column, _ALLOWED[kind]) for column, kind in zip(columns, kinds, strict=True)]
+
+
+def told_lengths(tellers: Tellers, columns: Sequence[Column]) -> list[Told | None]:
+    """Return the units that are told of recorded x, y, z; raises as `told_joints` does."""
+    return [tellers.of(column, ("length",)) for column in columns]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Judged:
+    """Joints whose unit, rad or deg, is held against their values in it, shape (n, joints)."""
+
+    columns: Sequence[Column]
+    unit: str
+    values: FloatArray
+    t_ns: IntArray | None
+    bounds: Bounds
 
 
 @dataclass(slots=True)
@@ -40,32 +80,27 @@ class UnitFinder:
     """Finds the units of the columns of one log, and keeps what was found out.
 
     Attributes:
-        given: Units given by the user, by the column's number; by 0 that of all joints that turn.
-        source: The source, if it is known.
-        file: The file, for errors.
+        tellers: Who tells units.
         kinematic: The units that the kinematics single out, if they do.
+        warnings: What was assumed or is doubted, and what contradicts the kinematics or the user.
+        doubts: Why a column's unit is only assumed, by its number.
         by_source: Whether the source told a unit.
     """
 
-    given: Mapping[int, Unit]
-    source: KnownSource | None
-    file: str
+    tellers: Tellers
     kinematic: KinematicUnits | None = None
-    _assumed: list[LogWarning] = field(default_factory=list)
-    _doubted: dict[tuple[Unit, Unit, str], list[Column]] = field(default_factory=dict)
-    _overruled: dict[Unit, list[Column]] = field(default_factory=dict)
-    _noted: dict[tuple[str, str], list[Column]] = field(default_factory=dict)
+    warnings: list[LogWarning] = field(default_factory=list)
+    doubts: dict[int, str] = field(default_factory=dict)
     by_source: bool = False
+    _noted: dict[tuple[str, str, bool], list[Column]] = field(default_factory=dict)
 
     @property
     def inferences(self) -> list[Inference]:
         """What was found out, columns of one unit and evidence together."""
-        return [unit_inference(columns, unit, evidence) for (unit, evidence), columns in self._noted.items()]
-
-    @property
-    def warnings(self) -> list[LogWarning]:
-        """What was assumed, and what contradicts the kinematics or the names of the columns."""
-        return [*self._assumed, *self._contradictions(), *self._against_names()]
+        return [
+            unit_inference(columns, unit, evidence, every=every)
+            for (unit, evidence, every), columns in self._noted.items()
+        ]
 
     def joints(
         self, columns: Sequence[Column], values: FloatArray, t_ns: IntArray | None, robot: Chain | None
@@ -77,161 +112,150 @@ class UnitFinder:
 
         Raises:
             LogError: If a unit is not known, does not fit the robot, or cannot be told.
+            OptionError: If one that the user gave does not fit the robot.
         """
-        kinds: list[JointKind | None] = [j.kind for j in robot.moving] if robot else [None] * len(columns)
-        found = told_units = [self._told(column, kind) for column, kind in zip(columns, kinds, strict=True)]
-        unknown = [j for j, unit in enumerate(found) if unit is None]
-        slides = [j for j in unknown if kinds[j] == "prismatic"]
-        turns = [j for j in unknown if kinds[j] != "prismatic"]
-        if slides:
-            self._assume("m", JOINTS, [columns[j] for j in slides])
-        if turns:
-            told = {unit for unit in found if unit is not None and unit.quantity == "angle"}
-            bounds = Bounds.of(robot, turns)
-            turning = values if len(turns) == len(columns) else values[:, turns]
-            unit = self._angle([columns[j] for j in turns], turning, t_ns, bounds, told)
-            found = [unit if j in turns else other for j, other in enumerate(found)]
-        if self.kinematic is None:
-            self._refuse_contradictions(columns, told_units, values, t_ns, robot)
-        metre = vocabulary().units["m"]
-        return [metre if unit is None else unit for unit in found]
+        told = told_joints(self.tellers, columns, robot)
+        if self.kinematic is not None:
+            units = self._by_kinematics(columns, told, "angle")
+            proved = self.kinematic.proved
+        else:
+            units = self._joints_by_themselves(columns, told, values, t_ns, robot)
+            proved = (False,) * len(columns)
+        for name in ("rad", "deg"):
+            group = [j for j, one in enumerate(told) if one and not one.given and units[j].name == name]
+            unproved = [j for j in group if not proved[j]]
+            if unproved:
+                mine = values if len(unproved) == len(columns) else values[:, unproved]
+                judged = _Judged([columns[j] for j in unproved], name, mine, t_ns, Bounds.of(robot, unproved))
+                by = {one for j in unproved if (one := told[j])}
+                self._refuse_contradiction(judged, by)
+                if len(unproved) == len(group) and 0 not in self.tellers.given:
+                    self._doubt(judged, by, "the joints are" if len(group) == len(columns) else "")
+        self.tell_reach(columns, told, units, "joint", "the joints are")
+        return units
 
     def derivatives(self, columns: Sequence[Column], joints: Sequence[Unit], order: int) -> list[Unit]:
         """Return the units of recorded rates (order 1) or accelerations (2): unsaid, the joints' own."""
         units = []
         for column, joint in zip(columns, joints, strict=False):
-            own = self._own(column)
+            own = self.tellers.own(column)
             unit = own if own is not None and own.quantity == joint.quantity else joint
             units.append(unit if unit.order else unit.per_second(order))
         return units
 
     def positions(self, columns: Sequence[Column], values: FloatArray) -> list[Unit]:
-        """Return the units of recorded x, y, z; their values are in the file's own units, shape (n, 3)."""
-        found = [self._told(column, "prismatic") for column in columns]
-        told = [unit for unit in found if unit is not None]
-        unsaid = [k for k, unit in enumerate(found) if unit is None]
-        if not unsaid:
-            return told
-        rest = self._length([columns[k] for k in unsaid], values[:, unsaid], set(told))
-        return [rest if unit is None else unit for unit in found]
+        """Return the units of recorded x, y, z: told, by the kinematics, or m, and said so.
 
-    def rotations(self, columns: Sequence[Column], forms: Sequence[RotationForm]) -> list[Unit | None]:
-        """Return the units that the columns of a recorded orientation tell, None where they do not.
+        They are never rescaled because they look too far for an arm. Values are in the file's own units,
+        shape (n, 3).
+        """
+        told = told_lengths(self.tellers, columns)
+        if self.kinematic is not None:
+            return self._by_kinematics(columns, told, "length")
+        known, unsaid = self._told_units(columns, told), [k for k, one in enumerate(told) if one is None]
+        if not unsaid:
+            return [unit for unit in known if unit is not None]
+        rest = self._like_others([columns[k] for k in unsaid], known, "position")
+        if rest is None:
+            rest = vocabulary().units["m"]
+            furthest = usual_peak(values[:, unsaid])
+            far = furthest > LONGEST_REACH
+            why = f", though values of {furthest:.6g} reach further than any arm" if far else ""
+            hints = which_unit(columns, "m", every=False) if far else unit_hints(columns[:1], OTHER_UNIT["m"])
+            self._assume([columns[k] for k in unsaid], rest, POSITIONS, hints, why, asks=far)
+        return [unit or rest for unit in known]
+
+    def rotations(self, columns: Sequence[Column], forms: Sequence[RotationForm]) -> list[Told | None]:
+        """Return the units that are told of the columns of a recorded orientation, None where none is.
 
         Raises:
             LogError: If a unit is not known or is none of an angle.
+            OptionError: If one that the user gave is none.
         """
-        if not any(map(angles, forms)):
-            return [None] * len(columns)
-        default = self.source.units.get("angle") if self.source else None
-        units: list[Unit | None] = []
-        for column in columns:
-            own = self._own(column) or default
-            if own is not None and (own.quantity != "angle" or own.order):
-                names = ", ".join(vocabulary().spelled("angle"))
-                message = f"found the unit {own.name}, allowed: {names}"
-                raise LogError(Finding(message, self.file, column=column.header))
-            units.append(own)
-        return units
+        turned = any(map(angles, forms))
+        return [self.tellers.of(column) if turned else None for column in columns]
 
-    def _told(self, column: Column, kind: JointKind | None) -> Unit | None:
-        """Return the unit that the user, the column's name or the source tells."""
-        allowed: tuple[Quantity, ...] = ("length",) if kind == "prismatic" else ("angle",)
-        allowed = ("angle", "length") if kind is None else allowed
-        unit, evidence = self._first_told(column, kind)
-        if unit is None:
-            return None
-        if unit.quantity not in allowed or unit.order:
-            names = ", ".join(name for quantity in allowed for name in vocabulary().spelled(quantity))
-            message = f"found the unit {unit.name} ({evidence}), allowed: {names}"
-            if column.number in self.given:
-                raise OptionError(Finding(message, column=column.name, parameter="unit"))
-            raise LogError(Finding(message, self.file, column=column.header))
-        return self._held_against_kinematics(column, unit, evidence)
+    def _told_units(self, columns: Sequence[Column], told: Sequence[Told | None]) -> list[Unit | None]:
+        """Return the units that are told, having noted them."""
+        for column, one in zip(columns, told, strict=True):
+            if one is not None:
+                self._note([column], one.unit, one.evidence, every=one.by == "every angle" or one.by_source)
+                self.by_source |= one.by_source
+        return [one.unit if one else None for one in told]
 
-    def _held_against_kinematics(self, column: Column, unit: Unit, evidence: str) -> Unit:
-        """Return the unit that is told, or the one that the kinematics single out if the user gave none."""
-        better = self.kinematic.of(unit.quantity) if self.kinematic else unit
-        if self.kinematic is None or better == unit:
-            self._note([column], unit.name, evidence)
-            return unit
-        by_how_much = self.kinematic.evidence(unit.quantity, unit)
-        self._doubted.setdefault((unit, better, evidence), []).append(column)
-        given = evidence == GIVEN
-        self._note([column], unit.name if given else better.name, evidence if given else by_how_much)
-        return unit if given else better
-
-    def _contradictions(self) -> Iterator[LogWarning]:
-        """Yield what the kinematics say against the units that were told."""
-        for (unit, better, evidence), columns in self._doubted.items():
-            names = ", ".join(column.name for column in columns)
-            told = f"{names}: {unit.name} ({evidence}) contradicts the kinematics: taken as"
-            by_how_much = self.kinematic.evidence(unit.quantity, unit) if self.kinematic else ""
-            if evidence == GIVEN:
-                said = f"{told} {unit.name}, though as {better.name} it would fit: {by_how_much}"
-                yield LogWarning("unit-contradiction", said)
-            else:
-                hints = unit_hints(columns, unit.name)
-                yield LogWarning("unit-contradiction", f"{told} {better.name}: {by_how_much}", hints=hints)
-
-    def _against_names(self) -> Iterator[LogWarning]:
-        """Yield the columns whose names tell another unit than the one given for all joints."""
-        for unit, columns in self._overruled.items():
-            names = ", ".join(column.name for column in columns)
-            said = f"{names}: taken as {self.given[0].name} ({GIVEN}), though their names say {unit.name}"
-            yield LogWarning("unit-contradiction", said)
-
-    def _first_told(self, column: Column, kind: JointKind | None) -> tuple[Unit | None, str]:
-        if column.number in self.given:
-            return self.given[column.number], GIVEN
-        if 0 in self.given and kind != "prismatic":
-            if column.unit and column.unit.quantity == "angle" and column.unit != self.given[0]:
-                self._overruled.setdefault(column.unit, []).append(column)
-            return self.given[0], GIVEN
-        own = self._own(column, "mm" if kind == "prismatic" else "deg")
-        if own is not None and own.quantity != "time":
-            return own, "its name"
-        default = (self.source.units if self.source else {}).get("length" if kind == "prismatic" else "angle")
-        if self.source is None or default is None:
-            return None, ""
-        self.by_source = True
-        return default, f"{self.source.name} writes {default.name}"
-
-    def _own(self, column: Column, likely: str = "deg") -> Unit | None:
-        """Return the unit that the user or the name gives this very column; raise if it is not known."""
-        if column.number in self.given:
-            return self.given[column.number]
-        if column.unit_text and column.unit is None:
-            message = f"found the unit {shown(column.unit_text)}, allowed: rad, deg, m, mm, cm"
-            hints = unit_hints([column], likely, "says which")
-            raise LogError(Finding(message, self.file, column=column.header, hints=hints))
-        return column.unit
-
-    def _settled(
-        self, columns: Sequence[Column], quantity: Quantity, told: set[Unit], others: str
+    def _like_others(
+        self, columns: Sequence[Column], known: Sequence[Unit | None], what: str, of: str = "length"
     ) -> Unit | None:
-        """Return the unit that the other columns agree on, or that the kinematics single out; else None."""
-        if len(told) == 1:
-            (unit,) = told
-            self._note(columns, unit.name, others)
-            return unit
-        if self.kinematic is None:
+        """Return the unit that the other columns agree on; None if they do not."""
+        others = {unit for unit in known if unit is not None and unit.quantity == of}
+        if len(others) != 1:
             return None
-        unit = self.kinematic.of(quantity)
-        self._note(columns, unit.name, self.kinematic.evidence(quantity))
+        (unit,) = others
+        self._note(columns, unit, f"as the other {what} columns")
         return unit
 
-    def _length(self, columns: Sequence[Column], values: FloatArray, told: set[Unit]) -> Unit:
-        """Return the unit of positions that say none: the others', mm if m cannot be, or m."""
-        settled = self._settled(columns, "length", told, "as the other position columns")
-        if settled is not None:
-            return settled
-        furthest = peak(values)
-        if furthest > LONGEST_REACH:
-            self._note(columns, "mm", f"values up to {furthest:.6g} reach further than any arm in m")
-            return vocabulary().units["mm"]
-        self._assume("m", POSITIONS, columns)
-        return vocabulary().units["m"]
+    def _by_kinematics(
+        self, columns: Sequence[Column], told: Sequence[Told | None], quantity: Quantity
+    ) -> list[Unit]:
+        """Return the units that the kinematics single out, but those that the user gave a column."""
+        assert self.kinematic is not None
+        units, overruled = list(self.kinematic.of(quantity)), dict[Told, list[int]]()
+        unsaid = [j for j, one in enumerate(told) if one is None]
+        if unsaid:
+            evidence = self.kinematic.evidence(quantity)
+            for j in unsaid:
+                self._note([columns[j]], units[j], evidence)
+        for j, one in enumerate(told):
+            if one is not None and one.unit == units[j]:
+                self._told_units([columns[j]], [one])
+            elif one is not None:
+                overruled.setdefault(one, []).append(j)
+        for one, places in overruled.items():
+            others = [one.unit if j in places else None for j in range(len(columns))]
+            by_how_much = self.kinematic.evidence(quantity, others)
+            self._overrule([columns[j] for j in places], one, units[places[0]], by_how_much)
+            if one.by == "column":
+                units = [one.unit if j in places else unit for j, unit in enumerate(units)]
+        return units
+
+    def _overrule(self, columns: Sequence[Column], told: Told, better: Unit, by_how_much: str) -> None:
+        """Note and say that the kinematics contradict what is told of some columns."""
+        if told.by == "every angle":  # as `tell_reach` says
+            self._note(columns, better, by_how_much)
+            return
+        names = ", ".join(column.name for column in columns)
+        contradicted = f"{names}: {told.unit.name} ({told.evidence}) contradicts the kinematics: taken as"
+        if told.by == "column":
+            self._note(columns, told.unit, GIVEN)
+            said = f"{contradicted} {told.unit.name}, though as {better.name} it would fit: {by_how_much}"
+            self.warnings.append(LogWarning("unit-contradiction", said))
+            return
+        self._note(columns, better, by_how_much)
+        said, hints = f"{contradicted} {better.name}: {by_how_much}", unit_hints(columns, told.unit.name)
+        self.warnings.append(LogWarning("unit-contradiction", said, hints=hints))
+
+    def _joints_by_themselves(
+        self,
+        columns: Sequence[Column],
+        told: Sequence[Told | None],
+        values: FloatArray,
+        t_ns: IntArray | None,
+        robot: Chain | None,
+    ) -> list[Unit]:
+        """Return the units of joints without the kinematics: those that are told, and of the others."""
+        known = self._told_units(columns, told)
+        unknown = [j for j, one in enumerate(told) if one is None]
+        slides = [j for j in unknown if robot and robot.moving[j].kind == "prismatic"]
+        turns = [j for j in unknown if j not in slides]
+        metre = vocabulary().units["m"]
+        if slides:
+            some = [columns[j] for j in slides]
+            self._assume(some, metre, "prismatic joints", unit_hints(some, OTHER_UNIT["m"]))
+        if turns:
+            turning = values if len(turns) == len(columns) else values[:, turns]
+            unit = self._angle([columns[j] for j in turns], turning, t_ns, Bounds.of(robot, turns), known)
+            known = [unit if j in turns else other for j, other in enumerate(known)]
+        return [unit or metre for unit in known]
 
     def _angle(
         self,
@@ -239,61 +263,110 @@ class UnitFinder:
         values: FloatArray,
         t_ns: IntArray | None,
         bounds: Bounds,
-        told: set[Unit],
+        known: Sequence[Unit | None],
     ) -> Unit:
         """Return the unit of joints that turn and say none: the others', what the data tell, or rad."""
-        names = ", ".join(column.name for column in columns)
-        settled = self._settled(columns, "angle", told, "as the other joint columns")
+        settled = self._like_others(columns, known, "joint", of="angle")
         if settled is not None:
             return settled
-        evidence = degrees_evidence(values, t_ns, bounds)
-        if evidence:
-            self._note(columns, "deg", evidence)
-            return vocabulary().units["deg"]
-        largest = peak(values)
-        if largest > MOST_TURNS * math.tau:
+        rad, deg = (vocabulary().units[name] for name in ("rad", "deg"))
+        for unit, proof in ((deg, degrees_proof(values, bounds)), (rad, radians_proof(values))):
+            if proof:
+                self._note(columns, unit, proof, every=True)
+                return unit
+        names = ", ".join(column.name for column in columns)
+        largest, fast = peak(values), too_fast(values, t_ns, bounds)
+        if not fast and largest > MOST_TURNS * math.tau:
             message = f"found values up to {largest:.6g} in {names} and no unit, allowed: rad or deg"
             unnamed = len(columns) == 3 and all(column.header.isdigit() for column in columns)
             hints = [Hint("unit", {"": name}, "says which") for name in ("rad", "deg")]
             hints += [Hint("source", "path", "reads them as x, y, z")] if unnamed else []
-            raise LogError(Finding(message, self.file, hints=tuple(hints)))
-        self._assume("rad", "joints", columns)
-        return vocabulary().units["rad"]
+            raise LogError(Finding(message, self.tellers.file, hints=tuple(hints)))
+        unit = deg if fast else rad
+        hints = [Hint("unit", {"": OTHER_UNIT[unit.name]}, "reads them otherwise")]
+        self._assume(columns, unit, "joints", hints, f": {fast}" if fast else "")
+        return unit
 
-    def _refuse_contradictions(
+    def _refuse_contradiction(self, judged: _Judged, by: Collection[Told]) -> None:
+        """Raise a `LogError` if the data contradict what names or source tell of joints that turn."""
+        found = contradiction(judged.unit, judged.values, judged.t_ns, judged.bounds)
+        if found is None:
+            return
+        why, places = found
+        columns, every = [judged.columns[j] for j in places], all(one.by_source for one in by)
+        names = ", ".join(column.name for column in columns)
+        said = f"found {names} in {judged.unit} by name or source, but {why}"
+        hints = which_unit(columns, judged.unit, every=every)
+        allowed = "a unit that fits the data"
+        raise LogError(Finding(f"{said}, allowed: {allowed}", self.tellers.file, hints=hints))
+
+    def _doubt(self, judged: _Judged, by: Collection[Told], whole: str) -> None:
+        """Say so where what names or source tell of joints that turn may as well be the other unit."""
+        why = doubt(judged.unit, judged.values, judged.t_ns, judged.bounds)
+        if why is None:
+            return
+        evidence = " and ".join(sorted(one.evidence for one in by))
+        names = ", ".join(column.name for column in judged.columns)
+        said = f"{names}: {judged.unit} ({evidence}) is doubted: {why}"
+        hints = which_unit(judged.columns, judged.unit, every=all(one.by_source for one in by))
+        taken = assumed(judged.columns, judged.unit, whole)
+        self._warn(
+            judged.columns, LogWarning("doubted-unit", said, hints=hints, assumption=taken, role="joint")
+        )
+
+    def tell_reach(
         self,
         columns: Sequence[Column],
-        units: Sequence[Unit | None],
-        values: FloatArray,
-        t_ns: IntArray | None,
-        robot: Chain | None,
+        told: Sequence[Told | None],
+        units: Sequence[Unit],
+        role: Role,
+        whole: str,
     ) -> None:
-        """Raise a `LogError` if the data contradict what names or source tell of joints that turn."""
-        for name, other in (("rad", "deg"), ("deg", "rad")):
-            which = [j for j, unit in enumerate(units) if unit and unit.name == name]
-            which = [j for j in which if not {0, columns[j].number} & set(self.given)]
-            if not which:
-                continue
-            bounds = Bounds.of(robot, which)
-            doubted = values if len(which) == len(columns) else values[:, which]
-            evidence = degrees_evidence(doubted, t_ns, bounds) if name == "rad" else radians_evidence(doubted)
-            if evidence:
-                names = ", ".join(columns[j].name for j in which)
-                said = f"found {names} in {name} by name or source, but {evidence}"
-                hints = tuple(Hint("unit", {"": one}, "says which") for one in (other, name))
-                raise LogError(Finding(f"{said}, allowed: a unit that fits the data", self.file, hints=hints))
+        """Name the angles that have another unit than the user gave for every angle.
 
-    def _note(self, columns: Sequence[Column], unit: str, evidence: str) -> None:
-        self._noted.setdefault((unit, evidence), []).extend(columns)
+        Args:
+            columns: The columns.
+            told: What is told of each.
+            units: What they are taken as.
+            role: What they hold.
+            whole: What they are together: "the joints are".
+        """
+        every, groups = self.tellers.given.get(0), dict[tuple[Unit, bool], list[Column]]()
+        if every is None:
+            return
+        for column, one, unit in zip(columns, told, units, strict=True):
+            if one and one.by != "column" and unit.quantity == "angle" and unit != every:
+                groups.setdefault((unit, one.unit == unit), []).append(column)
+        for (unit, named), some in groups.items():
+            together = whole if len(some) == len(columns) else ""
+            said = not_reached(some, every.name, unit.name, named=named, role=role, whole=together)
+            self._warn(some, said)
 
-    def _assume(self, unit: str, what: str, columns: Sequence[Column]) -> None:
+    def _warn(self, columns: Sequence[Column], said: LogWarning) -> None:
+        """Keep a warning; of columns whose unit it only assumes with what it says."""
+        self.warnings.append(said)
+        if said.assumption:
+            self.doubts |= {column.number: said.message for column in columns}
+
+    def _note(self, columns: Sequence[Column], unit: Unit, evidence: str, *, every: bool = False) -> None:
+        """Note the unit of some columns, and whether what is given for every angle would reach them."""
+        self._noted.setdefault((unit.name, evidence, every), []).extend(columns)
+
+    def _assume(
+        self,
+        columns: Sequence[Column],
+        unit: Unit,
+        what: str,
+        hints: Sequence[Hint],
+        why: str = "",
+        *,
+        asks: bool = False,
+    ) -> None:
+        """Say that some columns are taken to be in a unit that nothing tells."""
+        self._note(columns, unit, "assumed", every=unit.quantity == "angle")
         names = ", ".join(column.name for column in columns)
-        self._note(columns, unit, "assumed")
-        said = f"no unit is given for {names}: the {what} are taken as {unit}"
-        other, does = OTHER_UNIT[unit], "reads them otherwise"
-        turning = (Hint("unit", {"": other}, does),)  # of all joints that turn
-        some = columns if what == JOINTS else columns[:1]
-        hints = turning if unit == "rad" else unit_hints(some, other, does)
+        said = f"no unit is given for {names}: the {what} are taken as {unit.name}{why}"
         role: Role = "position" if what == POSITIONS else "joint"
-        taken = f"the {what} are in {unit}"
-        self._assumed.append(LogWarning("assumed-unit", said, hints=hints, assumption=taken, role=role))
+        taken = f"the {what} are in {unit.name}"
+        doubted = LogWarning("assumed-unit", said, hints=tuple(hints), assumption=taken, role=role, asks=asks)
+        self._warn(columns, doubted)
