@@ -90,7 +90,6 @@ def test_the_specimens_provoke_hints_of_many_kinds() -> None:
         "base",
         "joints",
         "repair",
-        "rotation",
         "source",
         "time",
         "tsp",

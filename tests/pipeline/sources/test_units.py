@@ -161,7 +161,7 @@ def test_speeds_that_no_joint_reaches_tell_degrees(read: Read) -> None:
         "no unit is given for q1: the joints are taken as deg: as rad it would turn at 124 rad/s for a tenth"
     )
     assert [(w.message, w.assumption) for w in log.warnings] == [
-        (f"{said} of the time", "the joints are in deg")
+        (f"no unit is given for q1: {said}", "the joints are in deg")
     ]
 
 
@@ -216,8 +216,8 @@ def test_positions_are_not_rescaled_because_they_look_too_far(read: Read) -> Non
         True,
     )
     assert str(warning) == (
-        "no unit is given for x, y, z: the positions are taken as m, though values of 658 reach further than any"
-        ' arm; unit={"x": "mm", "y": "mm", "z": "mm"} or unit={"x": "m", "y": "m", "z": "m"} says which'
+        "no unit is given for x, y, z: the positions are taken as m, though values of 658 reach further than"
+        ' any arm; unit={"x": "mm", "y": "mm", "z": "mm"} or unit={"x": "m", "y": "m", "z": "m"} says which'
     )
     for hint, per_m in zip(warning.hints, (1e3, 1.0), strict=True):
         told = read(table, unit=hint.value)
@@ -258,9 +258,9 @@ def test_digits_of_a_coarse_format(read: Read) -> None:
 
 
 def test_a_position_without_unit_is_like_the_others(read: Read) -> None:
-    log = read("t,x [mm],y,z\n0,1,2,3\n0.1,4,5,6\n")
+    log = read("t,x [mm],y,z\n0,100,200,300\n0.1,400,500,600\n")
     assert log.tcp_position is not None
-    np.testing.assert_allclose(log.tcp_position, [[1e-3, 2e-3, 3e-3], [4e-3, 5e-3, 6e-3]], rtol=1e-15)
+    np.testing.assert_allclose(log.tcp_position, [[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]], rtol=1e-15)
     assert not log.warnings
 
 
@@ -311,7 +311,9 @@ def test_a_unit_given_for_every_angle_does_not_reach_columns_whose_names_tell_an
 
 def test_a_unit_given_for_every_angle_reaches_what_the_source_tells_and_the_orientation(read: Read) -> None:
     names = [*(f"actual_q_{k}" for k in range(6)), *(f"actual_TCP_pose_{k}" for k in range(6))]
-    rows = "".join(f"{k},{','.join(map(str, range(10 + k, 22 + k)))}\n" for k in range(2))
+    rows = "".join(
+        f"{k},{','.join(map(str, (*range(20, 26), 0.1, 0.2, 0.3, 50, 60, 70)))}\n" for k in range(2)
+    )
     log = read(f"timestamp,{','.join(names)}\n{rows}", unit={"": "deg"})
     assert log.source == "ur-rtde"
     assert (log.units["actual_q_5"], log.units["actual_TCP_pose_5"]) == ("deg", "deg")

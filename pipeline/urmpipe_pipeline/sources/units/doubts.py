@@ -27,7 +27,8 @@ def contradiction(
 ) -> tuple[str, list[int]] | None:
     """Return why joint values are hardly in a unit, and which columns that is about; None if they may be.
 
-    It is about all columns but those that can only be in that unit.
+    It is about all columns but those that can only be in that unit. A speed alone excludes no values of less
+    than two turns: there it is the clock that may be wrong.
 
     Args:
         unit: rad or deg.
@@ -36,7 +37,8 @@ def contradiction(
         bounds: What the joints can do.
     """
     if unit == "rad":
-        if why := degrees_proof(values, bounds) or too_fast(values, t_ns, bounds):
+        far = usual_peak(values) > TWO_TURNS
+        if why := degrees_proof(values, bounds) or (far and too_fast(values, t_ns, bounds)):
             return why, [j for j, one in enumerate(values.T) if not radians_proof(one[:, np.newaxis])]
     elif why := radians_proof(values):
         return why, [j for j, one in enumerate(values.T) if peak(one) <= TWO_TURNS]

@@ -214,7 +214,11 @@ def _settled_by_kinematics(columns: Sequence[Column], told: Sequence[Choice], fo
     if best in told:
         return _settled(columns, best, found.evidence)
     if best.by_columns:
-        was, now, hints = "matrix by rows", "by columns", (Hint("rotation", "matrix", "reads it by rows"),)
+        was, now, hints = (
+            "matrix by rows",
+            "matrix by columns",
+            (Hint("rotation", "matrix", "reads it by rows"),),
+        )
     elif any(one.form == best.form for one in told):
         was, now = first.units[0].name, best.units[0].name
         hints = unit_hints(columns, was)

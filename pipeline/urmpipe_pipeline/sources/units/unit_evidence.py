@@ -67,26 +67,28 @@ class Bounds:
 
     def keeps(self, values: FloatArray) -> bool:
         """Return whether every joint has limits and usually keeps them: in [rad], shape (n, joints)."""
-        return bool(np.isfinite(self.reach).all()) and not self.excludes(values)
+        limited = bool(np.isfinite(self.reach).all())
+        return limited and bool((_usual_size(values) <= ROUNDED * np.asarray(self.reach)).all())
 
     def excludes(self, values: FloatArray) -> bool:
-        """Return whether a joint usually leaves its limits: in [rad], shape (n, joints)."""
-        return bool((_usual_size(values) > ROUNDED * np.asarray(self.reach)).any())
+        """Return whether a joint usually is at twice its limits or more: in [rad], shape (n, joints)."""
+        return bool((_usual_size(values) >= 2 * np.asarray(self.reach)).any())
 
 
 @np.errstate(over="ignore", invalid="ignore")  # huge numbers: their steps are infinite
 def degrees_proof(values: FloatArray, bounds: Bounds | None = None) -> str | None:
     """Return why values can only be in deg, or None if they may be in rad.
 
-    They wrap by 360, or keep the robot's limits in deg only, for more than a tenth of the rows. Values within
-    one turn in rad are never doubted. They are in the file's own units, shape (n, columns).
+    They wrap by 360, or are beyond the robot's limits, and any arm's, in rad only, for more than a tenth of
+    the rows. Values within one turn in rad are never doubted. They are in the file's own units, shape (n, columns).
     """
     if peak(values) <= math.tau:
         return None
     if count := int(wraps(values, "deg").sum()):
         return f"{counted(count, 'step')} of about 360 from one row to the next"
     reach = np.asarray((bounds or Bounds()).reach)
-    if (np.radians(_largest(values)) <= reach).all() and (_usual_size(values) > BEYOND * reach).any():
+    beyond = _usual_size(values) > np.maximum(BEYOND * reach, TWO_TURNS)
+    if beyond.any() and (np.radians(_largest(values)) <= reach).all():
         return f"values up to {peak(values):.6g} are beyond the robot's limits as rad and within them as deg"
     return None
 

@@ -38,6 +38,9 @@ MOST_TURNS = 4
 LONGEST_REACH = 10.0
 """A coordinate above this in [m] is hardly one: no arm reaches so far."""
 
+SHORTEST_REACH = 0.02
+"""Coordinates that all stay below this in [m] are hardly those of an arm's tool."""
+
 POSITIONS = "positions"
 
 _ALLOWED: dict[JointKind | None, tuple[Quantity, ...]] = {
@@ -62,6 +65,10 @@ def told_joints(tellers: Tellers, columns: Sequence[Column], robot: Chain | None
 def told_lengths(tellers: Tellers, columns: Sequence[Column]) -> list[Told | None]:
     """Return the units that are told of recorded x, y, z; raises as `told_joints` does."""
     return [tellers.of(column, ("length",)) for column in columns]
+
+
+def _evidence(by: Collection[Told]) -> str:
+    return " and ".join(sorted({one.evidence for one in by}))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -152,18 +159,37 @@ class UnitFinder:
         told = told_lengths(self.tellers, columns)
         if self.kinematic is not None:
             return self._by_kinematics(columns, told, "length")
-        known, unsaid = self._told_units(columns, told), [k for k, one in enumerate(told) if one is None]
-        if not unsaid:
-            return [unit for unit in known if unit is not None]
-        rest = self._like_others([columns[k] for k in unsaid], known, "position")
-        if rest is None:
-            rest = vocabulary().units["m"]
-            furthest = usual_peak(values[:, unsaid])
+        known, furthest = self._told_units(columns, told), usual_peak(values)
+        some = [column for column, one in zip(columns, told, strict=True) if one is None]
+        rest = self._like_others(some, known, "position") if some else None
+        if some and rest is None:
             far = furthest > LONGEST_REACH
             why = f", though values of {furthest:.6g} reach further than any arm" if far else ""
             hints = which_unit(columns, "m", every=False) if far else unit_hints(columns[:1], OTHER_UNIT["m"])
-            self._assume([columns[k] for k in unsaid], rest, POSITIONS, hints, why, asks=far)
-        return [unit or rest for unit in known]
+            self._assume(some, vocabulary().units["m"], POSITIONS, hints, why, asks=far)
+        units = [unit or rest or vocabulary().units["m"] for unit in known]
+        by = {one for one in told if one and not one.given}
+        if by and len(set(units)) == 1:
+            self._doubt_lengths(columns, by, units[0], furthest)
+        return units
+
+    def _doubt_lengths(
+        self, columns: Sequence[Column], by: Collection[Told], unit: Unit, furthest: float
+    ) -> None:
+        """Say so where x, y, z, in the unit that names or source tell, are nowhere near where arms work."""
+        if furthest * unit.factor > LONGEST_REACH:
+            why = f"values of {furthest:.6g} reach further than any arm"
+        elif 0 < furthest * unit.factor < SHORTEST_REACH:
+            why = f"values of {furthest:.6g} are closer to the origin than any arm works"
+        else:
+            return
+        names, evidence = ", ".join(column.name for column in columns), _evidence(by)
+        said, hints = (
+            f"{names}: {unit.name} ({evidence}) is doubted: {why}",
+            which_unit(columns, unit.name, every=False),
+        )
+        taken = assumed(columns, unit.name, "the positions are")
+        self._warn(columns, LogWarning("doubted-unit", said, hints=hints, assumption=taken, role="position"))
 
     def rotations(self, columns: Sequence[Column], forms: Sequence[RotationForm]) -> list[Told | None]:
         """Return the units that are told of the columns of a recorded orientation, None where none is.
@@ -305,8 +331,7 @@ class UnitFinder:
         why = doubt(judged.unit, judged.values, judged.t_ns, judged.bounds)
         if why is None:
             return
-        evidence = " and ".join(sorted(one.evidence for one in by))
-        names = ", ".join(column.name for column in judged.columns)
+        names, evidence = ", ".join(column.name for column in judged.columns), _evidence(by)
         said = f"{names}: {judged.unit} ({evidence}) is doubted: {why}"
         hints = which_unit(judged.columns, judged.unit, every=all(one.by_source for one in by))
         taken = assumed(judged.columns, judged.unit, whole)
