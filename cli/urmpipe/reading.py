@@ -26,7 +26,8 @@ class TableReading(TypedDict, total=False):
         delimiter: Sign between cells, or comma, semicolon, tab, spaces, bar.
         decimal: Decimal sign, or point, comma.
         time: Name or number (from 1) of the time column; "none" if there is none.
-        unit: Unit of all joints that turn, such as "deg"; or by column, such as {"q1": "deg"}.
+        unit: Unit of every angle of which neither its name nor the kinematics tell one, such as "deg"; or by
+            column, such as {"q1": "deg"}.
     """
 
     log_map: PathLike | LogMap | None

@@ -37,7 +37,7 @@ def test_ingest_says_what_it_inferred_and_changed(urmpipe: RunCommand, tmp_path:
 
 
 def test_ingest_json_is_all_that_stands_on_standard_output(urmpipe: RunCommand, tmp_path: Path) -> None:
-    ran = urmpipe("ingest", MATLAB, "--robot", "urm6", "--json", "-o", "run.rrd")
+    ran = urmpipe("ingest", MATLAB, "--robot", "urm6", "--rotation", "zyx", "--json", "-o", "run.rrd")
     assert ran.code == 0
     answer = json.loads(ran.out)
     run = read_recording(tmp_path / "run.rrd")
@@ -49,7 +49,7 @@ def test_ingest_json_is_all_that_stands_on_standard_output(urmpipe: RunCommand, 
     assert [one["row"] for one in answer["repolarizations"]] == [one.row for one in run.repolarizations]
     assert all(one["row"] == one["sample"] + 1 for one in answer["repolarizations"])
     assert answer["recording"] == "run.rrd"
-    assert "assumed-unit" in [w["kind"] for w in answer["warnings"]]
+    assert [w["kind"] for w in answer["warnings"]] == ["rotation-not-used"]
     assert "warning:" in ran.err
 
 
@@ -84,7 +84,7 @@ def test_rows_that_cannot_be_read_are_left_out_if_asked_for(urmpipe: RunCommand,
 
 
 def test_strict_makes_a_warning_an_error_and_writes_nothing(urmpipe: RunCommand, tmp_path: Path) -> None:
-    ran = urmpipe("ingest", MATLAB, "--robot", "urm6", "--strict")
+    ran = urmpipe("ingest", MATLAB, "--robot", "urm6", "--rotation", "zyx", "--strict")
     assert ran.code == 2
     assert ran.err.startswith("error: --strict: found 1 warning, allowed: none\n")
     assert files_in(tmp_path) == []

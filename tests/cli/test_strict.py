@@ -31,7 +31,7 @@ def repeated_samples(q: FloatArray) -> FloatArray:
 
 
 def joint_limit(q: FloatArray) -> FloatArray:
-    return q + 6.0  # of 2 pi
+    return q + 5.3  # of 2 pi
 
 
 def speed_limit(q: FloatArray) -> FloatArray:

@@ -81,7 +81,7 @@ TABLE = (
         multiple=True,
         callback=_units,
         metavar="[COLUMN=]UNIT",
-        help="Unit of the joint angles (rad, deg), or of one column.",
+        help="Unit of angles whose names tell none (rad, deg), or of one column.",
     ),
 )
 ROWS = (

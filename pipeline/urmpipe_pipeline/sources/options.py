@@ -11,7 +11,7 @@ from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.orientation import FORMS, RotationForm
 
 COLUMNS = "columns by name or number, such as ['q1', 'q2'] or [2, 3]"
-UNITS = "a unit of all joints that turn, such as 'deg', or a mapping, such as {'q1': 'deg'}"
+UNITS = "a unit of every angle, such as 'deg', or a mapping, such as {'q1': 'deg'}"
 INTERVALS = "two ends for all joints that turn, or a mapping, such as {'q1': (-180.0, 180.0)}"
 
 
@@ -31,7 +31,8 @@ class ReadOptions:
         position: Names or numbers of the recorded x, y, z.
         orientation: Names or numbers of the columns of the recorded orientation, in the order of its form.
         rotation: Form of the recorded orientation, as `RotationForm` lists them.
-        unit: Unit of a column by its name or number; by "" that of all joint columns that turn.
+        unit: Unit of a column by its name or number; by "" that of every angle (joints that turn, recorded
+            orientation) of which neither its own name nor the kinematics tell one.
         period: Time between rows in [s], of a log without a time column.
         skip_bad: Leave out rows that cannot be read, up to one in a hundred; each is a warning.
         interval: LOW, HIGH of the interval to which the environment limits a joint, by its name; by "" that

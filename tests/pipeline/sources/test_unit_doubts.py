@@ -1,4 +1,4 @@
-"""Headers that lie, logs that are written well: a reading is the truth, asked for, or says what it assumes."""
+"""Headers that lie, and logs that are written well: all is right, asked for, or said to be assumed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Arm = Callable[..., Chain]
 
 UR5E = load_robot("ur5e")
 ROWS = 200
-T = np.arange(ROWS) * 0.02
+T: FloatArray = np.arange(ROWS) * 0.02
 DEG = 180 / np.pi
 PRINTED = 1e-8
 """Ten decimals, in mm or deg at the worst."""

@@ -153,13 +153,11 @@ def test_wraps_of_360_tell_degrees(read: Read) -> None:
     assert not log.warnings
 
 
-def test_speeds_that_no_joint_reaches_tell_degrees(read: Read) -> None:
+def test_speeds_that_no_joint_reaches_are_a_reason_to_assume_degrees(read: Read) -> None:
     swinging = 40 * np.sin(2 * np.pi * 0.5 * np.arange(400) * 0.01)  # up to 126 a second
     log = read(csv_of(swinging[:, np.newaxis]))
     assert log.units["q1"] == "deg"
-    said = (
-        "no unit is given for q1: the joints are taken as deg: as rad it would turn at 124 rad/s for a tenth"
-    )
+    said = "the joints are taken as deg: as rad it would turn at 124 rad/s for a tenth of the time"
     assert [(w.message, w.assumption) for w in log.warnings] == [
         (f"no unit is given for q1: {said}", "the joints are in deg")
     ]
@@ -330,8 +328,7 @@ def test_numbers_name_columns_and_what_is_no_list_is_refused(read: Read) -> None
     assert str(caught.value).split("\n") == [
         f"joints: found 'q1', {columns}",
         f"position: found 3, {columns}",
-        "unit: found 3, allowed: a unit of all joints that turn, such as 'deg', or a mapping, such as"
-        " {'q1': 'deg'}",
+        "unit: found 3, allowed: a unit of every angle, such as 'deg', or a mapping, such as {'q1': 'deg'}",
         "interval: found 2.0, allowed: two ends for all joints that turn, or a mapping, such as"
         " {'q1': (-180.0, 180.0)}",
     ]

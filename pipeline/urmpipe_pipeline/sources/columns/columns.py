@@ -133,10 +133,10 @@ def find_column(columns: Sequence[Column], text: str, **place: str) -> Column:
 
 
 def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Unit]:
-    """Return the units that the user gave, by the column's number; by 0 that of all joints that turn.
+    """Return the units that the user gave, by the column's number; by 0 that of every angle.
 
     Raises:
-        OptionError: If a text is no unit, or that of all joints is none of angle.
+        OptionError: If a text is no unit, or that of every angle is none of one.
         LogError: If there is no such column.
     """
     given = {}

@@ -48,8 +48,13 @@ def contradiction(
 def doubt(unit: str, values: FloatArray, t_ns: IntArray | None, bounds: Bounds) -> str | None:
     """Return why joint values may well be in the other unit than rad or deg; None if nothing says so.
 
-    Small ones may be in rad, large ones in deg, unless wraps, speeds or the robot's limits tell. Arguments
-    are those of `contradiction`.
+    Small ones may be in rad, large ones in deg, unless wraps, speeds or the robot's limits tell.
+
+    Args:
+        unit: rad or deg.
+        values: In the file's own units, shape (n, columns).
+        t_ns: Times in [ns], shape (n,), or None.
+        bounds: What the joints can do.
     """
     size = usual_peak(values)
     if unit == "rad":

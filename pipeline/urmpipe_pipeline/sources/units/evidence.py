@@ -14,8 +14,6 @@ from typing import TypeVar
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.orientation import angle_between, conjugate, product
 
 Key = TypeVar("Key", bound=Hashable)
@@ -64,18 +62,6 @@ class Fit:
 def spread(rows: int) -> slice:
     """Return the rows that decide."""
     return slice(None, None, max(1, rows // SAMPLES))
-
-
-def fit(robot: Chain, q: FloatArray, recorded: FloatArray) -> Fit | None:
-    """Return how near a robot comes to recorded points; None if no row has both.
-
-    A point of three zeros was not recorded: a controller writes it before it knows one.
-
-    Joint values are in [rad] or [m], shape (n, joints), recorded positions in [m], shape (n, 3).
-    """
-    known = np.isfinite(q).all(axis=1) & np.isfinite(recorded).all(axis=1) & recorded.any(axis=1)
-    q, recorded = q[known], recorded[known]
-    return tool_fit(*poses_over_log(robot, q), recorded) if len(q) else None
 
 
 def tool_fit(position: FloatArray, rotation: FloatArray, recorded: FloatArray) -> Fit:

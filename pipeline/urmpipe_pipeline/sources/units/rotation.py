@@ -294,8 +294,9 @@ def _without_unit(columns: Sequence[Column], choices: Sequence[Choice], values: 
         return _settled(columns, choice, why)
     unit, names = choice.units[0].name, ", ".join(column.name for column in columns)
     said = f"no unit is given for {names}: they are taken as {unit}"
-    hints = unit_hints(columns, OTHER_UNIT[unit])
-    return _settled(columns, choice, "their names", _taken("assumed-unit", said, unit, hints))
+    hints, taken = unit_hints(columns, OTHER_UNIT[unit]), f"the orientation is in {unit}"
+    warning = LogWarning("assumed-unit", said, hints=hints, assumption=taken, role="rotation")
+    return _settled(columns, choice, "their names", warning)
 
 
 def _with_unit(columns: Sequence[Column], choice: Choice, values: FloatArray, told: Told | None) -> Settled:
@@ -314,18 +315,10 @@ def _with_unit(columns: Sequence[Column], choice: Choice, values: FloatArray, to
         likely = "are more than a turn as rad" if large else "may be rad as well"
         why = f"values of {size:.6g} {likely}"
     names = ", ".join(column.name for column in columns)
-    said, hints = (
-        f"{names}: {unit} ({told.evidence}) is doubted: {why}",
-        which_unit(columns, unit, every=False),
-    )
-    asks = bool(wrapped) or size > TWO_TURNS
-    return _settled(columns, choice, "their names", _taken("doubted-unit", said, unit, hints, asks=asks))
-
-
-def _taken(kind: str, said: str, unit: str, hints: tuple[Hint, ...], *, asks: bool = False) -> LogWarning:
-    """Return what is said of a unit in which the orientation is only assumed to be."""
-    taken = f"the orientation is in {unit}"
-    return LogWarning(kind, said, hints=hints, assumption=taken, role="rotation", asks=asks)
+    said, taken = f"{names}: {unit} ({told.evidence}) is doubted: {why}", f"the orientation is in {unit}"
+    asks, hints = bool(wrapped) or size > TWO_TURNS, which_unit(columns, unit, every=False)
+    warning = LogWarning("doubted-unit", said, hints=hints, assumption=taken, role="rotation", asks=asks)
+    return _settled(columns, choice, "their names", warning)
 
 
 def _unit_by_wraps(values: FloatArray, form: RotationForm) -> tuple[str, str] | None:

@@ -80,7 +80,8 @@ def degrees_proof(values: FloatArray, bounds: Bounds | None = None) -> str | Non
     """Return why values can only be in deg, or None if they may be in rad.
 
     They wrap by 360, or are beyond the robot's limits, and any arm's, in rad only, for more than a tenth of
-    the rows. Values within one turn in rad are never doubted. They are in the file's own units, shape (n, columns).
+    the rows. Values within one turn in rad are never doubted. They are in the file's own units, shape (n,
+    columns).
     """
     if peak(values) <= math.tau:
         return None
@@ -121,10 +122,14 @@ def radians_proof(values: FloatArray) -> str | None:
 
 @np.errstate(over="ignore", invalid="ignore")
 def wraps(values: FloatArray, unit: str) -> IntArray:
-    """Return how often each column, shape (n, columns), steps by a turn or two and goes on from there.
+    """Return how often each column steps by a turn or two and goes on from there, shape (columns,).
 
     A spike is none: it steps back at once. Nor is a step of values that jump about: those of other rows are
     usually small, and a wrap is no further off whole turns than twice the largest of them.
+
+    Args:
+        values: In the file's own units, shape (n, columns).
+        unit: Whose turns: rad or deg.
     """
     return np.array([_wraps(one[~np.isnan(one)], TURN[unit]) for one in values.T], dtype=np.int64)
 
