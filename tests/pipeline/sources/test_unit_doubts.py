@@ -29,7 +29,7 @@ Arm = Callable[..., Chain]
 
 UR5E = load_robot("ur5e")
 ROWS = 200
-T: FloatArray = np.arange(ROWS) * 0.02
+T: FloatArray = np.linspace(0.0, 0.02 * (ROWS - 1), ROWS, dtype=np.float64)
 DEG = 180 / np.pi
 PRINTED = 1e-8
 """Ten decimals, in mm or deg at the worst."""

@@ -59,7 +59,7 @@ class Recorded:
 
     @cached_property
     def rows(self) -> tuple[FloatArray, FloatArray]:
-        """Joints, shape (k, joints), and x, y, z, shape (k, 3), of the rows that decide, in the file's units.
+        """The rows that decide: joints, shape (k, joints), and positions, shape (k, 3), in the file's units.
 
         A point of three zeros was not recorded: a controller writes it before it knows one.
         """
