@@ -24,13 +24,14 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.orientation import FORMS
 from urmpipe_models.robots.catalogue import load_robot
 
 TOLERANCE, ANGLE = 3.5e-3, np.radians(1.0)
 
 ROBOTS = ("ur5e", "ur10", "panda", "urm6", "iiwa14")
 
-EULER = {"rpy": "xyz", "zyx": "ZYX", "xyz": "XYZ"}
+EULER = {"rpy": "xyz", "zyx": "ZYX", "xyz": "XYZ", "zyz": "ZYZ", "zxz": "ZXZ"}
 """Forms of Euler angles as SciPy calls them: extrinsic in small letters."""
 
 NAMES = {
@@ -40,6 +41,7 @@ NAMES = {
     "zyx": ("A", "B", "C"),
     "quat_xyzw": ("qx", "qy", "qz", "qw"),
     "quat_wxyz": ("quat_0", "quat_1", "quat_2", "quat_3"),
+    "matrix": tuple(f"r{i}{j}" for i in "123" for j in "123"),
 }
 """Names of the columns of an orientation; those of any are used for several forms."""
 
@@ -132,11 +134,13 @@ def position_columns(
 
 def rotation_columns(case: Case, turned: Rotation) -> tuple[list[str], FloatArray]:
     """Return the columns of an orientation in any form and unit."""
-    form = case.one_of("vector", "rpy", "zyx", "xyz", "quat_xyzw", "quat_wxyz")
+    form = case.one_of(*FORMS)
     case.told.append(form)
+    if form == "matrix":
+        return list(NAMES[form]), turned.as_matrix().reshape(-1, 9)
     if form.startswith("quat"):
         return list(NAMES[form]), turned.as_quat()[:, [3, 0, 1, 2] if form == "quat_wxyz" else [0, 1, 2, 3]]
-    called = "any" if form == "xyz" or (form != "zyx" and case.rng.random() < 0.5) else form
+    called = form if form in NAMES and case.rng.random() < 0.5 else "any"
     unit = case.one_of("rad", "deg")
     said = case.unit(unit, {"rad": "deg", "deg": "rad"}[unit])
     values = turned.as_rotvec() if form == "vector" else turned.as_euler(EULER[form])

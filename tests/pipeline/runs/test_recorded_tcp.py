@@ -22,6 +22,8 @@ from urmpipe_pipeline.runs.recorded_start import outlying_start
 from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded, lacking_tool
 from urmpipe_pipeline.runs.robot_inference import infer_robot
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources.units.kinematic_units import Recorded
+from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 SHARED = Path(__file__).parents[4] / "shared" / "logs"
 needs_shared = pytest.mark.skipif(not SHARED.is_dir(), reason="the folder shared is not beside the checkout")
@@ -290,7 +292,9 @@ def test_first_points_of_zeros_are_told_without_a_robot_and_hide_none() -> None:
     for robot in (None, TOOLED, UR5E):
         (told,) = far_from_recorded(robot, log(Q, recorded))
         assert told.message.startswith("the first 12 rows of 60 recorded the TCP as 0, 0, 0: ")
-    found = infer_robot(log(Q, positions_over_log(UR5E, Q) * (np.arange(60) > 11)[:, None]))
+    position = positions_over_log(UR5E, Q) * (np.arange(60) > 11)[:, None]
+    rad, metre = (vocabulary().units[name] for name in ("rad", "m"))
+    found = infer_robot(Recorded(log(Q, position).joints, Q, position, (rad,) * 6, (metre,) * 3))
     assert found is not None
     assert found[0] == UR5E
 

@@ -227,8 +227,9 @@ def test_units_and_form_of_a_measured_tool_are_told_by_the_joints(
 ) -> None:
     q, pose = measured(form, unit, turn)
     heads = [f"measurement_{name}" for name in ("x", "y", "z", "rx", "ry", "rz")]
-    text = table(q, **dict(zip(heads, pose.T, strict=True)))
-    log = read(text, load_robot("ur10"), unit="rad")
+    in_rad = tuple(f"{name} [rad]" for name in JOINTS)
+    text = table(q, names=in_rad, **dict(zip(heads, pose.T, strict=True)))
+    log = read(text, load_robot("ur10"))
     assert log.measured and not log.timed and not log.warnings
     assert log.tcp_position is not None and log.tcp_rotation is not None
     np.testing.assert_allclose(log.tcp_position, pose[:, :3] * unit, rtol=1e-12)
