@@ -143,7 +143,7 @@ def rotation_columns(case: Case, turned: Rotation) -> tuple[list[str], FloatArra
     called = form if form in NAMES and case.rng.random() < 0.5 else "any"
     unit = case.one_of("rad", "deg")
     said = case.unit(unit, {"rad": "deg", "deg": "rad"}[unit])
-    values = turned.as_rotvec() if form == "vector" else turned.as_euler(EULER[form])
+    values = turned.as_rotvec() if form == "vector" else turned.as_euler(EULER[form])  # type: ignore[call-overload]
     return [f"{name}{said}" for name in NAMES[called]], np.degrees(values) if unit == "deg" else values
 
 

@@ -14,6 +14,7 @@ import pytest
 import urmpipe as package
 from foreign_fmus import Foreign, Scalar, fmu, gain
 from urmpipe_models.errors import LogError
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 RunCommand = Callable[..., Any]
 
@@ -53,6 +54,13 @@ def errors(err: str) -> list[str]:
     return [line for line in err.splitlines() if line.startswith(("error", "warning"))]
 
 
+def recorded(folder: Path) -> Simulation:
+    """Return what the command recorded."""
+    result = package.read_recording(folder / "system.rrd")
+    assert isinstance(result, Simulation)
+    return result
+
+
 @pytest.mark.parametrize(
     ("place", "code", "samples", "where"),
     [
@@ -66,14 +74,15 @@ def errors(err: str) -> list[str]:
 def test_an_fmu_that_ends_the_process_fails_the_run(
     urmpipe: RunCommand, tmp_path: Path, place: str, code: str, samples: int, where: str
 ) -> None:
-    ends = replace(ENDS, **{place: code})
+    given: dict[str, Any] = {place: code}
+    ends = replace(ENDS, **given)
     ran = urmpipe(*write(tmp_path, {"bad": ends}, {ACTUAL: "bad.y"}), "--json")
     failed = f"block bad: {where}: ended the process with the exit code 0; it logged nothing"
     assert ran.code == 2
     assert errors(ran.err) == [f"error: {failed}; what was recorded until then is in system.rrd"]
     told = json.loads(ran.out)
     assert (told["failed"], told["samples"], told["verdict"]) == (failed, samples, "fail")
-    assert package.read_recording(tmp_path / "system.rrd").failed == failed
+    assert recorded(tmp_path).failed == failed
 
 
 @pytest.mark.parametrize("stops", [ENDS, STOPS])
@@ -112,7 +121,7 @@ def test_a_meter_that_depends_on_what_is_not_finite_does_not_pass(
         "Decided by: |Δx| = 0.0000 mm of 3.5 mm allowed (0 % of the tolerance) at t = 0.000 s; out of"
         f" tolerance: 0 of {samples} samples (0 %); a.y was nan at t = 0.2 s, and m depends on a"
     )
-    assert package.read_recording(tmp_path / "system.rrd").verdict == "fail"
+    assert recorded(tmp_path).verdict == "fail"
 
 
 def test_a_meter_that_is_given_what_is_not_finite_fails_the_run(urmpipe: RunCommand, tmp_path: Path) -> None:
@@ -149,7 +158,7 @@ def test_strict_keeps_what_a_failed_run_recorded(urmpipe: RunCommand, tmp_path: 
     ran = urmpipe(*write(tmp_path, {"a": GLITCH}, {ACTUAL: "a.y[1]"}), "--strict", "--json")
     assert ran.code == 2
     assert json.loads(ran.out)["samples"] == 2
-    assert package.read_recording(tmp_path / "system.rrd").verdict == "fail"
+    assert recorded(tmp_path).verdict == "fail"
 
 
 def test_the_meter_that_is_in_doubt_decides_before_one_that_passes(tmp_path: Path) -> None:

@@ -240,7 +240,7 @@ def test_the_form_of_orientations_is_the_one_that_leaves_no_angle(form: Rotation
         "matrix": made.as_matrix().reshape(-1, 9),
     }.get(form)
     if columns is None:
-        columns = made.as_euler(form.upper())
+        columns = made.as_euler(form.upper())  # type: ignore[call-overload]  # a word of Euler angles
     alike = {"zyz", "zxz"}  # these differ by quarter turns of base and tool
     for other in (one for one in FORMS if quaternions_fit(columns, one)):
         guess = matrices(quaternions(columns, other))
@@ -254,7 +254,7 @@ def test_the_form_of_orientations_is_the_one_that_leaves_no_angle(form: Rotation
 
 
 def quaternions_fit(columns: FloatArray, form: RotationForm) -> bool:
-    return columns.shape[1] == (9 if form == "matrix" else 4 if form.startswith("quat") else 3)
+    return bool(columns.shape[1] == (9 if form == "matrix" else 4 if form.startswith("quat") else 3))
 
 
 def test_the_angle_that_is_left_is_that_of_the_noise() -> None:

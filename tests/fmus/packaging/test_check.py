@@ -11,6 +11,7 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -183,7 +184,8 @@ def test_an_fmu_that_ends_well_but_early_is_no_good_one(tmp_path: Path) -> None:
 )
 def test_an_fmu_that_ends_its_process_well_is_no_good_one_whenever_it_does(place: str, when: str) -> None:
     ends = Foreign(name=place, scalars=(Scalar("y", 0),), variable_step=False)
-    found = check_fmu(fmu(replace(ends, **{place: "exit(0);"})))
+    given: dict[str, Any] = {place: "exit(0);"}
+    found = check_fmu(fmu(replace(ends, **given)))
     assert found.problems[-1] == f"{when} ended the process with the exit code 0"
     assert not found.ran
 

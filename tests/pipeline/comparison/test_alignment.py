@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -328,7 +329,7 @@ def test_the_base_and_the_tool_that_are_advised_give_the_same_deviation() -> Non
     facts = {fact.name: fact.value for fact in deviation_facts(found, result)}
     advice = facts["To apply this permanently"]
     assert isinstance(advice, Advice)
-    base, tool = (from_offset(there(hint.value)) for hint in advice.hints)
+    base, tool = (from_offset(cast("list[float]", hint.value)) for hint in advice.hints)
     assert [hint.parameter for hint in advice.hints] == ["base", "tool"]
     told = on_robot(run, there(run.robot).placed(base, tool))
     after = compare_recorded(told).runs[0]

@@ -148,8 +148,9 @@ def words(shown: Presentation) -> Iterator[str]:
             yield from (column.title for column in table.columns)
             yield table.note
         for figure in section.figures():
-            yield from (figure.title, figure.alt if isinstance(figure.alt, str) else figure.alt())
+            yield figure.title
             if isinstance(figure, Figure):
+                yield figure.alt if isinstance(figure.alt, str) else figure.alt()
                 yield from (figure.caption, *figure.instants.values())
         for event in section.events():
             assert event.t_ns is None

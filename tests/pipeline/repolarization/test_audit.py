@@ -135,7 +135,7 @@ def test_steps_of_one_kind_are_one_warning_and_all_in_the_audit() -> None:
 
 
 def test_samples_on_wraps_are_one_warning() -> None:
-    q = np.pi + 0.05 * (np.arange(400) - 19.5)
+    q = np.pi + 0.05 * np.linspace(-19.5, 379.5, 400)
     wrapped = wrap(q)
     wraps = np.flatnonzero(np.abs(np.diff(wrapped)) > 3) + 1
     for k, row in enumerate(wraps.tolist()):

@@ -109,7 +109,7 @@ def test_the_evidence_and_what_reads_the_rows_as_a_motion_are_told(read: Read) -
 
 
 def test_waypoints_in_degrees_are_poses(read: Read) -> None:
-    q = np.round(np.degrees(random_poses(20)), 2)
+    q: FloatArray = np.degrees(random_poses(20)).round(2)
     log = read(table(q), unit="deg")
     assert not log.timed
     np.testing.assert_allclose(log.q, np.radians(q), rtol=0, atol=1e-12)
