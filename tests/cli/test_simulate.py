@@ -350,3 +350,17 @@ def test_progress_rises_to_1(following: Path, tmp_path: Path) -> None:
     simulate(following, output=tmp_path / "run.rrd", progress=shares.append)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
+
+
+def test_no_meter_judges_positions_of_which_nothing_tells_the_unit(
+    urmpipe: RunCommand, tmp_path: Path
+) -> None:
+    t, x, y, z = np.loadtxt(LOGS / "path.csv", delimiter=",", skiprows=1)[:50].T
+    table = np.column_stack((t, 1e3 * x, 1e3 * y, 1e3 * z))
+    np.savetxt(tmp_path / "path.csv", table, "%.9g", ",", header="t,x,y,z", comments="")
+    (tmp_path / "matlab.csv").write_bytes((LOGS / "matlab.csv").read_bytes())
+    given = ("--set", "log=matlab.csv", "--set", "reference=path.csv", "--duration", "0.1")
+    ran = urmpipe("simulate", "log-to-delta", *given)
+    assert ran.code == 2
+    assert "no unit is given for x, y, z" in ran.err
+    assert not list(tmp_path.glob("*.rrd"))

@@ -125,7 +125,7 @@ class Deviation(Shown):
         angle: Angle between the orientations in [rad], shape (m,); None where a side has none.
         joint_delta: reference - log of each joint, turns included, in [rad] or [m], shape (m, joints); None
             where a side has none.
-        joint_turns: Whole turns that the two logs count apart for the pose they start in, one a joint; they
+        joint_turns: Whole turns that two motions count apart for the pose they start in, one a joint; they
             are taken out of `joint_delta`.
         outside: Where any quantity with a tolerance is out of it, shape (m,).
         sync: How the clocks were put together.

@@ -102,7 +102,7 @@ def _angle(matched: Matched) -> FloatArray | None:
 
 
 def _joint_delta(run: Run, matched: Matched) -> tuple[FloatArray | None, tuple[int, ...]]:
-    """Return reference - log of each joint, and the whole turns that are taken out of it.
+    """Return reference - log of each joint, and the whole turns that are taken out of a motion's.
 
     None if a joint has no value on a side: it could not be judged.
     """
@@ -111,8 +111,11 @@ def _joint_delta(run: Run, matched: Matched) -> tuple[FloatArray | None, tuple[i
     difference = matched.reference_q - matched.actual_q
     if not np.isfinite(difference).any(axis=0).all():
         return None, ()
-    turning = zip(difference.T, run.joint_units, strict=True)
-    turns = [_turns_at_start(values) if unit == "rad" else 0 for values, unit in turning]
+    turning = np.array(run.joint_units) == "rad"
+    if not run.timed:  # each pose names its turns for itself
+        whole = FULL_TURN * np.rint(difference / FULL_TURN)
+        return difference - np.where(turning, whole, 0.0), (0,) * len(turning)
+    turns = [_turns_at_start(values) if one else 0 for values, one in zip(difference.T, turning, strict=True)]
     return difference - FULL_TURN * np.array(turns), tuple(turns)
 
 

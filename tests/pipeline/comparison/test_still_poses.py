@@ -12,15 +12,19 @@ import numpy as np
 import pytest
 
 import urmpipe
+from asserting import there
 from exported import export_result
 from presented import every_section, figures, scene_of
+from recorded import static
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.palette import VALUE_SCALE, rgb, value_colours
 from urmpipe_pipeline.presentation.digits import written
-from urmpipe_pipeline.presentation.figure import Figure
+from urmpipe_pipeline.presentation.figure import Figure, SpaceFigure
 from urmpipe_pipeline.presentation.section import Presentation
+from urmpipe_pipeline.report.space import drawn_space
 from urmpipe_pipeline.results import present, read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.tables import ExportOptions
@@ -224,3 +228,43 @@ def test_two_logs_that_one_device_measured_share_its_frame(tmp_path: Path) -> No
     one, two = (write(tmp_path / f"{k}.csv", off=k * OFF, names=names) for k in (1, 2))
     result = urmpipe.compare(one, two, tcp="recorded")
     assert result.runs[0].statistics["x"].max == pytest.approx(OFF, abs=1e-9)
+
+
+def test_each_pose_names_its_turns_for_itself(tmp_path: Path) -> None:
+    done = Q + 2 * np.pi * np.random.default_rng(3).integers(-1, 2, Q.shape) * (np.arange(6) > 2) + 1e-3
+    files = []
+    for name, q in (("asked", Q), ("done", done)):
+        lines = [",".join(f"{head} [rad]" for head in HEADS)]
+        lines += [",".join(map(repr, row)) for row in q.tolist()]
+        files.append(tmp_path / f"{name}.csv")
+        files[-1].write_text("\n".join([*lines, ""]))
+    one = urmpipe.compare(files[0], files[1], UR5E, tolerance={"joint": 2e-3}).runs[0]
+    np.testing.assert_allclose(there(one.joint_delta), np.full(Q.shape, -1e-3), atol=1e-12)  # of some turns
+    assert (one.verdict, set(one.joint_turns)) == ("pass", {0})
+
+
+def test_the_deviation_of_each_pose_is_an_arrow_in_the_colour_of_its_size(found: Comparison) -> None:
+    one, arrows = found.runs[0], scene_of(present(found)).arrows
+    assert arrows is not None
+    factor = int(arrows.name.removeprefix("deviation drawn x"))
+    np.testing.assert_array_equal(arrows.start, one.reference)
+    np.testing.assert_allclose(arrows.end - arrows.start, factor * (one.actual - one.reference), atol=1e-15)
+    np.testing.assert_array_equal(arrows.values, one.delta[:, 3])
+    assert int(np.argmax(arrows.values)) == WORST
+    dark, light = value_colours(arrows.values)[[WORST, WORST - 1]]
+    assert tuple(dark) == rgb(VALUE_SCALE[-1][1])
+    assert int(light.astype(int).sum()) > int(dark.astype(int).sum())
+
+
+def test_the_arrows_stand_in_recording_and_report(found: Comparison, tmp_path: Path) -> None:
+    path = write_recording(found, tmp_path / "found.rrd")
+    arrows = scene_of(present(found)).arrows
+    assert arrows is not None
+    vectors = static(path, "/shown/scene/arrows", "Arrows3D:vectors")
+    np.testing.assert_allclose(vectors, arrows.end - arrows.start, atol=1e-6)  # single precision
+    blocks = (one for section in every_section(present(found).body) for one in section.blocks())
+    figure = next(one for one in blocks if isinstance(one, SpaceFigure))
+    assert figure.title == "Poses in space" and not figure.paths
+    drawn = drawn_space(figure).spec["data"]
+    assert [one["mode"] for one in drawn] == ["lines", "markers", "markers"]
+    assert drawn[1]["marker"]["showscale"]
