@@ -13,8 +13,8 @@ PAGE = (Path(__file__).parents[2] / "CONTRIBUTING.md").read_text(encoding="utf-8
 ROWS = re.findall(r"^\| ([^|]+) \| `(urmpipe[\w.]*)` \| `([\w.]+)` \|$", PAGE, re.MULTILINE)
 
 
-def test_twelve_behaviours_are_listed() -> None:
-    assert len(ROWS) == 12
+def test_the_behaviours_are_listed() -> None:
+    assert len(ROWS) >= 14
 
 
 @pytest.mark.parametrize(("module", "symbol"), [row[1:] for row in ROWS], ids=[row[0] for row in ROWS])
