@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError, for_each
+from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError, for_each, shown
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording import is_recording
@@ -19,6 +19,7 @@ from urmpipe_pipeline.runs.other_robot import on_robot
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources.vocabulary import key
 
 COMPARISON = "found the recording of a comparison, allowed: one that ingest wrote"
 
@@ -48,13 +49,15 @@ def load_runs(
         operands: Recordings (.rrd), logs and paths (CSV), folders whose CSV files make one log; runs, and
             solved targets as theirs.
         robot: The arm; of a recording or a run it replaces the one inside.
-        read: How to read the CSV files, all of them.
+        read: How to read the CSV files, all of them; the unit of a column holds for those that have it.
         tsp: Period of the grid in [s], of the CSV files.
         derivative: How the joints of CSV files are differentiated.
 
     Raises:
         UrmpipeError: With everything that is wrong with any of them: a bad CSV, a recording without a run.
     """
+    shared = sum(isinstance(one, Path) and not _is_recording(one) for one in operands) > 1
+    read = replace(read or ReadOptions(), shared=shared)
 
     def run_of(operand: Path | MadeRun) -> Run:
         """Return the run that an operand is, is recorded in, or is read as."""
@@ -70,7 +73,21 @@ def load_runs(
             found = (one if one.file else replace(one, file=str(operand)) for one in error.findings)
             raise LogError(*found) from error
 
-    return _told_apart(operands, for_each(run_of, operands))
+    runs = for_each(run_of, operands)
+    if shared:
+        _refuse_unreached(read, runs)
+    return _told_apart(operands, runs)
+
+
+def _refuse_unreached(read: ReadOptions, runs: Sequence[Run]) -> None:
+    """Raise an `OptionError` with each column that is given a unit, and that no log of several has in use."""
+    columns = [one for run in runs for one in run.log.columns]
+    used = {called for one in columns for called in (one.name, one.header, key(one.name), str(one.number))}
+    lost = [name for name in read.unit if name and not {name, key(name)} & used]
+    if lost:
+        allowed = "a column that a log has, and that is read"
+        said = (Finding(parameter="unit", found=f"no column {shown(name)}", allowed=allowed) for name in lost)
+        raise OptionError(*said)
 
 
 def load_sides(

@@ -148,3 +148,19 @@ def test_a_name_never_stands_against_itself(tmp_path: Path) -> None:
     assert (both.reference.name, both.runs[0].name) == ("log (asked)", "log (done)")
     again = urmpipe.compare(tmp_path / "done" / "log.csv", tmp_path / "done" / "log.csv", "ur5e")
     assert (again.reference.name, again.runs[0].name) == ("log (done)", "log (done)-2")
+
+
+def test_the_unit_of_a_column_reaches_the_logs_that_have_it(tmp_path: Path) -> None:
+    """So a hint about the path can be followed as it stands, beside a log that has no such column."""
+    asked, _ = motions()
+    position = 1e3 * poses_over_log(UR5E, asked)[0]
+    path = written(tmp_path / "path.csv", ["t", "x", "y", "z"], T, position)
+    log = written(tmp_path / "log.csv", ["t", *six("q{} [rad]")], T, asked)
+    said = refusal(LogError, urmpipe.compare, path, log, "ur5e")
+    assert 'unit={"x": "mm"' in said
+    result = urmpipe.compare(path, log, "ur5e", unit={"x": "mm", "y": "mm", "z": "mm"})
+    assert (result.verdict, result.assumptions) == ("pass", ())
+    assert result.runs[0].run.provenance.options["read"] == {"unit": {"x": "mm", "y": "mm", "z": "mm"}}
+    assert refusal(OptionError, urmpipe.compare, path, log, "ur5e", unit={"w": "mm"}) == (
+        "unit: found no column 'w', allowed: a column that a log has, and that is read"
+    )

@@ -73,6 +73,7 @@ def ingest_log(
     if because:
         log = replace(log, inferences=(*log.inferences, because))
     usual = asdict(ReadOptions())
+    usual |= {"shared": options.shared}  # says nothing of this log
     read_by = {name: value for name, value in asdict(options).items() if value != usual[name]}
     given = {"robot": robot.name if robot else None, "tsp": tsp, "derivative": derivative}
     made = provenance("ingest", given | {"read": read_by or None}, log.files)

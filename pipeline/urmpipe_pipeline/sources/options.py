@@ -44,6 +44,7 @@ class ReadOptions:
         poses: Whether the rows are still poses, which no motion joins: a clock of theirs is a label.
         measured: Names or numbers of the x, y, z of the tool as it was measured from outside, in a frame of
             its own, and behind them of its orientation, if it was.
+        shared: Whether they hold for several logs: the unit of a column that this one lacks is another's.
     """
 
     source: str | None = None
@@ -65,6 +66,7 @@ class ReadOptions:
     side: tuple[str, str] | None = None
     poses: bool = False
     measured: tuple[str, ...] = ()
+    shared: bool = False
 
     def __post_init__(self) -> None:
         """Take lists as tuples and numbers of columns as text; refuse what is of a wrong kind.
@@ -144,6 +146,7 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "skip_bad": _FLAG,
     "interval": (_are_named(_is_interval), INTERVALS),
     "repair": _FLAG,
+    "shared": _FLAG,
     "side": (
         lambda value: _are(_is_word)(value) and len(value) == 2,
         "two words, such as ('target', 'actual')",

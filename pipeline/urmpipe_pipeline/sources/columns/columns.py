@@ -120,9 +120,7 @@ def find_column(columns: Sequence[Column], text: str, **place: str) -> Column:
     Raises:
         LogError: If no column or more than one is meant.
     """
-    exact = [column for column in columns if text in (column.header, column.name)]
-    found = exact or [column for column in columns if key(text) == column.key != ""]
-    found = found or [column for column in columns if text == str(column.number)]
+    found = columns_called(columns, text)
     if len(found) == 1:
         return found[0]
     none, allowed = f"no column {shown(text)}", listed(columns)
@@ -130,6 +128,13 @@ def find_column(columns: Sequence[Column], text: str, **place: str) -> Column:
         numbers = ", ".join(str(column.number) for column in found)
         none, allowed = f"{shown(text)} as columns {numbers}", "one; give its number"
     raise LogError(Finding(found=none, allowed=allowed, **place))  # type: ignore[arg-type]
+
+
+def columns_called(columns: Sequence[Column], text: str) -> list[Column]:
+    """Return the columns that a text may mean: by their names, with or without unit, else by number."""
+    exact = [column for column in columns if text in (column.header, column.name)]
+    found = exact or [column for column in columns if key(text) == column.key != ""]
+    return found or [column for column in columns if text == str(column.number)]
 
 
 def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Unit]:
@@ -146,6 +151,8 @@ def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Un
         if unit is None or unit.quantity not in quantities:
             allowed = ", ".join(name for quantity in quantities for name in vocabulary().spelled(quantity))
             raise OptionError(Finding(parameter="unit", found=shown(unit_text), allowed=allowed))
+        if text and options.shared and not columns_called(columns, text):
+            continue
         given[find_column(columns, text, parameter="unit").number if text else 0] = unit
     return given
 
