@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -140,3 +141,10 @@ def test_a_ruler_among_comments_and_a_row_of_empty_cells_are_no_markers(read: Re
     header = "t|" + "|".join(f"q{k}" for k in range(1, 8))
     wide = [f"{t:.2f}|1|2|3|4|5|6|{t:.2f}" for t in TIMES]
     assert read("\n".join([header, *wide, "|||||||", "|||||||"])).rows == 300
+
+
+def test_a_row_of_many_empty_cells_between_bars_is_looked_at_once(read: Read) -> None:
+    began = time.perf_counter()
+    row = f"{'|' * 1000}0.1|0.2"
+    assert read("\n".join([f"{'|'.join(f'e{k}' for k in range(1000))}|q1|q2", *[row] * 20])).rows == 20
+    assert time.perf_counter() - began < 5.0  # it took 20 s

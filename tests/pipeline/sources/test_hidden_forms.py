@@ -123,6 +123,12 @@ def test_joints_that_run_evenly_together_are_no_damaged_clock(read: Read) -> Non
     assert read("\n".join(lines)).joints == ("q1", "q2")
 
 
+def test_joints_whose_values_have_length_1_in_most_rows_hide_no_orientation(read: Read) -> None:
+    near = np.c_[0.6 + 1e-4 * np.sin(K), 0.8 + 1e-4 * np.cos(K)]
+    near[-8:] += 0.1
+    assert read("\n".join(text(near))).joints == ("q1", "q2")
+
+
 @pytest.mark.parametrize("at", [1, 20, 40])
 def test_a_row_that_hides_a_pose_without_a_header(wrong: Wrong, at: int) -> None:
     lines = text(np.c_[Q, Q[:, :1], TURNS.as_quat()].round(6))

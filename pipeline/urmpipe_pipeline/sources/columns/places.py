@@ -120,7 +120,8 @@ def _trailing_pose(
     fits = len(columns) == 7 if robot is None else len(columns) >= joints + 7
     found = found or (trailing_quaternion(columns, layouts, some=some) if fits else None)
     for count in () if found else (16, 12, *([4] if fits else [])):
-        _refuse_odd_rows(columns[-count:], layouts)
+        if len(columns) >= count:
+            _refuse_odd_rows(columns[-count:], layouts)
     return found
 
 

@@ -30,7 +30,8 @@ _MEANING = {
 }
 _AROUND = r"[\s,;|\"]*"  # what spreadsheets and editors put around a line
 _MARKER = re.compile(
-    rf"{_AROUND}?(?P<text>(?:(?P<comment>[#%/]+)\s*)?(?P<run>(?P<sign>[<|=>])(?P=sign){{6,}})"
+    rf"(?:[\s,;\"]*|{_AROUND}(?!\|))(?P<text>(?:(?P<comment>[#%/]+)\s*)?"
+    rf"(?P<run>(?P<sign>[<|=>])(?P=sign){{6,}})(?!(?P=sign))"  # in one way: rows may begin with many bars
     rf"(?P<label>[\s,;].*[^<>\s,;|\"])?){_AROUND}"
 )
 """A line that may be a marker; a label with an angle at its end is an ornament: # >>>>>>> LOG <<<<<<<"""

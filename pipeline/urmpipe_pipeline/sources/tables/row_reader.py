@@ -236,6 +236,8 @@ class RowReader:
             return None
         if tuple(values[: len(names)]) == tuple(names):
             return "the header again"
+        if any(not isinstance(value, str) or is_number(value, self.layout.decimal) for value in values):
+            return None
         known = {split_unit(name)[0].lower() for name in names if name}
         alike = [str(value) for value in values if split_unit(str(value))[0].lower() in known]
         return f"another header, {_shown(text)}" if len(alike) > 1 and 2 * len(alike) >= len(names) else None
