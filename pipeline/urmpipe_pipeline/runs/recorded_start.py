@@ -50,12 +50,13 @@ def _by_tool(robot: Chain, log: JointLog, start: int) -> tuple[int, float]:
     every = np.arange(start, log.rows)
     rows = np.union1d(every[:SAMPLES], every[spread(len(every))])
     offset = _offsets(robot, log, rows)
-    usual = np.nanmedian(offset[np.isin(rows, every[spread(len(every))])], axis=0)
-    apart = np.linalg.norm(offset - usual, axis=1)
-    known = np.isfinite(apart)
-    rows, apart = rows[known], apart[known]
-    if len(rows) < LEAST_ROWS:
+    known = np.isfinite(offset).all(axis=1)
+    rows, offset = rows[known], offset[known]
+    even = np.isin(rows, every[spread(len(every))])
+    if np.count_nonzero(even) < LEAST_ROWS:
         return 0, 0.0
+    usual = np.median(offset[even], axis=0)
+    apart = np.linalg.norm(offset - usual, axis=1)
     least, most = np.minimum.accumulate(apart)[:-1], np.maximum.accumulate(apart[::-1])[::-1][1:]
     splits = np.flatnonzero(least > np.maximum(CLEARLY * most, CLOSE_WITH_TOOL))
     if not len(splits):

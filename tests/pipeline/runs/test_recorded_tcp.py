@@ -307,6 +307,13 @@ def test_the_last_outlying_row_of_a_long_log_is_found_between_those_looked_at() 
     assert outlying_start(TOOLED, log(q, recorded))[0] == 3210
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_start_is_not_told_where_no_row_has_both_sides() -> None:
+    q, recorded = Q.copy(), positions_over_log(UR5E, Q)
+    q[::2], recorded[1::2] = np.nan, np.nan
+    assert outlying_start(TOOLED, log(q, recorded)) == (0, np.inf)
+
+
 REAL = {
     "ur5e-rtde-static/robot_data.csv": ("ur5e", None),
     "ur-rtde-10rows/robot_data.csv": ("ur5e", None),

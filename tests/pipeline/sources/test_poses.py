@@ -253,6 +253,14 @@ def test_names_of_a_tool_measured_from_outside(read: Read, names: tuple[str, ...
     assert [column.name for column in log.columns if column.role == "position"] == list(names)
 
 
+@pytest.mark.parametrize("place", ["", "pos_", "pose_position_"])
+def test_an_orientation_stands_beside_the_position_of_its_device(read: Read, place: str) -> None:
+    q, pose = measured("vector")
+    names = [f"tracker_{place}{axis}" for axis in "xyz"] + [f"tracker_r{axis}" for axis in "xyz"]
+    log = read(table(q, **dict(zip(names, pose.T, strict=True))), load_robot("ur10"), unit="rad")
+    assert log.measured and log.rotation_form == "vector"
+
+
 def test_the_arms_own_tcp_comes_first_and_others_are_named_by_who_knows(read: Read, write: Write) -> None:
     q, pose = measured()
     own = dict(zip(("x", "y", "z"), poses_over_log(load_robot("ur10"), q)[0].T, strict=True))

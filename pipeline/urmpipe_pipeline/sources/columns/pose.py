@@ -26,6 +26,9 @@ ORTHOGONAL = 1e-2
 _LIKE_JOINT = re.compile(r"q_?\d")
 """Names that quaternions and joints have."""
 
+_OF_POSITION = re.compile(r"(?<=_)(pos|position|pose|pose_position|p|translation)_$")
+"""What the names of x, y, z may have behind the device, and those of the orientation have not."""
+
 _UNIT_LENGTH = 1e-2
 
 _PLACES = np.arange(16).reshape(4, 4)
@@ -86,6 +89,7 @@ def find_pose(
     rest = [column for column in numeric if column not in position]
     if measured and position:
         stem = os.path.commonprefix([column.key for column in position])  # noqa: RUF071 (names, not paths)
+        stem = _OF_POSITION.sub("", stem)
         rest = [column for column in rest if stem and column.key.startswith(stem)]
     rotation, forms = _rotation(rest, layouts, form, some=some) if position else ((), ())
     return Pose(position, rotation, forms, measured=measured and bool(position))
