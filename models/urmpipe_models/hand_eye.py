@@ -50,6 +50,9 @@ BETTER = 0.99
 NOTHING = 1e-9
 """Root mean square miss in [m] that rounding leaves."""
 
+NOWHERE = 1e15
+"""A coordinate of so many [m] is a fault of its file, and its square would drown all others."""
+
 STEPS = 100
 """A descent takes about ten steps."""
 
@@ -124,12 +127,14 @@ def hand_eye(
     Args:
         position: p_C, computed positions in [m], shape (n, 3).
         rotation: R_C, computed rotation matrices [-], shape (n, 3, 3).
-        measured: p_M, measured positions in [m], shape (n, 3). Rows with a NaN on a side are left out; at
-            least one has none.
+        measured: p_M, measured positions in [m], shape (n, 3). Rows with a NaN on a side, or beyond
+            `NOWHERE`, are left out; at least one is neither.
         measured_rotation: R_M, measured rotation matrices [-], shape (n, 3, 3), NaN where there is none; or
             None.
     """
-    known = np.isfinite(position + measured).all(axis=1) & np.isfinite(rotation).all(axis=(1, 2))
+    known = (np.abs(position) + np.abs(measured) < NOWHERE).all(axis=1) & np.isfinite(rotation).all(
+        axis=(1, 2)
+    )
     sides = [side[known] for side in (position, rotation, measured)]
     middle, rotation_middle, target = (side.mean(axis=0) for side in sides)
     alone = _Rows(*_condensed([side - side.mean(axis=0) for side in sides]))

@@ -101,6 +101,7 @@ def test_rows_without_a_value_count_nowhere() -> None:
     measured, turns = truth.measured.copy(), truth.measured_rotation.copy()
     position, rotation = truth.position.copy(), truth.rotation.copy()
     measured[0, 1], turns[5:9], position[10], rotation[11, 2, 2] = np.nan, np.nan, np.nan, np.nan
+    measured[14, 2] = 1e200
     assert_found(hand_eye(position, rotation, measured, turns), truth, turned=True)
     nowhere = np.full_like(turns, np.nan)
     assert_found(hand_eye(position, rotation, measured, nowhere), truth, turned=False)

@@ -38,6 +38,7 @@ LONGEST_TSP = 1e9
 EULER_SINGULAR = "euler-singular"
 
 
+@np.errstate(over="ignore", invalid="ignore")  # huge numbers in a log: their squares and steps are infinite
 def ingest_log(
     files: Sequence[Path],
     *,

@@ -15,7 +15,15 @@ from urmpipe_models.transform import Transform, rpy_of
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.runs.recorded_start import outlying_start
-from urmpipe_pipeline.sources.units.evidence import CLEARLY, Fit, mean_turn, spread, tool_fit, turned_apart
+from urmpipe_pipeline.sources.units.evidence import (
+    CLEARLY,
+    Fit,
+    has_both,
+    mean_turn,
+    spread,
+    tool_fit,
+    turned_apart,
+)
 
 FINEST = 1e-4
 """Options are told to a tenth of a millimetre: where kinematics are nearer than this in [m], none helps."""
@@ -76,17 +84,12 @@ class RecordedPoses:
         start, _ = outlying_start(robot, log)
         rows = np.arange(start, log.rows)[spread(log.rows - start)]
         q, position = log.q[rows], log.tcp_position[rows]
-        known = np.isfinite(q).all(axis=1) & np.isfinite(position).all(axis=1) & position.any(axis=1)
+        known = has_both(q, position)
         quat = None
         if log.tcp_rotation is not None and log.rotation_form is not None:
             quat = quaternions(log.tcp_rotation[rows], log.rotation_form)[known]
         told = quat is not None and bool(np.isfinite(quat).all(axis=1).any())
         return cls(q[known], position[known], quat if told else None) if known.any() else None
-
-    @property
-    def spread(self) -> float:
-        """Return the rms distance of the points from their middle in [m]."""
-        return float(np.sqrt(((self.position - self.position.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
     def fit(self, robot: Chain, q: FloatArray | None = None) -> Fit:
         """Return how near an arm comes to the points.

@@ -18,7 +18,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.runs.recorded_poses import FINEST, FINEST_TURN, Apart, RecordedPoses
 from urmpipe_pipeline.runs.recorded_start import start_warning
-from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, Fit
+from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, Fit, extent
 from urmpipe_pipeline.sources.vocabulary import split_unit
 
 LACKING_TOOL = "recorded-tcp-tool"
@@ -152,7 +152,7 @@ def _clearly_nearer(robot: Chain, log: JointLog, poses: RecordedPoses, own: Apar
     if own.distance <= FINEST and own.angle <= FINEST_TURN:
         return []
     moves = np.isfinite(poses.fit(robot).with_tool)
-    most = EXPLAINED * poses.spread if moves else CLOSE_WITH_TOOL
+    most = EXPLAINED * extent(poses.position) if moves else CLOSE_WITH_TOOL
     every = [*_other_robots(robot, poses), *_other_joints(robot, log, poses)]
     if moves and own.distance > FAR:  # less of it a base explains by chance
         every.append(_other_base(robot, poses))

@@ -186,7 +186,8 @@ def _measured(
     given = options.rotation is not None
     measured = tcp if roles.measured else None
     turned = settle_rotation(roles.rotation, roles.forms, rotation, told, arm, given=given, measured=measured)
-    finder.tell_reach(roles.rotation, told, turned.units, "rotation", "the orientation is")
+    if turned.form:
+        finder.tell_reach(roles.rotation, told, turned.units, "rotation", "the orientation is")
     turning = [roles.rotation[k] for k in turned.order]
     doubts = finder.doubts | {column.number: turned.doubt for column in turning if turned.doubt}
     return _Measured(

@@ -103,17 +103,17 @@ def _label(plan: Plan, times: IntArray, size: FloatArray, said: str) -> str:
     if stands >= IMPOSSIBLE:
         return f"{said}, and {name} repeats or runs backwards in {stands:.0%} of them"
     apart = _quantile(np.abs(passed), 0.5)
-    if not plan.clock.told and _quantile(size[timed] / np.abs(passed), 0.5) > FASTEST / 1e9:
+    speeds = size[timed] / np.maximum(np.abs(passed), 1)
+    if not plan.clock.told and _quantile(speeds, 0.5) > FASTEST / 1e9:
         apart *= 10.0 ** (9 - plan.clock.exponent)  # in s: the unit that its steps told is none of a motion
     return f"{said}, and {name} says that {apart / 1e9:.3g} s pass" if apart >= APART else ""
 
 
 def _in_si(plan: Plan, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return joint values, shape (..., joints), in [rad] or [m], and a turn of each, shape (joints,).
+    """Return joint values in [rad] or [m], and a turn of each joint, shape (joints,): 0 where it slides.
 
-    A joint that slides has a turn of 0.
-
-    By the units that the columns tell; without one beyond a turn in rad they are taken as deg.
+    By the units that the columns tell; without one values beyond a turn in rad are taken as deg. They are in
+    the file's own units, shape (..., joints).
     """
     source = plan.tables.known.units.get("angle") if plan.tables.known else None
     beyond = peak(values.reshape(-1, values.shape[-1])) > FULL_TURN

@@ -95,6 +95,15 @@ def test_a_missing_cell_is_a_missing_sample(tmp_path: Path) -> None:
     assert [w.kind for w in run.warnings] == ["missing"]
 
 
+@pytest.mark.filterwarnings("error")
+def test_huge_numbers_are_read_without_a_word_of_numpy(tmp_path: Path) -> None:
+    q = np.tile(np.linspace(0.2, 0.9, 40)[:, None], (1, 12))
+    q[7, [1, 6, 8, 9]] = 1e300, 1e200, 1e300, 1e250
+    path = write(tmp_path / "log.csv", q, "t,q1,q2,q3,q4,q5,q6,x,y,z,rx,ry,rz")
+    run = ingest_log([path], robot=load_robot("ur5e"), read=RAD)
+    assert run.q[7, 1] == 1e300
+
+
 def test_recorded_rates_are_used_where_they_agree(tmp_path: Path) -> None:
     t = 0.005 * np.arange(200)
     q, rates = np.sin(t)[:, None] + np.zeros(6), np.cos(t)[:, None] + np.zeros(6)

@@ -108,6 +108,12 @@ def test_the_evidence_and_what_reads_the_rows_as_a_motion_are_told(read: Read) -
     assert read(table(q, STEPS["seconds apart"][:18]), unit="rad", time="time").timed
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_pose_that_was_written_twice_at_once_changes_nothing(read: Read) -> None:
+    rows = [*range(40), *range(39, 72)]
+    assert not read(table(random_poses(72)[rows], [7.5 * row for row in rows])).timed
+
+
 def test_waypoints_in_degrees_are_poses(read: Read) -> None:
     q: FloatArray = np.degrees(random_poses(20)).round(2)
     log = read(table(q), unit="deg")

@@ -308,6 +308,14 @@ def test_the_kinematics_decide_on_the_form_against_the_names(
     follow_hints(lambda **given: read(table, UR5E, **given), log)
 
 
+@pytest.mark.parametrize("turns", [EULER, EULER * np.nan], ids=["of several forms", "empty"])
+def test_a_unit_of_every_angle_is_no_matter_to_an_orientation_that_is_not_used(
+    turns: FloatArray, read: Read
+) -> None:
+    table = csv([*joints(" [rad]"), *XYZ, "rx", "ry", "rz"], Q, FLANGE, turns)
+    assert read(table, unit={"": "rad"}).rotation_form is None
+
+
 @pytest.mark.parametrize(("unit", "per_m"), [("m", 1e3), ("mm", 1.0), ("cm", 0.01)])
 def test_positions_where_no_arm_works_are_doubted(unit: str, per_m: float, read: Read) -> None:
     table = csv([*joints(" [rad]"), *(f"{axis} [{unit}]" for axis in "xyz")], Q, FLANGE * per_m)

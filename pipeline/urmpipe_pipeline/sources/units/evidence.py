@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.arrays import BoolArray, FloatArray
 from urmpipe_models.orientation import angle_between, conjugate, product
 
 Key = TypeVar("Key", bound=Hashable)
@@ -64,6 +64,20 @@ def spread(rows: int) -> slice:
     return slice(None, None, max(1, rows // SAMPLES))
 
 
+def has_both(q: FloatArray, position: FloatArray) -> BoolArray:
+    """Return which rows have joint values, shape (n, joints), and a recorded point, shape (n, 3).
+
+    A point of three zeros was not recorded: a controller writes it before it knows one.
+    """
+    known = np.isfinite(q).all(axis=1) & np.isfinite(position).all(axis=1)
+    return np.asarray(known & position.any(axis=1))
+
+
+def extent(points: FloatArray) -> float:
+    """Return the root mean square distance of points, shape (n, 3) in any unit, from their middle."""
+    return _rms(points - points.mean(axis=0))
+
+
 def tool_fit(position: FloatArray, rotation: FloatArray, recorded: FloatArray) -> Fit:
     """Return how near poses come to recorded points, and with which tool.
 
@@ -74,7 +88,7 @@ def tool_fit(position: FloatArray, rotation: FloatArray, recorded: FloatArray) -
     """
     miss = recorded - position
     distance = _rms(miss)
-    if len(recorded) < _LEAST_ROWS or _rms(recorded - recorded.mean(axis=0)) < LEAST_MOTION:
+    if len(recorded) < _LEAST_ROWS or extent(recorded) < LEAST_MOTION:
         return Fit(distance, np.inf, (0.0, 0.0, 0.0))
     tool = (rotation.transpose(0, 2, 1) @ miss[:, :, np.newaxis]).mean(axis=0)  # least squares: R^T R = I
     x, y, z = tool[:, 0].tolist()

@@ -13,7 +13,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_pipeline.sources.units.evidence import Fit, clearly_worse, single_out, spread, tool_fit
+from urmpipe_pipeline.sources.units.evidence import Fit, clearly_worse, has_both, single_out, spread, tool_fit
 from urmpipe_pipeline.sources.units.unit_hints import OTHER_UNIT
 from urmpipe_pipeline.sources.vocabulary import Quantity, Unit, vocabulary
 
@@ -59,13 +59,10 @@ class Recorded:
 
     @cached_property
     def rows(self) -> tuple[FloatArray, FloatArray]:
-        """The rows that decide: joints, shape (k, joints), and positions, shape (k, 3), in the file's units.
-
-        A point of three zeros was not recorded: a controller writes it before it knows one.
-        """
+        """Joints, shape (k, joints), and positions, shape (k, 3), of some rows, in the file's units."""
         rows = spread(len(self.q))
         q, position = self.q[rows], self.position[rows]
-        known = np.isfinite(q).all(axis=1) & np.isfinite(position).all(axis=1) & position.any(axis=1)
+        known = has_both(q, position)
         return q[known], position[known]
 
     def judges(self, robot: Chain) -> bool:

@@ -6,12 +6,10 @@ changes distances, and a tool only by its length: the measured points spread as 
 
 from __future__ import annotations
 
-import numpy as np
-
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import positions_over_log
-from urmpipe_pipeline.sources.units.evidence import spread
+from urmpipe_pipeline.sources.units.evidence import extent, has_both, spread
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
 
 ALIKE = 2.0
@@ -28,10 +26,10 @@ def length_by_spread(robot: Chain, q: FloatArray, position: FloatArray) -> tuple
     """
     rows = spread(len(q))
     q, position = q[rows], position[rows]
-    known = np.isfinite(q).all(axis=1) & np.isfinite(position).all(axis=1)
+    known = has_both(q, position)
     if not known.any():
         return None
-    wanted, found = _rms(positions_over_log(robot, q[known])), _rms(position[known])
+    wanted, found = extent(positions_over_log(robot, q[known])), extent(position[known])
     units = [vocabulary().units[name] for name in vocabulary().spelled("length")]
     near = [unit for unit in units if wanted and wanted / ALIKE < found * unit.factor < wanted * ALIKE]
     if len(near) != 1:
@@ -39,8 +37,3 @@ def length_by_spread(robot: Chain, q: FloatArray, position: FloatArray) -> tuple
     moved, measured = wanted * 1e3, found * near[0].factor * 1e3
     said = f"in it the measured points spread by {measured:.0f} mm (rms), as the arm's by {moved:.0f} mm"
     return near[0], said
-
-
-def _rms(points: FloatArray) -> float:
-    """Return the root mean square distance of points, shape (n, 3), from their middle."""
-    return float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean()))

@@ -243,7 +243,7 @@ def _by_kinematics(
     robot, q = arm
     rows = spread(len(q))
     q, values = q[rows], values[rows]
-    known = np.isfinite(q).all(axis=1) & np.isfinite(values).all(axis=1)
+    known = np.isfinite(q).all(axis=1) & np.isfinite((values**2).sum(axis=1))  # huge ones have no direction
     if not known.any() or len(every) < 2:
         return None
     position, rotation = poses_over_log(robot, q[known])

@@ -184,10 +184,8 @@ class UnitFinder:
         else:
             return
         names, evidence = ", ".join(column.name for column in columns), _evidence(by)
-        said, hints = (
-            f"{names}: {unit.name} ({evidence}) is doubted: {why}",
-            which_unit(columns, unit.name, every=False),
-        )
+        said = f"{names}: {unit.name} ({evidence}) is doubted: {why}"
+        hints = which_unit(columns, unit.name, every=False)
         taken = assumed(columns, unit.name, "the positions are")
         self._warn(columns, LogWarning("doubted-unit", said, hints=hints, assumption=taken, role="position"))
 
