@@ -175,7 +175,8 @@ def _measured(
     q, qd, qdd = raw.q, _corrected(qd, signs), _corrected(qdd, signs)
     finder = UnitFinder(tellers, by_kinematics(robot, raw))
     clock = None if content.clock is None or content.still else t_ns
-    units = finder.joints(roles.joints, q, clock, robot) if roles.joints else []
+    judged = np.sort(q, axis=0) if content.still else q  # in no order, poses have no wraps
+    units = finder.joints(roles.joints, judged, clock, robot) if roles.joints else []
     rates = finder.derivatives(roles.rates, units, 1)
     seconds = finder.derivatives(roles.accelerations, units, 2)
     q = _in_si(q, units)

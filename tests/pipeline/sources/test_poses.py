@@ -187,6 +187,13 @@ def test_who_says_poses_gets_them(read: Read) -> None:
     assert not [one for one in log.inferences if one.what == "period"]
 
 
+def test_a_raster_that_begins_anew_has_no_wraps(read: Read) -> None:
+    q = np.degrees(random_poses(100))
+    q[:, 5] = np.tile(np.arange(-3.0, 3.1, 0.25), 4)
+    in_deg = tuple(f"{name} [deg]" for name in JOINTS)
+    assert set(read(table(q, names=in_deg), poses=True).units.values()) == {"deg"}
+
+
 def test_a_date_of_digits_alone_is_read_as_one(read: Read) -> None:
     log = read(table(smooth(40, 30.0), [f"{one}.5" for one in dates(39 * [1.0])]), unit="rad")
     assert log.timed
