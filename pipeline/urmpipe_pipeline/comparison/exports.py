@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
+from urmpipe_pipeline.comparison.matching import joint_order
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.exports import (
     ExportColumn,
@@ -45,7 +47,7 @@ def exports(comparison: Comparison) -> Exports:
 def delta_table(comparison: Comparison) -> ExportTable:
     """Return the compared samples of all logs, one below the other: deviation, reference and actual in SI.
 
-    Where joints alone are compared, their deviations, under the names that the first log has for them.
+    Where joints alone are compared, their deviations, under the names that the reference has for them.
     """
     runs = comparison.runs
     names = np.repeat([encodable(run.name) for run in runs], [len(run.sample) for run in runs])
@@ -58,9 +60,9 @@ def delta_table(comparison: Comparison) -> ExportTable:
         columns.append(ExportColumn("t [s]", "s", Times(np.concatenate([run.t_ns for run in runs]), "s")))
     placed = all(run.statistics for run in runs)
     if not placed:
-        joints = [f"delta_{name}" for name in runs[0].joint_statistics]
-        values = np.concatenate([run.values for run in runs], axis=1).T
-        columns += columns_of(joints, runs[0].run.joint_units, values)
+        joints, units = comparison.reference.joints, comparison.reference.joint_units
+        values = np.concatenate([_joint_delta(comparison, run) for run in runs])
+        columns += columns_of([f"delta_{name}" for name in joints], units, values)
     for what, axes in (("delta", AXES), ("reference", AXES[:3]), ("actual", AXES[:3])) if placed else ():
         values = np.concatenate([getattr(run, what) for run in runs])
         columns += columns_of([f"{what}_{axis}" for axis in axes], ["m"] * len(axes), values)
@@ -70,6 +72,12 @@ def delta_table(comparison: Comparison) -> ExportTable:
     return ExportTable(tuple(columns), clock if timed else None)
 
 
+def _joint_delta(comparison: Comparison, run: Deviation) -> FloatArray:
+    """Return a log's deviations in the order of the reference's joints [rad] or [m], shape (m, joints)."""
+    order = joint_order(comparison.reference.joints, run.run.log.joints) or ()
+    return np.column_stack(run.values)[:, np.argsort(order)]
+
+
 def _fields(comparison: Comparison) -> dict[str, Any]:
     """Return the fields of a comparison in SI, with a struct a log in the cell `runs`."""
     return {
@@ -77,21 +85,22 @@ def _fields(comparison: Comparison) -> dict[str, Any]:
         "reference": encodable(comparison.reference.name),
         "verdict": comparison.verdict,
         "tolerance": dict(comparison.tolerance),
-        "runs": [_deviation(run) for run in comparison.runs],
+        "runs": [_deviation(comparison, run) for run in comparison.runs],
     }
 
 
-def _deviation(run: Deviation) -> dict[str, Any]:
+def _deviation(comparison: Comparison, run: Deviation) -> dict[str, Any]:
+    """Return the fields of a log; where joints alone are compared, their names and deviations."""
     timed, nothing = run.run.timed, np.empty((0, 0))
+    joints = [*map(encodable, comparison.reference.joints)]
+    placed = {"delta": run.delta, "reference": run.reference, "actual": run.actual}
     return {
         "name": encodable(run.name),
         "verdict": run.verdict,
         "sample": run.sample,
         "t": run.t if timed else nothing,
         "clock_ns": run.run.log.clock_start_ns + run.t_ns if timed else nothing,
-        "delta": run.delta,
-        "reference": run.reference,
-        "actual": run.actual,
+        **(placed if run.statistics else {"joints": joints, "delta": _joint_delta(comparison, run)}),
         "out_of_tolerance": run.outside,
     }
 
