@@ -143,7 +143,7 @@ def _changes(now: Deviation, before: Deviation, noise: Mapping[str, float]) -> I
             periods=(_period(before), _period(now)),
             samples_shared=len(known),
             largest=None if at is None else float(step[at]),
-            t_largest=None if at is None else float(now.t[here[at]]),
+            t_largest=float(now.t[here[at]]) if at is not None and now.run.timed else None,
         )
 
 

@@ -32,7 +32,7 @@ class Change:
         periods: Periods of the samples before and now in [ns]: of another rate, they stand for another time.
         samples_shared: Samples at times that both have, with a value on both sides.
         largest: Largest absolute change at one of them; None without any.
-        t_largest: When that was, in [s] of the log.
+        t_largest: When that was, in [s] of the log; None without times.
     """
 
     run: str

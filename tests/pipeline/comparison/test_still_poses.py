@@ -129,6 +129,14 @@ def test_poses_are_held_against_as_many_poses(tmp_path: Path, log: Path) -> None
     assert str(wrong.value) == "sync: found 1.0 of still poses, allowed: start, row by row"
 
 
+def test_a_change_since_a_baseline_of_poses_has_no_time(tmp_path: Path, log: Path) -> None:
+    asked = write(tmp_path / "asked.csv")
+    before, now = (urmpipe.compare(asked, one, tcp="recorded") for one in (asked, log))
+    found = urmpipe.compare(now, baseline=before).baseline
+    assert found is not None and [one.largest for one in found.worse] == [pytest.approx(OFF)] * 3
+    assert {one.to_dict()["t_largest_change"] for one in found.changes} == {None}
+
+
 def test_poses_are_not_held_against_a_motion(tmp_path: Path, log: Path) -> None:
     path = tmp_path / "path.csv"
     rows = "\n".join(",".join(map(repr, [0.01 * k, *row])) for k, row in enumerate(POSITION.tolist()))
