@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas
 import pytest
+from scipy.io import loadmat
 
 import urmpipe
 from asserting import refusal
@@ -115,6 +117,33 @@ def test_joints_alone_come_back_from_a_recording_a_report_and_an_export(tmp_path
     assert said == f"{kept}: a comparison of joints alone, so no pose"
 
 
+def test_joints_alone_leave_under_the_names_of_the_reference(tmp_path: Path) -> None:
+    t, names, off = T[:50], ["foo [rad]", "bar [rad]", "baz [rad]"], np.array([0.001, 0.002, 0.003])
+    q = np.column_stack([np.sin(t + k) for k in range(3)])
+    written(tmp_path / "asked.csv", ["t", *names], t, q)
+    written(tmp_path / "done.csv", ["t", *names], t, q + off)
+    written(tmp_path / "turned.csv", ["t", *names[::-1]], t, (q + off)[:, ::-1])
+    kept, logs = tmp_path / "kept.rrd", [tmp_path / "done.csv", tmp_path / "turned.csv"]
+    urmpipe.compare(tmp_path / "asked.csv", logs, tolerance="joint=1deg", output=kept)
+    urmpipe.export(kept, output=tmp_path / "table.parquet")
+    table = pandas.read_parquet(tmp_path / "table.parquet")
+    np.testing.assert_allclose(table.filter(like="delta_"), np.tile(-off, (100, 1)), atol=1e-10)
+    urmpipe.export(kept, output=tmp_path / "all.mat")
+    for one in loadmat(tmp_path / "all.mat", simplify_cells=True)["comparison"]["runs"]:
+        assert one["joints"].tolist() == ["foo", "bar", "baz"] and "actual" not in one
+        np.testing.assert_allclose(one["delta"], np.tile(-off, (50, 1)), atol=1e-10)
+
+
+def test_nothing_is_known_of_joints_alone_within_a_step_of_the_reference(tmp_path: Path) -> None:
+    q, _ = motions()
+    step = q + np.where(np.arange(250) < 100, 0.0, 2.0)[:, np.newaxis]
+    written(tmp_path / "asked.csv", ["t", *six("q{} [rad]")], T, step)
+    between = (T[:-1] + T[1:]) / 2
+    written(tmp_path / "done.csv", ["t", *six("q{} [rad]")], between, (q[:-1] + q[1:]) / 2)
+    found = urmpipe.compare(tmp_path / "asked.csv", tmp_path / "done.csv", tolerance="joint=9rad", sync=0.004)
+    np.testing.assert_array_equal(np.setdiff1d(np.arange(249), found.runs[0].sample), [99])
+
+
 def test_a_place_is_asked_for_where_it_is_judged(tmp_path: Path) -> None:
     asked, done = motions()
     for name, q in (("asked", asked), ("done", done)):
@@ -123,6 +152,10 @@ def test_a_place_is_asked_for_where_it_is_judged(tmp_path: Path) -> None:
     lacks = "no robot, so no forward kinematics; robot=NAME|FILE gives one;"
     lacks += ' tolerance="joint=0.1deg" judges the joints alone'
     assert said == f"asked.csv: {lacks}\ndone.csv: {lacks}"
+    log = written(tmp_path / "log.csv", ["t", *six("target_q_{}"), *six("actual_q_{}")], T, asked, done)
+    moved = {"tolerance": "joint=1deg", "align": "start"}  # of which no tolerance of joints is a way out
+    said = refusal(LogError, urmpipe.compare, log, sides=("target", "actual"), **moved)
+    assert said == "log.csv: no robot, so no forward kinematics; robot=NAME|FILE gives one"
 
 
 def test_sides_that_are_not_there_are_refused(tmp_path: Path) -> None:
@@ -164,3 +197,24 @@ def test_the_unit_of_a_column_reaches_the_logs_that_have_it(tmp_path: Path) -> N
     assert refusal(OptionError, urmpipe.compare, path, log, "ur5e", unit={"w": "mm"}) == (
         "unit: found no column 'w', allowed: a column that a log has, and that is read"
     )
+
+
+def test_what_is_assumed_of_a_log_is_not_said_of_one_of_its_name(tmp_path: Path) -> None:
+    q, _ = motions()
+    units = {"one": "q{}", "two": "q{} [rad]"}
+    for name, pattern in units.items():
+        (tmp_path / name / "x").mkdir(parents=True)
+        written(tmp_path / name / "x" / "log.csv", ["t", *six(pattern)], T, q)
+    found = urmpipe.compare(*(tmp_path / name / "x" / "log.csv" for name in units), robot="ur5e")
+    assert [found.reference.name, found.runs[0].name] == ["log (x)", "log (x)-2"]
+    assert found.assumptions == ("the joints are in rad (log (x))",)
+
+
+def test_rows_without_times_are_a_guess_where_they_are_not_compared_one_by_one(tmp_path: Path) -> None:
+    q, _ = motions()
+    one, two = (written(tmp_path / f"{name}.csv", six("q{} [rad]"), q) for name in ("one", "two"))
+    fewer = written(tmp_path / "fewer.csv", six("q{} [rad]"), q[:200])
+    guess = ("the rows are 5 ms apart",)
+    assert urmpipe.compare(one, two, robot="ur5e").assumptions == ()
+    assert urmpipe.compare(one, two, robot="ur5e", sync=0.1).assumptions == guess
+    assert urmpipe.compare(one, fewer, robot="ur5e").assumptions == guess

@@ -122,11 +122,10 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     _refuse_poses_as_motion(reference, runs, chosen.sync)
     _refuse_frames_apart([(run, _goes_by_record(run, chosen.tcp)) for run in (reference, *runs)], chosen)
     alone = _joints_alone(reference, runs, chosen)
+    reference, *runs = _named_apart((reference, *runs))
     wanted = trajectory(reference, chosen.tcp, alone=alone)
-    names = text.unique([reference.name, *(run.name for run in runs)])[1:]
     deviations = for_each(
-        lambda named: _deviation(*named, wanted, trajectory(named[1], chosen.tcp, alone=alone), chosen),
-        zip(names, runs, strict=True),
+        lambda run: _deviation(run, wanted, trajectory(run, chosen.tcp, alone=alone), chosen), runs
     )
     told = [*(one.of(reference.name) for one in reference.warnings), *exchanged(reference, runs)]
     if chosen.tcp == "fk":
@@ -137,6 +136,14 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
         failed = [one for one in deviations if one.verdict == "fail"]
         told += [hint.of(one.name) for one in failed for hint in lacking_tool(one.run.robot, one.run.log)]
     return _comparison(wanted, deviations, chosen, told, _taken_for_granted(reference, runs, chosen))
+
+
+def _named_apart(runs: Sequence[Run]) -> list[Run]:
+    """Return runs of which no two have one name, so that what is said of one is not said of another."""
+    names = text.unique([run.name for run in runs])
+    return [
+        run if run.name == name else replace(run, name=name) for name, run in zip(names, runs, strict=True)
+    ]
 
 
 def _joints_alone(reference: Run, runs: Sequence[Run], options: CompareOptions) -> bool:
@@ -151,14 +158,16 @@ def _joints_alone(reference: Run, runs: Sequence[Run], options: CompareOptions) 
         return False
     if options.align == "none" and set(options.tolerance) == {"joint"}:
         return True
-    raise LogError(*(lacking(run, *NO_ROBOT, JOINTS_ALONE) for run in lacks))
+    hints = (JOINTS_ALONE,) if options.align == "none" else ()
+    raise LogError(*dict.fromkeys(lacking(run, *NO_ROBOT, *hints) for run in lacks))
 
 
 def _taken_for_granted(reference: Run, runs: Sequence[Run], options: CompareOptions) -> tuple[str, ...]:
     """Return what a verdict on runs assumes of them and the reference; raise what has to be told first."""
     sides = [(run, _compared_roles(run, options)) for run in (reference, *runs)]
-    alike = all(any(w.role == "time" and w.assumption for w in run.warnings) for run, _ in sides)
-    if not alike:  # rows that have no times on any side are compared one by one, whatever their period
+    without = all(any(w.role == "time" and w.assumption for w in run.warnings) for run, _ in sides)
+    alike = len({run.log.rows for run, _ in sides}) == 1 and isinstance(options.sync, str)
+    if not (without and alike):  # else the rows are compared one by one, whatever their period
         sides = [(run, {*roles, "time"} if run.timed else roles) for run, roles in sides]
     return assumptions(sides)
 
@@ -257,9 +266,7 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     recorded = replace(as_recorded(run), name=f"{run.name} (recorded)", joints=(), joint_units=(), q=None)
     computed = replace(by_kinematics(run), joints=(), joint_units=(), q=None)
     assumed = assumptions([(run, {"joint", *_recorded_roles(chosen, "start")})])  # others go by the joints'
-    found = _comparison(
-        recorded, [_deviation(run.name, run, recorded, computed, chosen)], chosen, (), assumed
-    )
+    found = _comparison(recorded, [_deviation(run, recorded, computed, chosen)], chosen, (), assumed)
     asked, turned = found.verdict == "fail" and "tool" not in chosen.align, "angle" in chosen.tolerance
     lacks = lacking_tool(run.robot, log, turned=turned) if asked else []
     return replace(found, warnings=(*found.warnings, *lacks))
@@ -303,13 +310,11 @@ def _shapes_gone(runs: Sequence[Run]) -> list[LogWarning]:
     return [warning for warning in gone if not any(warning in run.warnings for run in runs)]
 
 
-def _deviation(
-    name: str, run: Run, reference: Trajectory, actual: Trajectory, options: CompareOptions
-) -> Deviation:
+def _deviation(run: Run, reference: Trajectory, actual: Trajectory, options: CompareOptions) -> Deviation:
     """Return the deviation of one trajectory, at its own samples."""
     sync = synchronise(reference, actual, options.sync, options.align)
     matched = match(reference, actual, sync)
     if not len(matched.sample):
         said = f"no sample in common with {reference.name} (time offset {sync.offset} s)"
         raise LogError(lacking(run, said))
-    return measure(name, run, reference, align(matched, options.align, run), options.tolerance)
+    return measure(run, reference, align(matched, options.align, run), options.tolerance)

@@ -77,14 +77,12 @@ def by_kinematics(run: Run) -> Trajectory:
     """
     if run.tcp is None or run.robot is None:
         raise LogError(lacking(run, *NO_ROBOT))
-    rows = run.on_rows
     if run.rows is None:
         position, quat = run.tcp.position, quaternions(run.tcp.euler_zyx, "zyx")
     else:
-        position, rotation = poses_over_log(run.robot, rows.q)
+        position, rotation = poses_over_log(run.robot, run.rows.q)
         quat = quaternions(rotation.reshape(-1, 9), "matrix")
-    broken = np.unique([one.sample - 1 for one in run.audit if one.kind in ("unexplained", "ambiguous")])
-    return replace(_trajectory(run, position, continuous_quaternions(quat)), broken=broken.astype(np.int64))
+    return _by_joints(run, position, continuous_quaternions(quat))
 
 
 def as_recorded(run: Run) -> Trajectory:
@@ -101,7 +99,13 @@ def as_recorded(run: Run) -> Trajectory:
 
 def by_joints_alone(run: Run) -> Trajectory:
     """Return a run's joints on its log's own rows, without a place in space: its position is NaN."""
-    return _trajectory(run, np.full((run.log.rows, 3), np.nan), None)
+    return _by_joints(run, np.full((run.log.rows, 3), np.nan), None)
+
+
+def _by_joints(run: Run, position: FloatArray, quat: FloatArray | None) -> Trajectory:
+    """Return where a run was by its joints: nowhere within their steps that no motion explains."""
+    broken = np.unique([one.sample - 1 for one in run.audit if one.kind in ("unexplained", "ambiguous")])
+    return replace(_trajectory(run, position, quat), broken=broken.astype(np.int64))
 
 
 def _trajectory(run: Run, position: FloatArray, quat: FloatArray | None) -> Trajectory:
@@ -121,11 +125,11 @@ def match(reference: Trajectory, log: Trajectory, sync: Sync) -> Matched:
     shift = round(sync.offset * 1e9)
     at_ns = log.t_ns + shift
     wanted = interpolate(at_ns, reference.t_ns, reference.position)
-    wanted[_inside_broken(at_ns, reference)] = np.nan
     sides = wanted, log.position
     if not np.isfinite(reference.position).any() and reference.q is not None and log.q is not None:
         sides = interpolate(at_ns, reference.t_ns, reference.q), log.q  # compared by their joints alone
-    sample = np.flatnonzero(np.all([np.isfinite(side).all(axis=1) for side in sides], axis=0))
+    known = np.all([np.isfinite(side).all(axis=1) for side in sides], axis=0)
+    sample = np.flatnonzero(known & ~_inside_broken(at_ns, reference))
     at_ns = at_ns[sample]
     reference_q, actual_q = _joints(reference, log, sample, at_ns)
     first, last = log.t_ns[[0, -1]] + shift

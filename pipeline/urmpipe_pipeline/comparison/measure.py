@@ -25,14 +25,11 @@ START_SAMPLES = 11
 """Samples by which the turns of the start are counted: as few as outvote a wild one."""
 
 
-def measure(
-    name: str, run: Run, reference: Trajectory, matched: Matched, tolerance: Mapping[str, float]
-) -> Deviation:
+def measure(run: Run, reference: Trajectory, matched: Matched, tolerance: Mapping[str, float]) -> Deviation:
     """Return the deviation of a log: delta, distance from the path, angle, joints, and the verdict.
 
     Args:
-        name: The log's name, unique in the comparison.
-        run: The log.
+        run: The log, its name unique in the comparison.
         reference: What was asked for, whole.
         matched: Both sides at the same times, the log aligned.
         tolerance: In [m] or [rad], by kind or by coordinate.
@@ -46,6 +43,7 @@ def measure(
     placed, path, angle = bool(np.isfinite(values).any()), values[:, 3], _angle(matched)
     if placed:
         joined = ~gaps_behind(reference.t_ns) & run.timed  # nothing joins still poses
+        joined[[] if reference.broken is None else reference.broken] = False
         path = distance_from_path(matched.actual, reference.position, joined)
         path = np.minimum(path, values[:, 3])  # the reference of that time is on its path, but for rounding
     joint_delta, turns = _joint_delta(run, matched)
@@ -61,7 +59,7 @@ def measure(
     speed = _speed(run, matched)
     x, y, z, norm = (float(value) for value in values[0])
     return Deviation(
-        name=name,
+        name=run.name,
         run=run,
         sample=sample,
         t_ns=matched.t_ns,

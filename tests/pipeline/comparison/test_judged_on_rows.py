@@ -118,6 +118,15 @@ def test_nothing_is_interpolated_across_gaps_and_steps_of_the_reference() -> Non
     one = compare_runs(reference, [log], CompareOptions({"axis": 9.0})).runs[0]
     lost = np.setdiff1d(np.arange(99), one.sample)
     np.testing.assert_array_equal(lost, [*range(19, 30), 49])
+    at = 49  # a point on the straight line across the step: no way leads through it
+    wanted = trajectory(reference)
+    assert wanted.broken is not None
+    row = int(wanted.broken[0])
+    point = wanted.position[row : row + 2].mean(axis=0)
+    there = np.where(np.arange(99)[:, np.newaxis] == at - 1, point, positions_over_log(UR5E, motion(between)))
+    one = compare_runs(reference, [path(between, there)], CompareOptions({"axis": 9.0})).runs[0]
+    length = float(np.linalg.norm(np.diff(wanted.position[row : row + 2], axis=0)))
+    assert one.path[list(one.sample).index(at - 1)] > 0.4 * length
 
 
 def test_rows_count_alike_however_far_apart_they_are() -> None:
