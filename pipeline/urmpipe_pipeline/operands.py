@@ -114,7 +114,12 @@ def load_sides(
         OptionError: If there is more than one log, or it is a recording.
     """
     log = operands[0]
-    if len(operands) > 1 or not isinstance(log, Path) or _is_recording(log) or sides[0] == sides[1]:
+    if (
+        len(operands) > 1
+        or not isinstance(log, Path)
+        or _is_recording(log)
+        or sides[0].lower() == sides[1].lower()
+    ):
         found = ",".join(sides) + (" with several logs" if len(operands) > 1 else "")
         allowed = "two words for two sides of one log that is yet to be read"
         raise OptionError(Finding(parameter="sides", found=found, allowed=allowed))

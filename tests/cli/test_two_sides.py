@@ -163,13 +163,22 @@ def test_sides_that_are_not_there_are_refused(tmp_path: Path) -> None:
     log = written(tmp_path / "log.csv", ["t", *six("target_q_{}"), *six("actual_q_{}")], T, asked, done)
     said = refusal(LogError, urmpipe.compare, log, sides=("desired", "actual"))
     assert said == (
-        f"{log}: sides: found no column with the word desired in its name, allowed: a word of them, such as"
-        " q, target, actual"
+        f"{log}: sides: found no column with the word desired and without actual in its name, allowed: a word"
+        " of them, such as q, target, actual"
     )
+    said = refusal(LogError, urmpipe.compare, log, sides=("q", "rest"))
+    assert said == (
+        f"{log}: sides: found no column without q in its name, allowed: a word of them, such as q, target,"
+        " actual"
+    )
+    with pytest.raises(LogError):  # the columns of target have both words: of which side are they?
+        urmpipe.compare(log, sides=("target", "q"), tolerance="joint=9rad")
     allowed = "allowed: two words for two sides of one log that is yet to be read"
     said = refusal(OptionError, urmpipe.compare, log, log, sides=("target", "actual"))
     assert said == f"sides: found target,actual with several logs, {allowed}"
-    assert refusal(OptionError, urmpipe.compare, log, sides=("q", "q")) == f"sides: found q,q, {allowed}"
+    for words in (("q", "q"), ("target", "Target")):
+        said = refusal(OptionError, urmpipe.compare, log, sides=words)
+        assert said == f"sides: found {','.join(words)}, {allowed}"
 
 
 def test_a_name_never_stands_against_itself(tmp_path: Path) -> None:

@@ -20,22 +20,24 @@ def of_side(columns: Sequence[Column], side: tuple[str, str] | None, file: str) 
 
     Args:
         columns: The columns, without the clock.
-        side: A word in the names of the columns of this side, or `REST`, and that of the other side.
+        side: A word in the names of the columns of this side, or `REST`, and that of the other side. A column
+            with both words is of no side.
         file: The file, for errors.
 
     Raises:
-        LogError: If no column has the word in its name.
+        LogError: If no column has the word, and not that of the other side, in its name.
     """
     if side is None:
         return list(columns)
     word, other = (one.lower() for one in side)
-    own = [one for one in columns if (other not in one.words if word == REST else word in one.words)]
+    own = [one for one in columns if other not in one.words and (word == REST or word in one.words)]
     if not own:
         count = Counter(one for column in columns for one in column.words if one.isalpha())
         shared = [name for name, columns_with in count.most_common(SHARED) if columns_with > 1]
         allowed = (
             f"a word of them, such as {', '.join(shared)}" if shared else "a table with names of columns"
         )
-        found = f"found no column with the word {word} in its name"
+        with_word = "" if word == REST else f"with the word {word} and "
+        found = f"found no column {with_word}without {other} in its name"
         raise LogError(Finding(f"{found}, allowed: {allowed}", file, parameter="sides"))
     return own
