@@ -112,6 +112,7 @@ def comparison_lines(result: Comparison) -> Iterator[dict[str, Cell]]:
             "Made": minute(result.provenance),
             "Reference": result.reference.name,
             "Verdict": Judged(one.verdict),
+            "Assuming": "; ".join(result.assumptions),
             "Worse than its baseline": f"in {quantities(worse)}" if worse else "",
             **{title: cell(one) for title, cell in _sizes(result).values()},
         }

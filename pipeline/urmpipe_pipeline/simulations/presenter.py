@@ -56,6 +56,7 @@ def present(simulation: Simulation) -> Presentation:
             {
                 "System": Ref(body.title),
                 "Verdict": Judged(simulation.verdict),
+                "Assuming": "; ".join(simulation.assumptions),
                 "Blocks": Value(len(simulation.blocks)),
                 "Signals": Value(sum(one.columns.shape[1] for one in simulation.signals)),
                 "Samples": Value(len(simulation.t_ns)),

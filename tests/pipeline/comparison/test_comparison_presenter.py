@@ -107,6 +107,13 @@ def test_the_tables_hold_the_statistics_of_each_unit(arms: Compared) -> None:
     assert angles["start"] == [angle[0], *joint_delta[0].tolist()]
 
 
+def test_assumptions_stand_in_the_verdict_s_line_alone_and_among_others(paths: Compared) -> None:
+    result = replace(paths({"a": off(0.001)}), assumptions=("the joints are in deg", "so (a)"))
+    shown = present(result)
+    assert shown.headline.endswith(", assuming the joints are in deg and so (a)")
+    assert [line["Assuming"] for line in shown.lines] == ["the joints are in deg; so (a)"]
+
+
 def test_many_logs_are_ranked_and_keep_their_colours(paths: Compared) -> None:
     deltas = {f"log{k}": off(0.001 * (1 + (7 * k) % 12)) for k in range(12)}
     result = paths(deltas, tolerance={"axis": 0.006})
