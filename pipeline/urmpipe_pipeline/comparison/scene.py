@@ -62,7 +62,8 @@ def deviation_arrows(one: Deviation, radius: float) -> Arrows:
     drawn = np.sort(np.argsort(-size, kind="stable")[:MOST_ARROWS])
     start = np.asarray(one.reference)[drawn]
     end = start + factor * (np.asarray(one.actual)[drawn] - start)
-    return Arrows(f"deviation drawn x{factor}", start, end, size[drawn])
+    sample = np.asarray(one.sample)[drawn]
+    return Arrows(f"deviation drawn x{factor}", start, end, size[drawn], sample)
 
 
 def shown_log(result: Comparison) -> Deviation:

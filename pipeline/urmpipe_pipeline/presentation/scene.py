@@ -82,6 +82,7 @@ class Arrows:
         start: Where the arrows start in [m], shape (n, 3).
         end: Where they end in [m], shape (n, 3).
         values: What they stand for (small to large), in `unit`, shape (n,).
+        sample: Row numbers, from 0, shape (n,).
         unit: SI unit of `values`.
     """
 
@@ -89,6 +90,7 @@ class Arrows:
     start: FloatArray
     end: FloatArray
     values: FloatArray
+    sample: IntArray
     unit: str = "m"
 
 

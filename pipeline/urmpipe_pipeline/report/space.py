@@ -113,7 +113,7 @@ def _by_value(name: str, values: FloatArray, unit: str) -> Spec:
 def _arrows(arrows: Arrows) -> Iterator[Spec]:
     """Yield arrows as lines, a dot where each starts; both in the colour of what it stands for."""
     unit, factor = text.SHOWN.get(arrows.unit, (arrows.unit, 1.0))
-    values, row = factor * arrows.values, np.arange(1, len(arrows.values) + 1)
+    values, row = factor * arrows.values, arrows.sample + 1
     style = _by_value(arrows.name, values, unit)
     apart = np.full_like(arrows.start, np.nan)
     yield _in_space(np.stack((arrows.start, arrows.end, apart), axis=1).reshape(-1, 3)) | {

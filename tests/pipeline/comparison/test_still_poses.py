@@ -114,6 +114,15 @@ def test_one_log_is_held_against_its_record_row_by_row(found: Comparison) -> Non
     assert {row["t_max"] for row in found.rows()} == {None}
 
 
+def test_arrows_know_their_rows(tmp_path: Path, log: Path) -> None:
+    lines = log.read_text().splitlines()
+    lines[4] = lines[4].rpartition(",")[0] + ","  # its fourth row has no z
+    log.write_text("\n".join([*lines, ""]))
+    arrows = scene_of(present(urmpipe.compare(log))).arrows
+    assert arrows is not None
+    assert arrows.sample.tolist() == [0, 1, 2, *range(4, ROWS)]
+
+
 def test_poses_are_held_against_as_many_poses(tmp_path: Path, log: Path) -> None:
     other = write(tmp_path / "other.csv", off=-OFF)
     result = urmpipe.compare(log, other, tcp="recorded")

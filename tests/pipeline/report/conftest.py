@@ -138,5 +138,5 @@ def hostile() -> Comparison:
     audit = tuple(replace(item, joint=joints[JOINTS.index(item.joint)]) for item in run.repolarizations)
     made = Provenance(HOSTILE, {HOSTILE: HOSTILE}, log.files, {HOSTILE: HOSTILE}, HOSTILE)
     run = replace(run, log=log, audit=audit, provenance=made)
-    result = compare_runs(run, [run])
+    result = compare_runs(replace(run, name=f"{HOSTILE}0"), [run])  # runs of one name get another
     return replace(result, warnings=(LogWarning(HOSTILE, HOSTILE),), provenance=made)

@@ -22,7 +22,7 @@ from urmpipe_pipeline.presentation.figure import (
     Text,
     View,
 )
-from urmpipe_pipeline.presentation.scene import Path, Spot
+from urmpipe_pipeline.presentation.scene import Arrows, Path, Spot
 from urmpipe_pipeline.presentation.section import Block, Fact, Presentation, Section
 from urmpipe_pipeline.report import spec
 from urmpipe_pipeline.report.figures import drawn_figures, span_of
@@ -377,3 +377,11 @@ def test_plotly_accepts_every_figure_of_every_kind(
         titles = [axis["title"]["text"] for name, axis in axes.items() if "axis" in name]
         assert len(titles) >= 2
         assert all(title.endswith("]") and "[" in title for title in titles)
+
+
+def test_arrows_are_told_by_their_rows_of_the_log() -> None:
+    sizes, rows = np.array([0.001, 0.003]), np.array([4, 17])
+    arrows = Arrows("deviation x50", np.zeros((2, 3)), np.ones((2, 3)), sizes, rows)
+    found = drawn_space(SpaceFigure("S", "C.", "A.", (), (), arrows))
+    told = [numbers(one["customdata"]) for one in found.spec["data"] if "customdata" in one]
+    np.testing.assert_array_equal(told, [np.column_stack((rows + 1, 1e3 * sizes))])
