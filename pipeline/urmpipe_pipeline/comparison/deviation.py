@@ -239,6 +239,8 @@ class Deviation(Shown):
 
     def row(self, one: Statistics) -> int:
         """Return the log's row of numbers, from 1, in which a quantity was largest."""
+        if self.run.rows is None and self.run.resampled:  # judged on the grid, as it once was: the nearest
+            return int(np.argmin(np.abs(self.run.log.t_ns - self.t_ns[self.peak(one)]))) + 1
         return one.sample_max + 1
 
     @property

@@ -161,6 +161,18 @@ def test_a_baseline_made_on_the_grid_is_listed_as_made_otherwise_and_not_as_wors
     assert found is not None and found.verdict == "fail"  # a regular log's rows were its grid
 
 
+def test_a_recording_that_was_judged_on_the_grid_names_the_row_of_the_log() -> None:
+    t = uneven(200, 11)
+    run = joint_log(t, motion(t))
+    on_grid = replace(run, rows=None, warnings=())
+    wanted = positions_over_log(UR5E, on_grid.q)
+    wanted[150, 0] += 0.02
+    (one,) = compare_runs(path(on_grid.t, wanted), [on_grid]).runs
+    earlier = replace(one, run=replace(run, rows=None))
+    nearest = int(np.argmin(np.abs(run.log.t_ns - run.t_ns[150])))
+    assert earlier.row(one.decisive) == nearest + 1 != 151
+
+
 def before_rows(result: Comparison) -> Comparison:
     """Return a comparison as recordings hold it that were made before logs were judged on their rows."""
     runs = tuple(replace(one, run=replace(one.run, rows=None)) for one in result.runs)
