@@ -65,7 +65,7 @@ def spread(rows: int) -> slice:
 
 
 def has_both(q: FloatArray, position: FloatArray) -> BoolArray:
-    """Return which rows have joint values, shape (n, joints), and a recorded point, shape (n, 3).
+    """Return which rows have joint values and a recorded point, in any unit, shape (n, joints) and (n, 3).
 
     A point of three zeros was not recorded: a controller writes it before it knows one.
     """
