@@ -115,8 +115,9 @@ def radians_proof(values: FloatArray) -> str | None:
     A column stays within a turn in rad and wraps by 2 pi: in deg all these jumps would be of the same six
     degrees. They are in the file's own units, shape (n, columns).
     """
-    within = [j for j, one in enumerate(values.T) if peak(one) <= ONE_TURN]
-    count = int(wraps(values[:, within], "rad").sum())
+    if peak(values) > ONE_TURN:
+        values = values[:, [j for j, one in enumerate(values.T) if peak(one) <= ONE_TURN]]
+    count = int(wraps(values, "rad").sum())
     return f"{counted(count, 'step')} of about 6.28 from one row to the next" if count else None
 
 
