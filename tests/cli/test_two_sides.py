@@ -153,8 +153,9 @@ def test_a_place_is_asked_for_where_it_is_judged(tmp_path: Path) -> None:
     lacks += ' tolerance="joint=0.1deg" judges the joints alone'
     assert said == f"asked.csv: {lacks}\ndone.csv: {lacks}"
     log = written(tmp_path / "log.csv", ["t", *six("target_q_{}"), *six("actual_q_{}")], T, asked, done)
-    moved = {"tolerance": "joint=1deg", "align": "start"}  # of which no tolerance of joints is a way out
-    said = refusal(LogError, urmpipe.compare, log, sides=("target", "actual"), **moved)
+    said = refusal(  # no tolerance of joints is a way out where the log is to be moved
+        LogError, urmpipe.compare, log, sides=("target", "actual"), tolerance="joint=1deg", align="start"
+    )
     assert said == "log.csv: no robot, so no forward kinematics; robot=NAME|FILE gives one"
 
 
@@ -214,7 +215,8 @@ def test_what_is_assumed_of_a_log_is_not_said_of_one_of_its_name(tmp_path: Path)
     for name, pattern in units.items():
         (tmp_path / name / "x").mkdir(parents=True)
         written(tmp_path / name / "x" / "log.csv", ["t", *six(pattern)], T, q)
-    found = urmpipe.compare(*(tmp_path / name / "x" / "log.csv" for name in units), robot="ur5e")
+    reference, log = (tmp_path / name / "x" / "log.csv" for name in units)
+    found = urmpipe.compare(reference, log, "ur5e")
     assert [found.reference.name, found.runs[0].name] == ["log (x)", "log (x)-2"]
     assert found.assumptions == ("the joints are in rad (log (x))",)
 
