@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from functools import reduce
+from operator import matmul
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -42,6 +44,8 @@ class Transform:
     Attributes:
         rotation: The rows of R, each three elements [-].
         translation: p, three elements in [m].
+        made_of: The constants and elementary motions whose product it is; None where only its numbers are
+            known. It counts for nothing in a comparison, and a product of frames has none.
     """
 
     rotation: tuple[Vector, Vector, Vector] = field(
@@ -49,6 +53,7 @@ class Transform:
         metadata={"stored": tuple[_Numbers, _Numbers, _Numbers]},
     )
     translation: Vector = field(default=ZERO, metadata={"stored": _Numbers})
+    made_of: tuple[Transform | Step, ...] | None = field(default=None, compare=False, repr=False)
 
     def __matmul__(self, other: Transform) -> Transform:
         """Return the frame C in A from B in A (self) and C in B (other)."""
@@ -115,6 +120,45 @@ class Transform:
         return Transform(Transform((columns[0], columns[1], columns[2])).columns, self.translation)
 
 
+@dataclass(frozen=True, slots=True)
+class Step:
+    """An elementary motion, one parameter of a frame: a shift along an axis or a turn about it.
+
+    Attributes:
+        kind: along or about.
+        axis: x, y or z.
+        value: In [m] along, in [rad] about the axis, any element.
+        name: Its name in the arm; where it is empty, that of its frame and axis.
+        source: What described it, in a few words.
+    """
+
+    kind: Literal["along", "about"]
+    axis: Literal["x", "y", "z"]
+    value: Element = field(default=0.0, metadata={"stored": float})
+    name: str = ""
+    source: str = ""
+
+    @property
+    def frame(self) -> Transform:
+        """The frame after this motion in the frame before it."""
+        if self.kind == "about":
+            return {"x": rotation_x, "y": rotation_y, "z": rotation_z}[self.axis](self.value)
+        x, y, z = (self.value if axis == self.axis else 0.0 for axis in "xyz")
+        return translation(x, y, z)
+
+
+def product(parts: Iterable[Transform | Step]) -> Transform:
+    """Return the product of constants and elementary motions from the left, the identity of none."""
+    frames = [part.frame if isinstance(part, Step) else part for part in parts]
+    return reduce(matmul, frames) if frames else Transform()
+
+
+def made_of(*parts: Transform | Step) -> Transform:
+    """Return the product of constants and elementary motions, which knows them."""
+    frame = product(parts)
+    return Transform(frame.rotation, frame.translation, parts)
+
+
 def translation(x: Element, y: Element, z: Element) -> Transform:
     """Return a shift by x, y, z in [m]."""
     return Transform(translation=(x, y, z))
@@ -164,11 +208,29 @@ def from_rpy(rx: Element, ry: Element, rz: Element) -> Transform:
     return rotation_z(rz) @ rotation_y(ry) @ rotation_x(rx)
 
 
+def from_xyz_rpy(xyz: Vector, rpy: Vector, source: str = "") -> Transform:
+    """Return the frame at x, y, z in [m], turned by rx, ry, rz in [rad] (see `from_rpy`), as six motions.
+
+    Args:
+        xyz: Any elements in [m].
+        rpy: Any elements in [rad].
+        source: What described it.
+    """
+    (x, y, z), (rx, ry, rz) = xyz, rpy
+    return made_of(
+        Step("along", "x", x, source=source),
+        Step("along", "y", y, source=source),
+        Step("along", "z", z, source=source),
+        Step("about", "z", rz, source=source),
+        Step("about", "y", ry, source=source),
+        Step("about", "x", rx, source=source),
+    )
+
+
 def from_offset(values: Sequence[float]) -> Transform:
     """Return the frame written as x, y, z in [m] and optionally rx, ry, rz in [rad] (see `from_rpy`)."""
     x, y, z, rx, ry, rz = (*map(float, values), *(0.0,) * (6 - len(values)))
-    turned = from_rpy(rx, ry, rz)
-    return Transform(turned.rotation, (x, y, z))
+    return from_xyz_rpy((x, y, z), (rx, ry, rz), "offset")
 
 
 def euler_zyx(rotation: tuple[Vector, Vector, Vector]) -> tuple[Element, Element, Element, Element]:

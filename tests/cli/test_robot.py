@@ -52,8 +52,11 @@ def test_show_prints_parameters_and_points(urmpipe: Any) -> None:
     ran = urmpipe("robot", "show", "urm6")
     assert (ran.code, ran.err) == (0, "")
     assert ran.out.startswith("urm6: URM arm of 6 modules: the paper's\n")
-    (phi2,) = [" ".join(line.split()) for line in ran.out.splitlines() if " phi2 " in line]
-    assert phi2 == "phi2 revolute 0, 0, 0.243215 0, 52, 0 0, 0, 1 no limit no limit 180 deg"
+    (phi2,) = [" ".join(line.split()) for line in ran.out.splitlines() if " phi2 " in line[:9]]
+    assert phi2 == "phi2 revolute 0, 0, 1 no limit no limit 180 deg"
+    (theta2,) = [" ".join(line.split()) for line in ran.out.splitlines() if " theta2 " in line]
+    assert theta2 == "theta2 52 deg about y phi2 URM tilt"
+    assert "Parameters; 12 of value 0 not shown" in ran.out
     assert "p7      0.167397, 0, 1.10264   180, 0, 0" in ran.out
     assert "\x1b" not in ran.out  # no colours in a pipe
 
@@ -66,6 +69,22 @@ def test_show_as_json_is_the_chain_and_its_points(urmpipe: Any) -> None:
     np.testing.assert_allclose(answer["points"]["p1"]["euler_zyx"], [0.0, 0.0, 0.0], atol=1e-15)
     described = {key: answer[key] for key in ("kind", "name", "joints", "base", "tip", "tool", "start")}
     assert chain_from_dict(described).joints == load_robot("ur5e").joints
+    parameters = {one["name"]: one for one in answer["parameters"]}
+    assert (parameters["d_1"]["value"], parameters["tool.z"]["value"]) == (0.1625, 0.1)
+    assert parameters["alpha_1"] == {
+        "name": "alpha_1", "value": np.pi / 2, "unit": "rad", "kind": "about", "axis": "x",
+        "place": "shoulder_lift_joint", "source": "DH row 1",
+    }  # fmt: skip
+
+
+def test_show_tells_the_rotation_of_a_matrix(urmpipe: Any, tmp_path: Path) -> None:
+    rows = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]
+    tip = f"{{ translation = [0, 0, 1], rotation = {rows} }}"
+    text = f'kind = "joints"\njoints = [{{ name = "a" }}]\ntip = {tip}\n'
+    (tmp_path / "arm.toml").write_text(text, encoding="utf-8")
+    lines = [" ".join(line.split()) for line in urmpipe("robot", "show", "arm.toml").out.splitlines()]
+    assert "tip.z 1 m along z tip frame" in lines
+    assert "90, 0, 0 deg about x, y, z tip constant" in lines
 
 
 def test_show_draws_a_picture_and_replaces_only_its_own(urmpipe: Any, tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ kind = "{kind}"
 unheard = 1
 joints = [{{ unheard = 1, origin = {{ unheard = 1 }}, mimic = {{ unheard = 1 }} }}]
 limits = {{ unheard = 1 }}
-base = {{ unheard = 1 }}
+base = {{ unheard = 1, steps = [{{ unheard = 1 }}, {{ along = "x", unheard = 1 }}] }}
 tool = {{ unheard = 1 }}
 tip = {{ unheard = 1 }}
 visuals = [{{ unheard = 1, origin = {{ unheard = 1 }} }}, {{ mesh = "a.stl", unheard = 1 }}]
@@ -85,6 +85,9 @@ def test_the_keys_of_a_kind_are_those_that_are_read(read: Callable[[str], Chain]
     assert known(caught.value, "") == keys_of(every, "key") | keys_of(own, "key")
     for place in ("base.", "tool.", "visuals[0].origin."):
         assert known(caught.value, place) == keys_of(every, "key of a frame")
+    constant = keys_of(every, "key of a frame") - {"steps"}
+    assert known(caught.value, "base.steps[0].") == {"along", "about"} | constant
+    assert known(caught.value, "base.steps[1].") == keys_of(every, "key of `steps`") - {"about"}
     shapes = known(caught.value, "visuals[0].") | known(caught.value, "visuals[1].")
     assert shapes == keys_of(visuals, "key of `visuals`")
     limits = keys_of(every, "key of `limits`") if "limits" in keys_of(own, "key") else set()

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from urmpipe.printing.terminal import new_console, new_table
 from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.parameters import Parameter, parts_of
 from urmpipe_models.inverse.closed.closed_form import closed_form, method_words
 from urmpipe_models.kinematics.forward import forward, points_over_log
 from urmpipe_models.robots.robot_file import chain_to_dict
@@ -69,11 +70,19 @@ class PosedChain:
             name: {"position": list(pose.translation), "euler_zyx": list(euler_zyx(pose.rotation)[:3])}
             for name, pose in zip(names, self.poses, strict=True)
         }
-        described = chain_to_dict(self.chain)
+        described, parameters = chain_to_dict(self.chain), map(_parameter_dict, self.chain.parameters)
         return {
-            "schema": 1, **described, "coordinates": list(self.chain.coordinates), "q": list(self.q),
-            "points": points, "inverse": self.inverse,
+            "schema": 1, **described, "parameters": list(parameters),
+            "coordinates": list(self.chain.coordinates), "q": list(self.q), "points": points,
+            "inverse": self.inverse,
         }  # fmt: skip
+
+
+def _parameter_dict(one: Parameter) -> dict[str, Any]:
+    return {
+        "name": one.name, "value": float(one.value), "unit": one.unit, "kind": one.kind, "axis": one.axis,
+        "place": one.place, "source": one.source,
+    }  # fmt: skip
 
 
 def chain_at(chain: Chain, q: Sequence[float]) -> PosedChain:
@@ -93,28 +102,43 @@ def print_robots(robots: Sequence[Chain]) -> None:
 
 
 def print_chain(posed: PosedChain) -> None:
-    """Print an arm's parameters, and where its points are."""
+    """Print an arm's parameters and joints, and where its points are."""
     console, chain = new_console(), posed.chain
     console.print(posed.title, soft_wrap=True)
     if chain.source:
         console.print(f"Source: {chain.source}", soft_wrap=True)
     console.print(f"Inverse: {method_words(posed.inverse)}", soft_wrap=True)
-    console.print(_parameters(posed))
+    console.print(_parameters(chain))
+    console.print(_joints(posed))
     console.print(_points(posed))
 
 
-def _parameters(posed: PosedChain) -> Table:
+def _parameters(chain: Chain) -> Table:
+    zeros = sum(not one.value for one in chain.parameters)
     table = new_table(
-        "Joint", "Kind", "x, y, z [m]", "rx, ry, rz [deg]", "Axis", "Limits", "Speed", "q",
-        title="Joints: each frame in the one before it",
+        "Parameter", "Value", "Motion", "Frame", "Source",
+        title=f"Parameters; {zeros} of value 0 not shown",
     )  # fmt: skip
-    chain = posed.chain
-    values = dict(zip(chain.coordinates, posed.q, strict=True))
-    table.add_row("base", "frame", *_frame(chain.base))
-    for joint in chain.joints:
-        table.add_row(joint.name, _kind(joint), *_frame(joint.origin), *_motion(joint, values))
-    table.add_row("tip", "frame", *_frame(chain.tip))
-    table.add_row("tool", "frame", *_frame(chain.tool))
+    for k, (name, frame) in enumerate(zip(chain.frame_names, chain.frames, strict=True)):
+        for one in chain.parameters:
+            if one.frame_index == k and one.value:
+                table.add_row(one.name, _value(one), f"{one.kind} {one.axis}", name, one.source)
+        for part in parts_of(frame):
+            if isinstance(part, Transform) and part != Transform():
+                turn = _figures(math.degrees(angle) for angle in rpy_of(part.rotation))
+                table.add_row("", f"{turn} deg", "about x, y, z", name, "constant")
+    return table
+
+
+def _value(one: Parameter) -> str:
+    return f"{_figure(one.value)} m" if one.kind == "along" else f"{_figure(math.degrees(one.value))} deg"
+
+
+def _joints(posed: PosedChain) -> Table:
+    table = new_table("Joint", "Kind", "Axis", "Limits", "Speed", "q", title="Joints")
+    values = dict(zip(posed.chain.coordinates, posed.q, strict=True))
+    for joint in posed.chain.joints:
+        table.add_row(joint.name, _kind(joint), *_motion(joint, values))
     return table
 
 
@@ -147,10 +171,6 @@ def _limits(joint: Joint, unit: str, factor: float) -> str:
     if not math.isfinite(lower) and not math.isfinite(upper):
         return "no limit"
     return f"+-{_figure(upper)} {unit}" if lower == -upper else f"{_figure(lower)} .. {_figure(upper)} {unit}"
-
-
-def _frame(frame: Transform) -> tuple[str, str]:
-    return _figures(frame.translation), _figures(math.degrees(angle) for angle in rpy_of(frame.rotation))
 
 
 def _figures(values: Any) -> str:

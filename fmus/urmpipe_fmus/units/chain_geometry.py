@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Parameter
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.urm import UrmGeometry, urm_chain, urm_geometry
+from urmpipe_models.chains.parameters import Parameter as ArmParameter
+from urmpipe_models.chains.urm import SEGMENT, TILT
 from urmpipe_models.transform import Transform, from_rpy, rpy_of
 
 
@@ -26,12 +27,13 @@ class Geometry(NamedTuple):
 
 
 def geometry_of(robot: Chain) -> Geometry:
-    """Return the parameters of an arm: lengths and tilts of a URM arm, of any other the frames of its joints.
+    """Return the parameters of an arm: its lengths and tilts if they describe it, else its joints' frames.
 
     Where it stands (`base`) and its `tool` are parameters of both.
     """
-    urm = urm_geometry(robot)
-    shape = _of_frames(robot) if urm is None else _of_urm(robot, urm)
+    links = [one for one in robot.parameters if one.place not in ("base", "tool")]
+    of_urm = {one.source for one in links} == {SEGMENT, TILT}
+    shape = _of_urm(robot, links) if of_urm else _of_frames(robot)
     ends = (
         *_frame_parameters("base", "the base in the world", robot.base),
         *_frame_parameters("tool", "the tool centre point at the end of the arm", robot.tool),
@@ -44,12 +46,14 @@ def geometry_of(robot: Chain) -> Geometry:
     return Geometry((*shape.parameters, *ends), chain_at)
 
 
-def _of_urm(robot: Chain, urm: UrmGeometry) -> Geometry:
+def _of_urm(robot: Chain, links: Sequence[ArmParameter]) -> Geometry:
     """Return the shape of a URM arm."""
+    lengths, tilts = ([one for one in links if one.source == source] for source in (SEGMENT, TILT))
 
     def chain_at(v: Values) -> Chain:
         """Return the arm of some lengths and tilts."""
-        return urm_chain(robot.name, v.lengths, v.tilts, directions=urm.directions)
+        values = zip((*lengths, *tilts), (*v.lengths, *v.tilts), strict=True)
+        return robot.with_parameters({one.name: value for one, value in values})
 
     return Geometry(
         (
@@ -58,16 +62,16 @@ def _of_urm(robot: Chain, urm: UrmGeometry) -> Geometry:
                 description="Segments r_1..r_(n+1), the last one the effector",
                 unit="m",
                 display_unit="mm",
-                start=urm.lengths,
-                size=len(urm.lengths),
+                start=tuple(one.value for one in lengths),
+                size=len(lengths),
             ),
             Parameter(
                 name="tilts",
                 description="Tilts theta_2..theta_(n+1) of each segment against the one before",
                 unit="rad",
                 display_unit="deg",
-                start=urm.tilts,
-                size=len(urm.tilts),
+                start=tuple(one.value for one in tilts),
+                size=len(tilts),
             ),
         ),
         chain_at,

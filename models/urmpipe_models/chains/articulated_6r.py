@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.chains.geometric_model import GeometricRow, geometric_chain
 from urmpipe_models.elementwise import Element
+from urmpipe_models.transform import Step, made_of
 
 
 def articulated_6r_rows(l0: Element, l1: Element, l2: Element, l3: Element) -> tuple[GeometricRow, ...]:
@@ -57,11 +59,10 @@ def articulated_6r(
 
     Source: [Geometric6R]_ Figure 2, eq. 21-26, 39.
     """
-    return geometric_chain(
-        name,
-        articulated_6r_rows(l0, l1, l2, l3),
-        tip=(0.0, 0.0, l4),
-        start=start,
-        description=description,
-        source=source,
-    )
+    rows = articulated_6r_rows(l0, l1, l2, l3)
+    chain = geometric_chain(name, rows, start=start, description=description, source=source)
+    lengths = enumerate((l0, l1, l2, l3, l4))
+    *links, tip = (made_of(Step("along", "z", length, f"l{k}", "6R length")) for k, length in lengths)
+    origins = (*links, made_of(), made_of())  # the wrist's axes meet
+    joints = (replace(joint, origin=at) for joint, at in zip(chain.joints, origins, strict=True))
+    return replace(chain, joints=tuple(joints), tip=tip)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
 from typing import Literal
 
+from urmpipe_models.chains.parameters import Parameter, parameters_of, with_values
 from urmpipe_models.chains.visual import Visual
 from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import RobotError
+from urmpipe_models.names import not_among
 from urmpipe_models.transform import Transform
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
@@ -138,6 +141,42 @@ class Chain(Shown):
     def point_names(self) -> tuple[str, ...]:
         """p1..pn."""
         return tuple(f"p{k}" for k in range(1, len(self.joints) + 1))
+
+    @property
+    def frames(self) -> tuple[Transform, ...]:
+        """The base, the frame of every joint, the tip and the tool, each in the one before it."""
+        return (self.base, *(joint.origin for joint in self.joints), self.tip, self.tool)
+
+    @property
+    def frame_names(self) -> tuple[str, ...]:
+        """The name of each of `frames`: base, those of the joints, tip, tool."""
+        return ("base", *(joint.name for joint in self.joints), "tip", "tool")
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """The lengths and angles that the arm is made from, from the base to the tool."""
+        return tuple(parameters_of(self.frames, self.frame_names))
+
+    def with_parameters(self, values: Mapping[str, Element]) -> Chain:
+        """Return the same arm with other values of some parameters.
+
+        Args:
+            values: By name, in [m] and [rad], any elements.
+
+        Raises:
+            RobotError: With every name that no parameter has.
+        """
+        index = {one.name: one.frame_index for one in self.parameters}
+        unknown = [f"robot {self.name}: parameter: {not_among(n, index)}" for n in values if n not in index]
+        if unknown:
+            raise RobotError(*unknown)
+        frames = list(self.frames)
+        for k in {index[name] for name in values}:
+            own = (one for one in self.parameters if one.frame_index == k)
+            frames[k] = with_values(frames[k], [values.get(one.name, one.value) for one in own])
+        base, *origins, tip, tool = frames
+        joints = (replace(joint, origin=at) for joint, at in zip(self.joints, origins, strict=True))
+        return replace(self, joints=tuple(joints), tip=tip, base=base, tool=tool)
 
     def placed(self, base: Transform | None = None, tool: Transform | None = None) -> Chain:
         """Return the same arm on another base or with another tool."""

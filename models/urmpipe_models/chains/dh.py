@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from urmpipe_models.chains.chain import Chain, Joint, JointKind
 from urmpipe_models.elementwise import Element
-from urmpipe_models.transform import Transform, rotation_x, rotation_z, translation
+from urmpipe_models.transform import Step, Transform, made_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,8 @@ def dh_chain(
 
     Source: [DenavitHartenberg1955]_.
     """
-    *origins, tip = Transform(), *(_screw_z(row) @ _screw_x(row) for row in rows)
+    links = (made_of(*_screw_z(row, k), *_screw_x(row, k)) for k, row in enumerate(rows, start=1))
+    *origins, tip = made_of(), *links
     return Chain(
         name,
         _joints(rows, origins),
@@ -111,10 +112,11 @@ def modified_dh_chain(
 
     Source: [Craig2005]_ section 3.4.
     """
-    origins = [_screw_x(row) @ _screw_z(row) for row in rows]
+    origins = [made_of(*_screw_x(row, k), *_screw_z(row, k)) for k, row in enumerate(rows, start=1)]
     return Chain(
         name,
         _joints(rows, origins),
+        tip=made_of(),
         base=base or Transform(),
         tool=tool or Transform(),
         start=tuple(float(value) for value in start),
@@ -123,14 +125,20 @@ def modified_dh_chain(
     )
 
 
-def _screw_z(row: DHRow) -> Transform:
-    """Return Rz(theta) Tz(d), which commutes with the joint's own motion about and along z."""
-    return rotation_z(row.theta) @ translation(0.0, 0.0, row.d)
+def _screw_z(row: DHRow, k: int) -> tuple[Step, Step]:
+    """Return Rz(theta) Tz(d) of row k, which commutes with the joint's own motion about and along z."""
+    return (
+        Step("about", "z", row.theta, f"theta_{k}", f"DH row {k}"),
+        Step("along", "z", row.d, f"d_{k}", f"DH row {k}"),
+    )
 
 
-def _screw_x(row: DHRow) -> Transform:
-    """Return Tx(a) Rx(alpha)."""
-    return translation(row.a, 0.0, 0.0) @ rotation_x(row.alpha)
+def _screw_x(row: DHRow, k: int) -> tuple[Step, Step]:
+    """Return Tx(a) Rx(alpha) of row k."""
+    return (
+        Step("along", "x", row.a, f"a_{k}", f"DH row {k}"),
+        Step("about", "x", row.alpha, f"alpha_{k}", f"DH row {k}"),
+    )
 
 
 def _joints(rows: Sequence[DHRow], origins: Sequence[Transform]) -> tuple[Joint, ...]:

@@ -8,7 +8,7 @@ from typing import Literal
 
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.elementwise import ZERO, Vector
-from urmpipe_models.transform import translation
+from urmpipe_models.transform import Step, Transform, made_of
 
 AXES = {
     "x": (1.0, 0.0, 0.0),
@@ -66,13 +66,23 @@ def geometric_chain(
             Joint(
                 row.name or f"q{k}",
                 "revolute" if row.kind == "R" else "prismatic",
-                translation(*row.r),
+                _shift(row.r, k),
                 AXES[row.axis],
             )
             for k, row in enumerate(rows, start=1)
         ),
-        tip=translation(*tip),
+        tip=_shift(tip, len(rows) + 1),
         start=tuple(float(value) for value in start),
         description=description,
         source=source,
+    )
+
+
+def _shift(r: Vector, k: int) -> Transform:
+    """Return the frame at r_k, parallel to the one before."""
+    x, y, z = r
+    return made_of(
+        Step("along", "x", x, f"r{k}.x", f"geometric row {k}"),
+        Step("along", "y", y, f"r{k}.y", f"geometric row {k}"),
+        Step("along", "z", z, f"r{k}.z", f"geometric row {k}"),
     )

@@ -102,7 +102,9 @@ def chain_from_dict(data: Mapping[str, Any], file: str | None = None) -> Chain:
 def robot_toml(chain: Chain) -> str:
     """Return a chain as a TOML robot file of kind `joints`; read back it is the same chain, bit by bit."""
     data = chain_to_dict(chain)
-    frames = {key: data.pop(key) for key in ("base", "tip", "tool")}
+    frames = {key: _shortest(data.pop(key)) for key in ("base", "tip", "tool")}
+    for joint in data["joints"]:
+        joint["origin"] = _shortest(joint["origin"])
     lists = {key: data.pop(key, []) for key in ("joints", "visuals")}
     lines = [f"# {EXPORT_MARK}: lengths in m, angles in rad", *toml_lines(data)]
     for key, frame in frames.items():
@@ -111,6 +113,11 @@ def robot_toml(chain: Chain) -> str:
         for item in items:
             lines += ["", f"[[{key}]]", *toml_lines(item)]
     return "\n".join(lines) + "\n"
+
+
+def _shortest(frame: dict[str, Any]) -> dict[str, Any]:
+    """Return the steps of a frame alone where it tells them: their product is all the rest."""
+    return {"steps": frame["steps"]} if "steps" in frame else frame
 
 
 def _read(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, cast
 
 from urmpipe_models.chains.visual import Box, Capsule, Colour, Cylinder, Mesh, Shape, Sphere, Visual
@@ -17,7 +18,7 @@ def read_visual(table: Table, units: Units) -> Visual:
     visual = Visual(
         table.text("joint", "") if table.has("joint") else None,
         _shape(table, units),
-        read_frame(table.table("origin"), units),
+        replace(read_frame(table.table("origin"), units), made_of=None),
         cast("Colour", table.numbers("colour", 4)) if table.has("colour") else None,
     )
     table.close()

@@ -13,7 +13,7 @@ from urmpipe_models.errors import Finding, RobotError, shown
 from urmpipe_models.files.xml_tree import Node, read_xml
 from urmpipe_models.messages import Hint
 from urmpipe_models.names import did_you_mean
-from urmpipe_models.transform import Transform, from_rpy
+from urmpipe_models.transform import Transform, from_xyz_rpy
 
 KINDS: dict[str, JointKind] = {
     "revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed",
@@ -175,7 +175,7 @@ def origin_of(tree: UrdfTree, node: Node, place: str) -> Transform:
         return Transform()
     x, y, z = numbers_of(tree, origin, f"{place}: origin", "xyz", (0.0, 0.0, 0.0))
     rx, ry, rz = numbers_of(tree, origin, f"{place}: origin", "rpy", (0.0, 0.0, 0.0))
-    return Transform(from_rpy(rx, ry, rz).rotation, (x, y, z))
+    return from_xyz_rpy((x, y, z), (rx, ry, rz), f"URDF {place}")
 
 
 def _axis(tree: UrdfTree, node: Node, joint: str) -> tuple[float, float, float]:

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asserting import there
 from sliding_arm import sliding_arm
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.run import run
@@ -17,7 +16,7 @@ from urmpipe_fmus.units import make_unit
 from urmpipe_fmus.units.kinematic_chain import kinematic_chain
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.urm import urm_chain, urm_geometry
+from urmpipe_models.chains.urm import urm_chain
 from urmpipe_models.chains.visual import Sphere, Visual
 from urmpipe_models.kinematics.forward import point_over_log, points_over_log, positions_over_log
 from urmpipe_models.robots.catalogue import load_robot, robot_names
@@ -181,18 +180,13 @@ def test_an_arm_of_a_urdf_is_taken() -> None:
     )
 
 
-def test_lengths_and_tilts_are_told_of_urm_arms_only() -> None:
-    lengths, tilts = [0.3, 0.2, 0.1, 0.05], [0.4, 0.0, -0.5]
+def test_lengths_and_tilts_are_parameters_of_what_was_described_by_them() -> None:
+    lengths, tilts = (0.3, 0.2, 0.1, 0.05), (0.4, 0.0, -0.5)
     arm = urm_chain("c", lengths, tilts, directions=[1, -1, -1]).placed(from_offset((1.0, 2.0, 3.0)))
-    found = there(urm_geometry(arm))
-    assert (found.lengths, found.directions) == (tuple(lengths), (1.0, -1.0, -1.0))
-    np.testing.assert_allclose(found.tilts, tilts, rtol=0.0, atol=1e-16)
+    told = {one.name: one.start for one in kinematic_chain(arm).parameters}
+    assert (told["lengths"], told["tilts"], told["base"]) == (lengths, tilts, (1.0, 2.0, 3.0))
     bent = replace(arm, tip=from_offset((0.001, 0.0, 0.05)))
-    twisted = replace(arm.joints[1], origin=from_offset((0.0, 0.0, 0.3, 1e-6, 0.4, 0.0)))
-    sliding_joint = replace(arm.joints[0], kind="prismatic")
-    assert urm_geometry(bent) is None
-    assert urm_geometry(replace(arm, joints=(arm.joints[0], twisted, *arm.joints[2:]))) is None
-    assert urm_geometry(replace(arm, joints=(sliding_joint, *arm.joints[1:]))) is None
-    leaning = replace(arm.joints[0], axis=(1e-5, 0.0, 1.0))  # of length 1 to the tolerance of a chain
-    assert urm_geometry(replace(arm, joints=(leaning, *arm.joints[1:]))) is None
-    assert urm_geometry(load_robot("ur5e")) is None
+    for other in (bent, load_robot("ur5e")):
+        names = {one.name for one in kinematic_chain(other).parameters}
+        assert "tip_rpy" in names
+        assert "lengths" not in names

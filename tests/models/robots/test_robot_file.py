@@ -223,7 +223,7 @@ def test_everything_wrong_is_said_at_once(robot: Any) -> None:
         "arm.toml: key base.translation: found [1, 2], allowed: 3 finite numbers",
         "arm.toml: key base.rotation: found [[1, 0], [0, 1]], allowed: three rows of three finite numbers",
         "arm.toml: key base.rotation: found beside rpy; allowed: one of the two",
-        "arm.toml: key base.turn: unknown; allowed: translation, rpy, rotation",
+        "arm.toml: key base.turn: unknown; allowed: translation, rpy, rotation, steps",
         "arm.toml: key tool.rotation: is no rotation matrix; allowed: orthonormal rows, right-handed",
         "arm.toml: key lengths[1]: found 'long', allowed: a finite number",
         "arm.toml: key lengths[2]: found nan, allowed: a finite number",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,9 @@ from hypothesis.strategies import SearchStrategy
 from asserting import refusal
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.errors import RobotError
+from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.robots.robot_file import chain_from_dict, chain_to_dict, read_robot_file, robot_toml
-from urmpipe_models.transform import translation
+from urmpipe_models.transform import Transform, rotation_x, translation
 
 
 def bits(chain: Chain) -> bytes:
@@ -40,6 +42,7 @@ def test_a_dictionary_through_json_is_the_same_chain_bit_by_bit(
     back = chain_from_dict(json.loads(text))
     assert back == chain
     assert bits(back) == bits(chain)
+    assert back.parameters == chain.parameters
 
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -53,6 +56,53 @@ def test_a_toml_file_is_the_same_chain_bit_by_bit(
     back = read_robot_file(path)
     assert back == chain
     assert bits(back) == bits(chain)
+    assert back.parameters == chain.parameters
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_a_toml_file_keeps_the_parameters(tmp_path: Path, name: str) -> None:
+    chain = load_robot(name).placed(tool=Transform(rotation_x(0.5).rotation, (0.1, 0.2, 0.3)))
+    chain = chain.with_parameters({"tool.rx": 0.25, chain.parameters[6].name: 0.4})
+    path = tmp_path / f"{name}.toml"
+    path.write_text(robot_toml(chain), encoding="utf-8")
+    back = read_robot_file(path)
+    assert (back, back.parameters) == (chain, chain.parameters)
+
+
+def test_steps_of_a_file_are_parameters_in_its_units(tmp_path: Path) -> None:
+    path = tmp_path / "arm.toml"
+    path.write_text(
+        """
+        kind = "joints"
+        length_unit = "mm"
+        angle_unit = "deg"
+        joints = [{ name = "a", origin = { steps = [
+            { name = "height", along = "z", value = 250 },
+            { rotation = [[1, 0, 0], [0, 0, -1], [0, 1, 0]] },
+            { name = "lean", about = "y", value = 90, source = "drawing 7" },
+        ] } }]
+        """,
+        encoding="utf-8",
+    )
+    chain = read_robot_file(path)
+    height, lean = chain.parameters[6:8]
+    assert (height.name, height.value, height.source) == ("height", 0.25, "")
+    assert (lean.name, lean.value, lean.source, lean.place) == ("lean", math.pi / 2, "drawing 7", "a")
+    assert lean.before.rotation == ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))
+    assert chain.joints[0].origin.translation == (0.0, 0.0, 0.25)
+
+
+def test_steps_and_another_frame_beside_them_are_refused() -> None:
+    data = chain_to_dict(load_robot("urm4"))
+    data["joints"][1]["origin"]["translation"] = [0.0, 0.0, 0.3]
+    data["joints"][2]["origin"]["steps"][0] |= {"along": "u"}
+    assert refusal(RobotError, chain_from_dict, data) == (
+        "key joints[1].origin.steps: found beside translation and rotation of another frame;"
+        " allowed: steps alone\n"
+        "key joints[2].origin.steps[0].along: found 'u', allowed: one of x, y, z\n"
+        "key joints[2].origin.steps: found beside translation and rotation of another frame;"
+        " allowed: steps alone"
+    )
 
 
 def test_a_negative_zero_and_odd_texts_come_back() -> None:

@@ -1,0 +1,214 @@
+"""What an arm is made from: listed, replaced, and moving the arm as a rebuilt description does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.articulated_6r import articulated_6r
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.dh import DHRow, dh_chain, modified_dh_chain
+from urmpipe_models.chains.geometric_model import GeometricRow, geometric_chain
+from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.errors import RobotError
+from urmpipe_models.kinematics.forward import forward
+from urmpipe_models.robots.catalogue import load_robot, robot_names
+from urmpipe_models.transform import Step, Transform, from_offset, rotation_x
+
+BASE = ["base.x", "base.y", "base.z", "base.rz", "base.ry", "base.rx"]
+TOOL = ["tool.x", "tool.y", "tool.z", "tool.rz", "tool.ry", "tool.rx"]
+
+URDFS = {
+    "FancySafeBot_fsb-library/lbr_iiwa7_r800.urdf": None,
+    "FancySafeBot_fsb-library/panda.urdf": "panda_hand",
+    "FancySafeBot_fsb-library/ur5.urdf": "tool0",
+    "Gepetto_example-robot-data/panda.urdf": "panda_hand_tcp",
+    "Gepetto_example-robot-data/ur10_robot.urdf": "tool0",
+    "Gepetto_example-robot-data/ur3_robot.urdf": "tool0",
+    "Gepetto_example-robot-data/ur5_robot.urdf": "tool0",
+    "ros-industrial_kuka_experimental/lbr_iiwa_14_r820.urdf": None,
+}
+"""The URDFs beside this repository, with the link that ends the arm where its file leaves a choice."""
+
+
+def bits(chain: Chain) -> bytes:
+    """Every number of the frames: == takes 0.0 and -0.0 for the same."""
+    numbers = [[*frame.translation, *(x for row in frame.rotation for x in row)] for frame in chain.frames]
+    return np.array(numbers, dtype=float).tobytes()
+
+
+def names_of(chain: Chain) -> list[str]:
+    return [one.name for one in chain.parameters]
+
+
+def values_of(chain: Chain) -> dict[str, float]:
+    return {one.name: one.value for one in chain.parameters}
+
+
+def rebuilds_itself(chain: Chain) -> None:
+    again = chain.with_parameters(values_of(chain))
+    assert again == chain
+    assert bits(again) == bits(chain)
+    assert values_of(again) == values_of(chain)
+
+
+@pytest.mark.parametrize("name", robot_names())
+def test_a_robot_with_its_own_values_is_the_same_bit_by_bit(name: str) -> None:
+    rebuilds_itself(load_robot(name))
+
+
+@pytest.mark.parametrize("file", URDFS)
+def test_a_urdf_with_its_own_values_is_the_same_bit_by_bit(shared: Path, file: str) -> None:
+    chain = load_robot(shared / "robots" / file, tip_link=URDFS[file])
+    rebuilds_itself(chain)
+    first = chain.joints[0].name
+    assert chain.parameters[6].name == f"{first}.x"
+    assert chain.parameters[6].source == f"URDF joint {first}"
+
+
+@settings(max_examples=40, deadline=None)
+@given(data=st.data())
+def test_a_frame_is_what_stands_before_a_parameter_its_motion_and_what_stands_after(
+    chains: SearchStrategy[Chain], data: st.DataObject
+) -> None:
+    chain = data.draw(chains)
+    assert len(set(names_of(chain))) == len(chain.parameters)
+    for one in chain.parameters:
+        frame = chain.frames[one.frame_index]
+        again = one.before @ Step(one.kind, one.axis, one.value).frame @ one.after
+        np.testing.assert_allclose(again.rotation, frame.rotation, rtol=0.0, atol=1e-15)  # of another order
+        np.testing.assert_allclose(again.translation, frame.translation, rtol=0.0, atol=1e-15)
+
+
+def test_names_and_sources_are_those_of_the_description() -> None:
+    urm = urm_chain("two", (0.3, 0.2, 0.1), (0.5, -0.7))
+    assert names_of(urm) == [*BASE, "r1", "theta2", "r2", "theta3", "r3", *TOOL]
+    found = [(one.place, one.source, one.unit, one.value) for one in urm.parameters[6:11]]
+    assert found == [
+        ("phi2", "URM segment", "m", 0.3),
+        ("phi2", "URM tilt", "rad", 0.5),
+        ("effector", "URM segment", "m", 0.2),
+        ("effector", "URM tilt", "rad", -0.7),
+        ("tip", "URM segment", "m", 0.1),
+    ]
+    rows = [DHRow(name="turn"), DHRow(kind="prismatic")]
+    dh = dh_chain("two", rows).parameters[6:14]
+    assert " ".join(one.name for one in dh) == "theta_1 d_1 a_1 alpha_1 theta_2 d_2 a_2 alpha_2"
+    assert [(one.place, one.source) for one in dh[3:5]] == [("q2", "DH row 1"), ("tip", "DH row 2")]
+    craig = modified_dh_chain("two", rows).parameters[6:14]
+    assert " ".join(one.name for one in craig) == "a_1 alpha_1 theta_1 d_1 a_2 alpha_2 theta_2 d_2"
+    assert [(one.place, one.source) for one in craig[3:5]] == [("turn", "DH row 1"), ("q2", "DH row 2")]
+    assert names_of(articulated_6r(0.1, 0.2, 0.3, 0.4, 0.05))[6:-6] == ["l0", "l1", "l2", "l3", "l4"]
+    shifts = geometric_chain("one", [GeometricRow("T", "y")])
+    assert names_of(shifts)[6:-6] == ["r1.x", "r1.y", "r1.z", "r2.x", "r2.y", "r2.z"]
+
+
+def test_a_joint_called_base_or_tool_has_names_of_its_own() -> None:
+    names = names_of(Chain("arm", (Joint("base"), Joint("tool"))))
+    assert names[:7] == [*BASE, "base.x'"]
+    assert names[12:13] == ["tool.x"]
+    assert names[-6:] == [f"{one}'" for one in TOOL]
+
+
+def test_a_frame_of_numbers_alone_turns_after_its_rotation() -> None:
+    turned = rotation_x(0.5)
+    tool = Transform(turned.rotation, (0.1, 0.2, 0.3))
+    arm = Chain("arm", (Joint("a"),)).placed(tool=tool)
+    assert [one.value for one in arm.parameters[-6:]] == [0.1, 0.2, 0.3, 0.0, 0.0, 0.0]
+    assert arm.parameters[-1].before == tool
+    changed = arm.with_parameters({"tool.x": 0.7, "tool.rx": 0.25})
+    assert changed.tool.translation == (0.7, 0.2, 0.3)
+    np.testing.assert_allclose(changed.tool.rotation, rotation_x(0.75).rotation, rtol=0.0, atol=1e-15)
+    assert values_of(changed)["tool.rx"] == 0.25
+    assert changed.with_parameters({"tool.rx": 0.0, "tool.x": 0.1}) == arm
+
+
+def test_the_rest_of_the_arm_stays() -> None:
+    arm = load_robot("urm6").placed(from_offset((1.0, 2.0, 3.0)))
+    assert [one.value for one in arm.parameters[:3]] == [1.0, 2.0, 3.0]
+    limited = replace(arm, joints=(replace(arm.joints[0], lower=-1.0), *arm.joints[1:]))
+    changed = limited.with_parameters({"r3": 0.25})
+    assert replace(changed, joints=limited.joints) == limited
+    (moved,) = [k for k, joint in enumerate(changed.joints) if joint != limited.joints[k]]
+    assert replace(changed.joints[moved], origin=limited.joints[moved].origin) == limited.joints[moved]
+    assert limited.with_parameters({}) == limited
+
+
+def test_every_unknown_name_is_told() -> None:
+    with pytest.raises(RobotError) as caught:
+        articulated_6r(0.1, 0.2, 0.3, 0.4, 0.05).with_parameters({"l0": 0.2, "L_1": 0.2, "tool.w": 0.1})
+    one, other = str(caught.value).splitlines()
+    assert one.startswith("robot articulated6r: parameter: found 'L_1' (did you mean l1?), allowed: l1, ")
+    assert other.startswith(
+        "robot articulated6r: parameter: found 'tool.w' (did you mean tool.z?), allowed: "
+    )
+
+
+DESCRIBED: dict[str, tuple[Callable[..., Chain], str]] = {
+    "urm": (lambda *v: urm_chain("a", v[:3], v[3:5]), "r1 r2 r3 theta2 theta3"),
+    "dh": (lambda *v: dh_chain("a", [DHRow(*v[:4]), DHRow(0.1, v[4])]), "theta_1 d_1 a_1 alpha_1 d_2"),
+    "modified_dh": (
+        lambda *v: modified_dh_chain("a", [DHRow(*v[:4]), DHRow(0.1, v[4])]),
+        "theta_1 d_1 a_1 alpha_1 d_2",
+    ),
+    "articulated_6r": (articulated_6r, "l0 l1 l2 l3 l4"),
+    "geometric": (
+        lambda *v: geometric_chain("a", [GeometricRow("R", "y", v[:3])], tip=(v[3], v[4], 0.1)),
+        "r1.x r1.y r1.z r2.x r2.y",
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", DESCRIBED)
+@settings(max_examples=20, deadline=None)
+@given(
+    st.lists(st.floats(-2.0, 2.0), min_size=5, max_size=5),
+    st.lists(st.floats(-2.0, 2.0), min_size=5, max_size=5),
+)
+def test_other_values_make_the_arm_that_they_describe(
+    kind: str, values: Sequence[float], others: Sequence[float]
+) -> None:
+    made, names = DESCRIBED[kind]
+    found = made(*values).with_parameters(dict(zip(names.split(), others, strict=True)))
+    assert found == made(*others)
+    assert bits(found) == bits(made(*others))
+
+
+FILES = {
+    "arm.urdf": (
+        '<robot name="arm"><link name="a"/><link name="b"/><joint name="elbow" type="revolute">'
+        '<parent link="a"/><child link="b"/>'
+        '<origin xyz="0.1 {length} 0.3" rpy="0.4 {angle} 0.6"/></joint></robot>'
+    ),
+    "arm.toml": (
+        'kind = "joints"\nname = "arm"\njoints = [{{ name = "elbow", origin = {{'
+        " translation = [0.1, {length}, 0.3], rpy = [0.4, {angle}, 0.6] }} }}]\n"
+    ),
+}
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_other_values_make_the_arm_of_a_changed_file(tmp_path: Path, file: str) -> None:
+    path = tmp_path / file
+    path.write_text(FILES[file].format(length=0.2, angle=0.5), encoding="utf-8")
+    found = load_robot(path).with_parameters({"elbow.y": 0.25, "elbow.ry": -0.5})
+    path.write_text(FILES[file].format(length=0.25, angle=-0.5), encoding="utf-8")
+    assert (found, values_of(found)) == (load_robot(path), values_of(load_robot(path)))
+    assert bits(found) == bits(load_robot(path))
+
+
+def test_values_may_be_arrays() -> None:
+    lengths: FloatArray = np.linspace(0.1, 0.4, 4)
+    arm = load_robot("urm4")
+    tcp = forward(arm.with_parameters({"r2": lengths}), arm.start)[-1].translation
+    for k, length in enumerate(lengths.tolist()):
+        one = forward(arm.with_parameters({"r2": length}), arm.start)[-1].translation
+        np.testing.assert_allclose([np.broadcast_to(x, 4)[k] for x in tcp], one, rtol=0.0, atol=1e-15)
