@@ -11,8 +11,9 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError, for_each, shown
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.recording import is_recording
-from urmpipe_pipeline.results import read_recording
+from urmpipe_pipeline.results import kind_of, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.other_robot import on_robot
@@ -21,7 +22,7 @@ from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.sources.vocabulary import key
 
-COMPARISON = "found the recording of a comparison, allowed: one that ingest wrote"
+JUDGED = "found the recording of a {}, allowed: one that ingest wrote"
 
 WITH_BASELINE = Hint("baseline", None, "compares it, alone, with an earlier one")
 
@@ -38,45 +39,71 @@ MadeRun: TypeAlias = Run | SolvedTargets
 def load_runs(
     operands: Sequence[Path | MadeRun],
     *,
+    sides: tuple[str, str] | None = None,
     robot: Chain | None = None,
     read: ReadOptions | None = None,
     tsp: float | None = None,
     derivative: Method | None = None,
+    judged: Sequence[Hint] = (WITH_BASELINE,),
 ) -> list[Run]:
-    """Return the runs of several operands; the reading options hold for every log among them.
+    """Return the runs of several operands, or both sides of one log; the reading options hold for every log.
 
     Args:
         operands: Recordings (.rrd), logs and paths (CSV), folders whose CSV files make one log; runs, and
             solved targets as theirs.
+        sides: What was asked for, then what was done, of one log that is yet to be read: a word in the names
+            of the columns of each side, or "rest" for all others.
         robot: The arm; of a recording or a run it replaces the one inside.
         read: How to read the CSV files, all of them; the unit of a column holds for those that have it.
         tsp: Period of the grid in [s], of the CSV files.
         derivative: How the joints of CSV files are differentiated.
+        judged: What the recording of a comparison, which is no operand, can be given to.
 
     Raises:
         UrmpipeError: With everything that is wrong with any of them: a bad CSV, a recording without a run.
+        OptionError: If sides are wanted of anything but one log.
     """
     shared = sum(isinstance(one, Path) and not _is_recording(one) for one in operands) > 1
     read = replace(read or ReadOptions(), shared=shared)
 
-    def run_of(operand: Path | MadeRun) -> Run:
+    def run_of(one: tuple[Path | MadeRun, tuple[str, str] | None]) -> Run:
         """Return the run that an operand is, is recorded in, or is read as."""
+        operand, side = one
         if not isinstance(operand, Path):
             return on_robot(operand.as_run(), robot)
         name = operand.resolve().name if operand.is_dir() else None
+        name = name if side is None else f"{operand.resolve().stem} ({side[0]})"
         try:
             if _is_recording(operand):
-                return on_robot(_recorded(operand).as_run(), robot)
-            files = log_files(operand)
-            return ingest_log(files, robot=robot, read=read, tsp=tsp, derivative=derivative, name=name)
+                return on_robot(_recorded(operand, judged).as_run(), robot)
+            files, own = log_files(operand), replace(read, side=side)
+            return ingest_log(files, robot=robot, read=own, tsp=tsp, derivative=derivative, name=name)
         except LogError as error:  # of several logs, each is named
             found = (one if one.file else replace(one, file=str(operand)) for one in error.findings)
             raise LogError(*found) from error
 
-    runs = for_each(run_of, operands)
+    if sides is not None:
+        _refuse_sides(operands, sides)
+        return _on_one_arm(for_each(run_of, [(operands[0], side) for side in (sides, sides[::-1])]))
+    runs = for_each(run_of, [(operand, None) for operand in operands])
     if shared:
         _refuse_unreached(read, runs)
     return _told_apart(operands, runs)
+
+
+def _refuse_sides(operands: Sequence[Path | MadeRun], sides: tuple[str, str]) -> None:
+    """Raise an `OptionError` if there is more than one log, it was read before, or its sides are one."""
+    log, several = operands[0], len(operands) > 1
+    if several or not isinstance(log, Path) or _is_recording(log) or sides[0].lower() == sides[1].lower():
+        found = ",".join(sides) + (" with several logs" if several else "")
+        allowed = "two words for two sides of one log that is yet to be read"
+        raise OptionError(Finding(parameter="sides", found=found, allowed=allowed))
+
+
+def _on_one_arm(runs: Sequence[Run]) -> list[Run]:
+    """Return runs of which those without an arm have the one that another singles out."""
+    arm = next((run.robot for run in runs if run.robot), None)
+    return [on_robot(run, arm) if run.log.joints and run.robot is None else run for run in runs]
 
 
 def _refuse_unreached(read: ReadOptions, runs: Sequence[Run]) -> None:
@@ -88,51 +115,6 @@ def _refuse_unreached(read: ReadOptions, runs: Sequence[Run]) -> None:
         allowed = "a column that a log has, and that is read"
         said = (Finding(parameter="unit", found=f"no column {shown(name)}", allowed=allowed) for name in lost)
         raise OptionError(*said)
-
-
-def load_sides(
-    operands: Sequence[Path | MadeRun],
-    sides: tuple[str, str],
-    *,
-    robot: Chain | None = None,
-    read: ReadOptions | None = None,
-    tsp: float | None = None,
-    derivative: Method | None = None,
-) -> list[Run]:
-    """Return both sides of one log as runs: what was asked for, then what was done.
-
-    Args:
-        operands: The log (CSV), or a folder whose CSV files make it.
-        sides: A word in the names of the columns of each side, or "rest" for all others.
-        robot: The arm; None for the one that a side singles out.
-        read: How to read the log.
-        tsp: Period of the grid in [s].
-        derivative: How the joints are differentiated.
-
-    Raises:
-        UrmpipeError: With everything that is wrong with it.
-        OptionError: If there is more than one log, or it is a recording.
-    """
-    log = operands[0]
-    if (
-        len(operands) > 1
-        or not isinstance(log, Path)
-        or _is_recording(log)
-        or sides[0].lower() == sides[1].lower()
-    ):
-        found = ",".join(sides) + (" with several logs" if len(operands) > 1 else "")
-        allowed = "two words for two sides of one log that is yet to be read"
-        raise OptionError(Finding(parameter="sides", found=found, allowed=allowed))
-
-    def run_of(side: tuple[str, str]) -> Run:
-        """Return the run of one side."""
-        one = replace(read or ReadOptions(), side=side)
-        name = f"{log.resolve().stem} ({side[0]})"
-        return ingest_log(log_files(log), robot=robot, read=one, tsp=tsp, derivative=derivative, name=name)
-
-    runs = for_each(run_of, (sides, sides[::-1]))
-    found_arm = next((run.robot for run in runs if run.robot), None)
-    return [on_robot(run, found_arm) if run.log.joints and run.robot is None else run for run in runs]
 
 
 def _told_apart(operands: Sequence[Path | MadeRun], runs: Sequence[Run]) -> list[Run]:
@@ -149,12 +131,14 @@ def _told_apart(operands: Sequence[Path | MadeRun], runs: Sequence[Run]) -> list
     return [named(*each) for each in zip(runs, files, stems, strict=True)]
 
 
-def _recorded(operand: Path) -> MadeRun:
+def _recorded(operand: Path, judged: Sequence[Hint]) -> MadeRun:
+    """Return the run of a recording, or raise a `RecordingError` that says what else it is."""
     result = read_recording(operand)
     if isinstance(result, (Run, SolvedTargets)):
         return result
-    if isinstance(result, Comparison):
-        raise RecordingError(Finding(COMPARISON, str(operand), hints=(WITH_BASELINE,)))
+    if isinstance(result, (Comparison, Diagnosis)):
+        hints = judged if isinstance(result, Comparison) else ()
+        raise RecordingError(Finding(JUDGED.format(kind_of(result).name), str(operand), hints=tuple(hints)))
     raise RecordingError(Finding(SIMULATION, file=str(operand)))
 
 

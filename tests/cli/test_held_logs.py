@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from urmpipe.systems.held_logs import between_samples, clock_of, on_points
+from urmpipe.systems.held_logs import between_samples, on_points
 from urmpipe_fmus.table import Table
 from urmpipe_models.arrays import IntArray
+from urmpipe_pipeline.runs.grid import row_clock
 
 
 def stamps(rate: float, unit_ns: int, rows: int = 2000) -> IntArray:
@@ -18,15 +19,15 @@ def stamps(rate: float, unit_ns: int, rows: int = 2000) -> IntArray:
 @pytest.mark.parametrize("rate", [30.0, 60.0, 125.0, 200.0, 240.0])
 @pytest.mark.parametrize("unit_ns", [1, 1_000, 100_000, 1_000_000])
 def test_each_communication_point_of_a_regular_log_reads_its_own_row(rate: float, unit_ns: int) -> None:
-    clock = clock_of(stamps(rate, unit_ns))
-    assert clock.period is not None
-    assert clock.period == pytest.approx(1.0 / rate, rel=1e-5)  # by the ends of 2000 rows, to a digit
-    times = on_points(clock.t_ns, clock.period)
+    clock = row_clock(stamps(rate, unit_ns))
+    step = clock.period / 1e9
+    assert step == pytest.approx(1.0 / rate, rel=1e-5)  # by the ends of 2000 rows, to a digit
+    times = on_points(clock.t_ns, step)
     k = np.arange(len(times))
-    read = Table(times, k[:, None].astype(float)).rows_at(k * clock.period)
+    read = Table(times, k[:, None].astype(float)).rows_at(k * step)
     np.testing.assert_array_equal(read.before[0], k)
     np.testing.assert_array_equal(read.fraction, 0.0)
-    assert between_samples("log", times, clock.period, len(times) - 1) is None
+    assert between_samples("log", times, step, len(times) - 1) is None
 
 
 def test_samples_off_the_points_stay_where_they_are_and_are_told() -> None:
@@ -42,6 +43,6 @@ def test_samples_off_the_points_stay_where_they_are_and_are_told() -> None:
 
 
 def test_the_period_of_an_irregular_log_is_its_median_and_one_row_has_none() -> None:
-    assert clock_of(np.array([0, 10, 20, 90, 100], dtype=np.int64) * 1_000_000).period == 0.01
-    assert clock_of(np.array([0], dtype=np.int64)).period is None
+    assert row_clock(np.array([0, 10, 20, 90, 100], dtype=np.int64) * 1_000_000).period == 10e6
+    assert row_clock(np.array([0], dtype=np.int64)).period == 0.0
     assert on_points(np.array([0], dtype=np.int64), 0.005).tolist() == [0]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from urmpipe.arm_placing import place_robot
 from urmpipe.log_table import LogTable
 from urmpipe.reading import resolved
-from urmpipe.systems.held_logs import between_samples, clock_of, on_points
+from urmpipe.systems.held_logs import between_samples, on_points
 from urmpipe.systems.log_tables import read_table
 from urmpipe.systems.units import Backend, column_names, unit_of
 from urmpipe_datasets import LOGS
@@ -22,6 +22,7 @@ from urmpipe_fmus.cosim.system import STEP
 from urmpipe_fmus.table import Table
 from urmpipe_models.errors import Finding, OptionError, UrmpipeError, shown
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.runs.grid import row_clock
 
 if TYPE_CHECKING:
     from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
@@ -153,11 +154,11 @@ class Blocks:
 
     def _hold(self, block: str, t_ns: IntArray) -> None:
         """Remember the clock of joint values that are held between samples."""
-        clock = clock_of(t_ns)
+        clock = row_clock(t_ns)
         self._held[block] = clock.t_ns
         self.end = max(self.end or 0.0, float(clock.t_ns[-1]) / 1e9)
-        if clock.period is not None:
-            self.period = min(self.period or clock.period, clock.period)
+        if period := clock.period / 1e9:
+            self.period = min(self.period or period, period)
 
     def _meet(self, step: float) -> None:
         """Let the samples of held logs that are on communication points be met by these."""

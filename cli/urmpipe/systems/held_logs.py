@@ -1,4 +1,4 @@
-"""Joint logs that are held between samples: the step that they ask for, and their samples on it.
+"""Joint logs that are held between samples: their samples on communication points, and between them.
 
 Joint values may wrap, so nothing is in between: at a communication point that misses a sample the one before
 is held, against a reference that has moved on.
@@ -6,43 +6,11 @@ is held, against a reference that has moved on.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import REGULAR
-from urmpipe_pipeline.sources.clocks.quantised import behind_rounded
-
-
-class Clock(NamedTuple):
-    """The clock of a log, as `urmpipe.compare` takes it.
-
-    Attributes:
-        t_ns: Times in integer [ns], strictly rising, shape (n,): the log's own, or those of the regular clock
-            behind rounded ones.
-        period: Of a regular clock its mean, else the median, in [s]; None of a single row.
-    """
-
-    t_ns: IntArray
-    period: float | None
-
-
-def clock_of(t_ns: IntArray) -> Clock:
-    """Return the clock behind the times of a log.
-
-    Args:
-        t_ns: Times in integer [ns], strictly rising, shape (n,).
-    """
-    if len(t_ns) < 2:
-        return Clock(t_ns, None)
-    mean = float(t_ns[-1] - t_ns[0]) / (len(t_ns) - 1)
-    if np.abs(t_ns - t_ns[0] - np.arange(len(t_ns)) * mean).max() <= REGULAR * mean:
-        return Clock(t_ns, mean / 1e9)
-    if even := behind_rounded(t_ns):
-        return Clock(even.t_ns - even.t_ns[0] + t_ns[0], even.period / 1e9)
-    return Clock(t_ns, float(np.median(np.diff(t_ns))) / 1e9)
 
 
 def on_points(t_ns: IntArray, step: float) -> IntArray:

@@ -7,6 +7,7 @@ interpolated across a gap, or across a step of a joint that no motion explains.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,23 @@ RESAMPLED = "resampled"
 MOST = 20_000_000
 """Samples of a grid, where a log does not have as many rows: more come of a broken clock or a mistyped period
 and would fill the memory."""
+
+
+class RowClock(NamedTuple):
+    """The clock behind the rows of a log.
+
+    Attributes:
+        t_ns: Its times of the rows in integer [ns], strictly increasing, shape (n,): their own, or those of
+            the regular clock behind rounded ones.
+        period: Of a regular clock its mean, else the median, in [ns]; 0 of a single row.
+        regular: Whether it is regular.
+        rounded: What is seen behind rounded times; None where they stand as they are.
+    """
+
+    t_ns: IntArray
+    period: float
+    regular: bool
+    rounded: Regular | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,6 +144,19 @@ def inside_spans(
     return np.asarray(np.cumsum(depth, axis=0)[:-1] > 0)
 
 
+def row_clock(t_ns: IntArray) -> RowClock:
+    """Return the clock of rows at times in integer [ns], strictly increasing, shape (n,)."""
+    if len(t_ns) < 2:
+        return RowClock(t_ns, 0.0, True)
+    mean = float(t_ns[-1] - t_ns[0]) / (len(t_ns) - 1)
+    ideal = t_ns[0] + np.arange(len(t_ns)) * mean
+    if np.max(np.abs(t_ns - ideal)) <= REGULAR * mean:
+        return RowClock(t_ns, mean, True)
+    if rounded := behind_rounded(t_ns):
+        return RowClock(rounded.t_ns - rounded.t_ns[0] + t_ns[0], rounded.period, True, rounded)
+    return RowClock(t_ns, float(np.median(np.diff(t_ns))), False)
+
+
 def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
     """Return the grid of a log.
 
@@ -137,18 +168,13 @@ def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
     Raises:
         LogError: If it would have more samples than fit in memory.
     """
-    t = log.t_ns
-    if len(t) < 2:
-        return Grid(t, tsp or 0.0, True, t, ())
-    mean = float(t[-1] - t[0]) / (len(t) - 1)
-    ideal = t[0] + np.arange(len(t)) * mean
-    regular = bool(np.max(np.abs(t - ideal)) <= REGULAR * mean)
-    clock = None if regular else behind_rounded(t)
-    own = t if clock is None else clock.t_ns - clock.t_ns[0] + t[0]
-    period = mean if regular else clock.period if clock else float(np.median(np.diff(t)))
+    clock = row_clock(log.t_ns)
+    own, period = clock.t_ns, clock.period
+    if len(own) < 2:
+        return Grid(own, tsp or 0.0, True, own, ())
     wanted = period if tsp is None else tsp * 1e9
-    told = () if clock is None else (_rounded(clock),)
-    if (regular or clock) and abs(wanted - period) <= REGULAR * period / len(t):
+    told = () if clock.rounded is None else (_rounded(clock.rounded),)
+    if clock.regular and abs(wanted - period) <= REGULAR * period / len(own):
         return Grid(own, period / 1e9, True, own, told)
     count = int((own[-1] - own[0]) / wanted + 1e-6) + 1
     _refuse_endless(log, wanted, count)
