@@ -20,6 +20,7 @@ WIDTH = 100
 PAGES = {
     "ingest": "[logs.md](logs.md), [recording-logs.md](recording-logs.md)",
     "compare": "[compare.md](compare.md), [ci.md](ci.md)",
+    "diagnose": "[diagnose.md](diagnose.md)",
     "robot": "[robots.md](robots.md)",
     "ik": "[ik.md](ik.md), [targets.md](targets.md)",
     "fmu": "[fmu.md](fmu.md), [units.md](units.md)",

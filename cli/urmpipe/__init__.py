@@ -3,6 +3,7 @@
     import urmpipe
     run = urmpipe.ingest("log.csv", robot="urm6")
     comparison = urmpipe.compare("path.csv", "log.csv", robot="urm6")
+    urmpipe.diagnose("path.csv", "log.csv", robot="urm6").sentence
     urmpipe.report(comparison, "report.html")
     urmpipe.export(run, "log.parquet")
     simulation = urmpipe.simulate("log-to-delta", arguments={"log": "log.csv", "reference": "path.csv"})
@@ -21,6 +22,7 @@ from urmpipe_models.display import Shown
 if TYPE_CHECKING:
     from urmpipe.api.build_fmu import build_fmu as build_fmu
     from urmpipe.api.compare import compare as compare
+    from urmpipe.api.diagnose import diagnose as diagnose
     from urmpipe.api.export import export as export
     from urmpipe.api.ik import ik as ik
     from urmpipe.api.ingest import ingest as ingest
@@ -54,6 +56,7 @@ if TYPE_CHECKING:
     from urmpipe_models.transform import Transform as Transform
     from urmpipe_pipeline.comparison.comparison import Comparison as Comparison
     from urmpipe_pipeline.comparison.deviation import Deviation as Deviation
+    from urmpipe_pipeline.diagnosis.result import Diagnosis as Diagnosis
     from urmpipe_pipeline.joint_log import JointLog as JointLog
     from urmpipe_pipeline.runs.results import Run as Run
     from urmpipe_pipeline.simulations.simulation import Simulation as Simulation
@@ -70,6 +73,7 @@ _HOME = {
     "Comparison": "urmpipe_pipeline.comparison.comparison",
     "CosimulationError": "urmpipe_models.errors",
     "Deviation": "urmpipe_pipeline.comparison.deviation",
+    "Diagnosis": "urmpipe_pipeline.diagnosis.result",
     "Exported": "urmpipe_pipeline.tables",
     "FmuError": "urmpipe_models.errors",
     "SolvedTargets": "urmpipe_pipeline.solved_targets.result",
@@ -95,6 +99,7 @@ _HOME = {
     "ViewerError": "urmpipe_models.errors",
     "build_fmu": "urmpipe.api.build_fmu",
     "compare": "urmpipe.api.compare",
+    "diagnose": "urmpipe.api.diagnose",
     "export": "urmpipe.api.export",
     "ik": "urmpipe.api.ik",
     "ingest": "urmpipe.api.ingest",

@@ -135,6 +135,7 @@ KINDS = {
     "baseline": Kind(_is_baseline, "a recording, or what `compare` returned"),
     "build_fmu.log": Kind(_is_table, "a log: CSV, or a folder of plots"),
     "derivative": _one_of("central", "savgol"),
+    "diagnose": FLAG,
     "draw": PATH,
     "duration": SECONDS,
     "every": FLAG,

@@ -32,6 +32,7 @@ COMMANDS = {
     "demo": "Run the whole way on bundled logs.",
     "ingest": "Turn one log into a recording.",
     "compare": "Hold logs against a reference and give a verdict.",
+    "diagnose": "Say why a log deviates from its reference.",
     "report": "Write the HTML report of recordings.",
     "view": "Open recordings in the viewer.",
     "export": "Write a recording as CSV, Parquet, MAT or TUM.",
@@ -99,6 +100,7 @@ def cli() -> None:
       urmpipe demo
       urmpipe ingest log.csv --robot urm6
       urmpipe compare path.csv log.csv --robot urm6 --tolerance 0.0035
+      urmpipe diagnose path.csv log.csv --robot urm6
       urmpipe report log-against-path.rrd
       urmpipe view log-against-path.rrd
       urmpipe ik path.csv --robot urm6 -o joints.csv

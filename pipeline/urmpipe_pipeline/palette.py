@@ -47,6 +47,9 @@ NEUTRAL_COLOUR = "#c8d0d4"
 DEVIATION_COLOUR = "#fe046c"
 """The deviation made visible in the 3D view: the enlarged path and the worst place; crimson."""
 
+MENDED_COLOUR = _COLOURS["green"]
+"""A log as it would be without the causes of its deviation."""
+
 VALUE_SCALE = ((0.0, "#8fc1e3"), (0.35, "#e69f00"), (0.7, "#d55e00"), (1.0, "#6b0f00"))
 """Small to large: darker all the way, blue to red, legible on white and to the colour-blind."""
 

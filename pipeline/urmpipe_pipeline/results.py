@@ -14,6 +14,8 @@ from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison import exports as comparison_exports
 from urmpipe_pipeline.comparison import presenter as comparison
 from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.diagnosis import presenter as diagnosis
+from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Presentation
@@ -49,6 +51,7 @@ class Kind:
 KINDS: tuple[Kind, ...] = (
     Kind("run", Run, runs.present, run_exports.exports),
     Kind("comparison", Comparison, comparison.present, comparison_exports.exports),
+    Kind("diagnosis", Diagnosis, diagnosis.present),
     Kind("simulation", Simulation, simulations.present, simulation_exports.exports),
     Kind("solved targets", SolvedTargets, solved_targets.present, solved_targets.exports),
 )
@@ -65,6 +68,11 @@ def kind_of(result: Result) -> Kind:
     return next(kind for kind in KINDS if kind.cls is type(result))
 
 
+def whole(result: Result) -> Result:
+    """Return what is recorded and reported of a result: of a diagnosis the comparison that it stands in."""
+    return (result.comparison if isinstance(result, Diagnosis) else None) or result
+
+
 def write_recording(
     result: Result, path: Path, inputs: Sequence[Path] = (), progress: Callable[[float], None] | None = None
 ) -> Path:
@@ -79,7 +87,8 @@ def write_recording(
     Raises:
         OutputError: If the file may not be written there, or did not read back as it was written.
     """
-    write_result(result, kind_of(result).name, present(result), path, inputs, progress)
+    shown = whole(result)
+    write_result(shown, kind_of(shown).name, present(shown), path, inputs, progress)
     return path
 
 

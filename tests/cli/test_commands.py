@@ -224,9 +224,15 @@ def test_the_demo_goes_the_whole_way(urmpipe: RunCommand, tmp_path: Path) -> Non
     again = urmpipe("demo")
     assert again.code == 0
     assert again.out.startswith("Four logs of one motion: three should pass; the fourth, ")
-    *_, as_expected, more, logs, report, recording = again.out.splitlines()
+    *_, as_expected, more, first, second, third, fourth, logs, report, recording = again.out.splitlines()
     assert as_expected.startswith("The verdicts are as they should be: ")
-    assert more == "the counter-rotating module does not."
+    assert more == "the counter-rotating module does not. Why each deviates:"
+    assert [one.split(":")[0].strip() for one in (first, second, third)] == [
+        "coppeliasim",
+        "matlab",
+        "solidworks",
+    ]
+    assert fourth == "  counter_rotating: module 3 (phi3) counter-rotates: rms 416.57 mm -> 0.0001 mm"
     assert logs == f"Logs:      {LOGS}  (to look at, or to try the commands with)"
     assert report == f"Report:    {Path('urmpipe-demo', 'report.html')}  (open it in any browser)"
     assert recording.startswith(f"Recording: {Path('urmpipe-demo', 'demo.rrd')}  (open it: ")

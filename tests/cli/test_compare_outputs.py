@@ -17,8 +17,8 @@ from click.shell_completion import ShellComplete
 
 import urmpipe
 from four_logs import ALLOWED, Captured, compare, lay_logs, names, recorded, said, write_log
-from urmpipe.commands.compare import SYNC
 from urmpipe.main import cli, run
+from urmpipe.options.comparing import SYNC
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison.deviation import Statistics
 

@@ -11,6 +11,7 @@ import pytest
 
 import urmpipe
 from urmpipe.commands.compare import compare
+from urmpipe.commands.diagnose import diagnose
 from urmpipe.commands.export import export
 from urmpipe.commands.fmu import fmu
 from urmpipe.commands.ik import ik
@@ -23,6 +24,7 @@ from urmpipe_models.spelling import option_of
 COMMANDS: dict[str, tuple[click.Command, Callable[..., Any]]] = {
     "build": (fmu.commands["build"], urmpipe.build_fmu),
     "compare": (compare, urmpipe.compare),
+    "diagnose": (diagnose, urmpipe.diagnose),
     "export": (export, urmpipe.export),
     "ik": (ik, urmpipe.ik),
     "ingest": (ingest, urmpipe.ingest),
@@ -34,6 +36,7 @@ COMMANDS: dict[str, tuple[click.Command, Callable[..., Any]]] = {
 OPERANDS = {
     "build": {"unit"},
     "compare": {"reference", "logs"},
+    "diagnose": {"reference", "log"},
     "export": {"result"},
     "ik": {"targets"},
     "ingest": {"log"},

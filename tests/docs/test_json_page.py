@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import urmpipe
+from diagnoses import diagnosis_of
 from urmpipe.main import COMMANDS, cli, run
 from urmpipe_datasets import LOGS
 from urmpipe_models.inverse.targets import targets_of
@@ -72,6 +73,14 @@ def test_each_key_of_inverse_kinematics_is_named() -> None:
     assert keys(urmpipe.ik(poses, arm).to_dict()) <= keys(found)
 
 
+def test_each_key_of_a_diagnosis_is_named() -> None:
+    run = urmpipe.ingest(LOGS / "matlab.csv", robot="urm6")
+    (one,) = urmpipe.compare(LOGS / "path.csv", run).runs
+    found = keys(replace(one, diagnosis=diagnosis_of(one)).to_dict())
+    assert found - NAMED == set()
+    assert {"rms_before", "from_sample", "needs", "reason", "words"} <= found
+
+
 def test_each_key_of_a_simulation_is_named() -> None:
     t_ns, block = np.arange(2), SimulatedBlock("meter", "unit", "delta_meter", "")
     simulation = Simulation(
@@ -87,6 +96,7 @@ def test_each_key_of_a_simulation_is_named() -> None:
 
 CALLS = {
     "compare compare": "compare path.csv log.csv --robot urm6",
+    "diagnose diagnose": "diagnose path.csv log.csv --robot urm6",
     "export export": "export log.rrd -o log.parquet",
     "fmu build": "fmu build dc_drive --backend python",
     "fmu check": "fmu check dc_drive.fmu",

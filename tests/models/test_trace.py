@@ -25,9 +25,19 @@ from urmpipe_models.drives.drive import (
 )
 from urmpipe_models.drives.set_point import JointMotion, set_point
 from urmpipe_models.kinematics.forward import forward, jacobian
+from urmpipe_models.kinematics.identification import Twist, sensitivities
 from urmpipe_models.kinematics.motion import motions
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import euler_zxz, euler_zyx, from_rpy, from_zxz, rotation_z, translation
+from urmpipe_models.transform import (
+    euler_zxz,
+    euler_zyx,
+    from_offset,
+    from_rpy,
+    from_zxz,
+    rotation_x,
+    rotation_z,
+    translation,
+)
 
 TRACED = 1e-14
 """The same operations on values of about 1; CasADi may take another sine and simplify, each some 1e-16."""
@@ -59,6 +69,18 @@ def assert_traced(got: FloatArray, expected: list[Any], size: float = 1.0) -> No
 def symbols() -> list[Any]:
     casadi.GlobalOptions.setNumpyMode(-1)
     return [casadi.SX.sym(name, 6) for name in ("q", "qd", "qdd")]
+
+
+@pytest.mark.parametrize("name", ["urm6", "ur5e"])
+def test_changes_of_frames_trace_with_symbolic_joints(symbols: list[Any], name: str) -> None:
+    chain = load_robot(name)
+    frame = from_rpy(0.1, -0.7, 0.4)
+    twists = [Twist(place, kind, (0.0, 0.6, 0.8), frame) for place in range(9) for kind in ("along", "about")]
+    columns_of_q = traced(
+        "columns", symbols[:1], flat(tuple(sensitivities(chain, symbols[0].elements(), twists)))
+    )
+    for values in np.random.default_rng(12).uniform(-1.0, 1.0, (20, 6)).tolist():
+        assert_traced(columns_of_q(values), flat(tuple(sensitivities(chain, values, twists))))
 
 
 @pytest.mark.parametrize("name", ["urm6", "ur5e"])
@@ -152,6 +174,26 @@ def test_arms_of_every_kind_trace_with_all_their_parameters(number: int) -> None
     for _ in range(10):
         parameters, at = rng.uniform(0.1, 1.0, 12).tolist(), rng.uniform(-1.0, 1.0, joints).tolist()
         assert_traced(function(parameters, at), values_of(arms_of(parameters)[number], at), size=100.0)
+
+
+@pytest.mark.parametrize("name", ["urm4", "ur5e", "panda", "articulated6r"])
+def test_a_pose_has_derivatives_by_every_parameter(name: str) -> None:
+    casadi.GlobalOptions.setNumpyMode(-1)
+    arm, step = load_robot(name).placed(from_offset([1.0, 2.0, 3.0]), rotation_x(0.5)), 1e-6
+    names, own = [one.name for one in arm.parameters], [one.value for one in arm.parameters]
+    q = [0.3 * k - 0.7 for k in range(len(arm.coordinates))]
+
+    def entries(values: Sequence[Any]) -> list[Any]:
+        pose = forward(arm.with_parameters(dict(zip(names, values, strict=True))), q)[-1]
+        return [*pose.translation, *flat(pose.rotation)]
+
+    x = casadi.SX.sym("x", len(names))
+    found = casadi.vertcat(*entries(x.elements()))
+    slopes = np.array(casadi.Function("slopes", [x], [casadi.jacobian(found, x)])(own))
+    for k, slope in enumerate(slopes.T):
+        ahead, behind = (entries([*own[:k], own[k] + h, *own[k + 1 :]]) for h in (step, -step))
+        expected = np.subtract(ahead, behind) / (2.0 * step)
+        np.testing.assert_allclose(slope, expected, rtol=0.0, atol=1e-8)  # 5 m round to 1e-15, over 2e-6
 
 
 def drive_values(x: Sequence[Any]) -> list[Any]:

@@ -33,7 +33,7 @@ from urmpipe_pipeline.comparison.tables import statistics_rows
 from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.warnings import BEYOND, EXCHANGED, LARGE_NOISE, large_noises
-from urmpipe_pipeline.operands import MadeRun, is_log, load_comparison, load_runs, load_sides
+from urmpipe_pipeline.operands import WITH_BASELINE, MadeRun, is_log, load_comparison, load_runs
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.results import kind_of, present, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
@@ -67,6 +67,7 @@ def compare(
     sync: SyncOption = "start",
     align: AlignMode = "none",
     sides: tuple[str, str] | None = None,
+    diagnose: bool = False,
     baseline: PathLike | Comparison | None = None,
     noise: float | Mapping[str, float] | None = None,
     strict: bool = False,
@@ -98,6 +99,8 @@ def compare(
         align: How a log is moved in space first: none, start, rigid, tool or base+tool.
         sides: Two words in the names of the columns of one log, such as ("target", "actual"): what was asked
             for is the reference of what was done; "rest" for the columns without the other word.
+        diagnose: Whether the `diagnosis` of each run says why it deviates. Base and tool are causes then: not
+            with `align`.
         baseline: An earlier comparison, to tell what changed since.
         noise: Changes since then that mean nothing, in [m], or in [m] and [rad] by kind; default: 1 um and
             1 urad.
@@ -123,13 +126,15 @@ def compare(
     }  # fmt: skip
     told = None if junit is None else Path(junit)
     with errors_in_junit(told, kept, voice), guarded_outputs(outputs, kept) as parts:
-        options = CompareOptions(_allowed(tolerance), tcp, sync, align, _with_unit(tolerance))
+        options = CompareOptions(_allowed(tolerance), tcp, sync, align, _with_unit(tolerance), diagnose)
         level = _noise_level(noise, baseline)
         given = resolved(reading, robot, base, tool, base_link, tip_link)
         _refuse_unused(operands, {**reading, "tsp": tsp, "derivative": derivative, "sides": sides})
         earlier = None if baseline is None else _earlier(baseline)
-        loader = load_runs if sides is None else partial(load_sides, sides=sides)
-        load = partial(loader, robot=given.arm, read=given.options, tsp=tsp, derivative=derivative)
+        load = partial(
+            load_runs, sides=sides, robot=given.arm, read=given.options, tsp=tsp, derivative=derivative,
+            judged=() if diagnose else (WITH_BASELINE,),
+        )  # fmt: skip
         made = None if operands[1:] or earlier is None else _made_before(reference, output)
         made = made or _compared(operands, load, options)
         if earlier is not None:

@@ -12,7 +12,7 @@ from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import for_each
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Cell, Value
-from urmpipe_pipeline.results import present, read_recording
+from urmpipe_pipeline.results import present, read_recording, whole
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -66,7 +66,10 @@ def _plain(cell: Cell) -> Any:
     return cell.number if isinstance(cell, Value) else cell
 
 
-SHOWN = "a recording, a Run, a Comparison or a Simulation; ik(..., output=FILE.rrd) writes a recording"
+SHOWN = (
+    "a recording, a Run, a Comparison, a Diagnosis or a Simulation; ik(..., output=FILE.rrd) writes a"
+    " recording"
+)
 
 
 @public
@@ -82,7 +85,8 @@ def report(
     """Write one self-contained HTML file about recordings or results, and its figures as files: all or none.
 
     Args:
-        results: Recordings (.rrd), what `ingest`, `compare` and `simulate` returned, or one of them.
+        results: Recordings (.rrd), what `ingest`, `compare`, `diagnose` and `simulate` returned, or
+            one of them.
         output: The HTML file to write.
         figures: A folder to write every figure to as a file; needs the extra `figures` and Chromium.
         formats: svg, png or both.
@@ -106,7 +110,7 @@ def report(
         number, one = numbered
         found = read_recording(Path(one), lazy=True) if isinstance(one, (str, Path)) else one
         reading(number / len(given))
-        return found
+        return whole(found)
 
     found = for_each(read, enumerate(given, start=1))
     shown = [present(one) for one in found]

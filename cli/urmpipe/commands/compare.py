@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
+from urmpipe.options.comparing import comparing_options
 from urmpipe.options.given import for_logs, options_given
 from urmpipe.options.grouped import Command
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import log_options
-from urmpipe.options.types import TIMES, OneOf, ParsedType, parsed, quantity
-from urmpipe_models.tolerance import DEFAULT_TOLERANCE
+from urmpipe.options.types import OneOf, ParsedType
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.comparison.comparison import Comparison
@@ -24,53 +23,11 @@ OF_RESULTS = {"baseline", "noise", "junit", "csv", "strict", "as_json", "quiet",
 """Parameters that a comparison takes that was made before; the others say how one is made."""
 
 
-def _sync(text: str) -> str | float:
-    """Return how the clocks are put together: start, auto, or an offset in [s].
-
-    Raises:
-        OptionError: If it is none of them.
-    """
-    from urmpipe_models.errors import OptionError, shown
-
-    offset = quantity(text, TIMES)
-    if text not in ("start", "auto") and not math.isfinite(offset):
-        allowed = "start, auto, or a time in s, such as -0.2 or 200ms"
-        raise OptionError(f"found {shown(text)}, allowed: {allowed}")
-    return text if text in ("start", "auto") else offset
-
-
-def _tolerance(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> str:
-    """Return what is allowed, which can be read; given several times, it is all of it."""
-    from urmpipe_pipeline.comparison.tolerance import parse_tolerance
-
-    text = ",".join(values)
-    parsed(parse_tolerance, text, ctx, param)
-    return text
-
-
 def _noise(text: str) -> dict[str, float]:
     """Return what of a change means nothing, by kind."""
     from urmpipe_pipeline.comparison.baseline import parse_noise
 
     return parse_noise(text)
-
-
-def _sides(text: str) -> tuple[str, ...]:
-    """Return the two words.
-
-    Raises:
-        OptionError: If there are not two.
-    """
-    from urmpipe_models.errors import OptionError, shown
-
-    words = tuple(word.strip() for word in text.split(","))
-    if len(words) != 2 or not all(words):
-        raise OptionError(f"found {shown(text)}, allowed: two words, such as target,actual")
-    return words
-
-
-SIDES = ParsedType("REFERENCE,LOG", _sides)
-SYNC = ParsedType("sync", _sync)
 
 
 def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command], Command]:
@@ -82,33 +39,7 @@ def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command]
 @click.argument("reference", type=click.Path(path_type=Path))
 @click.argument("logs", metavar="[LOG...]", nargs=-1, type=click.Path(path_type=Path))
 @output_option("RUN.rrd", "The recording [default: LOG-against-REFERENCE.rrd here].")
-@click.option(
-    "--tolerance",
-    default=[str(DEFAULT_TOLERANCE)],
-    show_default=True,
-    multiple=True,
-    callback=_tolerance,
-    metavar="M|KIND=VALUE,...",
-    help="Largest deviation allowed: on an axis in m, or of kinds: axis, x, y, z, norm, path (m, mm, um),"
-    " angle, joint (rad, mrad, deg; m of joints that slide), as axis=3.5mm,norm=5mm,angle=0.5deg. It replaces"
-    " the default whole: what is not named is not judged.",
-)
-@click.option(
-    "--tcp",
-    type=OneOf(["fk", "recorded"]),
-    default="fk",
-    show_default=True,
-    help="Where a log was: by its joints, or as it recorded itself.",
-)
-@click.option(
-    "--sync",
-    default="start",
-    show_default=True,
-    type=SYNC,
-    metavar="start|auto|SECONDS",
-    help="Start both together, find the offset by the motion, or t_reference = t_log + SECONDS (below 0 for a"
-    " late log).",
-)
+@comparing_options
 @click.option(
     "--align",
     type=OneOf(["none", "start", "rigid", "tool", "base+tool"]),
@@ -118,10 +49,9 @@ def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command]
     " the best base and tool at once (measured from outside).",
 )
 @click.option(
-    "--sides",
-    type=SIDES,
-    help="Both sides of one log, by words in the names of its columns: target,actual; desired,actual;"
-    " commanded,measured. rest: the columns without the other word.",
+    "--diagnose",
+    is_flag=True,
+    help="Say why each log deviates, too: docs/diagnose.md. Base and tool are causes then: not with --align.",
 )
 @_file("--junit", metavar="FILE.xml", help="Write the verdicts as JUnit XML, for GitLab, Jenkins and GitHub.")
 @_file(
@@ -166,6 +96,7 @@ def compare(
       urmpipe compare log.csv --robot ur5e --tolerance axis=2mm,angle=0.5deg
       urmpipe compare rtde.csv --sides target,actual --robot ur5e
       urmpipe compare path.csv log.csv --robot urm6 --junit v.xml --csv v.csv
+      urmpipe compare path.csv a.csv b.csv --robot urm6 --diagnose
       urmpipe compare today.rrd --baseline released.rrd --noise 5um
 
     Exit codes: 0 within tolerance and not worse than the baseline, 1 not so, 2 bad input or usage.
@@ -192,8 +123,7 @@ def compare(
     terminal.warn(result.warnings)
     written = {"JUnit": options["junit"], "Statistics": options["csv"]}
     terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces, written))
-    if terminal.quiet and result.verdict == "fail":
-        _tell_failure(result)
+    terminal.tell_failure(result)
     return 0 if result.verdict == "pass" else 1
 
 
@@ -208,14 +138,6 @@ def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) 
         if path:
             say(f"{title}: {path}")
     print_recording(result.recording, replaced=replaces)
-
-
-def _tell_failure(result: Comparison) -> None:
-    """Print the verdict alone on standard error: a job that fails says why, however quiet it is."""
-    from urmpipe.printing.presentation import print_verdict
-    from urmpipe_pipeline.results import present
-
-    print_verdict(present(result), err=True)
 
 
 def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:

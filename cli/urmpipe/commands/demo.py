@@ -19,10 +19,10 @@ EXPECTED = {"coppeliasim": "pass", "matlab": "pass", "solidworks": "pass", "coun
 way round."""
 
 EXPLAINED = """Four logs of one motion: three should pass; the fourth, of an arm with one module the wrong way
-round, should fail, and so does all of it."""
+round, should fail, and so does all of it. Which module that is, is to be found."""
 
 AS_EXPECTED = """The verdicts are as they should be: the three environments agree with the path, the arm with
-the counter-rotating module does not."""
+the counter-rotating module does not. Why each deviates:"""
 
 
 @click.command(short_help="Run the whole way on bundled logs.")
@@ -37,7 +37,7 @@ the counter-rotating module does not."""
 )
 @output_options
 def demo(output: Path, terminal: Terminal) -> int:
-    """Run the whole way on bundled logs: ingest, compare, report.
+    """Run the whole way on bundled logs: ingest, compare and diagnose, report.
 
     One motion of the six-module URM arm, as three environments logged it and as an arm with a
     counter-rotating module did. Exit code 0 if the verdicts are as they should be.
@@ -58,7 +58,7 @@ def demo(output: Path, terminal: Terminal) -> int:
             runs.append(urmpipe.ingest(source, robot="urm6", output=output / f"{name}.rrd"))
             if progress:
                 progress(number / steps)
-        result = urmpipe.compare(LOGS / "path.csv", runs, output=output / "demo.rrd")
+        result = urmpipe.compare(LOGS / "path.csv", runs, diagnose=True, output=output / "demo.rrd")
         if progress:
             progress((steps - 1) / steps)
         report = urmpipe.report([result], output / "report.html")
@@ -81,6 +81,9 @@ def _print(result: Comparison, report: Report, as_expected: bool) -> None:
     click.echo(f"{EXPLAINED}\n")
     print_presentation(present(result))
     click.echo(AS_EXPECTED if as_expected else f"These are not the verdicts expected: {EXPECTED}")
+    for one in result.runs:
+        if one.diagnosis is not None:
+            say(f"  {one.name}: {one.diagnosis.sentence}")
     say(f"Logs:      {LOGS}  (to look at, or to try the commands with)")
     say(f"Report:    {report.path}  (open it in any browser)")
     print_recording(result.recording)

@@ -15,6 +15,7 @@ from urmpipe.options.grouped import Command, grouped, with_options
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.joint_log import LogWarning
+    from urmpipe_pipeline.presentation.result import Result
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +54,16 @@ class Terminal:
             from urmpipe.printing.terminal import print_warnings
 
             print_warnings(warnings, log)
+
+    def tell_failure(self, result: Result) -> None:
+        """Print the verdict alone on standard error, of a job that fails quietly: it says why."""
+        if self.quiet:
+            from urmpipe.printing.presentation import print_verdict
+            from urmpipe_pipeline.results import present
+
+            shown = present(result)
+            if shown.verdict == "fail":
+                print_verdict(shown, err=True)
 
     def note(self, line: str) -> None:
         """Print what is no warning and yet good to know, on standard error."""

@@ -28,7 +28,7 @@ from urmpipe_pipeline.comparison.matching import (
 from urmpipe_pipeline.comparison.measure import measure, unheld
 from urmpipe_pipeline.comparison.sync import SyncOption, check_sync, sync_doubts, synchronise
 from urmpipe_pipeline.comparison.tolerance import check_tolerance
-from urmpipe_pipeline.comparison.trajectory import AlignMode, Trajectory
+from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
 from urmpipe_pipeline.comparison.warnings import (
     exchanged,
     large_tolerances,
@@ -37,6 +37,8 @@ from urmpipe_pipeline.comparison.warnings import (
     recorded_apart,
     thin_evidence,
 )
+from urmpipe_pipeline.diagnosis.diagnose import diagnose
+from urmpipe_pipeline.diagnosis.sides import Side
 from urmpipe_pipeline.joint_log import SOLVED, LogWarning, Role
 from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import provenance
@@ -51,6 +53,9 @@ RECORDED_APART = 1e-3
 third of the default tolerance."""
 
 
+NO_ALIGNMENT = "none with a diagnosis, which names base and tool as causes"
+
+
 @dataclass(frozen=True, slots=True)
 class CompareOptions:
     """How logs are held against a reference.
@@ -63,6 +68,9 @@ class CompareOptions:
             the offset in [s]: t_reference = t_log + offset, both from their first samples.
         align: How a log is moved in space before it is compared: none, start, rigid, tool or base+tool.
         with_unit: Kinds whose tolerance was given with its unit: however large it is, it is meant.
+        diagnose: Whether it is asked why each log deviates. Base and tool are causes then: no alignment may
+            be asked for, and only a log that was measured in a frame of its own, whose base and tool are
+            always unknown, is moved first.
     """
 
     tolerance: Mapping[str, float] = field(default_factory=lambda: {"axis": DEFAULT_TOLERANCE})
@@ -70,6 +78,7 @@ class CompareOptions:
     sync: SyncOption = "start"
     align: AlignMode = "none"
     with_unit: frozenset[str] = frozenset()
+    diagnose: bool = False
 
     def __post_init__(self) -> None:
         check_tolerance(self.tolerance)
@@ -112,7 +121,8 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
         LogError: If a run has no position to go by, shares no time with the reference, or lacks what a
             tolerance is for; if still poses are held against a motion, or against more or fewer of them; if
             a side was measured in a frame of its own, and nothing joins it to the other's.
-        OptionError: If the clocks of still poses are to be put together.
+        OptionError: If the clocks of still poses are to be put together, or a log that is to be diagnosed is
+            to be moved in space.
 
     Source: [UrmArm2021]_ eq. 19-23.
     """
@@ -120,13 +130,13 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     if not runs:
         raise OptionError("compare: no log to hold against the reference; at least one is needed")
     _refuse_poses_as_motion(reference, runs, chosen.sync)
-    _refuse_frames_apart([(run, _goes_by_record(run, chosen.tcp)) for run in (reference, *runs)], chosen)
+    chosen = _joined([(run, _goes_by_record(run, chosen.tcp)) for run in (reference, *runs)], chosen)
     alone = _joints_alone(reference, runs, chosen)
     reference, *runs = _named_apart((reference, *runs))
-    wanted = trajectory(reference, chosen.tcp, alone=alone)
-    deviations = for_each(
-        lambda run: _deviation(run, wanted, trajectory(run, chosen.tcp, alone=alone), chosen), runs
-    )
+    sides = (_side(run, chosen.tcp, alone=alone) for run in runs)
+    asked = _side(reference, chosen.tcp, alone=alone)
+    wanted = asked.trajectory
+    deviations = for_each(lambda done: _deviation(asked, done, chosen), sides)
     told = [*(one.of(reference.name) for one in reference.warnings), *exchanged(reference, runs)]
     if chosen.tcp == "fk":
         told += _differing_robots([reference, *runs])
@@ -136,6 +146,11 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
         failed = [one for one in deviations if one.verdict == "fail"]
         told += [hint.of(one.name) for one in failed for hint in lacking_tool(one.run.robot, one.run.log)]
     return _comparison(wanted, deviations, chosen, told, _taken_for_granted(reference, runs, chosen))
+
+
+def _side(run: Run, tcp: Tcp, *, alone: bool) -> Side:
+    """Return one side of a comparison."""
+    return Side(run, trajectory(run, tcp, alone=alone), not _goes_by_record(run, tcp))
 
 
 def _named_apart(runs: Sequence[Run]) -> list[Run]:
@@ -213,14 +228,22 @@ def _no_motion(run: Run) -> Finding:
     return lacking(run, said, Hint("poses", True, "takes the rows of every log as still poses"))
 
 
-def _refuse_frames_apart(sides: Sequence[tuple[Run, bool]], options: CompareOptions) -> None:
-    """Raise if some sides stand in a frame of their own, others in the base's, and nothing joins them.
+def _joined(sides: Sequence[tuple[Run, bool]], options: CompareOptions) -> CompareOptions:
+    """Return options that join sides of which some stand in a frame of their own, others in the base's.
 
     Each side is a run, and whether it is where it recorded itself.
+
+    Raises:
+        LogError: If nothing joins them: a diagnosis moves base and tool, else an alignment has to be given.
+        OptionError: If an alignment is given with a diagnosis.
     """
+    if options.diagnose and options.align != "none":
+        raise OptionError(Finding(parameter="align", found=options.align, allowed=NO_ALIGNMENT))
     apart = [run for run, recorded in sides if recorded and run.log.measured]
     if not apart or len(apart) == len(sides) or options.align not in ("none", "tool"):
-        return
+        return options
+    if options.diagnose:
+        return replace(options, align="base+tool")
     hint, findings = Hint("align", "base+tool", "finds the frames of base and tool"), []
     for run in apart:
         names = ", ".join(column.name for column in run.log.columns if column.role == "position")
@@ -246,7 +269,7 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     left on a wrap were repaired, the repaired ones count.
 
     Raises:
-        OptionError: If another time than its own is asked for.
+        OptionError: If another time than its own is asked for, or as of `compare_runs`.
         LogError: If the log has no joints, no robot, or recorded no position.
     """
     chosen = options or CompareOptions()
@@ -262,11 +285,12 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
         said = "one log, which recorded no tool centre point; allowed: a reference before the log"
         doubts = [one.as_finding() for one in log.warnings if one.kind == TCP_NOT_READ]
         raise LogError(lacking(run, said), *(replace(one, file=file_of(run)) for one in doubts))
-    _refuse_frames_apart([(run, True), (run, False)], chosen)
+    chosen = _joined([(run, True), (run, False)], chosen)
     recorded = replace(as_recorded(run), name=f"{run.name} (recorded)", joints=(), joint_units=(), q=None)
     computed = replace(by_kinematics(run), joints=(), joint_units=(), q=None)
     assumed = assumptions([(run, {"joint", *_recorded_roles(chosen, "start")})])  # others go by the joints'
-    found = _comparison(recorded, [_deviation(run, recorded, computed, chosen)], chosen, (), assumed)
+    sides = Side(run, recorded, by_joints=False), Side(run, computed, by_joints=True)
+    found = _comparison(recorded, [_deviation(*sides, chosen)], chosen, (), assumed)
     asked, turned = found.verdict == "fail" and "tool" not in chosen.align, "angle" in chosen.tolerance
     lacks = lacking_tool(run.robot, log, turned=turned) if asked else []
     return replace(found, warnings=(*found.warnings, *lacks))
@@ -291,6 +315,7 @@ def _comparison(
     warnings += _shapes_gone([one.run for one in deviations])
     inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
     given = {name: getattr(options, name) for name in ("tcp", "sync", "align")}
+    given |= {"diagnose": True} if options.diagnose else {}
     name = f"{deviations[0].name}-" if len(deviations) == 1 else ""
     return Comparison(
         f"{name}against-{reference.name}",
@@ -310,11 +335,26 @@ def _shapes_gone(runs: Sequence[Run]) -> list[LogWarning]:
     return [warning for warning in gone if not any(warning in run.warnings for run in runs)]
 
 
-def _deviation(run: Run, reference: Trajectory, actual: Trajectory, options: CompareOptions) -> Deviation:
-    """Return the deviation of one trajectory, at its own samples."""
+def _deviation(asked: Side, done: Side, options: CompareOptions) -> Deviation:
+    """Return the deviation of one trajectory, at its own samples; why it deviates, if asked for."""
+    run, reference, actual = done.run, asked.trajectory, done.trajectory
     sync = synchronise(reference, actual, options.sync, options.align)
     matched = match(reference, actual, sync)
     if not len(matched.sample):
         said = f"no sample in common with {reference.name} (time offset {sync.offset} s)"
         raise LogError(lacking(run, said))
-    return measure(run, reference, align(matched, options.align, run), options.tolerance)
+    found = measure(run, reference, align(matched, options.align, run), options.tolerance)
+    if not options.diagnose:
+        return found
+    lag = _moves_alike(asked, done, sync)
+    return replace(found, diagnosis=diagnose(found, matched, asked, done, lag))
+
+
+def _moves_alike(asked: Side, done: Side, sync: Sync) -> float | None:
+    """Return the offset in [s], besides how clocks were put together, at which two logs move alike."""
+    if not done.run.timed or asked.run is done.run:
+        return None
+    try:
+        return synchronise(asked.trajectory, done.trajectory, "auto").offset - sync.offset
+    except LogError:  # the motions do not tell it
+        return None

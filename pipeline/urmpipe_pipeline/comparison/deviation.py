@@ -13,6 +13,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
+from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.runs.results import Run
 
@@ -138,6 +139,7 @@ class Deviation(Shown):
         start: delta at the first compared sample in [m]: x, y, z, norm (the paper's mutual calibration).
         speed_correlation: Pearson's r of the norm and the speed; None where one of them does not change.
         verdict: pass or fail.
+        diagnosis: Why it deviates, where that was asked for.
     """
 
     name: str
@@ -162,6 +164,7 @@ class Deviation(Shown):
     start: tuple[float, float, float, float]
     speed_correlation: float | None
     verdict: Verdict
+    diagnosis: Diagnosis | None = None
 
     @property
     def t(self) -> FloatArray:
@@ -303,4 +306,5 @@ class Deviation(Shown):
             "speed_correlation": self.speed_correlation,
             "verdict": self.verdict,
             "warnings": [one.to_dict(voice) for one in self.run.warnings],
+            "diagnosis": None if self.diagnosis is None else self.diagnosis.to_dict(voice),
         }

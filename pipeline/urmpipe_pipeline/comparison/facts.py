@@ -11,24 +11,26 @@ from urmpipe_models.messages import Hint
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import as_option, placed
-from urmpipe_pipeline.comparison.causes import causes
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.comparison.wording import decided_words, out_words, size_of, stretch_words, used_words
+from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts
 from urmpipe_pipeline.presentation.section import Advice, Fact, Place, Ref, Value
 from urmpipe_pipeline.runs.parts import log_facts
 
 
 def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
-    """Yield which log and quantity decided the verdict: how much, when and where."""
+    """Yield why a log deviates, if that is known, and what decided the verdict: how much, when and where."""
     held = one.decisive
+    yield from () if one.diagnosis is None else diagnosis_facts(one.diagnosis)[:1]
     yield Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", Ref(one.name, colour))
     yield Fact("Decided by", decided_words(held))
     if not held.missing and one.run.timed:
         yield Fact("Data row", Value(one.row(held)))
     yield Fact("Position", place_of(one, held))
     yield from _furthest_joint(one)
+    yield from _undiagnosed(one)
 
 
 def place_of(one: Deviation, held: Statistics) -> Place | None:
@@ -67,8 +69,22 @@ def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     yield Fact("Joint tolerance", _sliding(one))
     if (r := one.speed_correlation) is not None:
         yield Fact("r(‖Δ‖, speed)", Value(r, "1", signed=True), "1: they grow together; 0: no correlation")
-    yield from (Fact("Looks like", cause) for cause in causes(one, result.reference))
+    yield from _why(one, result)
     yield from (replace(fact, brief=fact.name == "Robot") for fact in log_facts(one.run))
+
+
+def _why(one: Deviation, result: Comparison) -> Iterator[Fact]:
+    """Yield why a log deviates, or what says so."""
+    if one.diagnosis is not None:
+        several = len(result.runs) > 1  # else the answer stands with the verdict
+        yield from (replace(fact, brief=fact.brief and several) for fact in diagnosis_facts(one.diagnosis))
+    yield from (replace(fact, brief=False) for fact in _undiagnosed(one))
+
+
+def _undiagnosed(one: Deviation) -> Iterator[Fact]:
+    """Yield what says why a log is out of tolerance; nothing if that is known, or with an alignment."""
+    if one.verdict == "fail" and one.diagnosis is None and one.alignment.mode == "none":
+        yield Fact("Cause", Advice(hints=(Hint("diagnose", True, "says why"),)))
 
 
 def sync_words(sync: Sync) -> tuple[str, str]:

@@ -10,6 +10,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
+from urmpipe_pipeline.comparison.mended import mended_figure, mended_path
 from urmpipe_pipeline.comparison.scene import deviation_arrows
 from urmpipe_pipeline.comparison.trajectory import extent
 from urmpipe_pipeline.comparison.wording import SYMBOLS, amount_words, symbol, when
@@ -68,7 +69,10 @@ def deviation_figures(one: Deviation) -> Iterator[Figure]:
     """Yield the plots of a compared log: how it deviates, then how it moves."""
     if one.statistics:
         yield _deviation(one)
+        yield from mended_figure(one)
     yield from _joints(one)
+    if not one.statistics:
+        yield from mended_figure(one)
     yield from joints_figure(one.run, 1 if one.joint_delta is not None else None)
     if np.isfinite(one.speed).any():
         yield speed_figure(one.name, one.t_ns, one.speed)
@@ -105,6 +109,7 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
                 "actual: ‖Δ‖", one.actual, one.t_ns, AXIS_COLOURS["norm"], values=column(one.delta, 3),
                 sample=one.sample, kept=(one.decided_at,),
             ),
+            *mended_path(one),
         ),
         spots,
     )  # fmt: skip

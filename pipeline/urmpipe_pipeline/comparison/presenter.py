@@ -28,6 +28,7 @@ from urmpipe_pipeline.comparison.wording import (
     verdict_words,
     when,
 )
+from urmpipe_pipeline.diagnosis.presenter import diagnosis_tables
 from urmpipe_pipeline.palette import run_colour
 from urmpipe_pipeline.presentation.parts import inputs_table, minute, provenance_table, recording_fact
 from urmpipe_pipeline.presentation.section import (
@@ -110,7 +111,7 @@ def _log(one: Deviation, result: Comparison) -> Section:
         one.name,
         one.verdict,
         tuple(deviation_facts(one, result)),
-        tuple(statistics_tables(one)),
+        (*(diagnosis_tables(one.diagnosis) if one.diagnosis else ()), *statistics_tables(one)),
         partial(deviation_figures, one),
         partial(_page, one),
         tuple(_checks(result, one)),
@@ -140,6 +141,7 @@ def _properties(result: Comparison, one: Deviation) -> dict[str, Any]:
     return {
         "reference": result.reference.name,
         "verdict": one.verdict,
+        **({"cause": one.diagnosis.sentence} if one.diagnosis else {}),
         "assumptions": "; ".join(result.assumptions),
         "duration": one.duration if one.run.timed else None,
         "samples": len(one.sample),

@@ -11,6 +11,7 @@ from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_pipeline.comparison.alignment import placed
 from urmpipe_pipeline.comparison.comparison import Comparison, by_tolerance
 from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.mended import cause_marks, mended_path
 from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.comparison.wording import amount_words, when
 from urmpipe_pipeline.palette import DEVIATION_COLOUR, REFERENCE_COLOUR, run_colour
@@ -46,6 +47,7 @@ def comparison_scene(result: Comparison) -> Scene:
         arrows = deviation_arrows(shown, radius)
         title = f"{whose} and poses [m], {arrows.name}, from light to dark the larger"
         return Scene(title, arms, tuple(paths), spots, arrows=arrows)
+    paths += mended_path(shown)
     if larger := _enlarged(shown, radius):
         paths.append(larger)
     said = f", in crimson the {larger.name}" if larger else ""
@@ -79,7 +81,8 @@ def _arm(one: Deviation, colour: str) -> Iterator[Arm]:
         return
     decided = int(one.t_ns[one.decided_at])
     row = min(int(np.searchsorted(run.t_ns, decided)), len(run.t_ns) - 1)
-    yield Arm(placed(run.robot, one.alignment), run.q, times_of(run), colour, kept=(row,))
+    chain = placed(run.robot, one.alignment)
+    yield Arm(chain, run.q, times_of(run), colour, kept=(row,), marks=cause_marks(one, chain))
 
 
 def _reference(reference: Trajectory, shown: Deviation) -> Iterator[Path]:

@@ -13,6 +13,7 @@ from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation
 from urmpipe_pipeline.comparison.matching import by_kinematics
 from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
 from urmpipe_pipeline.comparison.trajectory import Trajectory, extent
+from urmpipe_pipeline.diagnosis.sides import AT_REST
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
 from urmpipe_pipeline.runs.recorded_start import outlying_start
@@ -28,10 +29,6 @@ LARGE_NOISE = "large-noise"
 """The kind of a doubt about the noise of a baseline: another baseline has its own."""
 
 TCP_APART = "recorded-tcp-apart"
-
-AT_REST = 3e-4
-"""What moves by less in [m] or [rad] rests: three times what a UR5e at rest was logged to span in 25 s,
-0.10 mrad and 0.10 mm."""
 
 CALIBRATION = 5e-3
 """A controller's own calibration moves the tool by up to this in [m] from where those of the data sheet have

@@ -39,7 +39,7 @@ class Line:
         values: In the panel's unit, shape (n,) or (n, k); only `len` and slices are taken of it.
         names: One a column; a name that several panels have is one entry of the legend.
         colours: One a column, as #rrggbb.
-        dashed: True for what was asked for, beside what was measured.
+        dashed: True for what was asked for, or was before, beside what was measured: no limit holds for it.
         steps: True for what changes only from one row to the next.
         points: True for rows that nothing joins.
         t_ns: Time of each row in [ns], shape (n,), where it is not the panel's.
@@ -147,6 +147,7 @@ class Figure:
         instants: Times in [ns] at which a line goes through all panels, with a word each.
         opened: Number of the view that the viewer opens; None: all of them, one below the other.
         share: Height of its row in the viewer relative to others; of each row if all views are open.
+        beside: Whether the viewer shows its views as further tabs of the figure before it.
     """
 
     title: str
@@ -156,6 +157,7 @@ class Figure:
     instants: Mapping[int, str] = field(default_factory=dict)
     opened: int | None = 0
     share: float = 1.0
+    beside: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,6 +14,23 @@ from urmpipe_models.chains.chain import Chain
 BoolArray: TypeAlias = NDArray[bool_]
 
 
+@dataclass(frozen=True, slots=True)
+class ArmMark:
+    """A word at a point of an arm, which it follows.
+
+    Attributes:
+        point: Number of the point: 0 the base, k the end of joint k's segment, where joint k + 1 stands.
+        words: What is written there.
+        colour: As #rrggbb.
+        segment: True for the middle of the segment that ends there.
+    """
+
+    point: int
+    words: str
+    colour: str
+    segment: bool = False
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Arm:
     """An arm that moves.
@@ -27,6 +44,7 @@ class Arm:
         ghost: True for another solution, drawn faintly beside the arm.
         vanishes: True if nothing is drawn where there is no pose; else the last pose stays.
         kept: Rows that are drawn in any case.
+        marks: Words at its points; not of a ghost.
     """
 
     chain: Chain
@@ -37,6 +55,7 @@ class Arm:
     ghost: bool = False
     vanishes: bool = False
     kept: tuple[int, ...] = ()
+    marks: tuple[ArmMark, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

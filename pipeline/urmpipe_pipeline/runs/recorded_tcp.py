@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,8 @@ from urmpipe_models.messages import Hint
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.transform import Transform, from_offset
 from urmpipe_pipeline import text
-from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning
+from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.log_edits import Edit, robot_edits, sign_edits, swap_edits
 from urmpipe_pipeline.runs.recorded_poses import FINEST, FINEST_TURN, Apart, RecordedPoses
 from urmpipe_pipeline.runs.recorded_start import start_warning
 from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, Fit, extent
@@ -153,7 +153,9 @@ def _clearly_nearer(robot: Chain, log: JointLog, poses: RecordedPoses, own: Apar
         return []
     moves = np.isfinite(poses.fit(robot).with_tool)
     most = EXPLAINED * extent(poses.position) if moves else CLOSE_WITH_TOOL
-    every = [*_other_robots(robot, poses), *_other_joints(robot, log, poses)]
+    count = len(log.joints)
+    edits = [*robot_edits(robot), *sign_edits(count, most=1), *swap_edits(count)]
+    every = [_with(edit, robot, log, poses) for (edit,) in edits]
     if moves and own.distance > FAR:  # less of it a base explains by chance
         every.append(_other_base(robot, poses))
     near = [one for one in every if _distance(poses.fit(one.robot, one.q)) <= most]
@@ -168,28 +170,24 @@ def _distance(found: Fit) -> float:
     return found.with_tool if np.isfinite(found.with_tool) else found.distance
 
 
-def _other_robots(robot: Chain, poses: RecordedPoses) -> Iterator[_Other]:
-    """Yield the other robots with as many joints, on the same base and with the same tool."""
-    for name in robot_names():
-        other = load_robot(name).placed(robot.base, robot.tool)
-        if name != robot.name and len(other.moving) == poses.q.shape[1]:
-            yield _Other(f"those of {name} agree", Hint("robot", name, "takes it"), other, poses.q)
+def _with(edit: Edit, robot: Chain, log: JointLog, poses: RecordedPoses) -> _Other:
+    """Return the robot with other joint values, or another robot on the same base and with the same tool."""
+    other = robot if edit.robot is None else edit.robot.placed(robot.base, robot.tool)
+    (q,) = edit.of_joints(np.arange(len(poses.q)), poses.q.T)
+    return _Other(*_given(edit, log), other, q.T)
 
 
-def _other_joints(robot: Chain, log: JointLog, poses: RecordedPoses) -> Iterator[_Other]:
-    """Yield the robot with each joint counted the other way, and with each two exchanged."""
-    count, q = len(log.joints), poses.q
-    for j, name in enumerate(log.joints):
-        hint = Hint("log_map", None, f"says so with sign = -1 for {name}")
-        said = f"with {name} counted the other way they agree"
-        yield _Other(said, hint, robot, q * np.where(np.arange(count) == j, -1.0, 1.0))
-    columns = [column for column in log.columns if column.role == "joint"]
-    for first, second in combinations(range(count), 2):
-        order = list(range(count))
-        order[first], order[second] = second, first
-        names = _called([columns[j] for j in order]) if columns else [log.joints[j] for j in order]
-        said = f"with {log.joints[first]} and {log.joints[second]} exchanged they agree"
-        yield _Other(said, Hint("joints", names, "exchanges them"), robot, q[:, order])
+def _given(edit: Edit, log: JointLog) -> tuple[str, Hint]:
+    """Return what agrees, and how it is given."""
+    if edit.kind == "other_robot":
+        return f"those of {edit.name} agree", Hint("robot", edit.name, "takes it")
+    names = " and ".join(log.joints[j] for j in edit.joints)
+    if edit.kind == "joint_sign":
+        hint = Hint("log_map", None, f"says so with sign = -1 for {names}")
+        return f"with {names} counted the other way they agree", hint
+    order, (first, second) = _called(log), edit.joints
+    order[first], order[second] = order[second], order[first]
+    return f"with {names} exchanged they agree", Hint("joints", order, "exchanges them")
 
 
 def _other_base(robot: Chain, poses: RecordedPoses) -> _Other:
@@ -199,11 +197,13 @@ def _other_base(robot: Chain, poses: RecordedPoses) -> _Other:
     return _Other("on another base they agree", hint, replace(robot, base=from_offset(frame)), poses.q)
 
 
-def _called(columns: Sequence[LogColumn]) -> list[str]:
-    """Return what `joints` calls some columns, in order: their names, or numbers where names do not tell."""
+def _called(log: JointLog) -> list[str]:
+    """Return what `joints` calls the joints: their columns' names, or numbers where names do not tell."""
+    columns = [column for column in log.columns if column.role == "joint"]
     names = [split_unit(column.header)[0] if column.header else "" for column in columns]
     told = [name if name and "," not in name and names.count(name) == 1 else "" for name in names]
-    return [name or str(column.number) for name, column in zip(told, columns, strict=True)]
+    called = [name or str(column.number) for name, column in zip(told, columns, strict=True)]
+    return called or list(log.joints)
 
 
 def _frame(numbers: Sequence[float]) -> list[float]:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import urmpipe
+from diagnoses import diagnosis_of
 from urmpipe_datasets import LOGS
 from urmpipe_models.display import Shown
 from urmpipe_pipeline.comparison.change import Absent, BaselineComparison
@@ -35,8 +36,8 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         provenance=run.provenance,
     )  # fmt: skip
     made = [
-        run, run.log, comparison, comparison.runs[0], urmpipe.load_robot("urm6"),
-        urmpipe.ik([[0.4, 0.1, 0.4]], "ur5e"), simulation,
+        run, run.log, comparison, comparison.runs[0], diagnosis_of(comparison.runs[0]),
+        urmpipe.load_robot("urm6"), urmpipe.ik([[0.4, 0.1, 0.4]], "ur5e"), simulation,
         urmpipe.build_fmu("dc_drive", backend="python", output=folder),
         urmpipe.export(run, folder / "log.csv"), urmpipe.report([run], folder / "report.html"),
     ]  # fmt: skip

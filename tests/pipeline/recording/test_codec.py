@@ -212,8 +212,19 @@ def test_an_arm_comes_back_with_every_bit(name: str) -> None:
     back = round_trip(chain)
     assert back == chain
     assert robot_toml(back) == robot_toml(chain)
+    assert back.parameters == chain.parameters
     q = [0.1 * k + 0.37 for k in range(len(chain.coordinates))]
     assert forward(back, q) == forward(chain, q)
+
+
+def test_an_arm_stored_without_its_parameters_has_those_of_its_frames() -> None:
+    tree = encode(load_robot("urm4")).tree
+    for frame in (tree["base"], tree["tip"], tree["tool"], *(joint["origin"] for joint in tree["joints"])):
+        del frame["made_of"]
+    back = decode(Chain, tree, lambda *_: np.zeros(0))
+    assert back == load_robot("urm4")
+    found = {one.name: one.value for one in back.parameters}
+    assert (found["phi2.z"], found["tip.z"], found["phi2.ry"]) == (0.243215, 0.042215, 0.0)
 
 
 WRONG: list[tuple[Callable[[dict[str, Any]], object], str]] = [

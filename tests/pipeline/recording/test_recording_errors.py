@@ -134,7 +134,7 @@ def test_a_recording_of_another_layout_says_how_to_make_it_again(
         ("{", "found damaged metadata (JSONDecodeError("),
         ("[]", "found damaged metadata (TypeError("),
         ("{}", "found damaged metadata (KeyError('layout_version'))"),
-        (document("", {}), "found a result of kind '', allowed: run, comparison, simulation"),
+        (document("", {}), "found a result of kind '', allowed: run, comparison, diagnosis, simulation"),
         (document("run", None), "found damaged metadata, /: found None, allowed: Run"),
         (document("run", {"name": 1}), "found damaged metadata, /name: found 1, allowed: str"),
         (

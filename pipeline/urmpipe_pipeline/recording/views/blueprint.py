@@ -8,8 +8,8 @@ the verdict was decided. Opened otherwise the viewer stands at the first sample:
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from urmpipe_pipeline.presentation.figure import Figure, Text
@@ -102,12 +102,23 @@ def _parts(body: Section) -> list[_Part]:
     found = []
     for section, key in zip(sections, keys([one.title for one in sections]), strict=True):
         blocks = tuple(section.figures())
-        figures = tuple(one for one in blocks if isinstance(one, Figure))
+        figures = tuple(_joined(one for one in blocks if isinstance(one, Figure)))
         texts = tuple(one for one in blocks if isinstance(one, Text))
         events = tuple(section.events())
         found.append(
             _Part(section.title, (section.verdict or "").upper(), key, figures, texts, events, section.opened)
         )
+    return found
+
+
+def _joined(figures: Iterable[Figure]) -> list[Figure]:
+    """Return figures, the views of those that stand beside the one before as further tabs of it."""
+    found: list[Figure] = []
+    for one in figures:
+        if one.beside and found:
+            found[-1] = replace(found[-1], views=(*found[-1].views, *one.views))
+        else:
+            found.append(one)
     return found
 
 

@@ -13,7 +13,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_models.orientation import matrices
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour
-from urmpipe_pipeline.presentation.scene import Arm, Arrows, Path, Scene, Targets
+from urmpipe_pipeline.presentation.scene import Arm, ArmMark, Arrows, Path, Scene, Targets
 from urmpipe_pipeline.recording.views.label_places import name_places, placed_names
 from urmpipe_pipeline.recording.views.shapes import Body, bodies_over_log
 from urmpipe_pipeline.recording.views.tracks import (
@@ -64,6 +64,7 @@ class DrawnArm:
         skeleton: Base, p1..pn of each pose in [m], shape (m, n + 1, 3).
         colours: One a point: a joint's own, or the reference's where nothing moves.
         bodies: Its links as they look; none where that is not known.
+        marks: Words at its points.
     """
 
     chain: Chain
@@ -71,6 +72,12 @@ class DrawnArm:
     skeleton: FloatArray
     colours: tuple[str, ...]
     bodies: tuple[Body, ...]
+    marks: tuple[ArmMark, ...] = ()
+
+    def place(self, mark: ArmMark) -> FloatArray:
+        """Return where a mark is in each pose in [m], shape (m, 3)."""
+        end = self.skeleton[:, mark.point]
+        return (end + self.skeleton[:, mark.point - 1]) / 2.0 if mark.segment else end
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,7 +156,7 @@ def drawn_arm(arm: Arm) -> DrawnArm | None:
     poses = q[moving.rows]
     colours = _point_colours(arm.chain, arm.colour)
     skeleton = points_over_log(arm.chain, poses)
-    return DrawnArm(arm.chain, moving, skeleton, colours, bodies_over_log(arm.chain, poses))
+    return DrawnArm(arm.chain, moving, skeleton, colours, bodies_over_log(arm.chain, poses), arm.marks)
 
 
 def drawn_ghosts(arms: Sequence[Arm]) -> tuple[DrawnGhost, ...]:

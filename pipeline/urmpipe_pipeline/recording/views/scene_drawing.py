@@ -16,7 +16,7 @@ from urmpipe_pipeline.palette import (
     rgb,
     value_colours,
 )
-from urmpipe_pipeline.presentation.scene import Arrows, Scene, Spot
+from urmpipe_pipeline.presentation.scene import ArmMark, Arrows, Scene, Spot
 from urmpipe_pipeline.recording.sending import ROOT, keys, shown_path, times_at
 from urmpipe_pipeline.recording.views.camera import EYE, eye_distance, seen
 from urmpipe_pipeline.recording.views.geometry import (
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from rerun import ComponentColumnList, LineStrips3D, Points3D, RecordingStream
     from rerun.blueprint import Spatial3DView
 
-LINK, JOINT, POINT, SPOT, AXIS = 0.012, 0.022, 0.018, 0.024, 0.005
+LINK, JOINT, POINT, SPOT, AXIS, MARK = 0.012, 0.022, 0.018, 0.024, 0.005, 0.034
 ASKED, DONE = 0.0065, 0.0035
 FRAME_LENGTH, FRAME, TARGET, MISSED = 0.09, 0.004, 0.012, 0.02
 """Sizes in the 3D view, as shares of the radius of everything in it."""
@@ -133,6 +133,20 @@ def _draw_arm(stream: RecordingStream, arm: DrawnArm, size: float) -> None:
     columns = rr.Points3D.columns(positions=skeleton.reshape(-1, 3))
     _send(stream, entity, moving, columns, skeleton.shape[1])
     _send_gone(stream, entity, moving, rr.Points3D.columns(positions=[]))
+    for number, mark in enumerate(arm.marks):
+        _draw_mark(stream, arm, mark, shown_path("scene", "robot", "mark", str(number)), size)
+
+
+def _draw_mark(stream: RecordingStream, arm: DrawnArm, mark: ArmMark, entity: str, size: float) -> None:
+    """Draw a ball with a word that moves with a point of an arm."""
+    import rerun as rr
+
+    stream.log(entity, rr.Points3D.from_fields(colors=[rgb(mark.colour)], radii=[MARK * size]), static=True)
+    stream.log(f"{entity}/label", _label(mark.words), static=True)
+    for one in (entity, f"{entity}/label"):
+        columns = rr.Points3D.columns(positions=arm.place(mark).astype(np.float32))
+        _send(stream, one, arm.moving, columns, 1)
+        _send_gone(stream, one, arm.moving, rr.Points3D.columns(positions=[]))
 
 
 def _draw_links(stream: RecordingStream, moving: Moving, skeleton: NDArray[np.float32], size: float) -> None:

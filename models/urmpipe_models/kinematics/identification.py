@@ -1,0 +1,122 @@
+"""Identification: how small changes of an arm's frames move its tool centre point.
+
+A change is a twist between two joints: a shift along, or a turn about, an axis of a frame there. Lengths and
+tilts of modules, Denavit-Hartenberg parameters, base and tool are all such twists.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.elementwise import ZERO, Element, Vector, cross, scale, subtract
+from urmpipe_models.kinematics.frames import frames
+from urmpipe_models.transform import Transform, rotation_about, translation
+
+BASE = 0
+"""The place of the base; joint k (from 1) sits at place k, the tip at n + 1, the tool at n + 2."""
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """One way in which a frame of a chain may differ: F' = A exp(v) A^-1 F.
+
+    Attributes:
+        place: Which frame F: `BASE`, 1..n of the joints, n + 1 of the tip, n + 2 of the tool.
+        kind: along (a shift in [m]) or about (a turn in [rad]).
+        axis: Unit vector in the frame A [-].
+        frame: A, in the frame that F is given in.
+    """
+
+    place: int
+    kind: Literal["along", "about"]
+    axis: tuple[float, float, float]
+    frame: Transform
+
+    def motion(self, value: Element) -> Transform:
+        """Return exp(v) of a value in [m] or [rad]."""
+        if self.kind == "along":
+            return translation(*scale(value, self.axis))
+        return rotation_about(self.axis, value)
+
+
+def sensitivities(chain: Chain, q: Sequence[Element], twists: Sequence[Twist]) -> list[tuple[Vector, Vector]]:
+    """Return how each twist moves the tool centre point: the columns of the identification Jacobian.
+
+    Of a shift along u: (u, 0); of a turn about u through o: (u x (p - o), u), all in the world.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+        twists: Where the arm may differ.
+
+    Returns:
+        One a twist: the velocity in [m] and the turn in [rad] per unit of it.
+
+    Source: [Khalil2002]_ section 11.4.
+    """
+    *parents, last = [Transform(), *frames(chain, q)]
+    parents += [last, last @ chain.tip]
+    return columns_of(parents, (parents[-1] @ chain.tool).translation, twists)
+
+
+def columns_of(
+    parents: Sequence[Transform], target: Vector, twists: Sequence[Twist]
+) -> list[tuple[Vector, Vector]]:
+    """Return how each twist moves a point, as `sensitivities` does.
+
+    Args:
+        parents: What the frame of each place is given in, in the world.
+        target: The point in the world in [m], any elements.
+        twists: What may differ.
+    """
+    columns: list[tuple[Vector, Vector]] = []
+    for twist in twists:
+        parent = parents[twist.place]
+        axis = parent.rotate(twist.frame.rotate(twist.axis))
+        if twist.kind == "along":
+            columns.append((axis, ZERO))
+        else:
+            columns.append((cross(axis, subtract(target, parent.point(twist.frame.translation))), axis))
+    return columns
+
+
+def changed(chain: Chain, changes: Sequence[tuple[Twist, float]]) -> tuple[Chain, list[Twist]]:
+    """Return a chain some of whose frames differ, and the twists where they then are.
+
+    Args:
+        chain: The arm.
+        changes: Twists, each with its value in [m] or [rad].
+
+    Returns:
+        The changed arm; and the same twists for `sensitivities` of it.
+    """
+    (base, *origins, tip, tool), located = changed_frames(chain.frames, changes)
+    if not any(value for _, value in changes):
+        return chain, located
+    joints = tuple(replace(joint, origin=origin) for joint, origin in zip(chain.joints, origins, strict=True))
+    return replace(chain, joints=joints, base=base, tip=tip, tool=tool), located
+
+
+def changed_frames(
+    places: Sequence[Transform], changes: Sequence[tuple[Twist, float]]
+) -> tuple[list[Transform], list[Twist]]:
+    """Return frames of which some differ, and the twists where they then are.
+
+    Several changes of one frame follow each other, the first is the outermost.
+
+    Args:
+        places: The frame of each place, in the one before it.
+        changes: Twists, each with its value in [m] or [rad].
+    """
+    moved: dict[int, Transform] = {}
+    located = []
+    for twist, value in changes:
+        before = moved.get(twist.place)
+        located.append(twist if before is None else replace(twist, frame=before @ twist.frame))
+        if value:
+            motion = twist.frame @ twist.motion(value) @ twist.frame.inverse()
+            moved[twist.place] = motion if before is None else before @ motion
+    return [moved[k] @ frame if k in moved else frame for k, frame in enumerate(places)], located

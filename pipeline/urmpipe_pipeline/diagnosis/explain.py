@@ -1,0 +1,198 @@
+"""What an explanation is worth: sizes with their intervals, shares, twins, what would decide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.diagnosis.arm import ArmModel
+from urmpipe_pipeline.diagnosis.deciding import deciding_joint
+from urmpipe_pipeline.diagnosis.fit import Model
+from urmpipe_pipeline.diagnosis.hypotheses import Group, State
+from urmpipe_pipeline.diagnosis.result import Alternative, Cause, rms
+from urmpipe_pipeline.diagnosis.search import Explanation, Found, Search
+from urmpipe_pipeline.diagnosis.shares import shapley_shares
+from urmpipe_pipeline.log_edits import Edit
+
+SAMPLES = 4_000
+"""Rows, spread evenly, on which shares are told: each takes all combinations of causes."""
+
+SWEPT = 120
+"""Poses on which it is looked for which joint's motion tells two explanations apart."""
+
+EXACT = 1e-9
+"""Two columns are one if 1 - |cos| of their directions is less: they differ by rounding alone."""
+
+CONFIDENCE = 1.96
+"""Standard deviations to both sides that hold 95 % of a normal distribution."""
+
+TWINS = {
+    "joint_offset": "offset of {}", "joint_scale": "scale of {}", "compliance": "compliance of {}",
+    "base_shift": "base shift", "base_rotation": "base rotation",
+    "tool_shift": "tool shift", "tool_rotation": "tool rotation",
+    "time_lag": "time lag", "clock_drift": "clock drift",
+}  # fmt: skip
+"""What causes are called among twins; others by their name alone."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One cause of an explanation: an edit, or the numbers of a group.
+
+    Attributes:
+        edit: The edit; None of a group.
+        group: Place of the group; -1 of an edit.
+    """
+
+    edit: Edit | None = None
+    group: int = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """What a search found, in the words of the result.
+
+    Attributes:
+        search: What was looked for.
+        found: What was found.
+        names: What the log calls its joints.
+        own_names: What the arm calls them.
+    """
+
+    search: Search
+    found: Found
+    names: tuple[str, ...]
+    own_names: tuple[str, ...]
+
+    @property
+    def model(self) -> Model:
+        """What was held against what it should be."""
+        return self.search.model
+
+    def causes(self) -> tuple[tuple[Cause, ...], tuple[Alternative, ...]]:
+        """Return the named causes, the largest share first, and what the log does not decide between."""
+        best = self.found.best
+        every = [best, *self.found.others]
+        common = set.intersection(*(set(_parts(one)) for one in every))
+        named = self._causes(best, common)
+        if len(every) == 1:
+            return named, ()
+        needs = self._needs(every)
+        return named, tuple(Alternative(self._causes(one, set(_parts(one)) - common), needs) for one in every)
+
+    def _causes(self, one: Explanation, wanted: set[Part]) -> tuple[Cause, ...]:
+        """Return some causes of an explanation, the largest share first."""
+        parts = _parts(one)
+        shares = shapley_shares(parts, lambda some: self._left(one.state, some) ** 2)
+        causes = [
+            replace(
+                self._of_edit(part.edit) if part.edit else self._of_group(part.group, one),
+                rms_before=self._left(one.state, ()),
+                rms_after=self._left(one.state, (part,)),
+                share=shares[part],
+            )
+            for part in parts if part in wanted
+        ]  # fmt: skip
+        return tuple(sorted(causes, key=lambda cause: -cause.share))
+
+    def _left(self, state: State, mended: Iterable[Part]) -> float:
+        """Return the root mean square of what stays when some causes of an explanation are mended."""
+        kept = set(mended)
+        values = np.zeros_like(state.values)
+        for g in [*self.search.forced, *(part.group for part in kept if part.edit is None)]:
+            columns = list(self.model.groups[g].columns)
+            values[columns] = state.values[columns]
+        edits = tuple(edit for edit in state.edits if Part(edit) in kept)
+        rows = self.found.rows
+        few = replace(rows, at=rows.at[:: max(len(rows.at) // SAMPLES, 1)])
+        some = self.search.placed(State(values, edits), few)
+        return rms(self.model.deviation(some, self.search.spread(SAMPLES)).T)
+
+    def _of_edit(self, edit: Edit) -> Cause:
+        """Return a cause that is there or not."""
+        joints = tuple(self.names[j] for j in edit.joints)
+        name = edit.name or " and ".join(self.own_names[j] for j in edit.joints)
+        value, unit = {"path_unit": ((edit.value,), ""), "turns": ((edit.value,), "turns")}.get(
+            edit.kind, ((), "")
+        )
+        begins = edit.kind in ("half_turn", "mirrored", "turns")
+        return Cause(
+            edit.kind, name, joints, value=value, unit=unit, from_sample=edit.first if begins else None
+        )
+
+    def _of_group(self, g: int, one: Explanation) -> Cause:
+        """Return a cause of some size, with its interval and its twins."""
+        group = self.model.groups[g]
+        values, reach = one.state.of(group), CONFIDENCE * self._deviations(one, g)
+        nominal = 1.0 if group.kind == "joint_scale" else 0.0
+        low, middle, high = (
+            tuple((nominal + part).tolist()) for part in (values - reach, values, values + reach)
+        )
+        joint = () if group.joint is None else (self.names[group.joint],)
+        return Cause(
+            group.kind, self._name(group), joint, group.segment, group.axis, middle, group.unit, low, high,
+            twins=tuple(self._twins(g, values)),
+        )  # fmt: skip
+
+    def _name(self, group: Group) -> str:
+        """Return what a cause is of, a joint as the arm calls it."""
+        return group.name if group.joint is None else self.own_names[group.joint]
+
+    def _deviations(self, one: Explanation, g: int) -> FloatArray:
+        """Return the standard deviations of a group's numbers, all causes fitted together."""
+        columns = [c for h in sorted(one.subset) for c in self.model.groups[h].columns]
+        gram = self.found.normal.gram[np.ix_(columns, columns)]
+        size = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+        inverse = np.linalg.pinv(gram / size / size[:, np.newaxis], rcond=1e-12, hermitian=True)
+        variance = self.found.variance * self.found.tau * np.diag(inverse) / size**2
+        own = [columns.index(c) for c in self.model.groups[g].columns]
+        return np.asarray(np.sqrt(np.maximum(variance[own], 0.0)))
+
+    def _twins(self, g: int, values: FloatArray) -> Iterator[str]:
+        """Yield the names of what would do the very same as a group, or as one of its three numbers."""
+        groups, group = self.model.groups, self.model.groups[g]
+        yield from (self._called(groups[other]) for other, told in self.found.twins.items() if told == g)
+        for h, other in enumerate(groups):
+            if h == g or h in self.found.twins or len(group.columns) == len(other.columns) == 1:
+                continue
+            for k, c in enumerate(group.columns):
+                own = f" ({'xyz'[k]})" if len(group.columns) > 1 else ""
+                for i, d in enumerate(other.columns):
+                    if values[k] and self._same(c, d):
+                        axis = f" {'xyz'[i]}" if len(other.columns) > 1 else ""
+                        yield f"{self._called(other)}{axis}{own}"
+
+    def _called(self, group: Group) -> str:
+        """Return what a cause is called among twins."""
+        return TWINS.get(group.kind, "{}").format(self._name(group))
+
+    def _same(self, c: int, d: int) -> bool:
+        """Tell whether two columns have one direction."""
+        gram = self.found.normal.gram
+        size = float(np.sqrt(max(gram[c, c], 0.0) * max(gram[d, d], 0.0)))  # rounding may leave less than 0
+        return size > 0.0 and 1.0 - abs(float(gram[c, d])) / size < EXACT
+
+    def _needs(self, every: Sequence[Explanation]) -> str:
+        """Return the joint whose motion would decide between explanations; empty if none would."""
+        joints = {j for one in every for j in self._joints_of(one)}
+        if len(joints) == 1:
+            (only,) = joints
+            return "" if only is None else self.names[only]
+        if not isinstance(self.model, ArmModel):
+            return ""
+        first, second = (one.state for one in every[:2])
+        decides = deciding_joint(self.model, first, second, self.search.spread(SWEPT))
+        return "" if decides is None else self.names[decides]
+
+    def _joints_of(self, one: Explanation) -> set[int | None]:
+        """Return the joints that an explanation is of; None among them for what is of no joint."""
+        of_edits: set[int | None] = {j for edit in one.state.edits for j in edit.joints}
+        return of_edits | {self.model.groups[g].joint for g in one.subset}
+
+
+def _parts(one: Explanation) -> list[Part]:
+    """Return the causes of an explanation: its edits, then its groups."""
+    return [*(Part(edit) for edit in one.state.edits), *(Part(group=g) for g in sorted(one.subset))]

@@ -1,0 +1,176 @@
+"""Least squares of a model against what it should be: normal equations, steps, outliers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_models.row_blocks import row_blocks, side_by_side
+from urmpipe_pipeline.diagnosis.hypotheses import Group, State
+from urmpipe_pipeline.diagnosis.selection import Normal
+
+OUTLIER = 6.0
+"""A row is left out if it is further off than so many medians: of Gaussian noise none in a million is."""
+
+SELDOM = 0.1
+"""Outliers are no more than this share of the rows."""
+
+TAIL = 1.6
+"""So many medians a tenth of the rows is beyond, of Gaussian noise in three directions."""
+
+STEPS = 12
+"""Steps of a fit: from a good start three are enough."""
+
+STILL = 1e-8
+"""A fit has come to rest when a step takes less than this share from what it leaves."""
+
+BLOCK = 4096
+"""Rows whose Jacobian is in memory at a time, on each thread."""
+
+
+class Model(Protocol):
+    """A side that is modelled, beside what it should be."""
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """What may differ by some amount."""
+
+    @property
+    def rows(self) -> int:
+        """How many rows are held against each other."""
+
+    @property
+    def blocks(self) -> IntArray:
+        """Which components share a noise, shape (c,)."""
+
+    def residual(self, state: State, rows: IntArray) -> FloatArray:
+        """Return what an explanation leaves in [m] and [rad], shape (c, n); NaN where a side has no value."""
+
+    def linear(
+        self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return what an explanation leaves in [m] and [rad], shape (c, n), and the Jacobian (p, c, n)."""
+
+    def deviation(self, state: State, rows: IntArray) -> FloatArray:
+        """Return what an explanation leaves of what is judged, in [m] or [rad], shape (k, n)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Rows that an explanation is held against.
+
+    Attributes:
+        at: Their indices, shape (n,).
+        weight: Of each component in [1/m] or [1/rad], one over its noise, shape (c,).
+        least: What is no outlier, in these weights.
+    """
+
+    at: IntArray
+    weight: FloatArray
+    least: float = 0.0
+
+    def trimmed(self, left: FloatArray) -> Rows:
+        """Return those that are no outliers, by what is left of them in [m] and [rad], shape (c, n)."""
+        return replace(self, at=self.at[inliers(left * self.weight[:, np.newaxis], self.least)])
+
+
+def inliers(left: FloatArray, least: float = 0.0) -> BoolArray:
+    """Return which rows have a value and are no outliers: no further off than some medians, shape (n,).
+
+    Of a log that rests much of its time the median tells nothing: what a tenth of the rows has is no outlier.
+
+    Args:
+        left: In one unit, shape (c, n).
+        least: What is no outlier however little the others are off.
+    """
+    size = np.sqrt((left**2).sum(axis=0))
+    known = np.isfinite(size)
+    if not known.any():
+        return np.asarray(known)
+    median, most = np.quantile(size[known], (0.5, 1.0 - SELDOM))
+    return np.asarray(known & (size <= OUTLIER * max(median, most / TAIL, least)))
+
+
+def normal_equations(model: Model, state: State, rows: Rows, groups: Sequence[Group] | None = None) -> Normal:
+    """Return the normal equations of an explanation's neighbourhood, in which its own numbers count from 0.
+
+    y = left + J x of the state's own numbers x: so a subset that lacks one of them pays for it.
+    """
+    taken = list(model.groups if groups is None else groups)
+    columns = np.array([c for g in taken for c in g.columns], dtype=np.int64)
+    now = state.values[columns]
+
+    def of_block(block: slice) -> Normal:
+        left, jacobian = model.linear(state, rows.at[block], taken)
+        known = np.isfinite(left).all(axis=0)
+        y = (left + np.tensordot(now, jacobian, 1))[:, known] * rows.weight[:, np.newaxis]
+        flat = (jacobian[:, :, known] * rows.weight[:, np.newaxis]).reshape(len(columns), -1)
+        flat_y = y.ravel()
+        return Normal(flat @ flat.T, flat @ flat_y, float(flat_y @ flat_y), flat_y.size)
+
+    parts = side_by_side(of_block, row_blocks(len(rows.at), BLOCK))
+    whole = parts[0]
+    for part in parts[1:]:
+        whole = whole + part
+    return whole
+
+
+def residual(model: Model, state: State, rows: IntArray) -> FloatArray:
+    """Return what an explanation leaves of rows in [m] and [rad], shape (c, n), worked on by blocks."""
+    left = np.empty((len(model.blocks), len(rows)))
+
+    def work(block: slice) -> None:
+        left[:, block] = model.residual(state, rows[block])
+
+    side_by_side(work, row_blocks(len(rows)))
+    return left
+
+
+def cost(model: Model, state: State, rows: Rows) -> float:
+    """Return the mean square of what an explanation leaves, in the weights of rows; inf without any."""
+    left = residual(model, state, rows.at) * rows.weight[:, np.newaxis]
+    known = np.isfinite(left).all(axis=0)
+    return float((left[:, known] ** 2).mean()) if known.any() else np.inf
+
+
+def fitted(model: Model, state: State, groups: Sequence[Group], rows: Rows, *, others: bool = False) -> State:
+    """Return an explanation whose numbers of some groups leave the least (Gauss-Newton, halved steps).
+
+    Args:
+        model: What is held against what it should be.
+        state: Where to start from.
+        groups: Whose numbers.
+        rows: The rows that count.
+        others: Whether the other numbers stay; else they are 0.
+    """
+    columns = np.array([c for g in groups for c in g.columns], dtype=np.int64)
+    kept = state.values.copy() if others else np.zeros_like(state.values)
+    kept[columns] = state.values[columns]
+    state = replace(state, values=kept)
+    if not len(columns):
+        return state
+    now = cost(model, state, rows)
+    for _ in range(STEPS):
+        normal = normal_equations(model, state, rows, groups)
+        size = np.sqrt(np.maximum(np.diag(normal.gram), 1e-300))
+        scaled = normal.gram / size / size[:, np.newaxis]
+        target = np.linalg.lstsq(scaled, normal.moment / size, rcond=1e-13)[0] / size
+        step = target - state.values[columns]
+        for _ in range(8):
+            values = state.values.copy()
+            values[columns] += step
+            there = replace(state, values=values)
+            after = cost(model, there, rows)
+            if after <= now:
+                break
+            step = step / 2.0
+        else:
+            return state
+        gained, state, now = now - after, there, after
+        if gained <= STILL * now or now == 0.0:
+            break
+    return state

@@ -1,0 +1,90 @@
+"""Joints of both sides, held against each other one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.kinematics.forward import positions_over_log
+from urmpipe_pipeline.diagnosis.hypotheses import Group, State
+from urmpipe_pipeline.diagnosis.motion import Clock, Motion
+
+
+@dataclass(frozen=True, eq=False)
+class JointsModel:
+    """The joints of a log beside those of the reference.
+
+    Attributes:
+        groups: What may differ by some amount.
+        motion: The log's joints.
+        clock: The log's times.
+        sample: Rows of the log, shape (n,).
+        q: The reference's joints in [rad] or [m], shape (joints, n).
+        sliding: Which joints are in [m], shape (joints,).
+        chain: The arm; None for the joints alone.
+    """
+
+    groups: tuple[Group, ...]
+    motion: Motion
+    clock: Clock
+    sample: IntArray
+    q: FloatArray
+    sliding: tuple[bool, ...]
+    chain: Chain | None = None
+
+    @property
+    def rows(self) -> int:
+        """How many rows are held against each other."""
+        return len(self.sample)
+
+    @property
+    def blocks(self) -> IntArray:
+        """Which components share a noise: those that turn 0, those that slide 1, shape (joints,)."""
+        return np.array(self.sliding, dtype=np.int64)
+
+    def residual(self, state: State, rows: IntArray) -> FloatArray:
+        """Return what an explanation leaves: reference - log in [rad] or [m], shape (joints, n)."""
+        joints = self.motion.joints(state, self.groups, self.clock, self.sample, rows)
+        return np.asarray(np.where(joints.inside, self.q[:, rows] - joints.q, np.nan))
+
+    def linear(
+        self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return what an explanation leaves, and how each number of some groups changes the joints.
+
+        Args:
+            state: The explanation.
+            rows: Rows, by index, shape (n,).
+            groups: Whose numbers; all by default.
+
+        Returns:
+            The residual in [m] and [rad], shape (c, n), and the Jacobian per unit of each number, in order
+            of the groups, shape (p, c, n).
+        """
+        taken = self.groups if groups is None else groups
+        joints = self.motion.joints(state, self.groups, self.clock, self.sample, rows)
+        columns = np.zeros((len(taken), *joints.q.shape))
+        for column, group in zip(columns, taken, strict=True):
+            for j, factor in joints.factors(group, self.clock, rows):
+                column[j] = factor
+        return np.where(joints.inside, self.q[:, rows] - joints.q, np.nan), columns
+
+    def deviation(self, state: State, rows: IntArray) -> FloatArray:
+        """Return what an explanation leaves of the tool centre point in [m], shape (3, n).
+
+        Without an arm it is what it leaves of the joints in [rad] or [m], shape (joints, n).
+
+        Args:
+            state: The explanation.
+            rows: Rows, by index, shape (n,).
+        """
+        if self.chain is None:
+            return self.residual(state, rows)
+        joints = self.motion.joints(state, self.groups, self.clock, self.sample, rows)
+        wanted = positions_over_log(self.chain, self.q[:, rows].T)
+        left = (wanted - positions_over_log(self.chain, joints.q.T)).T
+        return np.asarray(np.where(joints.inside, left, np.nan))

@@ -1,0 +1,228 @@
+"""Which of many small causes a deviation takes: subsets of the columns of a linear model, scored.
+
+A deviation y is y = sum(J_g x_g) + noise over the groups g of columns that are taken. Subsets are scored by
+the extended Bayesian information criterion
+
+    n ln(max(RSS / N, floor)) + k ln n + 2 ln C(K, s),
+
+with RSS the sum of the N squares that s of K groups with k columns leave, and n the number of independent
+ones among them: N divided by the autocorrelation time. The lowest score is best.
+
+Source: [ChenChen2008]_ eq. 2, gamma = 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from math import comb, log
+from typing import TypeAlias
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+
+Subset: TypeAlias = frozenset[int]
+"""The groups that are taken, by their index."""
+
+MOST = 6
+"""Groups that are taken at most: a deviation that takes more is no list of causes."""
+
+STARTS = 4
+"""So many of the best subsets of one or two groups are searched on from."""
+
+TWIN = 1e-9
+"""Columns whose directions differ by less, as 1 - |cos|, are the same but for rounding."""
+
+NOTHING = 1e-10
+"""A column of which no more is left (of its square) when what is always taken is taken away moves nothing."""
+
+_RIDGE = 1e-11
+"""Keeps the equations of twins solvable; columns have unit length."""
+
+
+@dataclass(frozen=True, eq=False)
+class Normal:
+    """The normal equations of all columns: all that subsets are scored by.
+
+    Attributes:
+        gram: J^T J [-], in the weights of the rows, shape (p, p).
+        moment: J^T y [-], shape (p,).
+        square: y^T y.
+        count: N, the number of rows that stand in them.
+    """
+
+    gram: FloatArray
+    moment: FloatArray
+    square: float
+    count: int
+
+    def __add__(self, other: Normal) -> Normal:
+        """Return the equations of the rows of both."""
+        return Normal(
+            self.gram + other.gram,
+            self.moment + other.moment,
+            self.square + other.square,
+            self.count + other.count,
+        )
+
+    def without(self, taken: Sequence[int], damping: FloatArray) -> Normal:
+        """Return the equations of what is left when some columns are always taken (Schur complement).
+
+        With a damping of sigma^2 / s^2 a column has numbers of about s beside noise of about sigma: what so
+        much of it explains needs no other cause.
+
+        Args:
+            taken: The columns.
+            damping: Of each of them, in the square of its unit to the -1, shape (len(taken),).
+        """
+        at = np.array(taken, dtype=np.int64)
+        if not len(at):
+            return self
+        inner = self.gram[np.ix_(at, at)] + np.diag(damping)
+        size = np.sqrt(np.maximum(np.diag(inner), 1e-300))
+        inverse = np.linalg.pinv(inner / size / size[:, np.newaxis], rcond=1e-13, hermitian=True)
+        inverse = inverse / size / size[:, np.newaxis]
+        across = self.gram[:, at] @ inverse
+        gram = self.gram - across @ self.gram[at]
+        moment = self.moment - across @ self.moment[at]
+        square = self.square - float(self.moment[at] @ inverse @ self.moment[at])
+        return Normal(gram, moment, max(square, 0.0), self.count - int(np.count_nonzero(damping == 0.0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Subsets of groups and their scores.
+
+    Attributes:
+        normal: The normal equations.
+        groups: The columns of each group, shape (k,) each.
+        independent: n, how many of the N rows tell something of their own.
+        floor: Least mean square that means anything.
+        taken: Causes that are taken besides, those that are there or not.
+        numbers: Their numbers: one each, and one more where it begins at some row.
+        hypotheses: K, among how many causes is chosen.
+    """
+
+    normal: Normal
+    groups: tuple[IntArray, ...]
+    independent: float
+    floor: float
+    taken: int
+    numbers: int
+    hypotheses: int
+
+    @cached_property
+    def _scaled(self) -> tuple[FloatArray, FloatArray]:
+        """The normal equations of columns of unit length."""
+        size = np.sqrt(np.maximum(np.diag(self.normal.gram), 0.0))
+        by = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
+        gram = self.normal.gram * by[:, np.newaxis] * by
+        return gram + _RIDGE * np.eye(len(gram)), self.normal.moment * by
+
+    def left(self, subsets: Sequence[Subset]) -> FloatArray:
+        """Return the mean square [-] that each of some subsets leaves, shape (len(subsets),)."""
+        gram, moment = self._scaled
+        explained = np.zeros(len(subsets))
+        columns = [self.columns(subset) for subset in subsets]
+        sizes = np.array([len(one) for one in columns])
+        for size in np.unique(sizes[sizes > 0]):
+            at = np.flatnonzero(sizes == size)
+            taken = np.array([columns[i] for i in at])
+            right = moment[taken]
+            inner = gram[taken[:, :, np.newaxis], taken[:, np.newaxis, :]]
+            found = np.linalg.solve(inner, right[:, :, np.newaxis])[:, :, 0]
+            explained[at] = (found * right).sum(axis=1)
+        left: FloatArray = np.maximum(self.normal.square - explained, 0.0) / max(self.normal.count, 1)
+        return left
+
+    @cached_property
+    def _columns(self) -> list[tuple[int, ...]]:
+        """The columns of each group."""
+        return [tuple(group.tolist()) for group in self.groups]
+
+    def columns(self, subset: Iterable[int]) -> list[int]:
+        """Return the columns of some groups."""
+        return [c for g in sorted(subset) for c in self._columns[g]]
+
+    def scores(self, subsets: Sequence[Subset]) -> FloatArray:
+        """Return the score [-] of each of some subsets, shape (len(subsets),)."""
+        left = self.left(subsets)
+        penalty = [self.penalty(sum(len(self._columns[g]) for g in one), len(one)) for one in subsets]
+        return np.asarray(self.independent * np.log(np.maximum(left, self.floor)) + np.array(penalty))
+
+    def penalty(self, columns: int, groups: int) -> float:
+        """Return what a subset of some groups with some columns in all pays."""
+        return self._penalties[0] * (columns + self.numbers) + self._penalties[1 + groups]
+
+    @cached_property
+    def _penalties(self) -> list[float]:
+        """Of a column; then of so many groups, from 0."""
+        counts = (min(groups + self.taken, self.hypotheses) for groups in range(MOST + 1))
+        return [
+            log(max(self.independent, 2.0)),
+            *(2.0 * log(comb(self.hypotheses, count)) for count in counts),
+        ]
+
+    def best(self, among: Sequence[int]) -> Subset:
+        """Return the best subset of some groups: none, singles, pairs, and what they grow into."""
+        small = [frozenset(subset) for size in range(3) for subset in combinations(among, size)]
+        scores = self.scores(small)
+        order = np.argsort(scores, kind="stable")
+        climbed = [self.climbed(small[i], float(scores[i]), among) for i in order[:STARTS]]
+        return min(climbed, key=lambda one: one[1])[0]
+
+    def climbed(self, subset: Subset, score: float, among: Sequence[int]) -> tuple[Subset, float]:
+        """Return where adding, dropping and exchanging groups leads from a subset, and the score there."""
+        while True:
+            near = list(self.neighbours(subset, among))
+            if not near:
+                return subset, score
+            scores = self.scores(near)
+            best = int(np.argmin(scores))
+            if not scores[best] < score - 1e-9:
+                return subset, score
+            subset, score = near[best], float(scores[best])
+
+    def neighbours(self, subset: Subset, among: Sequence[int]) -> Iterator[Subset]:
+        """Yield the subsets with a group more, a group less, or a group exchanged."""
+        others = [g for g in among if g not in subset]
+        if len(subset) < MOST:
+            yield from (subset | {g} for g in others)
+        for gone in sorted(subset):
+            yield subset - {gone}
+            yield from (subset - {gone} | {g} for g in others)
+
+
+def without_twins(
+    normal: Normal, groups: Sequence[IntArray], largest: FloatArray
+) -> tuple[list[int], dict[int, int]]:
+    """Return which groups stand for all: twins are told by one, and what moves nothing not at all.
+
+    Args:
+        normal: The normal equations.
+        groups: The columns of each group, shape (k,) each; of twins the first stands for all.
+        largest: The squares of the columns [-] before anything was taken away, shape (p,).
+
+    Returns:
+        The groups that stand, and for each twin the group that tells it.
+    """
+    gram = normal.gram
+    square = np.maximum(np.diag(gram), 0.0)
+    size = np.sqrt(np.where(square > 0.0, square, 1.0))
+    stand: list[int] = []
+    twins: dict[int, int] = {}
+    for g, columns in enumerate(groups):
+        if (square[columns] <= NOTHING * largest[columns]).all():
+            continue
+        if len(columns) == 1:
+            c = int(columns[0])
+            single = ((h, int(groups[h][0])) for h in stand if len(groups[h]) == 1)
+            like = (h for h, d in single if 1.0 - abs(gram[c, d]) / (size[c] * size[d]) < TWIN)
+            if (twin := next(like, None)) is not None:
+                twins[g] = twin
+                continue
+        stand.append(g)
+    return stand, twins

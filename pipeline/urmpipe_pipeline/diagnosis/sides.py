@@ -1,0 +1,316 @@
+"""What two sides allow to be asked: a model of one, held against the other, and what they cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.kinematics.forward import jacobian
+from urmpipe_models.orientation import matrices
+from urmpipe_models.transform import Transform
+from urmpipe_pipeline.diagnosis.arm import ArmModel
+from urmpipe_pipeline.diagnosis.arm_groups import (
+    arm_groups,
+    base_groups,
+    joint_groups,
+    time_groups,
+    tool_groups,
+)
+from urmpipe_pipeline.diagnosis.hypotheses import numbered
+from urmpipe_pipeline.diagnosis.joints import JointsModel
+from urmpipe_pipeline.diagnosis.motion import Clock, Motion, motion_of
+from urmpipe_pipeline.diagnosis.place import TOOL, PlaceModel
+from urmpipe_pipeline.diagnosis.result import NotLookedFor
+from urmpipe_pipeline.log_edits import Edits, robot_edits, sign_edits, swap_edits, unit_edits
+from urmpipe_pipeline.runs.grid import ROUNDING_NS
+from urmpipe_pipeline.runs.results import Run
+
+if TYPE_CHECKING:  # a comparison holds its diagnosis: no ring between the two
+    from urmpipe_pipeline.comparison.matching import Matched
+    from urmpipe_pipeline.comparison.trajectory import Trajectory
+
+AT_REST = 3e-4
+"""What moves by less in [m] or [rad] rests: three times what a UR5e at rest was logged to span in 25 s,
+0.10 mrad and 0.10 mm."""
+
+ORIENTED = 0.5
+"""Orientations count where more than this share of the rows has them on both sides."""
+
+LOOKED_AT = 2000
+"""Values of a column from which its step is told."""
+
+PARTS = (1, 2, 5, 10)
+"""The least distance of two values that occur may be so many steps."""
+
+WHOLE = 0.01
+"""A value is a multiple of a step if it is no further off than this share of one."""
+
+STRUCTURE = ("link_length", "tilt")
+JOINTS = (
+    "joint_sign",
+    "joint_offset",
+    "joint_scale",
+    "compliance",
+    "joints_swapped",
+    "half_turn",
+    "mirrored",
+)
+FRAMES = ("base_shift", "base_rotation", "tool_shift", "tool_rotation")
+TIME = ("time_lag", "clock_drift")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Side:
+    """One side of a comparison.
+
+    Attributes:
+        run: The log or the path.
+        trajectory: Where it was, as it was compared.
+        by_joints: Whether that is by its joints and a robot, or by their values alone; else it is
+            where the run recorded itself.
+    """
+
+    run: Run
+    trajectory: Trajectory
+    by_joints: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Question:
+    """What is held against what, and what may be found.
+
+    Attributes:
+        model: The side that is modelled, beside the other.
+        edits: What may be there or not.
+        turning: Which joints turn, shape (joints,); none without joints.
+        names: What the log calls its joints.
+        own_names: What the arm calls them; as the log without one.
+        sample: Rows of the log, shape (n,).
+        rounding: What rounding and interpolation leave, of each component in [m] or [rad], shape (c,).
+        forced: Groups that are unknown, and always taken.
+        sign: 1 if the model is the log's, -1 if it is the reference's: of what stays, as reference - log.
+        not_looked_for: What these sides cannot tell, and why.
+    """
+
+    model: ArmModel | JointsModel | PlaceModel
+    edits: tuple[Edits, ...]
+    turning: tuple[bool, ...]
+    names: tuple[str, ...]
+    own_names: tuple[str, ...]
+    sample: IntArray
+    rounding: FloatArray
+    forced: tuple[int, ...]
+    sign: float
+    not_looked_for: tuple[NotLookedFor, ...]
+
+
+def question(matched: Matched, reference: Side, log: Side) -> Question:
+    """Return what two sides, at the same times, allow to be asked."""
+    if reference.by_joints and log.by_joints and matched.reference_q is not None:
+        return _of_joints(matched, reference, log)
+    if log.by_joints or reference.by_joints:
+        return _of_arm(matched, reference, log)
+    return _of_places(matched, reference, log)
+
+
+def _of_joints(matched: Matched, reference: Side, log: Side) -> Question:
+    """Return the question of joints on both sides."""
+    run = log.run
+    sliding = tuple(unit == "m" for unit in run.joint_units)
+    units = ["m" if one else "rad" for one in sliding]
+    groups = numbered([*joint_groups(units, run.log.joints), *(time_groups() if run.timed else ())])
+    q = np.asarray(matched.reference_q).T
+    model = JointsModel(
+        groups, _motion(run), _clock(matched, run, log=True), matched.sample, q, sliding, run.robot
+    )
+    rounding = np.hypot(_rounding(run.on_rows.q, run), _rounding(q.T, run))
+    recorded = run.log.tcp_position is not None
+    alone = (
+        "diagnosed alone, the log is held against the one that it recorded"
+        if recorded
+        else "none was recorded"
+    )
+    reason = f"both sides have joints: only a recorded tool centre point tells them, {alone}"
+    told = NotLookedFor((*STRUCTURE, *FRAMES, "path_unit", "other_robot"), reason)
+    edits = (*sign_edits(len(sliding), most=len(sliding)), *swap_edits(len(sliding)))
+    turning = tuple(not one for one in sliding)
+    return Question(
+        model,
+        edits,
+        turning,
+        run.log.joints,
+        _own_names(run),
+        matched.sample,
+        rounding,
+        (),
+        1.0,
+        (told, *_untimed(run)),
+    )
+
+
+def _of_arm(matched: Matched, reference: Side, log: Side) -> Question:
+    """Return the question of joints on one side: what arm, joints and clock have that is not told."""
+    own, other = (log, reference) if log.by_joints else (reference, log)
+    run, robot = own.run, own.run.robot
+    assert robot is not None  # a side without kinematics has no place, and is not compared by it
+    position, quat = (
+        (matched.reference, matched.reference_quat)
+        if log.by_joints
+        else (matched.actual, matched.actual_quat)
+    )
+    rotation = _turned(quat)
+    names, timed = run.log.joints, log.run.timed
+    open_frames = other.run.log.measured
+    groups = numbered(
+        [*arm_groups(robot, names, turned=rotation is not None), *(time_groups() if timed else ())]
+    )
+    clock = _clock(matched, log.run, log=log.by_joints)
+    model = ArmModel(
+        robot, groups, _motion(run), clock, matched.sample, position.T.copy(), rotation, open_frames
+    )
+    rounding = np.sqrt(
+        _rounding(position, run) ** 2 + _by_joints(model, _rounding(run.on_rows.q, run)) ** 2
+        + _between(matched, reference.trajectory) ** 2
+    )  # fmt: skip
+    rounding = np.concatenate((rounding, np.zeros(len(model.blocks) - 3)))
+    count = len(robot.moving)
+    edits = (*sign_edits(count, most=2 if open_frames else count), *swap_edits(count), *robot_edits(robot))
+    edits += () if open_frames else tuple(unit_edits("reference" if log.by_joints else "log"))
+    forced = tuple(g for g, group in enumerate(groups) if open_frames and group.kind in FRAMES)
+    told = [NotLookedFor(("turns",), "whole turns move no tool centre point: joints on both sides tell them")]
+    if rotation is None:
+        told.append(NotLookedFor(("tool_rotation",), "a side has no orientation"))
+    if open_frames:
+        told.append(
+            NotLookedFor((*FRAMES, "path_unit"), "measured in a frame of its own: base and tool are unknown")
+        )
+    turning = tuple(joint.kind == "revolute" for joint in robot.moving)
+    return Question(
+        model, edits, turning, names, _own_names(run), matched.sample, rounding, forced,
+        1.0 if log.by_joints else -1.0, (*told, *_untimed(log.run)),
+    )  # fmt: skip
+
+
+def _of_places(matched: Matched, reference: Side, log: Side) -> Question:
+    """Return the question of a tool centre point on both sides, without joints."""
+    run = log.run
+    quat = matched.actual_quat
+    oriented = _turned(quat) is not None
+    rotation = _turned(matched.reference_quat) if oriented else None
+    tool = tool_groups(Transform(), TOOL, turned=rotation is not None) if oriented else ()
+    groups = numbered([*base_groups(Transform()), *tool, *(time_groups() if run.timed else ())])
+    trajectory = log.trajectory
+    turns = None if trajectory.quat_xyzw is None or not oriented else _matrices(trajectory.quat_xyzw)
+    model = PlaceModel(
+        groups, motion_of(trajectory.t if run.timed else None, trajectory.position.T), turns,
+        _clock(matched, run, log=True), matched.sample, matched.reference.T.copy(), rotation,
+    )  # fmt: skip
+    rounding = np.sqrt(
+        _rounding(matched.reference, run) ** 2 + _rounding(matched.actual, run) ** 2
+        + _between(matched, reference.trajectory) ** 2
+    )  # fmt: skip
+    rounding = np.concatenate((rounding, np.zeros(len(model.blocks) - 3)))
+    told = [NotLookedFor((*STRUCTURE, *JOINTS, "turns", "other_robot"), "no side has joints")]
+    if not oriented:
+        told.append(NotLookedFor(("tool_shift", "tool_rotation"), "the log has no orientation"))
+    elif rotation is None:
+        told.append(NotLookedFor(("tool_rotation",), "the reference has no orientation"))
+    return Question(
+        model,
+        tuple(unit_edits("reference", "log")),
+        (),
+        (),
+        (),
+        matched.sample,
+        rounding,
+        (),
+        1.0,
+        (*told, *_untimed(run)),
+    )
+
+
+def _own_names(run: Run) -> tuple[str, ...]:
+    """Return what an arm calls its joints; without one what the log calls them."""
+    return run.log.joints if run.robot is None else run.robot.coordinates
+
+
+def _untimed(run: Run) -> Iterator[NotLookedFor]:
+    """Yield that still poses tell nothing of time."""
+    if not run.timed:
+        yield NotLookedFor((*TIME, "compliance"), "still poses have no time")
+
+
+def _clock(matched: Matched, run: Run, *, log: bool) -> Clock:
+    """Return the times of the compared rows on the clock of the modelled side."""
+    if not run.timed:
+        return Clock(matched.sample.astype(float), -1.0, np.zeros(len(matched.sample)))
+    since = matched.t_ns / 1e9
+    return Clock(since, -1.0, since) if log else Clock(since + matched.sync.offset, 1.0, since)
+
+
+def _motion(run: Run) -> Motion:
+    """Return the joints of a run on its log's rows, with their rates where they have times."""
+    rows = run.on_rows
+    return motion_of(rows.t_ns / 1e9 if run.timed else None, rows.q.T)
+
+
+def _turned(quat: FloatArray | None) -> FloatArray | None:
+    """Return orientations as matrices, shape (3, 3, n); None where too few rows have one."""
+    if quat is None or np.isfinite(quat).all(axis=1).mean() <= ORIENTED:
+        return None
+    return _matrices(quat)
+
+
+def _matrices(quat: FloatArray) -> FloatArray:
+    return matrices(quat).transpose(1, 2, 0).copy()
+
+
+def _rounding(values: FloatArray, run: Run) -> FloatArray:
+    """Return the root mean square error of rounding to the steps that columns are written in, shape (k,).
+
+    Still poses are chosen in round numbers, which are exact.
+    """
+    if not run.timed:
+        return np.zeros(values.shape[1])
+    some = values[:: max(len(values) // LOOKED_AT, 1)]
+    steps = np.array([_step(column[np.isfinite(column)]) for column in some.T])
+    return np.asarray(steps / np.sqrt(12.0))
+
+
+def _step(values: FloatArray) -> float:
+    """Return the step that all values are multiples of: the least between two, or a part of it; else 0."""
+    apart = np.diff(np.unique(values))
+    for part in PARTS if len(apart) else ():
+        step = float(apart.min()) / part
+        if np.abs(values / step - np.rint(values / step)).max() < WHOLE:
+            return step
+    return 0.0
+
+
+def _by_joints(model: ArmModel, rounding: FloatArray) -> FloatArray:
+    """Return what the rounding of joints leaves of a position in [m], shape (3,)."""
+    rows = np.unique(np.linspace(0, model.rows - 1, min(model.rows, 100)).round().astype(np.int64))
+    q = model.motion.at(model.clock.t[rows])[0]
+    columns = np.array([[np.nanmean(np.square(part * np.ones(len(rows)))) for part in column[:3]]
+                        for column in jacobian(model.chain, list(q))])  # fmt: skip
+    return np.asarray(np.sqrt((columns * rounding[:, np.newaxis] ** 2).sum(axis=0)))
+
+
+def _between(matched: Matched, reference: Trajectory) -> FloatArray:
+    """Return what lines between samples of the reference leave, in [m]: an eighth of second differences.
+
+    Nothing where the rows of the log meet its samples.
+    """
+    at_ns = matched.t_ns + round(matched.sync.offset * 1e9)
+    if len(reference.t_ns) < 3:
+        return np.zeros(3)
+    after = np.clip(np.searchsorted(reference.t_ns, at_ns), 1, len(reference.t_ns) - 1)
+    away = np.minimum(*(np.abs(at_ns - reference.t_ns[beside]) for beside in (after - 1, after)))
+    if np.median(away) <= ROUNDING_NS:
+        return np.zeros(3)
+    second = np.diff(reference.position, 2, axis=0)
+    return np.asarray(np.sqrt(np.nanmean(second**2, axis=0)) / 8.0)

@@ -1,0 +1,197 @@
+"""`urmpipe diagnose` and `compare --diagnose`: the answer, what is written, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import warnings
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+import urmpipe
+from asserting import refusal, there
+from same_results import assert_same
+from urmpipe.main import run
+from urmpipe_datasets import LOGS
+from urmpipe_models.errors import LogError, OptionError
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.comparison.comparison import Comparison
+
+Captured = pytest.CaptureFixture[str]
+
+PATH, WRONG, RIGHT = (str(LOGS / f"{name}.csv") for name in ("path", "counter_rotating", "matlab"))
+ARM = ("--robot", "urm6")
+ANSWER = "module 3 (phi3) counter-rotates: rms 416.57 mm -> 0.0001 mm"
+KEYS = [
+    "schema", "name", "verdict", "samples", "unit", "rms", "causes", "undecided", "not_looked_for",
+    "remainder", "warnings", "recording",
+]  # fmt: skip
+CAUSE_KEYS = [
+    "kind", "name", "joint", "segment", "axis", "value", "unit", "interval", "from_sample", "twins",
+    "rms_before", "rms_after", "share",
+]  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Enter an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def told(capsys: Captured) -> dict[str, Any]:
+    """Return the JSON object that was printed."""
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return found
+
+
+def test_the_first_line_is_verdict_and_answer(capsys: Captured) -> None:
+    assert run(["diagnose", PATH, WRONG, *ARM]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == f"FAIL  {ANSWER}"
+    assert (
+        "Verdict: counter_rotating out of tolerance against path, assuming the positions are in m (path)"
+        in lines
+    )
+    assert lines[-1].startswith("Recording: counter_rotating-diagnosed.rrd  (open it: ")
+
+
+def test_what_is_written_is_the_comparison_with_its_diagnosis() -> None:
+    run(["diagnose", PATH, WRONG, *ARM, "-q"])
+    run(["compare", PATH, WRONG, *ARM, "--diagnose", "-q", "-o", "compared.rrd"])
+    found, compared = map(urmpipe.read_recording, ("counter_rotating-diagnosed.rrd", "compared.rrd"))
+    assert isinstance(found, Comparison) and isinstance(compared, Comparison)
+    assert there(found.runs[0].diagnosis).sentence == ANSWER
+    assert_same(found.runs[0].diagnosis, compared.runs[0].diagnosis)
+    assert run(["report", "counter_rotating-diagnosed.rrd", "-q"]) == 0
+    assert "module 3 (phi3) counter-rotates" in Path("counter_rotating-diagnosed.html").read_text("utf-8")
+
+
+def test_json_has_the_keys_that_are_promised(capsys: Captured) -> None:
+    assert run(["diagnose", PATH, WRONG, *ARM, "--json"]) == 1
+    found = told(capsys)
+    assert list(found) == KEYS
+    assert (found["name"], found["verdict"], found["unit"]) == ("counter_rotating", "fail", "m")
+    assert found["recording"] == "counter_rotating-diagnosed.rrd"
+    (cause,) = found["causes"]
+    assert list(cause) == CAUSE_KEYS
+    assert (cause["kind"], cause["name"], cause["joint"]) == ("joint_sign", "phi3", "q3")
+    assert cause["value"] is None
+    assert [one["message"] for one in found["warnings"]][-1].startswith("no unit is given for x, y, z")
+    assert run(["compare", PATH, WRONG, *ARM, "--diagnose", "--json"]) == 1
+    (compared,) = told(capsys)["runs"]
+    same = [key for key in KEYS if key not in ("warnings", "recording")]
+    assert {key: compared["diagnosis"][key] for key in same} == {key: found[key] for key in same}
+    assert run(["compare", PATH, WRONG, *ARM, "--json"]) == 1
+    assert told(capsys)["runs"][0]["diagnosis"] is None
+
+
+def test_a_log_that_passes_is_diagnosed_too(capsys: Captured) -> None:
+    assert run(["diagnose", PATH, RIGHT, *ARM]) == 0
+    assert capsys.readouterr().out.startswith("PASS  ")
+
+
+def test_a_quiet_failure_says_why_and_nothing_else(capsys: Captured) -> None:
+    assert run(["diagnose", PATH, WRONG, *ARM, "-q"]) == 1
+    assert capsys.readouterr() == ("", f"FAIL  {ANSWER}\n")
+
+
+def test_junit_has_the_answer_as_a_property() -> None:
+    run(["compare", PATH, WRONG, *ARM, "--diagnose", "-q", "--junit", "verdict.xml"])
+    suite = there(ET.parse("verdict.xml").getroot().find("testsuite"))
+    assert there(suite.find("properties/property[@name='cause']")).get("value") == ANSWER
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([PATH, RIGHT], "matlab.csv: no robot, so no forward kinematics; --robot NAME|FILE gives one"),
+        ([PATH], "path.csv: a path alone, which has no joints; allowed: a log to hold against it"),
+        (
+            [RIGHT, *ARM],
+            "matlab.csv: one log, which recorded no tool centre point; allowed: a reference before the log",
+        ),
+        (
+            [PATH, RIGHT, WRONG, *ARM],
+            f"found {WRONG} besides the rest, allowed: urmpipe diagnose [OPTIONS] REFERENCE [LOG]; a robot is"
+            " named with --robot",
+        ),
+        (
+            [PATH, RIGHT, *ARM, "--align", "rigid"],
+            "--align: found rigid, allowed: none with a diagnosis, which names base and tool as causes",
+        ),
+    ],
+)
+def test_what_cannot_be_diagnosed_is_refused(arguments: list[str], said: str, capsys: Captured) -> None:
+    assert run(["diagnose", *arguments]) == 2
+    assert capsys.readouterr().err == f"error: {said}\n"
+    assert not list(Path.cwd().iterdir())
+
+
+def test_an_alignment_is_refused_with_a_diagnosis(capsys: Captured) -> None:
+    assert run(["compare", PATH, RIGHT, *ARM, "--diagnose", "--align", "tool"]) == 2
+    assert capsys.readouterr().err == (
+        "error: --align: found tool, allowed: none with a diagnosis, which names base and tool as causes\n"
+    )
+
+
+def test_a_comparison_that_stands_is_not_diagnosed(capsys: Captured) -> None:
+    run(["compare", PATH, RIGHT, *ARM, "-q", "-o", "made.rrd"])
+    assert run(["compare", "made.rrd", "--baseline", "made.rrd", "--diagnose"]) == 2
+    assert capsys.readouterr().err == (
+        "error: --diagnose: found with the recording of a comparison (made.rrd), which stands as it was made,"
+        " allowed: with the logs themselves\n"
+    )
+
+
+@pytest.mark.parametrize("operands", [["made.rrd"], [PATH, "made.rrd"]])
+def test_the_recording_of_a_comparison_is_no_log(operands: list[str], capsys: Captured) -> None:
+    run(["compare", PATH, RIGHT, *ARM, "-q", "-o", "made.rrd"])
+    assert run(["diagnose", *operands, *ARM]) == 2
+    assert capsys.readouterr().err == (
+        "error: made.rrd: found the recording of a comparison, allowed: one that ingest wrote\n"
+    )
+
+
+def test_in_python_it_stands_in_its_comparison() -> None:
+    with pytest.warns(urmpipe.UrmpipeWarning) as shown:
+        found = urmpipe.diagnose(PATH, WRONG, robot="urm6")
+    assert [one.filename for one in shown] == [__file__]
+    assert found.sentence == ANSWER
+    assert repr(found) == f"<Diagnosis counter_rotating: {ANSWER}, 1 warning>"
+    made = found.comparison
+    assert isinstance(made, Comparison)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urmpipe.UrmpipeWarning)
+        compared = urmpipe.compare(PATH, WRONG, robot="urm6", diagnose=True)
+        assert urmpipe.report(found, "report.html").results == (made,)
+    assert made.verdict == compared.verdict
+    np.testing.assert_array_equal(made.runs[0].delta, compared.runs[0].delta)
+    assert found.to_frame()["name"].tolist() == ["phi3"]
+
+
+def test_in_python_operands_are_refused_by_their_names() -> None:
+    number, listed = cast("tuple[Any, Any]", (3, [1.0]))
+    said = refusal(OptionError, urmpipe.diagnose, number, listed)
+    assert [line.split(":")[0] for line in said.splitlines()] == ["reference", "log"]
+    assert refusal(LogError, urmpipe.diagnose, PATH, RIGHT).startswith("matlab.csv: no robot")
+
+
+def test_poses_measured_from_outside_are_put_into_their_base_and_tool_first() -> None:
+    arm = load_robot("ur5e")
+    q = np.array([0.3, -1.2, 1.1, -0.7, -1.5, 0.4]) + np.random.default_rng(1).uniform(-1.0, 1.0, (40, 6))
+    position, rotation = poses_over_log(arm, q)
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    seen = (position + rotation @ [0.01, 0.02, 0.1]) @ turned.T + [2.0, 1.0, 0.3]
+    header = ",".join([*(f"q{k} [rad]" for k in range(1, 7)), "X [m]", "Y [m]", "Z [m]"])
+    np.savetxt("tracker.csv", np.column_stack([q, seen]), "%.9f", ",", header=header, comments="")
+    measured = ["X", "Y", "Z"]
+    found = urmpipe.diagnose("tracker.csv", robot="ur5e", poses=True, measured=measured)
+    assert isinstance(found.comparison, Comparison)
+    assert found.comparison.runs[0].alignment.mode == "base+tool"
+    assert (found.verdict, found.causes) == ("pass", ())
+    assert found.rms < 1e-8  # the digits of the file

@@ -1,0 +1,161 @@
+"""A compared log that was diagnosed: its cause beside the verdict, over time, in space and on the arm."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from asserting import refusal, there
+from diagnoses import LENGTH, SIGN, diagnosis_of
+from made_runs import off, path_run, run_of
+from presented import cells, facts, figures, scene_of
+from urmpipe_models.errors import OptionError
+from urmpipe_models.messages import Hint
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.mended import cause_marks
+from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts, diagnosis_tables
+from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR, MENDED_COLOUR
+from urmpipe_pipeline.presentation.scene import ArmMark
+from urmpipe_pipeline.presentation.section import Advice, Fact
+from urmpipe_pipeline.results import present
+
+Compared = Callable[..., Comparison]
+
+
+def diagnosed(result: Comparison) -> Comparison:
+    """Return a comparison of which each log has a diagnosis."""
+    return replace(result, runs=tuple(replace(one, diagnosis=diagnosis_of(one)) for one in result.runs))
+
+
+def test_its_cause_stands_under_the_verdict(paths: Compared) -> None:
+    result = diagnosed(paths({"log": off(0.5)}))
+    shown = present(result)
+    (section,) = shown.body.sections
+    said = there(result.runs[0].diagnosis).sentence
+    assert [fact.name for fact in shown.facts][:2] == ["Cause", "Furthest out"]
+    assert shown.facts[0].value == facts(section)["Cause"] == section.properties["cause"] == said
+
+
+def test_a_log_out_of_tolerance_says_what_tells_its_cause(paths: Compared) -> None:
+    result = paths({"log": off(0.5), "near": off(0.001)})
+    shown = present(result)
+    far, near = shown.body.sections
+    hint = Fact("Cause", Advice(hints=(Hint("diagnose", True, "says why"),)))
+    assert hint in shown.facts[1:]  # behind what decided
+    assert facts(far)["Cause"] == hint.value
+    assert "Cause" not in facts(near)
+    assert "cause" not in far.properties
+    aligned = replace(result.runs[0], alignment=replace(result.runs[0].alignment, mode="rigid"))
+    (section, _) = present(replace(result, runs=(aligned, result.runs[1]))).body.sections
+    assert "Cause" not in facts(section)  # a diagnosis is refused with an alignment
+
+
+def test_causes_and_what_is_undecided_are_tables_and_what_was_not_looked_for_is_a_line(
+    paths: Compared,
+) -> None:
+    (section,) = present(diagnosed(paths({"log": off(0.01)}))).body.sections
+    tables = {one.title: one for one in section.tables}
+    assert list(tables)[:2] == ["Causes", "Undecided between"]
+    assert facts(section)["Not looked for"] == "orientation of the tool (the reference has no orientation)"
+    assert cells(tables["Causes"]) == {
+        "cause": ["module 3 (phi3) counter-rotates", "r_4 needs +1.2000 mm from row 4 on"],
+        "value": ["", "+1.2000 mm"],
+        "interval": ["", "+1.1000 to +1.3000 mm"],
+        "from_row": [None, 4],
+        "twins": ["", "d_5, tool shift z"],
+        "rms_after": [SIGN.rms_after, LENGTH.rms_after],
+        "share": [SIGN.share, LENGTH.share],
+    }
+    assert cells(tables["Undecided between"])["needs"] == ["phi5", "phi5"]
+
+
+def test_one_cause_is_no_table_in_the_terminal(paths: Compared) -> None:
+    one = paths({"log": off(0.01)}).runs[0]
+    several, alone = (replace(diagnosis_of(one), causes=causes) for causes in ((SIGN, LENGTH), (SIGN,)))
+    assert [next(diagnosis_tables(found)).brief for found in (several, alone)] == [True, False]
+
+
+def test_what_stays_is_said_only_beside_a_cause(paths: Compared) -> None:
+    found = diagnosis_of(paths({"log": off(0.01)}).runs[0])
+    said = {fact.name: fact.value for fact in diagnosis_facts(found)}
+    assert said["What stays"] == "rms 0.0574 mm, 0.01 % of the mean square: the digits of the log"
+    nothing = {fact.name: fact.value for fact in diagnosis_facts(replace(found, causes=(), undecided=()))}
+    assert nothing["What stays"] == ""
+    assert str(nothing["Cause"]).startswith("no cause named: rms ")
+
+
+def test_each_axis_is_drawn_mended_with_its_tolerance(paths: Compared) -> None:
+    result = diagnosed(paths({"log": off(0.01)}))
+    one = result.runs[0]
+    figure = figures(present(result).body.sections[0])[1]
+    assert figure.beside
+    (view,) = figure.views
+    assert [panel.limit for panel in view.panels] == [0.0035] * 3
+    for axis, panel in enumerate(view.panels):
+        (mended,) = panel.lines
+        assert mended.colours == (AXIS_COLOURS["xyz"[axis]],)
+        np.testing.assert_array_equal(mended.values[:], one.delta[::2, axis] / 100.0)
+        np.testing.assert_array_equal(mended.t_ns, one.t_ns[::2])
+
+
+def test_joints_alone_are_drawn_one_by_one_beside_their_deviation(arms: Compared) -> None:
+    off_by = np.outer(np.linspace(0.0, 0.01, 60), np.arange(1.0, 7.0))
+    result = arms({"log": off_by}, tolerance={"joint": 0.002})
+    one = replace(result.runs[0], statistics={})
+    joints = there(one.joint_delta)
+    found = replace(diagnosis_of(one), unit="rad", sample=one.sample, mended=joints / 10.0)
+    result = replace(result, runs=(replace(one, diagnosis=found),))
+    deviation, mended, *_ = figures(present(result).body.sections[0])
+    assert (deviation.title, mended.beside) == ("Deviation of joints", True)
+    panels = mended.views[0].panels
+    assert [panel.title for panel in panels] == [f"Δ q{k}" for k in range(1, 7)]
+    assert {(panel.unit, panel.limit) for panel in panels} == {("rad", 0.002)}
+    for k, panel in enumerate(panels):
+        np.testing.assert_array_equal(panel.lines[0].values[:], joints[:, k] / 10.0)
+
+
+def test_the_mended_path_lies_beside_the_reference_by_what_stays(paths: Compared) -> None:
+    result = diagnosed(paths({"log": off(0.01)}))
+    one = result.runs[0]
+    (mended,) = (path for path in scene_of(present(result)).paths if path.name == "mended")
+    assert mended.colour == MENDED_COLOUR
+    np.testing.assert_array_equal(mended.position, (one.reference - one.delta[:, :3] / 100.0)[::2])
+    np.testing.assert_array_equal(mended.t_ns, one.t_ns[::2])
+
+
+def test_what_is_named_is_marked_on_the_arm(arms: Compared) -> None:
+    (one,) = diagnosed(arms({"log": np.full((60, 6), 0.01)})).runs
+    chain = there(one.run.robot)
+    assert cause_marks(one, chain) == (
+        ArmMark(2, "module 3 (phi3) counter-rotates", DEVIATION_COLOUR),
+        ArmMark(4, "r_4 needs +1.2000 mm from row 4 on", DEVIATION_COLOUR, segment=True),
+    )
+    assert scene_of(present(diagnosed(arms({"log": np.full((60, 6), 0.01)})))).arms[0].marks
+    found = there(one.diagnosis)
+    twice = replace(SIGN, kind="joint_offset", value=(0.1,), unit="rad")
+    both = replace(one, diagnosis=replace(found, causes=(SIGN, twice)))
+    assert [mark.words for mark in cause_marks(both, chain)] == [
+        "module 3 (phi3) counter-rotates and module 3 (phi3) needs an offset of +5.7296 deg"
+    ]
+
+
+def test_without_a_cause_nothing_is_mended(paths: Compared) -> None:
+    result = paths({"log": off(0.01)})
+    one = result.runs[0]
+    nothing = replace(diagnosis_of(one), causes=(), undecided=())
+    result = replace(result, runs=(replace(one, diagnosis=nothing),))
+    assert not any(figure.beside for figure in figures(present(result).body.sections[0]))
+    assert not any(path.name == "mended" for path in scene_of(present(result)).paths)
+
+
+ALIGNED = "align: found rigid, allowed: none with a diagnosis, which names base and tool as causes"
+
+
+def test_an_alignment_is_refused_with_a_diagnosis() -> None:
+    options = CompareOptions(align="rigid", diagnose=True)
+    path, arm = path_run(off(0.1)), run_of(np.zeros((100, 6)), recorded=off(0.1))
+    assert refusal(OptionError, compare_runs, path, [path], options) == ALIGNED
+    assert refusal(OptionError, compare_recorded, arm, options) == ALIGNED

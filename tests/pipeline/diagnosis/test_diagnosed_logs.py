@@ -1,0 +1,151 @@
+"""Diagnoses of whole logs: joints on both sides, a path against joints, paths alone, too little to tell."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from altered_arm import DURATION, demo_motion, poses, rich_motion, times, uniform
+from altered_log import POSES, TRACKER, diagnosed, diagnosed_record, drawn, tracked
+from made_runs import path_run, run_of
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.diagnosis.result import Diagnosis
+
+URM6 = load_robot("urm6")
+SAMPLES = 1000
+PERIOD = DURATION / (SAMPLES - 1)
+
+
+def joints(motion: str = "rich") -> FloatArray:
+    moved = demo_motion() if motion == "demo" else rich_motion(URM6)
+    return np.asarray(moved(times(SAMPLES)))
+
+
+def against_joints(q: FloatArray, seed: int = 1) -> Diagnosis:
+    """A log of joints with 0.02 deg of noise against those that were asked for."""
+    noise = np.random.default_rng(seed).normal(0.0, np.radians(0.02), q.shape)
+    asked = run_of(joints(), URM6, name="asked", tsp=PERIOD)
+    return diagnosed(asked, run_of(q + noise, URM6, tsp=PERIOD))
+
+
+def against_path(q: FloatArray, motion: str = "rich") -> Diagnosis:
+    """A log of joints against the path that was asked for, +-3.5 mm."""
+    position, _ = poses(URM6, joints(motion), oriented=False)
+    noisy = uniform(np.random.default_rng(1), position)
+    return diagnosed(path_run(noisy.T, tsp=PERIOD), run_of(q, URM6, tsp=PERIOD))
+
+
+def answer(found: Diagnosis) -> list[tuple[str, tuple[str, ...], int | None]]:
+    """The causes, of which none is undecided."""
+    assert not found.undecided
+    return [(one.kind, one.joints, one.from_sample) for one in found.causes]
+
+
+def test_joints_that_agree_have_no_cause() -> None:
+    assert answer(against_joints(joints())) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("j", [0, 3, 5])
+def test_a_joint_that_counts_the_other_way_is_named_and_not_by_a_factor(j: int, seed: int) -> None:
+    q = joints()
+    q[:, j] *= -1.0
+    assert answer(against_joints(q, seed=seed)) == [("joint_sign", (f"q{j + 1}",), None)]
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("j", [1, 4])
+def test_a_whole_turn_is_named_though_the_tool_centre_point_lacks_nothing(j: int, seed: int) -> None:
+    q = joints()
+    q[300:, j] -= 2.0 * np.pi
+    assert answer(against_joints(q, seed=seed)) == [("turns", (f"q{j + 1}",), 300)]
+
+
+def test_an_exchange_of_joints_is_named() -> None:
+    q = joints()
+    assert answer(against_joints(q[:, [0, 4, 2, 3, 1, 5]])) == [("joints_swapped", ("q2", "q5"), None)]
+
+
+def test_an_offset_of_a_joint_is_named_with_its_size() -> None:
+    q = joints()
+    q[:, 2] += np.radians(0.1)
+    found = against_joints(q)
+    assert answer(found) == [("joint_offset", ("q3",), None)]
+    (cause,) = found.causes
+    assert cause.low[0] < -np.radians(0.1) < cause.high[0]
+
+
+@pytest.mark.parametrize("motion", ["demo", "rich"])
+@pytest.mark.parametrize("j", [0, 3, 5])
+def test_half_a_turn_is_found_at_the_tool_centre_point_to_the_sample(motion: str, j: int) -> None:
+    q = joints(motion)
+    q[400:, j] += np.pi
+    assert answer(against_path(q, motion)) == [("half_turn", (f"q{j + 1}",), 400)]
+
+
+@pytest.mark.parametrize("motion", ["demo", "rich"])
+@pytest.mark.parametrize("j", [1, 2, 4])
+def test_a_mirrored_angle_is_found_there_within_seven_samples(motion: str, j: int) -> None:
+    q = joints(motion)
+    q[600:, j] *= -1.0
+    ((kind, names, first),) = answer(against_path(q, motion))
+    assert (kind, names) == ("mirrored", (f"q{j + 1}",))
+    assert first is not None
+    assert abs(first - 600) <= 7
+
+
+def test_a_path_that_stands_elsewhere_has_another_base() -> None:
+    position = poses(URM6, joints(), oriented=False)[0].T
+    shift = np.array([1.5e-3, -1.2e-3, 1.6e-3])
+    log = path_run(position + shift, name="log", tsp=PERIOD)
+    found = diagnosed(path_run(position, tsp=PERIOD), log)
+    assert answer(found) == [("base_shift", (), None)]
+    (cause,) = found.causes
+    # what is added to the log so that the sides agree; told to a hundredth of the tolerance
+    np.testing.assert_allclose(cause.value, -shift, atol=3.5e-5)
+
+
+def test_the_remainder_is_what_the_mended_log_leaves() -> None:
+    q = joints()
+    q[:, 1] += 0.01
+    found = against_path(q)
+    known = np.isfinite(found.mended).all(axis=1)
+    assert found.remainder.rms == pytest.approx(float(np.sqrt((found.mended[known] ** 2).sum(axis=1).mean())))
+    assert found.remainder.share == pytest.approx((found.remainder.rms / found.rms) ** 2)
+    assert sum(one.share for one in found.causes) + found.remainder.share == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("samples", [1, 9])
+def test_of_fewer_than_ten_samples_nothing_is_named(samples: int) -> None:
+    q = joints()[:samples]
+    position = poses(URM6, q, oriented=False)[0].T
+    found = diagnosed(path_run(position + 0.1, tsp=PERIOD), run_of(q, URM6, tsp=PERIOD))
+    assert not found.causes
+    assert not found.undecided
+    assert found.not_looked_for[0].reason == f"{samples} samples: fewer than 10"
+    assert found.rms == pytest.approx(0.1 * np.sqrt(3.0))
+    assert found.remainder.share == 1.0
+
+
+def test_of_a_log_at_rest_nothing_is_named() -> None:
+    q = np.tile(joints()[300], (100, 1))
+    position = poses(URM6, q, oriented=False)[0].T
+    found = diagnosed(path_run(position + 0.1, tsp=PERIOD), run_of(q, URM6, tsp=PERIOD))
+    assert not found.causes
+    assert not found.undecided
+    assert found.not_looked_for[0].reason == "the log is at rest: one pose"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not TRACKER.exists(), reason=f"no {TRACKER}")
+def test_a_sign_and_a_zero_of_a_real_arm_are_found_by_a_laser_tracker() -> None:
+    run = tracked()
+    rows = np.sort(np.random.default_rng(0).choice(len(run.q), POSES, replace=False))
+    assert answer(diagnosed_record(drawn(run, rows))) == []
+    for j, name in ((2, "elbow_joint"), (3, "wrist_1_joint")):
+        turned, off = run.q.copy(), run.q.copy()
+        turned[:, j] *= -1.0
+        off[:, j] += np.radians(0.5)
+        assert answer(diagnosed_record(drawn(run, rows, turned))) == [("joint_sign", (name,), None)]
+        assert answer(diagnosed_record(drawn(run, rows, off))) == [("joint_offset", (name,), None)]

@@ -1,0 +1,77 @@
+"""A diagnosis in a recording: it reads back bit for bit, and is there to be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asserting import there
+from diagnoses import diagnosis_of
+from recorded import columns, rows_of, static, views
+from same_results import assert_same
+from urmpipe_models.errors import RecordingError
+from urmpipe_models.kinematics.forward import points_over_log
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.operands import load_runs
+from urmpipe_pipeline.results import read_recording, whole, write_recording
+
+MakeComparison = Callable[..., Comparison]
+
+
+@pytest.fixture
+def diagnosed(make_comparison: MakeComparison) -> Comparison:
+    """A comparison of one log that was diagnosed."""
+    result = make_comparison(("log",))
+    return replace(result, runs=(replace(result.runs[0], diagnosis=diagnosis_of(result.runs[0])),))
+
+
+def test_it_reads_back_bit_for_bit(diagnosed: Comparison, tmp_path: Path) -> None:
+    found = read_recording(write_recording(diagnosed, tmp_path / "run.rrd"))
+    assert isinstance(found, Comparison)
+    assert_same(found, diagnosed)
+
+
+def test_one_alone_reads_back_and_is_no_log(diagnosed: Comparison, tmp_path: Path) -> None:
+    alone = there(diagnosed.runs[0].diagnosis)
+    path = write_recording(alone, tmp_path / "run.rrd")
+    assert_same(read_recording(path), alone)
+    with pytest.raises(RecordingError) as error:
+        load_runs([path])
+    assert str(error.value).endswith("found the recording of a diagnosis, allowed: one that ingest wrote")
+
+
+def test_with_its_comparison_it_is_recorded_as_that(diagnosed: Comparison, tmp_path: Path) -> None:
+    found = replace(there(diagnosed.runs[0].diagnosis), comparison=diagnosed)
+    assert whole(found) is diagnosed
+    assert_same(read_recording(write_recording(found, tmp_path / "run.rrd")), diagnosed)
+
+
+def test_its_answer_stands_in_the_summary_and_mended_deviations_in_a_tab(
+    diagnosed: Comparison, tmp_path: Path
+) -> None:
+    path = write_recording(diagnosed, tmp_path / "run.rrd")
+    (text,) = static(path, "/shown/summary", "TextDocument:text")
+    said = there(diagnosed.runs[0].diagnosis).sentence
+    assert "Cause: **module 3 (phi3) counter" in text.replace("\\", "")
+    assert said in text.replace("\\", "")
+    tabs = views(path)["ViewBlueprint:display_name"]
+    assert tabs.index("delta mended [mm]") == tabs.index("delta = reference - log [mm]") + 3
+
+
+def test_what_is_named_is_marked_where_the_arm_is(diagnosed: Comparison, tmp_path: Path) -> None:
+    path = write_recording(diagnosed, tmp_path / "run.rrd")
+    run = diagnosed.runs[0].run
+    skeleton = points_over_log(there(run.robot), run.q)
+    wanted = (skeleton[:, 2], (skeleton[:, 3] + skeleton[:, 4]) / 2.0)
+    words = ("module 3 (phi3) counter-rotates", "r_4 needs +1.2000 mm from row 4 on")
+    for number, (place, said) in enumerate(zip(wanted, words, strict=True)):
+        entity = f"/shown/scene/robot/mark/{number}"
+        found = rows_of(path, entity, "Points3D:positions")
+        rows = np.searchsorted(run.t_ns, list(found))
+        drawn = np.array(list(found.values()))[:, 0]
+        np.testing.assert_array_equal(drawn, place[rows].astype(np.float32))
+        assert columns(path, f"{entity}/label", "Points3D:labels") == [[said]]

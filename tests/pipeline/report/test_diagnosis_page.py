@@ -1,0 +1,32 @@
+"""A diagnosis in a report: its answer right under the verdict, its tables, its figure."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from asserting import there
+from diagnoses import diagnosis_of
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.report.page import lay_out
+from urmpipe_pipeline.report.spec import Figure
+from urmpipe_pipeline.report.tables import Grid
+from urmpipe_pipeline.results import present
+
+
+def test_its_parts_stand_where_they_are_read_first(comparison: Comparison) -> None:
+    runs = [replace(one, diagnosis=diagnosis_of(one)) for one in comparison.runs]
+    result = replace(comparison, runs=tuple(runs))
+    page = lay_out([present(result)])
+    said = there(result.worst.diagnosis).sentence
+    assert (page.banner.facts[0].name, page.banner.facts[0].value) == ("Cause", said)
+    (part,) = (one for one in page.parts[0].parts if one.title == result.worst.name)
+    grids = [block for block in part.blocks if isinstance(block, Grid)]
+    assert [(one.title, one.folded) for one in grids[:2]] == [
+        ("Causes", False), ("Undecided between", False),
+    ]  # fmt: skip
+    assert [one.text for one in grids[0].rows[1]] == [
+        "r_4 needs +1.2000 mm from row 4 on", "+1.2000 mm", "+1.1000 to +1.3000 mm", "4",
+        "d_5, tool shift z", "399.0000", "0.2 %",
+    ]  # fmt: skip
+    figures = [block.title for block in part.blocks if isinstance(block, Figure)]
+    assert figures[:2] == ["Deviation over time", "Deviation over time without the causes"]
