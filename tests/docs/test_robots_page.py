@@ -113,6 +113,7 @@ EXPECTED: dict[str, dict[str, Any]] = {
         "lower": [-170 * TURN, 0],
         "upper": [170 * TURN, 0.5],
         "velocity": [180 * TURN, 1],
+        "acceleration": [720 * TURN, 4],
         "tool": (0, 0, 0),
     },
     "elbow": {
@@ -137,6 +138,7 @@ EXPECTED: dict[str, dict[str, Any]] = {
         "lower": [-170 * TURN, 0],
         "upper": [170 * TURN, 0.04],
         "velocity": [90 * TURN, math.inf],
+        "acceleration": [360 * TURN, math.inf],
         "tool": (0, 0, 0),
     },
     "arm-with-gripper": {
@@ -152,9 +154,9 @@ EXPECTED: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_is_the_arm_that_it_says(read: Callable[[str], Chain], name: str) -> None:
-    chain, expected = read(EXAMPLES[name]), EXPECTED[name]
+    chain, expected = read(EXAMPLES[name]), {"acceleration": math.inf} | EXPECTED[name]
     assert (chain.name, chain.coordinates) == (name or "arm", expected["coordinates"])
-    for key in ("lower", "upper", "velocity"):
+    for key in ("lower", "upper", "velocity", "acceleration"):
         np.testing.assert_allclose([getattr(one, key) for one in chain.moving], expected[key], rtol=1e-15)
     np.testing.assert_allclose(chain.start, expected["start"], rtol=1e-15)
     assert chain.tool.translation == expected["tool"]

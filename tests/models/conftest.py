@@ -39,7 +39,7 @@ axes = st.sampled_from([(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)]) | s
     direction, angles, angles
 )
 limits = st.just((-math.inf, math.inf)) | st.tuples(lengths, lengths).map(sorted)
-velocities = st.floats(0.1, 10.0) | st.just(math.inf)
+rates = st.floats(0.1, 10.0) | st.just(math.inf)
 moving: SearchStrategy[JointKind] = st.sampled_from(["revolute", "revolute", "prismatic", "fixed"])
 one_in_four = st.sampled_from([True, False, False, False])
 counts = st.integers(1, 7)
@@ -54,7 +54,7 @@ def drawn_joint(draw: DrawFn, name: str, leaders: list[str]) -> Joint:
     if leaders and bool(draw(one_in_four)):
         mimic = Mimic(draw(st.sampled_from(leaders)), draw(lengths), draw(lengths))
     lower, upper = draw(limits)
-    return Joint(name, kind, draw(frames), draw(axes), lower, upper, draw(velocities), mimic)
+    return Joint(name, kind, draw(frames), draw(axes), lower, upper, draw(rates), draw(rates), mimic)
 
 
 @st.composite

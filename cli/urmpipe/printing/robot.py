@@ -135,10 +135,12 @@ def _value(one: Parameter) -> str:
 
 
 def _joints(posed: PosedChain) -> Table:
-    table = new_table("Joint", "Kind", "Axis", "Limits", "Speed", "q", title="Joints")
+    known = any(math.isfinite(joint.acceleration) for joint in posed.chain.joints)
+    rates = ("Speed", "Acceleration")[: 1 + known]
+    table = new_table("Joint", "Kind", "Axis", "Limits", *rates, "q", title="Joints")
     values = dict(zip(posed.chain.coordinates, posed.q, strict=True))
     for joint in posed.chain.joints:
-        table.add_row(joint.name, _kind(joint), *_motion(joint, values))
+        table.add_row(joint.name, _kind(joint), *_motion(joint, values, len(rates)))
     return table
 
 
@@ -156,20 +158,25 @@ def _kind(joint: Joint) -> str:
     return f"{joint.kind}, {_figure(joint.mimic.multiplier)} x {joint.mimic.joint}"
 
 
-def _motion(joint: Joint, values: dict[str, float]) -> tuple[str, ...]:
-    """Return axis, limits, speed and coordinate of a moving joint."""
+def _motion(joint: Joint, values: dict[str, float], rates: int) -> tuple[str, ...]:
+    """Return axis, limits, speed, with two rates acceleration, and coordinate of a moving joint."""
     if joint.kind == "fixed":
         return ()
     unit, factor = ("m", 1.0) if joint.kind == "prismatic" else ("deg", 180.0 / math.pi)
-    speed = f"{_figure(joint.velocity * factor)} {unit}/s" if math.isfinite(joint.velocity) else "no limit"
     value = f"{_figure(values[joint.name] * factor)} {unit}" if joint.name in values else ""
-    return _figures(joint.axis), _limits(joint, unit, factor), speed, value
+    largest = (
+        f"{_figure(most * factor)} {unit}/{per}" if math.isfinite(most) else "no limit"
+        for most, per in ((joint.velocity, "s"), (joint.acceleration, "s²"))[:rates]
+    )
+    return _figures(joint.axis), _limits(joint, unit, factor), *largest, value
 
 
 def _limits(joint: Joint, unit: str, factor: float) -> str:
     lower, upper = joint.lower * factor, joint.upper * factor
     if not math.isfinite(lower) and not math.isfinite(upper):
         return "no limit"
+    if lower == upper:
+        return f"only {_figure(upper)} {unit}"
     return f"+-{_figure(upper)} {unit}" if lower == -upper else f"{_figure(lower)} .. {_figure(upper)} {unit}"
 
 

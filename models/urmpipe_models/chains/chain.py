@@ -44,6 +44,7 @@ class Joint:
         lower: Least value allowed, in [rad] or [m].
         upper: Largest value allowed, in [rad] or [m].
         velocity: Largest speed, in [rad/s] or [m/s].
+        acceleration: Largest acceleration either way, in [rad/s2] or [m/s2].
         mimic: The joint it follows, if it has no coordinate of its own.
     """
 
@@ -54,6 +55,7 @@ class Joint:
     lower: float = -math.inf
     upper: float = math.inf
     velocity: float = math.inf
+    acceleration: float = math.inf
     mimic: Mimic | None = None
 
     def faults(self) -> Iterator[str]:
@@ -63,8 +65,9 @@ class Joint:
             yield f"joint {self.name}: axis {list(self.axis)} has length {length:g}; allowed: 1"
         if not self.lower <= self.upper:
             yield f"joint {self.name}: lower limit {self.lower:g} above upper {self.upper:g}"
-        if not self.velocity > 0.0:
-            yield f"joint {self.name}: velocity {self.velocity:g}; allowed: more than 0"
+        for key, value in (("velocity", self.velocity), ("acceleration", self.acceleration)):
+            if not value > 0.0:
+                yield f"joint {self.name}: {key} {value:g}; allowed: more than 0"
 
 
 @dataclass(frozen=True, repr=False)

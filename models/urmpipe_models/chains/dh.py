@@ -28,6 +28,7 @@ class DHRow:
         lower: Least coordinate allowed, in [rad] or [m].
         upper: Largest coordinate allowed, in [rad] or [m].
         velocity: Largest speed, in [rad/s] or [m/s].
+        acceleration: Largest acceleration either way, in [rad/s2] or [m/s2].
     """
 
     theta: Element = 0.0
@@ -39,6 +40,7 @@ class DHRow:
     lower: float = -math.inf
     upper: float = math.inf
     velocity: float = math.inf
+    acceleration: float = math.inf
 
 
 def dh_chain(
@@ -151,6 +153,7 @@ def _joints(rows: Sequence[DHRow], origins: Sequence[Transform]) -> tuple[Joint,
             lower=row.lower,
             upper=row.upper,
             velocity=row.velocity,
+            acceleration=row.acceleration,
         )
         for name, row, origin in zip(_names(rows), rows, origins, strict=True)
     )

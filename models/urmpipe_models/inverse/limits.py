@@ -105,10 +105,15 @@ def limits_of(chain: Chain) -> tuple[FloatArray, FloatArray]:
 def turning(chain: Chain) -> BoolArray:
     """Return true of the joints that a whole turn leaves where they were, shape (joints,).
 
-    The one that another follows (mimic) is none of them: the other one turns by a multiple.
+    One that another follows (mimic) is among them only if that one turns by whole turns, too.
     """
-    followed = {joint.mimic.joint for joint in chain.joints if joint.mimic is not None}
-    return np.array([joint.kind == "revolute" and joint.name not in followed for joint in chain.moving])
+    barred = {
+        joint.mimic.joint
+        for joint in chain.joints
+        if joint.mimic is not None
+        and not (joint.kind == "revolute" and float(joint.mimic.multiplier).is_integer())
+    }
+    return np.array([joint.kind == "revolute" and joint.name not in barred for joint in chain.moving])
 
 
 def _reasons(chain: Chain, solutions: Solutions, outside: BoolArray) -> TextArray:

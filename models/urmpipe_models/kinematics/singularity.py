@@ -62,6 +62,8 @@ def singularity_over_log(
     the velocity are divided by a characteristic length L, and the columns of prismatic joints multiplied
     by it: diag(1/L, 1) J diag(1 or L) has no unit, and is the same for an arm and its scale model.
 
+    A joint whose limits are equal cannot move: J has no column of it, unless none of the joints can.
+
     Args:
         chain: The arm, its tool included.
         q: Joint values in [rad] or [m], shape (n, joints).
@@ -71,10 +73,12 @@ def singularity_over_log(
     unit = characteristic_length(chain) if length is None else length
     rows = 6 if orientation else 3
     whole = np.asarray(np.isfinite(q).all(axis=1))
-    jacobians = jacobian_over_log(chain, q[whole])[:, :rows]
+    free = np.array([joint.lower != joint.upper for joint in chain.moving])
+    free |= not free.any()
+    jacobians = jacobian_over_log(chain, q[whole])[:, :rows, free]
     across = np.array([1.0 / unit] * 3 + [1.0] * (rows - 3))
     along = np.array([unit if joint.kind == "prismatic" else 1.0 for joint in chain.moving])
-    scaled = across[:, None] * jacobians * along
+    scaled = across[:, None] * jacobians * along[free]
     square = jacobians.shape[1] == jacobians.shape[2]
     return SingularityLog(
         _filled(np.linalg.svd(scaled, compute_uv=False)[:, -1], whole),

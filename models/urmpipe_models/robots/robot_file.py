@@ -29,11 +29,12 @@ Build: TypeAlias = Callable[[str], Chain]
 
 
 class _Limits(NamedTuple):
-    """Limits of a joint in [rad] or [m], and its largest speed in [rad/s] or [m/s]."""
+    """Limits of a joint in [rad] or [m], its largest speed and acceleration in these a second or s2."""
 
-    lower: float
-    upper: float
-    velocity: float
+    lower: float = -math.inf
+    upper: float = math.inf
+    velocity: float = math.inf
+    acceleration: float = math.inf
 
 
 def read_robot_file(path: str | Path) -> Chain:
@@ -43,13 +44,14 @@ def read_robot_file(path: str | Path) -> Chain:
     default), `description`, `source`, `length_unit` (m, mm), `angle_unit` (rad, deg), `start`, and the
     tables `[base]` and `[tool]` with `translation` and `rpy` (or `rotation`, three rows). By kind:
 
-    - urm: `lengths`, `tilts`, `directions`; `[limits]` with `lower`, `upper`, `velocity`, each one number
-      or one a moving joint.
+    - urm: `lengths`, `tilts`, `directions`; `[limits]` with `lower`, `upper`, `velocity`, `acceleration`,
+      each one number or one a moving joint.
     - dh, modified_dh: `[[joints]]` with `name`, `kind` (fixed: a frame without a coordinate), `theta`, `d`,
       `a`, `alpha`; `[limits]`.
     - articulated6r: `lengths` l0..l4 (see `articulated_6r`); `[limits]`.
-    - joints: `[[joints]]` with `name`, `kind`, `origin`, `axis`, `lower`, `upper`, `velocity`, `mimic`;
-      `[tip]`. A mimic has `joint`, `offset` and `multiplier`, the last in rad and m always.
+    - joints: `[[joints]]` with `name`, `kind`, `origin`, `axis`, `lower`, `upper`, `velocity`,
+      `acceleration`, `mimic`; `[tip]`. A mimic has `joint`, `offset` and `multiplier`, the last in rad and
+      m always.
     - urdf: `file` (relative to this one), `base_link`, `tip_link`.
 
     What the arm looks like (instead of what a URDF says): `[[visuals]]` with `joint` (none: the base),
@@ -264,9 +266,10 @@ def _joint(table: Table, units: Units) -> Joint:
         cast("JointKind", kind),
         read_frame(table.table("origin"), units),
         cast("tuple[float, float, float]", table.numbers("axis", 3, (0.0, 0.0, 1.0))),
-        lower=units.of_joint(kind, table.number("lower", -math.inf, infinite=True)),
-        upper=units.of_joint(kind, table.number("upper", math.inf, infinite=True)),
-        velocity=units.of_joint(kind, table.number("velocity", math.inf, infinite=True)),
+        **{
+            key: units.of_joint(kind, table.number(key, default, infinite=True))
+            for key, default in _Limits._field_defaults.items()
+        },
         mimic=_mimic(table.table("mimic"), kind, units) if table.has("mimic") else None,
     )
     table.close()
@@ -286,10 +289,7 @@ def _mimic(table: Table, kind: str, units: Units) -> Mimic:
 
 def _limits(table: Table, kinds: Sequence[JointKind], units: Units) -> list[_Limits]:
     """Return the limits of every joint, in SI."""
-    given = [
-        table.spread(key, len(kinds), default)
-        for key, default in (("lower", -math.inf), ("upper", math.inf), ("velocity", math.inf))
-    ]
+    given = [table.spread(key, len(kinds), default) for key, default in _Limits._field_defaults.items()]
     table.close()
     return [
         _Limits(*(units.of_joint(kind, value) for value in values))
@@ -311,9 +311,7 @@ def _joint_to_dict(joint: Joint) -> dict[str, Any]:
         "kind": joint.kind,
         "origin": frame_to_dict(joint.origin),
         "axis": [float(value) for value in joint.axis],
-        "lower": _finite_or_none(joint.lower),
-        "upper": _finite_or_none(joint.upper),
-        "velocity": _finite_or_none(joint.velocity),
+        **{key: _finite_or_none(getattr(joint, key)) for key in _Limits._fields},
         "mimic": joint.mimic and _mimic_to_dict(joint.mimic),
     }
 

@@ -133,7 +133,7 @@ def _add_joint(tree: UrdfTree, node: Node) -> None:
         tree.fault(f"joint {name}: found type {shown(type_)}; allowed: {', '.join(KINDS)}", node.line)
     parent, child = (_link_of(tree, node, name, end) for end in ("parent", "child"))
     kind = KINDS.get(type_, "fixed")
-    lower, upper, velocity = _limits(tree, node, name, type_)
+    lower, upper, velocity, acceleration = _limits(tree, node, name, type_)
     joint = Joint(
         name,
         kind,
@@ -142,6 +142,7 @@ def _add_joint(tree: UrdfTree, node: Node) -> None:
         lower=lower,
         upper=upper,
         velocity=velocity,
+        acceleration=acceleration,
         mimic=None if kind == "fixed" else _mimic(tree, node, name),
     )
     tree.edges[name] = Edge(joint, type_, parent, child, node.line)
@@ -193,21 +194,27 @@ def _axis(tree: UrdfTree, node: Node, joint: str) -> tuple[float, float, float]:
     return x / length, y / length, z / length
 
 
-def _limits(tree: UrdfTree, node: Node, joint: str, type_: str) -> tuple[float, float, float]:
-    """Return lower, upper and velocity; what the file leaves out or gives as 0 speed is not limited."""
+def _limits(tree: UrdfTree, node: Node, joint: str, type_: str) -> tuple[float, float, float, float]:
+    """Return lower, upper, velocity and acceleration; what the file leaves out is not limited."""
     limit = node.first("limit")
     if limit is None or type_ == "fixed":
-        return -math.inf, math.inf, math.inf
+        return -math.inf, math.inf, math.inf, math.inf
     place = f"joint {joint}: limit"
-    (velocity,) = numbers_of(tree, limit, place, "velocity", (math.inf,))
-    if velocity < 0.0:
-        tree.fault(f"{place} velocity: found {velocity:g}; allowed: 0 (not known) or more", limit.line)
+    velocity, acceleration = (_rate(tree, limit, place, key) for key in ("velocity", "acceleration"))
     if type_ == "continuous" or not limit.attributes.keys() & {"lower", "upper"}:
-        return -math.inf, math.inf, velocity or math.inf
+        return -math.inf, math.inf, velocity, acceleration
     (lower,), (upper,) = (numbers_of(tree, limit, place, end, (0.0,)) for end in ("lower", "upper"))
     if lower > upper:
         tree.fault(f"{place}: lower {lower:g} above upper {upper:g}", limit.line)
-    return lower, upper, velocity or math.inf
+    return lower, upper, velocity, acceleration
+
+
+def _rate(tree: UrdfTree, limit: Node, place: str, attribute: str) -> float:
+    """Return the largest speed or acceleration; 0 is no limit."""
+    (value,) = numbers_of(tree, limit, place, attribute, (math.inf,))
+    if value < 0.0:
+        tree.fault(f"{place} {attribute}: found {value:g}; allowed: 0 (not known) or more", limit.line)
+    return value or math.inf
 
 
 def _mimic(tree: UrdfTree, node: Node, joint: str) -> Mimic | None:

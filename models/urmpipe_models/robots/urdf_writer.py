@@ -36,8 +36,9 @@ def urdf_text(chain: Chain) -> str:
     too, then `tip` and `tool0`. The fixed joints `urmpipe_base`, `urmpipe_tip` and `urmpipe_tool` hold
     the chain's base, tip and tool. Point p_k is where joint k + 1 sits on link k, so the origin of link
     k + 1 if that joint does not slide; the last one is the origin of tool0. A revolute joint without
-    limits is `continuous`; elsewhere the largest double stands for infinity. An arm without visuals gets a
-    cylinder a link, which `read_urdf` leaves out again.
+    limits is `continuous`; elsewhere the largest double stands for infinity. Limits of acceleration make it
+    URDF 1.2, which has them. An arm without visuals gets a cylinder a link, which `read_urdf` leaves out
+    again.
 
     Raises:
         RobotError: If a joint has one of these three names.
@@ -62,7 +63,7 @@ def urdf_text(chain: Chain) -> str:
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
         f"<!-- {EXPORT_MARK}: lengths in m, angles in rad -->",
-        f"<robot name={quoteattr(chain.name)}>",
+        f"<robot name={quoteattr(chain.name)}{_version(chain)}>",
         f'  <material name="{STAND_IN}"><color rgba="0.35 0.55 0.75 1.0"/></material>',
         '  <link name="world"/>',
     ]
@@ -73,6 +74,15 @@ def urdf_text(chain: Chain) -> str:
         lines += _link_lines(child, carried[child] if chain.visuals else _stand_in_lines(end, radius))
         lines += _joint_lines(joint, parent, child)
     return "\n".join([*lines, "</robot>"]) + "\n"
+
+
+def _version(chain: Chain) -> str:
+    """Return the attribute of the version that has limits of acceleration, none where it has no such limit.
+
+    Parsers before urdfdom 6 refuse the version, later ones ignore accelerations without it.
+    """
+    limited = any(joint.kind != "fixed" and math.isfinite(joint.acceleration) for joint in chain.joints)
+    return ' version="1.2"' if limited else ""
 
 
 def _link_lines(name: str, visuals: Sequence[str]) -> list[str]:
@@ -134,6 +144,8 @@ def _joint_lines(joint: Joint, parent: str, child: str) -> list[str]:
     ]
     if joint.kind != "fixed":
         limits = {"lower": joint.lower, "upper": joint.upper, "effort": math.inf, "velocity": joint.velocity}
+        if math.isfinite(joint.acceleration):
+            limits["acceleration"] = joint.acceleration
         given = " ".join(f'{key}="{_finite(value)!r}"' for key, value in limits.items())
         lines += [f'    <axis xyz="{_numbers(joint.axis)}"/>', f"    <limit {given}/>"]
     if joint.mimic is not None:

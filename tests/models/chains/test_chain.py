@@ -43,7 +43,7 @@ def test_everything_wrong_is_said_at_once() -> None:
             "arm",
             (
                 Joint("a", axis=(0.0, 0.0, 2.0)),
-                Joint("b", lower=1.0, upper=-1.0, velocity=0.0),
+                Joint("b", lower=1.0, upper=-1.0, velocity=0.0, acceleration=-1.0),
                 Joint("b"),
                 Joint("c", mimic=Mimic("d")),
             ),
@@ -54,13 +54,14 @@ def test_everything_wrong_is_said_at_once() -> None:
         "robot arm: joint a: axis [0.0, 0.0, 2.0] has length 2; allowed: 1",
         "robot arm: joint b: lower limit 1 above upper -1",
         "robot arm: joint b: velocity 0; allowed: more than 0",
+        "robot arm: joint b: acceleration -1; allowed: more than 0",
         "robot arm: joint c mimics d, no moving joint of the chain; allowed: a, b, b",
         "robot arm: start has 1 values; allowed: 3, one a coordinate",
     ]
 
 
-def test_limits_may_meet_a_speed_may_be_small_and_an_axis_may_be_rounded() -> None:
-    held = Joint("held", lower=0.5, upper=0.5, velocity=1e-9)
+def test_limits_may_meet_a_rate_may_be_small_and_an_axis_may_be_rounded() -> None:
+    held = Joint("held", lower=0.5, upper=0.5, velocity=1e-9, acceleration=1e-9)
     for length in (1.0 - 0.9 * AXIS_TOLERANCE, 1.0 + 0.9 * AXIS_TOLERANCE):
         assert Chain("arm", (held, Joint("turn", axis=(0.0, length, 0.0)))).coordinates == ("held", "turn")
     for length in (1.0 - 1.1 * AXIS_TOLERANCE, 1.0 + 1.1 * AXIS_TOLERANCE):
@@ -70,11 +71,13 @@ def test_limits_may_meet_a_speed_may_be_small_and_an_axis_may_be_rounded() -> No
 
 def test_limits_and_speeds_that_are_no_numbers_are_refused() -> None:
     with pytest.raises(RobotError) as caught:
-        Chain("arm", (Joint("a", lower=math.nan), Joint("b", upper=math.nan), Joint("c", velocity=math.nan)))
+        joints = Joint("a", lower=math.nan), Joint("b", upper=math.nan), Joint("c", velocity=math.nan)
+        Chain("arm", (*joints, Joint("d", acceleration=math.nan)))
     assert str(caught.value).splitlines() == [
         "robot arm: joint a: lower limit nan above upper inf",
         "robot arm: joint b: lower limit -inf above upper nan",
         "robot arm: joint c: velocity nan; allowed: more than 0",
+        "robot arm: joint d: acceleration nan; allowed: more than 0",
     ]
 
 
@@ -107,7 +110,8 @@ def test_urm_modules_are_joints_about_z_and_a_tilted_effector() -> None:
     assert (chain.joints[2].name, chain.joints[2].kind) == ("effector", "fixed")
     assert chain.joints[2].origin.rotation == ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
     assert chain.tip == translation(0.0, 0.0, 0.1)
-    assert all(math.isinf(joint.velocity) and math.isinf(joint.upper) for joint in chain.joints)
+    limits = [(joint.upper, joint.velocity, joint.acceleration) for joint in chain.joints]
+    assert limits == [(math.inf,) * 3] * 3
 
 
 def test_urm_counts_and_directions_must_fit() -> None:

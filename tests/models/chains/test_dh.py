@@ -84,10 +84,17 @@ def test_the_points_of_a_standard_arm_are_its_frames_origins(
 
 @pytest.mark.parametrize("build", [dh_chain, modified_dh_chain])
 def test_names_limits_and_speeds_go_into_the_chain(build: Any) -> None:
-    rows = [DHRow(name="turn", lower=-1.0, upper=2.0, velocity=3.0), DHRow(kind="prismatic", upper=0.5)]
+    rows = [DHRow(name="turn", lower=-1.0, upper=2.0, velocity=3.0, acceleration=4.0)]
+    rows += [DHRow(kind="prismatic", upper=0.5)]
     chain = build("arm", rows, start=(0.1, 0.2), description="two joints", source="a test")
     turn, slide = chain.joints
-    assert (turn.name, turn.lower, turn.upper, turn.velocity) == ("turn", -1.0, 2.0, 3.0)
+    assert (turn.name, turn.lower, turn.upper, turn.velocity, turn.acceleration) == (
+        "turn",
+        -1.0,
+        2.0,
+        3.0,
+        4.0,
+    )
     assert (slide.name, slide.kind, slide.lower, slide.upper) == ("q2", "prismatic", -math.inf, 0.5)
     assert (chain.name, chain.start) == ("arm", (0.1, 0.2))
     assert (chain.description, chain.source) == ("two joints", "a test")

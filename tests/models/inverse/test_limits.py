@@ -32,8 +32,12 @@ def test_only_a_joint_without_limits_turns_without_end() -> None:
         Joint("slides", kind="prismatic"),
         Joint("leads"),
         Joint("follows", mimic=Mimic("leads", 0.5)),
+        Joint("undone"),
+        Joint("undoes", mimic=Mimic("undone", -1.0, 0.3)),
+        Joint("winds"),
+        Joint("rope", "prismatic", mimic=Mimic("winds", 1.0)),
     )
-    assert periods(chain).tolist() == [TURN, math.inf, math.inf, math.inf, math.inf]
+    assert periods(chain).tolist() == [TURN, math.inf, math.inf, math.inf, math.inf, TURN, math.inf]
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
@@ -94,7 +98,7 @@ def test_the_turn_told_is_the_one_nearest_to_the_limits() -> None:
     assert found.reason(0) == "joint q1 at 5.283 rad, allowed: 3 to 4 rad"
 
 
-def test_a_joint_that_another_follows_is_not_turned() -> None:
+def test_a_joint_that_another_follows_by_half_is_not_turned() -> None:
     chain = arm(Joint("leads", lower=0.0, upper=7.0), Joint("follows", mimic=Mimic("leads", 0.5)))
     assert within_limits(chain, one_solution(-1.0)).reason(0) == "joint leads at -1 rad, allowed: 0 to 7 rad"
 

@@ -157,7 +157,8 @@ def test_they_are_what_numpy_says_pose_by_pose(name: str, orientation: bool) -> 
     q = poses(chain, 20, 4)
     found = singularity_over_log(chain, q, orientation=orientation)
     rows = 6 if orientation else 3
-    for k, jacobian in enumerate(jacobian_over_log(chain, q)[:, :rows]):
+    free = [joint.lower < joint.upper for joint in chain.moving]
+    for k, jacobian in enumerate(jacobian_over_log(chain, q)[:, :rows, free]):
         scaled = jacobian.copy()
         scaled[:3] /= found.length
         expected = np.linalg.svd(scaled, compute_uv=False).min()
@@ -165,7 +166,7 @@ def test_they_are_what_numpy_says_pose_by_pose(name: str, orientation: bool) -> 
         gram = jacobian @ jacobian.T if rows <= len(jacobian.T) else jacobian.T @ jacobian
         volume = math.sqrt(max(np.linalg.det(gram), 0.0))
         assert found.manipulability[k] == pytest.approx(volume, rel=1e-6)  # of a root of a difference
-    if rows == len(chain.moving):
+    if rows == sum(free):
         np.testing.assert_allclose(np.abs(there(found.determinant)), found.manipulability, rtol=1e-10)
     else:
         assert found.determinant is None
@@ -215,6 +216,42 @@ def test_another_length_weighs_ways_against_turns() -> None:
     expected = np.linalg.svd(jacobian_over_log(ARM6, q), compute_uv=False)[:, -1]
     np.testing.assert_allclose(metre.smallest, expected, rtol=1e-12)
     assert metre.length == 1.0
+
+
+# --- joints that cannot move ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("orientation", [True, False])
+def test_a_joint_whose_limits_are_equal_counts_as_if_it_were_fixed_there(orientation: bool) -> None:
+    panda = load_robot("panda")
+    q = poses(panda, 50, 8)
+    q[:, 2] = 0.4
+    locked, fixed = (
+        replace(panda, joints=(*panda.joints[:2], third, *panda.joints[3:]), start=())
+        for third in (
+            replace(panda.joints[2], lower=0.4, upper=0.4),
+            Joint("fixed", "fixed", panda.joints[2].origin @ rotation_z(0.4)),
+        )
+    )
+    found = singularity_over_log(locked, q, orientation=orientation, length=1.0)
+    expected = singularity_over_log(fixed, np.delete(q, 2, axis=1), orientation=orientation, length=1.0)
+    # rounding of a frame that is multiplied before instead of after: entries and products of about 1
+    np.testing.assert_allclose(found.smallest, expected.smallest, rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(found.manipulability, expected.manipulability, rtol=0.0, atol=1e-14)
+    if orientation:  # six joints are left of seven
+        np.testing.assert_allclose(
+            there(found.determinant), there(expected.determinant), rtol=0.0, atol=1e-14
+        )
+    else:
+        assert found.determinant is expected.determinant is None
+
+
+def test_where_no_joint_can_move_all_count() -> None:
+    statue = replace(ARM6, joints=tuple(replace(joint, lower=0.0, upper=0.0) for joint in ARM6.joints))
+    q = poses(ARM6, 5, 9)
+    found, whole = singularity_over_log(statue, q), singularity_over_log(ARM6, q)
+    np.testing.assert_array_equal(found.smallest, whole.smallest)
+    np.testing.assert_array_equal(there(found.determinant), there(whole.determinant))
 
 
 # --- the characteristic length ---------------------------------------------------------------------

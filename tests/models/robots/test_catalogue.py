@@ -19,6 +19,7 @@ NAMES = (
     "arm6",
     "articulated6r",
     "iiwa14",
+    "irb60",
     "panda",
     "ur3",
     "ur5",

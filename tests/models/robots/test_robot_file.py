@@ -50,7 +50,7 @@ def test_urm_modules_in_mm_and_deg(robot: Any) -> None:
         tilts = [52, 90]
         directions = [1, -1]
         start = [0, 180]
-        limits = { velocity = [180, 90], upper = 360 }
+        limits = { velocity = [180, 90], upper = 360, acceleration = 720 }
         base = { translation = [0, 0, 1000], rpy = [0, 0, 90] }
         tool = { translation = [0, 0, 150] }
     """
@@ -60,6 +60,7 @@ def test_urm_modules_in_mm_and_deg(robot: Any) -> None:
     ).placed(from_offset([0, 0, 1, 0, 0, math.pi / 2]), translation(0.0, 0.0, 0.15))  # fmt: skip
     got = robot(text)
     assert [joint.velocity for joint in got.moving] == [math.pi, math.pi / 2]
+    assert [joint.acceleration for joint in got.moving] == [4 * math.pi] * 2
     assert [joint.upper for joint in got.moving] == [2 * math.pi] * 2
     assert [joint.lower for joint in got.moving] == [-math.inf] * 2
     unlimited = [Joint(joint.name, joint.kind, joint.origin, joint.axis) for joint in got.joints]
@@ -91,7 +92,7 @@ def test_dh_rows(robot: Any, kind: str, build: Any) -> None:
 def test_fixed_dh_rows_have_no_coordinate_no_limits_and_no_start(robot: Any) -> None:
     text = """
         kind = "modified_dh"
-        limits = { lower = [-1, -2], upper = [3, 4], velocity = [5, 6] }
+        limits = { lower = [-1, -2], upper = [3, 4], velocity = [5, 6], acceleration = [7, 8] }
         start = [0.1, 0.2]
         [[joints]]
         d = 0.2
@@ -109,9 +110,9 @@ def test_fixed_dh_rows_have_no_coordinate_no_limits_and_no_start(robot: Any) -> 
     assert [joint.name for joint in chain.joints] == ["q1", "frame2", "q2", "flange"]
     assert [joint.kind for joint in chain.joints] == ["revolute", "fixed", "prismatic", "fixed"]
     assert chain.start == (0.1, 0.2)
-    limits = [(joint.lower, joint.upper, joint.velocity) for joint in chain.joints]
-    assert limits[0::2] == [(-1.0, 3.0, 5.0), (-2.0, 4.0, 6.0)]
-    assert limits[1::2] == [(-math.inf, math.inf, math.inf)] * 2
+    limits = [(joint.lower, joint.upper, joint.velocity, joint.acceleration) for joint in chain.joints]
+    assert limits[0::2] == [(-1.0, 3.0, 5.0, 7.0), (-2.0, 4.0, 6.0, 8.0)]
+    assert limits[1::2] == [(-math.inf, math.inf, math.inf, math.inf)] * 2
 
 
 def test_articulated6r_by_its_lengths(robot: Any) -> None:
@@ -120,7 +121,7 @@ def test_articulated6r_by_its_lengths(robot: Any) -> None:
         length_unit = "mm"
         angle_unit = "deg"
         lengths = [100, 200, 300, 400, 50]
-        limits = { lower = [-180, -90, -90, -180, -90, -360], velocity = 90 }
+        limits = { lower = [-180, -90, -90, -180, -90, -360], velocity = 90, acceleration = 45 }
     """)
     bare = articulated_6r(0.1, 0.2, 0.3, 0.4, 0.05)
     assert (chain.name, chain.tip, chain.start) == ("arm", bare.tip, (0.0,) * 6)
@@ -135,6 +136,7 @@ def test_articulated6r_by_its_lengths(robot: Any) -> None:
         -2 * math.pi,
     ]
     assert [joint.velocity for joint in chain.joints] == [quarter] * 6
+    assert [joint.acceleration for joint in chain.joints] == [quarter / 2] * 6
 
 
 def test_joints_of_any_kind(robot: Any) -> None:
@@ -214,7 +216,7 @@ def test_everything_wrong_is_said_at_once(robot: Any) -> None:
         description = 5
         base = { translation = [1, 2], rpy = [0, 0, 0], rotation = [[1, 0], [0, 1]], turn = 3 }
         tool = { rotation = [[1, 0, 0], [0, 1, 0], [0, 0, -1]] }
-        limits = { lower = [1, 2], uper = 5, velocity = "fast" }
+        limits = { lower = [1, 2], uper = 5, velocity = "fast", acceleration = [nan] }
     """
     assert complaint(robot, text) == [
         "arm.toml: key length_unit: found 'inch', allowed: one of m, mm",
@@ -231,7 +233,9 @@ def test_everything_wrong_is_said_at_once(robot: Any) -> None:
         "arm.toml: key directions: found 1, allowed: a list of finite numbers",
         "arm.toml: key limits.lower: found [1, 2], allowed: a number, or 0 numbers, one a joint",
         "arm.toml: key limits.velocity: found 'fast', allowed: a number, or 0 numbers, one a joint",
-        "arm.toml: key limits.uper: unknown (did you mean upper?); allowed: lower, upper, velocity",
+        "arm.toml: key limits.acceleration: found [nan], allowed: a number, or 0 numbers, one a joint",
+        "arm.toml: key limits.uper: unknown (did you mean upper?); allowed: lower, upper, velocity,"
+        " acceleration",
         "arm.toml: key nmae: unknown (did you mean name?); allowed: kind, length_unit, angle_unit, name,"
         " description, source, start, base, tool, lengths, tilts, directions, limits, visuals",
     ]

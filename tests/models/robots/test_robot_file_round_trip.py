@@ -26,7 +26,7 @@ def bits(chain: Chain) -> bytes:
     for frame in (chain.base, chain.tip, chain.tool, *(joint.origin for joint in chain.joints)):
         numbers += [*frame.translation, *(entry for row in frame.rotation for entry in row)]
     for joint in chain.joints:
-        numbers += [*joint.axis, joint.lower, joint.upper, joint.velocity]
+        numbers += [*joint.axis, joint.lower, joint.upper, joint.velocity, joint.acceleration]
         if joint.mimic is not None:
             numbers += [joint.mimic.multiplier, joint.mimic.offset]
     return np.array(numbers, dtype=float).tobytes()
@@ -109,6 +109,13 @@ def test_a_negative_zero_and_odd_texts_come_back() -> None:
     chain = Chain('\x7f"\\\n', (Joint("é\t", origin=translation(-0.0, 1e-300, 5e-324)),), start=(-0.0,))
     back = chain_from_dict(chain_to_dict(chain))
     assert (back, bits(back)) == (chain, bits(chain))
+
+
+def test_a_dictionary_from_before_limits_of_acceleration_has_none() -> None:
+    data = chain_to_dict(load_robot("ur5e"))
+    for joint in data["joints"]:
+        del joint["acceleration"]
+    assert chain_from_dict(data) == load_robot("ur5e")
 
 
 def test_a_dictionary_opens_no_file() -> None:

@@ -36,7 +36,10 @@ ROWS = """
         {{ kind = "prismatic", d = {short} }},
     ]
     start = [{quarter}, {short}]
-    limits = {{ lower = [{quarter}, {short}], upper = [{half}, {long}], velocity = [{half}, {long}] }}
+    limits.lower = [{quarter}, {short}]
+    limits.upper = [{half}, {long}]
+    limits.velocity = [{half}, {long}]
+    limits.acceleration = [{quarter}, {long}]
 """
 
 KINDS = {
@@ -44,21 +47,23 @@ KINDS = {
         lengths = [{long}, {short}]
         tilts = [{quarter}]
         start = [{half}]
-        limits = {{ lower = {quarter}, upper = {half}, velocity = [{half}] }}
+        limits = {{ lower = {quarter}, upper = {half}, velocity = [{half}], acceleration = {quarter} }}
     """,
     "dh": ROWS,
     "modified_dh": ROWS,
     "articulated6r": """
         lengths = [{long}, {short}, {long}, {short}, {long}]
         start = [{half}, 0, 0, 0, 0, {quarter}]
-        limits = {{ lower = {quarter}, upper = {half}, velocity = {half} }}
+        limits = {{ lower = {quarter}, upper = {half}, velocity = {half}, acceleration = {half} }}
     """,
     "joints": """
-        start = [{quarter}, {short}]
+        start = [{quarter}, {short}, {half}, {long}]
         joints = [
             {{ name = "a", origin = {{ rpy = [{half}, 0, {quarter}] }}, lower = {quarter}, upper = {half} }},
             {{ name = "b", kind = "prismatic", lower = {short}, upper = {long}, velocity = {long} }},
             {{ name = "c", mimic = {{ joint = "b", multiplier = 2, offset = {quarter} }}, upper = {half} }},
+            {{ name = "d", velocity = {quarter}, acceleration = {half} }},
+            {{ name = "e", kind = "prismatic", acceleration = {long} }},
         ]
         tip = {{ translation = [0, {short}, {long}], rpy = [0, 0, {quarter}] }}
     """,

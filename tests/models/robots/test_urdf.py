@@ -19,10 +19,10 @@ ARM = """<robot name="arm">
   <link name="root"/> <link name="a"/> <link name="b"/> <link name="c"/> <link name="flange"/>
   <joint name="j1" type="revolute">
     <parent link="root"/> <child link="a"/> <origin xyz="0 0 0.3" rpy="0 0 0"/> <axis xyz="0 0 2"/>
-    <limit lower="-1" upper="2" effort="5" velocity="0.5"/>
+    <limit lower="-1" upper="2" effort="5" velocity="0.5" acceleration="3"/>
   </joint>
   <joint name="j2" type="continuous">
-    <parent link="a"/> <child link="b"/> <limit lower="0" upper="0" effort="5" velocity="0"/>
+    <parent link="a"/> <child link="b"/> <limit lower="0" upper="0" effort="5" velocity="0" acceleration="0"/>
   </joint>
   <joint name="j3" type="prismatic">
     <parent link="b"/> <child link="c"/> <axis xyz="0 1 0"/> <mimic joint="j2" multiplier="0.5" offset="0.1"/>
@@ -54,8 +54,8 @@ def test_every_kind_of_joint_is_read(urdf: Any) -> None:
     assert urdf(ARM) == Chain(
         "arm",
         (
-            Joint("j1", "revolute", translation(0.0, 0.0, 0.3), (0.0, 0.0, 1.0), -1.0, 2.0, 0.5),
-            Joint("j2", "revolute", axis=(1.0, 0.0, 0.0)),  # URDF's default axis; speed 0 is not known
+            Joint("j1", "revolute", translation(0.0, 0.0, 0.3), (0.0, 0.0, 1.0), -1.0, 2.0, 0.5, 3.0),
+            Joint("j2", "revolute", axis=(1.0, 0.0, 0.0)),  # URDF's default axis; a rate of 0 is not known
             Joint("j3", "prismatic", axis=(0.0, 1.0, 0.0), mimic=Mimic("j2", 0.5, 0.1)),
             Joint("sensor", "fixed", translation(0.1, 0.0, 0.0)),
         ),
@@ -130,7 +130,7 @@ def test_everything_wrong_is_said_at_once_with_its_line(urdf: Any) -> None:
         joint("j1", "r", "a", "spinning"),
         joint("j1", "a", "b"),
         joint("j2", "a", "b", inside='<origin xyz="0 abc 0" rpy="1 2"/><axis xyz="0 0 0"/>'),
-        joint("j3", "a", "b", "revolute", '<limit lower="2" upper="1" velocity="-1"/>'),
+        joint("j3", "a", "b", "revolute", '<limit lower="2" upper="1" velocity="-1" acceleration="-2"/>'),
         joint("j4", "a", "cc", inside='<mimic joint="ghost" multiplier="nan"/>'),
         '<joint name="j5" type="fixed"><child link="c"/></joint>',
         '<joint type="fixed"/>',
@@ -144,6 +144,7 @@ def test_everything_wrong_is_said_at_once_with_its_line(urdf: Any) -> None:
         "arm.urdf:10: joint j2: origin rpy: found '1 2', expected three numbers",
         "arm.urdf:10: joint j2: axis is zero; allowed: a direction",
         "arm.urdf:11: joint j3: limit velocity: found -1; allowed: 0 (not known) or more",
+        "arm.urdf:11: joint j3: limit acceleration: found -2; allowed: 0 (not known) or more",
         "arm.urdf:11: joint j3: limit: lower 2 above upper 1",
         "arm.urdf:12: joint j4: child 'cc'; allowed: a link of the file (did you mean c?)",
         "arm.urdf:12: joint j4: mimic multiplier: found 'nan', expected a number",
@@ -159,7 +160,7 @@ def test_each_end_and_axis_that_is_missing_is_said_by_itself(urdf: Any) -> None:
         link("r") + link("another root"),
         '<joint name="j1" type="continuous"><parent link="r"/></joint>',
         '<joint name="j2" type="continuous"><parent link="r"/><axis xyz="0 0"/></joint>',
-        '<joint name="j3"><parent link="r"/><limit velocity="x" lower="y"/></joint>',
+        '<joint name="j3"><parent link="r"/><limit velocity="x" lower="y" acceleration="z"/></joint>',
         '<joint name="j4" type="revolute"><parent link="r"/><mimic joint="j1" offset="x"/></joint>',
     )
     assert complaint(urdf, text) == [
@@ -169,6 +170,7 @@ def test_each_end_and_axis_that_is_missing_is_said_by_itself(urdf: Any) -> None:
         "arm.urdf:5: joint j3: found type ''; allowed: revolute, continuous, prismatic, fixed",
         'arm.urdf:5: joint j3: no <child link="...">; allowed: one',
         "arm.urdf:5: joint j3: limit velocity: found 'x', expected a number",
+        "arm.urdf:5: joint j3: limit acceleration: found 'z', expected a number",
         "arm.urdf:5: joint j3: limit lower: found 'y', expected a number",
         'arm.urdf:6: joint j4: no <child link="...">; allowed: one',
         "arm.urdf:6: joint j4: mimic offset: found 'x', expected a number",
@@ -182,14 +184,16 @@ def test_where_a_link_has_two_parents_its_roots_are_not_asked_for(urdf: Any) -> 
 
 def test_what_a_joint_leaves_out_is_what_urdf_takes_for_it(urdf: Any) -> None:
     limits = ["", '<limit velocity="2"/>', '<limit lower="-1"/>', '<limit upper="1"/>', "<axis/>"]
+    limits.append('<limit acceleration="4"/>')
     names = [f"l{k}" for k in range(len(limits) + 1)]
     joints = [joint(f"j{k}", names[k], names[k + 1], "revolute", inside) for k, inside in enumerate(limits)]
     chain = urdf(robot(*map(link, names), *joints))
     inf = math.inf
-    assert [(one.lower, one.upper, one.velocity) for one in chain.joints] == [
-        (-inf, inf, inf), (-inf, inf, 2.0), (-1.0, 0.0, inf), (0.0, 1.0, inf), (-inf, inf, inf),
+    assert [(one.lower, one.upper, one.velocity, one.acceleration) for one in chain.joints] == [
+        (-inf, inf, inf, inf), (-inf, inf, 2.0, inf), (-1.0, 0.0, inf, inf), (0.0, 1.0, inf, inf),
+        (-inf, inf, inf, inf), (-inf, inf, inf, 4.0),
     ]  # fmt: skip
-    assert chain.joints[-1].axis == (1.0, 0.0, 0.0)
+    assert chain.joints[4].axis == (1.0, 0.0, 0.0)
 
 
 def test_an_axis_whose_length_is_1_but_for_rounding_keeps_its_bits(urdf: Any) -> None:

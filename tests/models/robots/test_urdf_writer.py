@@ -121,6 +121,17 @@ def test_links_are_cylinders_from_frame_to_frame(chain: Chain) -> None:
         np.testing.assert_allclose(ends, [(0.0, 0.0, 0.0), way], atol=1e-15)  # rounding
 
 
+def test_limits_of_acceleration_make_it_the_version_of_urdf_that_has_them() -> None:
+    free, limited = Joint("free"), Joint("limited", "prismatic", acceleration=2.5)
+    frame = Joint("frame", "fixed", acceleration=3.0)
+    assert '<robot name="arm">' in urdf_text(Chain("arm", (free, frame)))
+    text = urdf_text(Chain("arm", (free, frame, limited)))
+    assert '<robot name="arm" version="1.2">' in text
+    limits = [line.strip() for line in text.splitlines() if "<limit " in line]
+    assert ["acceleration" in line for line in limits] == [False, True]
+    assert limits[1].endswith('acceleration="2.5"/>')
+
+
 def test_names_are_escaped(tmp_path: Path) -> None:
     chain = Chain("<a> & \"b\" 'c'", (Joint('<j> & "k"'),))
     write_urdf(chain, tmp_path / "odd.urdf")

@@ -15,7 +15,7 @@ from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
 
 ROWS = 60
-ARMS = [name for name in robot_names() if len(load_robot(name).moving) in {6, 7}]
+ARMS = [name for name in robot_names() if len(load_robot(name).moving) in {4, 6, 7}]
 
 
 def motion(joints: int = 6) -> FloatArray:
