@@ -53,6 +53,10 @@ class LogError(UrmpipeError):
     """A log cannot be read, or holds what no log may hold."""
 
 
+class PathError(UrmpipeError):
+    """The rows of a path make no lines and arcs, or no arm gets to them."""
+
+
 class RecordingError(UrmpipeError):
     """A recording cannot be read, is not ours, or holds too little for what was asked."""
 

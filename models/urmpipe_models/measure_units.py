@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from decimal import Decimal
+import math
+import re
+from collections.abc import Mapping
+from decimal import Decimal, DecimalException
 
 from urmpipe_models.errors import OptionError, shown
 
@@ -21,6 +24,21 @@ MEASURES: dict[str, dict[str, Decimal]] = {
     "V": {"V": Decimal(1), "mV": Decimal("1e-3")},
 }
 """What is measured, named by its SI unit: its units, and how many SI units each is."""
+
+
+TIMES = {"": Decimal(1), **MEASURES["s"]}
+LENGTHS = {"": Decimal(1), "cm": Decimal("1e-2"), **MEASURES["m"]}
+ANGLES = {"": Decimal(1), **MEASURES["rad"]}
+"""Units that a value may have behind it, and how many SI units each is; a value without one is in SI."""
+
+
+def quantity(text: str, units: Mapping[str, Decimal]) -> float:
+    """Return a number with one of the units behind it in SI, rounded once; NaN if it is none."""
+    match = re.fullmatch(r"(.*?)\s*([a-z]*)", text.strip())
+    try:
+        return float(Decimal(match[1]) * units[match[2]]) if match else math.nan
+    except (ValueError, KeyError, DecimalException):
+        return math.nan
 
 
 def units_of(si: str) -> dict[str, Decimal]:

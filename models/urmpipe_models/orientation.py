@@ -172,6 +172,20 @@ def product(first: FloatArray, second: FloatArray) -> FloatArray:
     )
 
 
+def rotation_vectors(quat_xyzw: FloatArray) -> FloatArray:
+    """Return u a, 0 <= a <= pi, of orientations, in [rad], shape (n, 3); NaN of one with NaN.
+
+    With v = u sin(a / 2), w = cos(a / 2) of either sign: a = 2 atan2(|v|, |w|).
+
+    Args:
+        quat_xyzw: Unit quaternions x, y, z, w [-], shape (n, 4).
+    """
+    imaginary, real = quat_xyzw[:, :3], quat_xyzw[:, 3]
+    angle = 2.0 * np.arctan2(np.linalg.norm(imaginary, axis=1), np.abs(real))
+    scale = 2.0 / np.sinc(angle / (2.0 * np.pi))  # a / sin(a / 2)
+    return np.asarray(imaginary * np.copysign(scale, real)[:, None])
+
+
 def best_rotation(crossed: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the rotation R with the largest sum of products a . R b, which brings points b nearest to a.
 

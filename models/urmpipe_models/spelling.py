@@ -65,6 +65,9 @@ IN_MAP = {
 IN_FILE = {**IN_MAP, "log_map": "map", "robot": "robot"}
 """Where a system file, or the map of a log in it, says what is a parameter elsewhere; others are options."""
 
+ARGUMENTS = ("path",)
+"""Parameters that the command line takes without an option, by their names in capitals."""
+
 _PARTING = frozenset(" \t'&()[]{},;=@#$`^!+%~|<>")
 """What PowerShell or cmd reads as more than a letter of a word."""
 
@@ -77,6 +80,8 @@ def subject(parameter: str, voice: Voice) -> str:
     """Return a parameter as somebody calls it: an option, a keyword, or a key of a file."""
     if voice == "python":
         return parameter
+    if parameter in ARGUMENTS:
+        return parameter.upper()
     return IN_FILE.get(parameter, option_of(parameter)) if voice == "system file" else option_of(parameter)
 
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urmpipe_models.errors import OptionError
-from urmpipe_models.measure_units import MEASURES, factor, units_of
+from urmpipe_models.measure_units import LENGTHS, MEASURES, factor, quantity, units_of
 
 EVERY = [(si, unit) for si, units in MEASURES.items() for unit in units]
 PAIRS = [(one, other) for units in MEASURES.values() for one in units for other in units]
@@ -55,3 +55,15 @@ def test_an_unknown_unit_is_refused_with_all_that_are_known() -> None:
         factor("inch", "mm")
     assert str(error.value) == f"unit: found 'inch', allowed: {', '.join(unit for _, unit in EVERY)}"
     assert units_of("inch") == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("0.6", 0.6), ("600mm", 0.6), (" 1.1 mm ", 1.1e-3), ("3cm", 0.03), ("-2e3um", -2e-3), ("1e3", 1e3),
+        ("nan", math.nan), ("inf", math.nan), ("mm", math.nan), ("", math.nan), ("1 2", math.nan),
+        ("1rad", math.nan), ("0x1", math.nan), ("1e999", math.inf),
+    ],
+)  # fmt: skip
+def test_a_quantity_is_a_number_with_one_of_the_units_rounded_once(text: str, value: float) -> None:
+    assert quantity(text, LENGTHS) == value or (math.isnan(quantity(text, LENGTHS)) and math.isnan(value))

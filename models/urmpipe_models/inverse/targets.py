@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.orientation import quaternions, rotation_vectors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,18 +53,5 @@ def misses(chain: Chain, q: FloatArray, targets: Targets) -> tuple[FloatArray, F
     position, rotation = poses_over_log(chain, q)
     if targets.rotation is None:
         return targets.position - position, np.zeros_like(position)
-    return targets.position - position, _rotation_vector(targets.rotation @ rotation.transpose(0, 2, 1))
-
-
-def _rotation_vector(rotation: FloatArray) -> FloatArray:
-    """Return u a, 0 <= a <= pi, of rotation matrices, shape (n, 3, 3); NaN of matrices with NaN.
-
-    By the unit quaternion v = u sin(a / 2), w = cos(a / 2) of either sign: a = 2 atan2(|v|, |w|). Without
-    scipy, which would take longer to import than a thousand targets to be solved.
-    """
-    quat = quaternions(rotation.reshape(-1, 9), "matrix")
-    imaginary, real = quat[:, :3], quat[:, 3]
-    length = np.linalg.norm(imaginary, axis=1)
-    angle = 2.0 * np.arctan2(length, np.abs(real))
-    scale = 2.0 / np.sinc(angle / (2.0 * np.pi))  # a / sin(a / 2)
-    return np.asarray(imaginary * np.copysign(scale, real)[:, None])
+    between = targets.rotation @ rotation.transpose(0, 2, 1)
+    return targets.position - position, rotation_vectors(quaternions(between.reshape(-1, 9), "matrix"))

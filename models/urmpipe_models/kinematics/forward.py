@@ -260,6 +260,30 @@ def jacobian_over_log(chain: Chain, q: FloatArray, point: int = -1) -> FloatArra
     return result.transpose(2, 1, 0)
 
 
+def bias_over_log(chain: Chain, q: FloatArray, qd: FloatArray) -> FloatArray:
+    """Return J' q', the acceleration of the tool centre point that the rates alone make, for every row.
+
+    Args:
+        chain: The arm.
+        q: Joint values in [rad] or [m], shape (n, joints).
+        qd: Their rates in [rad/s] or [m/s], shape (n, joints).
+
+    Returns:
+        Shape (n, 6): acceleration in [m/s2], then angular acceleration in [rad/s2], in the world.
+    """
+    result = np.empty((6, len(q)))
+
+    def work(block: slice) -> None:
+        """Fill the rows of a block."""
+        rates = _columns(qd[block])
+        *_, tip = each_motion(chain, _columns(q[block]), rates, [0.0] * len(rates))
+        _fill(result[:3, block], tip.acceleration)
+        _fill(result[3:, block], tip.alpha)
+
+    side_by_side(work, row_blocks(len(q)))
+    return result.T
+
+
 def _columns(rows: FloatArray) -> list[FloatArray]:
     """Return the columns of (m, joints) as contiguous arrays."""
     return list(np.ascontiguousarray(rows.T))

@@ -1,0 +1,146 @@
+"""The joints along a planned path: how they change with arc length, exactly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.arrays import BoolArray, FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.inverse.limits import LIMIT_ROUNDING, limits_of
+from urmpipe_models.inverse.targets import Targets, misses
+from urmpipe_models.kinematics.forward import bias_over_log, jacobian_over_log
+from urmpipe_models.planning.line_arc import LineArcPath
+
+NUDGE = 1e-6
+"""Step of the fastest joint, in [rad] or [m], for a difference of Jacobians: error 1e-12, rounding 1e-10."""
+
+NEAR = 1e-13
+"""The tool within this of its path, in [m] and [rad], is on it: rounding."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JointSlopes:
+    """Joint values by arc length.
+
+    Attributes:
+        q: In [rad] or [m], shape (n, joints).
+        dq: dq/ds in [rad/m] or [-], shape (n, joints).
+        ddq: d2q/ds2 in [rad/m2] or [1/m], shape (n, joints).
+    """
+
+    q: FloatArray
+    dq: FloatArray
+    ddq: FloatArray
+
+    def rows(self, chosen: slice) -> JointSlopes:
+        """Return the chosen rows."""
+        return JointSlopes(self.q[chosen], self.dq[chosen], self.ddq[chosen])
+
+    def rates(self, v: FloatArray, a: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return q' = dq s' and q'' = ddq s'^2 + dq s'', each of shape (n, joints), in SI.
+
+        Args:
+            v: s' in [m/s], shape (n,).
+            a: s'' in [m/s2], shape (n,).
+        """
+        return self.dq * v[:, None], self.ddq * (v * v)[:, None] + self.dq * a[:, None]
+
+
+def targets_at(path: LineArcPath, s: FloatArray) -> Targets:
+    """Return where the tool shall be at arc lengths in [m], shape (n,)."""
+    rotation = None if path.turning is None else path.turning.matrices(s)
+    return Targets(path.points(s).position, rotation)
+
+
+def joint_slopes(
+    chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray, *, before: bool = False
+) -> JointSlopes:
+    """Return the slopes of joint values that lead the tool along a path with the least motion.
+
+    With x' = (t, turn rate) and x'' = (curvature, 0): q' = J+ x', and differentiated once more, with
+    y = J+^T q', q'' = J+ (x'' - J' q') + (1 - J+ J) J'^T y; the last term is 0 where J is square. Joints
+    whose limits are equal, or that stay on a limit, have no column in J.
+
+    Args:
+        chain: The arm.
+        path: The path.
+        q: Joint values along it in [rad] or [m], shape (n, joints); a row of NaN has slopes of NaN.
+        s: Arc lengths in [m], shape (n,).
+        before: Whether slopes that jump, where two segments meet, are those before it; else after it.
+    """
+    points = path.points(s, before=before)
+    first, second = points.tangent, points.curvature
+    if path.turning is not None:
+        first = np.hstack((first, path.turning.rates(s, before=before)))
+        second = np.hstack((second, np.zeros_like(second)))
+    dq, ddq = np.full(q.shape, np.nan), np.full(q.shape, np.nan)
+    known = np.isfinite(q).all(axis=1)
+    moves = _moving(chain, q)
+    for pattern in np.unique(moves[known], axis=0):
+        rows = np.flatnonzero(known & (moves == pattern).all(axis=1))
+        dq[rows], ddq[rows] = _slopes(chain, q[rows], first[rows], second[rows], pattern)
+    return JointSlopes(q, dq, ddq)
+
+
+def polished(chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray) -> FloatArray:
+    """Return joint values in [rad] or [m], shape (n, joints), with the tool on the path to the last digits.
+
+    A path is followed to 1e-9 m; a Newton step q + J+ (x - FK(q)) leaves the square of that. What is nearer
+    than `NEAR` stays.
+
+    Args:
+        chain: The arm.
+        path: The path.
+        q: Joint values along it in [rad] or [m], shape (n, joints), NaN where there are none.
+        s: Arc lengths in [m], shape (n,).
+    """
+    miss = np.hstack(misses(chain, q, targets_at(path, s)))[:, : 3 if path.turning is None else 6]
+    better = q.copy()
+    off = np.asarray(np.abs(miss).max(axis=1) > NEAR)  # false where there is no solution
+    moves = _moving(chain, q)
+    for pattern in np.unique(moves[off], axis=0):
+        rows = np.flatnonzero(off & (moves == pattern).all(axis=1))
+        J = jacobian_over_log(chain, q[rows])[:, : miss.shape[1], pattern]
+        better[np.ix_(rows, pattern)] += _times(np.asarray(np.linalg.pinv(J), dtype=float), miss[rows])
+    return better
+
+
+def _moving(chain: Chain, q: FloatArray) -> BoolArray:
+    """Return which joints are free to move, shape (n, joints): not those that rest on a limit."""
+    lower, upper = limits_of(chain)
+    on = (np.abs(q - lower) <= LIMIT_ROUNDING) | (np.abs(q - upper) <= LIMIT_ROUNDING)
+    still = np.zeros_like(on)
+    still[1:] = np.abs(np.diff(q, axis=0)) <= LIMIT_ROUNDING
+    still[:-1] |= still[1:]
+    return np.asarray((lower < upper) & ~(on & still))
+
+
+def _slopes(
+    chain: Chain, q: FloatArray, first: FloatArray, second: FloatArray, moves: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return dq/ds and d2q/ds2 where the same joints move, both of shape (m, joints)."""
+    rows = first.shape[1]
+    dq, ddq = np.zeros_like(q), np.zeros_like(q)
+    J = jacobian_over_log(chain, q)[:, :rows, moves]
+    inverse: FloatArray = np.asarray(np.linalg.pinv(J), dtype=float)
+    dq[:, moves] = _times(inverse, first)
+    ddq[:, moves] = _times(inverse, second - bias_over_log(chain, q, dq)[:, :rows])
+    if J.shape[2] > rows:
+        changed = _jacobian_along(chain, q, dq)[:, :rows, moves]
+        pull = _times(changed.transpose(0, 2, 1), _times(inverse.transpose(0, 2, 1), dq[:, moves]))
+        ddq[:, moves] += pull - _times(inverse, _times(J, pull))
+    return dq, ddq
+
+
+def _times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
+    """Return the products of matrices, shape (n, j, k), and vectors, shape (n, k)."""
+    return np.asarray(np.einsum("njk,nk->nj", matrix, vector))
+
+
+def _jacobian_along(chain: Chain, q: FloatArray, dq: FloatArray) -> FloatArray:
+    """Return the derivative of the Jacobian along a motion, by a central difference, shape (n, 6, joints)."""
+    step = NUDGE / np.maximum(np.abs(dq).max(axis=1, keepdims=True), 1e-12)
+    change = jacobian_over_log(chain, q + step * dq) - jacobian_over_log(chain, q - step * dq)
+    return np.asarray(change / (2.0 * step)[:, :, None])

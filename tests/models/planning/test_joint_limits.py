@@ -1,0 +1,216 @@
+"""Joints along a path: their slopes against differences, the law of their limits against TOPP-RA."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from toppra.algorithm import TOPPRA
+from toppra.constraint import DiscretizationType, JointAccelerationConstraint, JointVelocityConstraint
+
+from urmpipe_models.arrays import FloatArray, IndexArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.inverse.along_path.path import follow
+from urmpipe_models.inverse.targets import misses
+from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.joint_limits import law_of_limits
+from urmpipe_models.planning.joint_motion import JointSlopes, joint_slopes, polished, targets_at
+from urmpipe_models.planning.line_arc import LineArcPath
+from urmpipe_models.planning.rows import path_rows
+from urmpipe_models.planning.time_law import TimeLaw
+from urmpipe_models.robots.catalogue import load_robot
+
+DOWN = np.diag([1.0, -1.0, -1.0])
+SQUARE = np.array([[0.15, 0.15], [0.3, 0.15], [0.3, -0.15], [0.0, -0.15], [0.0, 0.15], [0.15, 0.15]])
+
+
+def arm(name: str, velocity: float, acceleration: float) -> Chain:
+    chain = load_robot(name)
+    joints = (replace(one, velocity=velocity, acceleration=acceleration) for one in chain.joints)
+    return replace(chain, joints=tuple(joints))
+
+
+def square(x: float, z: float, turned: bool) -> LineArcPath:
+    points = np.column_stack((SQUARE[:, 0] + x, SQUARE[:, 1], np.full(6, z)))
+    return path_of(path_rows(points, 0.03, corner=True, rotation=DOWN if turned else None))
+
+
+CASES = {
+    "poses": ("ur5e", square(0.3, 0.3, turned=True)),
+    "positions": ("urm6", square(0.3, 0.6, turned=False)),
+}
+"""An arm with a closed form, and one with a joint too many at positions, that moves as little as it can."""
+
+
+def followed(chain: Chain, path: LineArcPath, s: FloatArray) -> JointSlopes:
+    q = follow(chain, targets_at(path, s), np.arange(len(s))).q
+    return joint_slopes(chain, path, polished(chain, path, q, s), s)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_slopes_are_those_of_the_joint_values(case: str) -> None:
+    """By differences in each segment; half the step leaves a quarter of what they differ by."""
+    name, path = CASES[case]
+    errors = []
+    for count in (100, 200):
+        parts = (np.linspace(a, b, count) for a, b in zip(path.bounds[:-1], path.bounds[1:], strict=True))
+        s = np.unique(np.concatenate([*parts]))
+        found = followed(load_robot(name), path, s)
+        inner = np.flatnonzero(np.abs(s[:, None] - path.bounds).min(axis=1) > 1e-9)
+        first, second = differences(found.q, s, inner), differences(found.dq, s, inner)
+        errors.append(
+            [
+                np.abs(first - found.dq[inner]).max(),
+                np.abs(second - found.ddq[inner]).max() * path.radius.min(),
+            ]
+        )
+    # least motion leaves each sample's own null space as it comes: an error of the step, not of its square
+    ratio, most = (0.26, 2e-3) if case == "poses" else (0.55, 4e-2)
+    assert (np.array(errors[1]) < ratio * np.array(errors[0])).all()
+    assert (np.array(errors[1]) < most).all()
+
+
+def differences(values: FloatArray, s: FloatArray, at: IndexArray) -> FloatArray:
+    """Return the slopes of parabolas through three neighbours."""
+    before, after = s[at] - s[at - 1], s[at + 1] - s[at]
+    rise, fall = values[at + 1] - values[at], values[at] - values[at - 1]
+    weighted = rise * (before / after)[:, None] + fall * (after / before)[:, None]
+    return np.asarray(weighted / (before + after)[:, None])
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_slopes_move_the_tool_along_its_path(case: str) -> None:
+    """A step along dq is the tangent, and ddq the curvature: to the third power of the step."""
+    name, path = CASES[case]
+    chain, s = load_robot(name), np.linspace(0.01, path.total - 0.01, 80)
+    s = s[np.abs(s[:, None] - path.bounds).min(axis=1) > 2e-4]
+    found = followed(chain, path, s)
+    h = 1e-4
+    ahead = found.q + h * found.dq + 0.5 * h * h * found.ddq
+    miss, turn = misses(chain, ahead, targets_at(path, s + h))
+    allowed = 10.0 * h**3 / path.radius.min() ** 2  # the third derivative of an arc is 1 / r^2
+    assert np.abs(miss).max() < allowed
+    assert np.abs(turn).max() < allowed
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_polished_joints_are_on_the_path(case: str) -> None:
+    name, path = CASES[case]
+    chain, s = load_robot(name), np.linspace(0.0, path.total, 300)
+    found = followed(chain, path, s)
+    assert np.linalg.norm(misses(chain, found.q, targets_at(path, s))[0], axis=1).max() < 1e-14
+
+
+class Sampled:
+    """Our joint values as a path of TOPP-RA, on its own grid."""
+
+    def __init__(self, chain: Chain, path: LineArcPath, s: FloatArray) -> None:
+        self.slopes, self.s = followed(chain, path, s), s
+        self.path_interval, self.dof = np.array([0.0, path.total]), len(chain.coordinates)
+        self.waypoints = None
+
+    def __call__(self, places: FloatArray, order: int = 0) -> FloatArray:
+        values = (self.slopes.q, self.slopes.dq, self.slopes.ddq)[order]
+        return np.asarray(values[np.searchsorted(self.s, np.clip(places, 0.0, self.s[-1]))])
+
+
+def by_toppra(chain: Chain, path: LineArcPath, s: FloatArray, scheme: DiscretizationType) -> float:
+    """Return the duration that TOPP-RA finds on places of the path."""
+    both = np.ones((len(chain.coordinates), 2)) * [-1.0, 1.0]
+    limits = [
+        JointVelocityConstraint(chain.moving[0].velocity * both),
+        JointAccelerationConstraint(chain.moving[0].acceleration * both, discretization_scheme=scheme),
+    ]
+    instance = TOPPRA(limits, Sampled(chain, path, s), gridpoints=s, parametrizer="ParametrizeConstAccel")
+    _, speeds, _ = instance.compute_parameterization(0.0, 0.0)
+    return float((2.0 * np.diff(s) / (speeds[1:] + speeds[:-1])).sum())
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("way", ["line", "contour"])
+@pytest.mark.parametrize(("velocity", "acceleration"), [(2.0, 5.0), (0.4, 20.0), (5.0, 1.0)])
+def test_the_law_of_limits_is_as_fast_as_toppra(
+    case: str, way: str, velocity: float, acceleration: float
+) -> None:
+    """Within 1 %, and never faster by more than 0.1 %, on the same places and the same joint values.
+
+    TOPP-RA knows one curvature at a place. Interpolating, it would hold the end of a line to that of the arc
+    behind it, which costs 1 %: so a path with arcs is held against its collocation.
+    """
+    name, path = CASES[case]
+    if way == "line":
+        ends = np.array([[0.0, 0.1, 0.0], [0.1, -0.2, 0.0]])
+        path = path_of(path_rows(path.points(path.stops).position + ends))
+    chain = arm(name, velocity, acceleration)
+    law = law_of_limits(chain, path, None, np.inf, np.inf)
+    assert law is not None
+    s = np.append([phase.s for phase in law.phases], path.total)
+    wanted = by_toppra(
+        chain, path, s, DiscretizationType.Interpolation if way == "line" else DiscretizationType.Collocation
+    )
+    assert 0.999 * wanted <= law.duration <= 1.01 * wanted
+
+
+def on_grid(chain: Chain, path: LineArcPath, law: TimeLaw) -> tuple[FloatArray, FloatArray]:
+    """Return how much of their limits rates and accelerations use, just inside both ends of every phase."""
+    ends = law.ends
+    begin = np.append(0.0, ends[:-1])
+    t = np.sort(np.concatenate((begin + 1e-9 * (ends - begin), ends - 1e-9 * (ends - begin))))
+    found = law.at(t)
+    rates, accelerations = followed(chain, path, found.s).rates(found.v, found.a)
+    velocity, acceleration = chain.moving[0].velocity, chain.moving[0].acceleration
+    return np.abs(rates) / velocity, np.abs(accelerations) / acceleration
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_law_of_limits_runs_at_its_limits(case: str) -> None:
+    """On its grid no limit is exceeded, and nearly everywhere one is used up."""
+    name, path = CASES[case]
+    chain = arm(name, 1.0, 5.0)
+    law = law_of_limits(chain, path, None, np.inf, np.inf)
+    assert law is not None
+    rates, accelerations = on_grid(chain, path, law)
+    allowed = 1.0 + (1e-6 if case == "poses" else 2e-3)  # least motion on another grid differs by its step
+    assert rates.max() < allowed
+    assert accelerations.max() < allowed
+    used = np.maximum(rates.max(axis=1), accelerations.max(axis=1))
+    assert np.mean(used > 0.97) > 0.9
+
+
+def test_speed_and_acceleration_of_the_tool_hold_too() -> None:
+    name, path = CASES["poses"]
+    law = law_of_limits(arm(name, 5.0, 50.0), path, None, 0.2, 1.0)
+    assert law is not None
+    found = law.at(np.linspace(0.0, law.duration, 5000))
+    assert found.v.max() <= 0.2 * (1.0 + 1e-9)
+    assert np.abs(found.a).max() <= 1.0 + 1e-9
+    assert law.duration == pytest.approx(path.total / 0.2 + 0.2 / 1.0, rel=1e-3)  # the joints hardly matter
+
+
+def test_it_rests_at_stops_and_where_the_turn_changes_its_rate() -> None:
+    points = np.array([[0.4, -0.2, 0.3], [0.5, 0.0, 0.3], [0.4, 0.2, 0.3], [0.3, 0.1, 0.3]])
+    turned = np.array([DOWN, DOWN, DOWN @ [[0, -1, 0], [1, 0, 0], [0, 0, 1]], DOWN])
+    path = path_of(path_rows(points, np.array([0, 0.05, 0, 0]), corner=True, rotation=turned))
+    law = law_of_limits(arm("ur5e", 3.0, 10.0), path, None, np.inf, np.inf)
+    assert law is not None and path.turning is not None
+    assert path.turning.uneven.tolist() == [1, 2]
+    np.testing.assert_allclose(law.at(law.time_at(path.at)).v, 0.0, atol=1e-6)
+
+
+def test_a_path_out_of_reach_has_none() -> None:
+    assert law_of_limits(arm("ur5e", 1.0, 1.0), square(0.8, 0.3, turned=True), None, np.inf, np.inf) is None
+
+
+def test_a_joint_without_room_gives_no_freedom() -> None:
+    """Locked, the last joint of ur5e leaves five for a position, and stays where it is."""
+    chain = load_robot("ur5e")
+    *others, last = chain.joints
+    locked = replace(chain, joints=(*others, replace(last, lower=0.3, upper=0.3)))
+    path = square(0.3, 0.3, turned=False)
+    s = np.linspace(0.0, path.total, 200)
+    found = followed(locked, path, s)
+    np.testing.assert_array_equal(found.q[:, -1], 0.3)
+    np.testing.assert_array_equal(found.dq[:, -1], 0.0)
+    np.testing.assert_array_equal(found.ddq[:, -1], 0.0)
+    assert (np.abs(found.dq[:, :3]).max(axis=0) > 0.1).all()

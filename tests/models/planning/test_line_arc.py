@@ -1,0 +1,240 @@
+"""Lines and arcs from rows: laws of the curve, both meanings of a radius, and what rows make no path."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from random_paths import by_first_points, corner_rows
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.errors import PathError
+from urmpipe_models.orientation import angle_between, matrices, quaternions
+from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.line_arc import LineArcPath
+from urmpipe_models.planning.rows import PathRows, path_rows
+from urmpipe_models.transform import from_offset
+
+ROUNDING = 1e-12
+"""Of coordinates of up to 1 m through some tens of operations, and of unit vectors, in [m] and [-]."""
+
+CONTOUR = [[1.7, 0.3, 1], [1.97, 0.3, 1], [2, -0.27, 1], [1.43, -0.3, 1], [1.4, 0.27, 1], [1.7, 0.3, 1]]
+"""The rows of the paper, section 5: a cube of 0.6 m about (1.7, 0, 1), R = 0.03 m."""
+
+
+def along(path: LineArcPath, count: int = 400) -> FloatArray:
+    return np.linspace(0.0, path.total, count)
+
+
+def test_the_papers_contour() -> None:
+    """Five lines and four arcs that close; lengths after errata of the paper."""
+    path = path_of(path_rows(np.array(CONTOUR), 0.03))
+    assert path.kinds == ["line", "arc"] * 4 + ["line"]
+    arc = 0.015 * np.pi
+    np.testing.assert_allclose(path.length, [0.27, arc, 0.54, arc, 0.54, arc, 0.54, arc, 0.27], atol=ROUNDING)
+    assert path.total == pytest.approx(2.348496, abs=5e-7)  # the printed digits
+    np.testing.assert_allclose(
+        path.points(np.array([0.0, path.total])).position, [CONTOUR[0]] * 2, atol=ROUNDING
+    )
+    corners = [[2, 0.3, 1], [2, -0.3, 1], [1.4, -0.3, 1], [1.4, 0.3, 1]]
+    np.testing.assert_allclose(path.corners, corners, atol=ROUNDING)
+
+
+@given(corner_rows(variants=True))
+def test_the_direction_goes_on_where_segments_meet(rows: PathRows) -> None:
+    path = path_of(rows)
+    inner = path.bounds[1:-1]
+    moving = inner[~np.isin(inner, path.stops)]
+    before, after = path.points(moving, before=True), path.points(moving)
+    np.testing.assert_allclose(before.tangent, after.tangent, atol=ROUNDING)
+    met = path.points(inner, before=True).position - path.points(inner).position
+    np.testing.assert_allclose(met, 0.0, atol=ROUNDING * (1.0 + np.abs(path.start).max()))
+
+
+@given(corner_rows(variants=True))
+def test_points_are_on_their_arc_at_unit_speed(rows: PathRows) -> None:
+    path = path_of(rows)
+    s = along(path)
+    points, k = path.points(s), path.segment_at(s)
+    np.testing.assert_allclose(np.linalg.norm(points.tangent, axis=1), 1.0, atol=ROUNDING)
+    arc = np.isfinite(path.radius[k])
+    radius = path.radius[k][arc]
+    centre = path.start[k][arc] + radius[:, None] * path.normal[k][arc]
+    away = np.linalg.norm(points.position[arc] - centre, axis=1)
+    np.testing.assert_allclose(away, radius, rtol=ROUNDING, atol=ROUNDING)
+    bent = np.linalg.norm(points.curvature, axis=1)
+    np.testing.assert_allclose(bent, np.where(arc, 1.0 / path.radius[k], 0.0), rtol=ROUNDING, atol=ROUNDING)
+
+
+@given(corner_rows(variants=True), st.floats(0.01, 0.99))
+def test_derivatives_are_those_of_the_place(rows: PathRows, share: float) -> None:
+    """By central differences inside every segment, whose error is h^2 / (6 r^2) and h^2 / (6 r^3)."""
+    path = path_of(rows)
+    s = path.bounds[:-1] + share * path.length
+    h = 1e-4 * np.minimum(np.minimum(share, 1.0 - share) * path.length, np.minimum(path.radius, 1.0))
+    ahead, behind, here = path.points(s + h), path.points(s - h), path.points(s)
+    slope = (ahead.position - behind.position) / (2.0 * h)[:, None]
+    # the rounding of 1 m over h, which is 5e-7 m at least, and the error of the difference
+    np.testing.assert_allclose(slope, here.tangent, atol=1e-8 + 2e-16 / h.min())
+    bend = (ahead.tangent - behind.tangent) / (2.0 * h)[:, None] * np.minimum(path.radius, 1.0)[:, None]
+    allowed = 1e-8 + 2e-16 / h.min()
+    np.testing.assert_allclose(bend, here.curvature * np.minimum(path.radius, 1.0)[:, None], atol=allowed)
+
+
+@given(corner_rows())
+def test_the_length_is_that_of_a_fine_polygon(rows: PathRows) -> None:
+    """A polygon through all bounds is shorter by less than (step / r)^2 / 24 of each arc."""
+    path = path_of(rows)
+    s = np.unique(np.concatenate((along(path, 2000), path.bounds)))
+    polygon = float(np.linalg.norm(np.diff(path.points(s).position, axis=0), axis=1).sum())
+    arcs = path.arcs
+    step = np.diff(s).max()
+    lost = float((np.minimum((step / path.radius[arcs]) ** 2 / 24.0, 1.0) * path.length[arcs]).sum())
+    assert path.total - lost - ROUNDING <= polygon <= path.total + 1e-9  # rounding of 2000 sums
+    assert path.total == pytest.approx(float(path.length.sum()), rel=ROUNDING)
+
+
+@given(corner_rows(variants=True))
+def test_both_meanings_of_a_radius_give_one_curve(rows: PathRows) -> None:
+    one, other = path_of(rows), path_of(by_first_points(rows))
+    assert one.kinds == other.kinds
+    s = along(one)
+    # the lines of the other follow from one another: what rounds in one, the next has at its end
+    np.testing.assert_allclose(other.points(s).position, one.points(s).position, atol=1e-9)
+
+
+@given(corner_rows(variants=True))
+def test_reversed_rows_give_the_reversed_curve(rows: PathRows) -> None:
+    path = path_of(rows)
+    back = path_rows(rows.position[::-1], rows.radius[::-1], corner=True, variant=rows.variant[::-1])
+    s = along(path)
+    there, returned = path.points(s), path_of(back).points(path.total - s)
+    np.testing.assert_allclose(returned.position, there.position, atol=1e-11)  # sums of up to 20 m of path
+    inside = ~np.isin(s, path.bounds)
+    np.testing.assert_allclose(returned.tangent[inside], -there.tangent[inside], atol=1e-9)
+
+
+@given(corner_rows())
+def test_reversed_first_points_are_the_last_points(rows: PathRows) -> None:
+    """Told by the paper's meaning, the way back begins its arcs where the way there ends them."""
+    path = path_of(rows)
+    arcs = path.arcs
+    position = rows.position.copy()
+    ends = path.points(path.bounds[arcs + 1], before=True).position
+    position[path.row[arcs]] = ends
+    back = path_of(path_rows(position[::-1], rows.radius[::-1]))
+    s = along(path)
+    np.testing.assert_allclose(back.points(path.total - s).position, path.points(s).position, atol=1e-9)
+
+
+@given(corner_rows(variants=True), st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6))
+def test_a_rigid_motion_of_the_rows_moves_the_curve(rows: PathRows, motion: list[float]) -> None:
+    frame = from_offset(motion)
+    R: FloatArray = np.array(frame.rotation)
+    p: FloatArray = np.array(frame.translation)
+    moved = path_rows(rows.position @ R.T + p, rows.radius, corner=True, variant=rows.variant)
+    s = along(path_of(rows))
+    found, wanted = path_of(moved).points(s), path_of(rows).points(s).position @ R.T + p
+    np.testing.assert_allclose(
+        found.position, wanted, atol=1e-9
+    )  # radii are sharpened by up to 20 of a corner
+
+
+@given(corner_rows())
+def test_rows_stand_where_they_say(rows: PathRows) -> None:
+    """Stops at their own points, corners at the middle of their arcs, first points where these begin."""
+    path = path_of(rows)
+    np.testing.assert_allclose(path.points(path.stops).position, rows.position[path.stop_row], atol=1e-11)
+    rounded = np.flatnonzero(rows.radius > 0.0)
+    middle = 0.5 * (path.bounds[path.arcs] + path.bounds[path.arcs + 1])
+    np.testing.assert_allclose(path.at[rounded], middle, atol=ROUNDING)
+    first = path_of(by_first_points(rows))
+    np.testing.assert_allclose(first.at[rounded], first.bounds[first.arcs], atol=ROUNDING)
+
+
+def test_an_improper_arc_turns_away_and_round() -> None:
+    """A right angle to the left by an arc to the right: 270 deg, from behind the corner."""
+    rows = path_rows(
+        np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.0]]), np.array([0, 0.1, 0]), corner=True, variant=1
+    )
+    path = path_of(rows)
+    np.testing.assert_allclose(path.length, [1.1, 0.15 * np.pi, 1.1], atol=ROUNDING)
+    np.testing.assert_allclose(path.normal[1], [0.0, -1.0, 0.0], atol=ROUNDING)
+    np.testing.assert_allclose(
+        path.points(path.bounds[1:3]).position, [[1.1, 0, 0], [1, -0.1, 0]], atol=ROUNDING
+    )
+
+
+def test_arcs_may_touch_and_reach_a_stop() -> None:
+    """Two half turns of 0.5 m without any line: a path of arcs alone."""
+    rows = path_rows(np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 1, 0], [1, 1, 0.0]]), 0.5, corner=True)
+    path = path_of(rows)
+    assert path.kinds == ["arc", "arc"]
+    np.testing.assert_allclose(path.length, 0.25 * np.pi, atol=ROUNDING)
+    np.testing.assert_allclose(path.at, [0, np.pi / 8, 3 * np.pi / 8, np.pi / 2], atol=ROUNDING)
+
+
+@given(corner_rows(), st.lists(st.floats(-2.0, 2.0), min_size=60, max_size=60))
+def test_the_tool_turns_evenly_from_row_to_row(rows: PathRows, angles: list[float]) -> None:
+    turned = np.array(angles).reshape(20, 3)[: len(rows)]
+    rotation = matrices(quaternions(turned, "zyx"))
+    path = path_of(path_rows(rows.position, rows.radius, corner=True, rotation=rotation))
+    assert path.turning is not None
+    at = path.turning.matrices(path.at)
+    np.testing.assert_allclose(at[:-1], rotation[:-1], atol=ROUNDING)
+    np.testing.assert_allclose(at[-1], rotation[-1], atol=1e-9)  # after a whole turn by the last rate
+    middle = 0.5 * (path.at[1:] + path.at[:-1])
+    quats = path.turning.quaternions(middle)
+    ends = quaternions(rotation.reshape(-1, 9), "matrix")
+    halves = np.stack((angle_between(ends[:-1], quats), angle_between(quats, ends[1:])))
+    np.testing.assert_allclose(halves[0], halves[1], atol=1e-7)  # acos-like near 0
+    speed = np.linalg.norm(path.turning.rate, axis=1) * np.diff(path.at)
+    np.testing.assert_allclose(speed, angle_between(ends[:-1], ends[1:]), atol=1e-7)
+
+
+def faults(points: Sequence[Sequence[float]], radius: Sequence[float], corner: bool = False) -> list[str]:
+    with pytest.raises(PathError) as raised:
+        path_of(path_rows(np.array(points, dtype=float), np.array(radius), corner=corner))
+    return [str(one) for one in raised.value.findings]
+
+
+def test_radii_that_are_too_large_are_all_told() -> None:
+    corners: list[list[float]] = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [2, 1, 0], [2, 1.2, 0]]
+    assert faults(corners, [0, 0.6, 0.6, 0.3, 0], corner=True) == [
+        "row 3, column corner_r: found 0.6 and 0.6 m, whose arcs need 1.2 m on the line from row 2 to row 3,"
+        " allowed: its length, 1 m",
+        "row 4, column corner_r: found 0.3 m, whose arc needs 0.3 m on the line from row 4 to row 5,"
+        " allowed: its length, 0.2 m",
+    ]
+    assert faults([[0, 0, 0], [1, 0, 0], [1.1, 0.2, 0]], [0, 0.2, 0]) == [
+        "row 2, column r: found 0.2 m, a circle around row 3, allowed: up to 0.125 m"
+    ]
+
+
+@pytest.mark.parametrize(("corner", "column"), [(True, "corner_r"), (False, "r")])
+def test_arcs_need_a_plane_and_rows_a_place_of_their_own(corner: bool, column: str) -> None:
+    line: list[list[float]] = [[0, 0, 0], [1, 0, 0], [3, 0, 0], [4, 1, 0]]
+    assert faults(line, [0, 0.1, 0, 0], corner) == [
+        f"row 2, column {column}: found 0.1 m on one line with rows 1 and 3,"
+        " allowed: 0, or a point off that line"
+    ]
+    twice = [[0, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0]]
+    assert faults(twice, [0.1, 0, 0, 0.2], corner) == [
+        f"row 1, column {column}: found 0.1 m, allowed: 0, since a path starts and ends at rest",
+        f"row 4, column {column}: found 0.2 m, allowed: 0, since a path starts and ends at rest",
+        "row 3: found the point of row 2 again, allowed: a point away from it",
+        "row 4: found the point of row 3 again, allowed: a point away from it",
+    ]
+
+
+@given(st.floats(0.01, 3.0), st.floats(-1.0, 1.0), st.floats(0.01, 1.0))
+def test_the_largest_radius_is_that_through_the_next_row(a: float, x: float, y: float) -> None:
+    """Just below it there is a path, just above there is none."""
+    points = np.array([[-a, 0, 0], [0, 0, 0], [x, y, 0]])
+    most = (x * x + y * y) / (2.0 * y)
+    path_of(path_rows(points, 0.999 * most))
+    with pytest.raises(PathError):
+        path_of(path_rows(points, 1.001 * most))
