@@ -22,6 +22,10 @@ ROW_NS = 1_000_000_000
 """How much of `t_ns` a row without a time counts: `t` is then the number of the row from 0, and no time."""
 
 
+OWN = "urmpipe"
+"""The source of a file that urmpipe wrote: a joint log of inverse kinematics, or a plan."""
+
+
 SOLVED = "ik"
 """The source of a log that inverse kinematics made: a reader's name stands in others."""
 

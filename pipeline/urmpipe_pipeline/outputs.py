@@ -19,7 +19,7 @@ from urmpipe_pipeline.text import encodable
 
 OutputKind = Literal[
     "recording", "report", "map", "export", "audit", "junit", "statistics", "figure", "drawing", "fmu",
-    "joints", "system",
+    "joints", "plan", "system",
 ]  # fmt: skip
 
 NOUNS: dict[str, str] = {
@@ -31,7 +31,7 @@ NOUNS: dict[str, str] = {
 SUFFIXES: dict[OutputKind, tuple[str, ...]] = {
     "recording": (".rrd",), "report": (".html", ".htm"), "map": (".toml",), "audit": (".csv",),
     "junit": (".xml",), "statistics": (".csv",), "drawing": (".svg",), "fmu": (".fmu",), "joints": (".csv",),
-    "system": (".toml",),
+    "plan": (".csv",), "system": (".toml",),
 }  # fmt: skip
 """How a file of a kind is called; exports and figures say it by their formats."""
 
@@ -71,8 +71,8 @@ TARGET_ROW = "urmpipe_target_row"
 """The last column of a joint log of ours: the data row of each target. A log of anybody else has none of this
 name; a remark above the header would tell as well, but not every reader of CSV passes over it."""
 
-JOINTS = re.compile(rb"\A[^\n]*," + TARGET_ROW.encode() + rb"\r?\n")
-"""How the header of a joint log of ours ends."""
+PATH_ROW = "urmpipe_path_row"
+"""The last column of a plan of ours, likewise: the data row of the path that each sample belongs to."""
 
 GENERATION_TOOL = re.compile(rb"<fmiModelDescription\s[^>]*\sgenerationTool=\"urmpipe\b")
 """How the model description of an FMU of ours tells where it comes from."""
@@ -86,7 +86,10 @@ FIRST_LINES = {
 }  # fmt: skip
 _MARKS: dict[str, re.Pattern[bytes]] = {
     "figure": FIGURE,
-    "joints": JOINTS,
+    **{
+        kind: re.compile(rb"\A[^\n]*," + last.encode() + rb"\r?\n")
+        for kind, last in (("joints", TARGET_ROW), ("plan", PATH_ROW))
+    },
     **{kind: re.compile(re.escape(first.encode())) for kind, first in FIRST_LINES.items()},
 }
 """How the head of an output of ours matches, by kind."""

@@ -7,7 +7,8 @@ import math
 import click
 
 from urmpipe.options.grouped import Command, with_options
-from urmpipe.options.types import TIMES, OneOf, ParsedType, parsed, quantity
+from urmpipe.options.types import OneOf, ParsedType, parsed
+from urmpipe_models.measure_units import TIMES, quantity
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 
 

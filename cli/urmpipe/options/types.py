@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
 from urmpipe_models.errors import shown
-
-TIMES = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}
-LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
-ANGLES = {"": 1.0, "rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
-"""Units that a value on the command line may have behind it, in the SI unit; without one it is in that."""
+from urmpipe_models.measure_units import ANGLES, LENGTHS, TIMES, quantity
 
 
 class CatalogueType(click.ParamType[str]):
@@ -115,15 +111,6 @@ class ParsedType(click.ParamType[Any]):
         return parsed(self._parse, value, ctx, param) if isinstance(value, str) else value
 
 
-def quantity(text: str, units: Mapping[str, float]) -> float:
-    """Return a number with its unit behind it in SI; one without a unit is in SI; NaN if it is none."""
-    match = re.fullmatch(r"(.*?)\s*([a-z]*)", text.strip())
-    try:
-        return float(match[1]) * units[match[2]] if match else math.nan
-    except (ValueError, KeyError):
-        return math.nan
-
-
 class OffsetType(click.ParamType[Any]):
     """A frame as X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, or with units: 0,0,150mm."""
 
@@ -142,6 +129,26 @@ class OffsetType(click.ParamType[Any]):
             allowed = "X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0,150mm,0,0,90deg"
             self.fail(f"found {shown(value)}, allowed: {allowed}", param, ctx)
         return from_offset(values)
+
+
+class NumberType(click.ParamType[float]):
+    """A number in a unit that is not written behind it.
+
+    Args:
+        name: What the value is called in the help.
+        unit: The unit.
+    """
+
+    def __init__(self, name: str, unit: str) -> None:
+        self.name = name
+        self._unit = unit
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the number."""
+        try:
+            return float(value)
+        except ValueError:
+            self.fail(f"found {shown(value)}, allowed: a number of {self._unit}", param, ctx)
 
 
 class WholeType(click.ParamType[int]):

@@ -24,6 +24,7 @@ from urmpipe_pipeline.comparison.matching import (
     file_of,
     lacking,
     match,
+    without_robot,
 )
 from urmpipe_pipeline.comparison.measure import measure, unheld
 from urmpipe_pipeline.comparison.sync import SyncOption, check_sync, sync_doubts, synchronise
@@ -174,7 +175,7 @@ def _joints_alone(reference: Run, runs: Sequence[Run], options: CompareOptions) 
     if options.align == "none" and set(options.tolerance) == {"joint"}:
         return True
     hints = (JOINTS_ALONE,) if options.align == "none" else ()
-    raise LogError(*dict.fromkeys(lacking(run, *NO_ROBOT, *hints) for run in lacks))
+    raise LogError(*dict.fromkeys(without_robot(run, *hints) for run in lacks))
 
 
 def _taken_for_granted(reference: Run, runs: Sequence[Run], options: CompareOptions) -> tuple[str, ...]:

@@ -65,6 +65,7 @@ ORIENTED = "joints with a robot, or a recorded orientation"
 NO_ROBOT = ("no robot, so no forward kinematics", Hint("robot", None, "gives one"))
 """What a run without kinematics lacks, and what to give."""
 
+AS_RECORDED = Hint("tcp", "recorded", "goes by the recorded tool centre point")
 JOINTS_ALONE = Hint("tolerance", "joint=0.1deg", "judges the joints alone")
 """What else to give where both sides have joints."""
 
@@ -76,7 +77,7 @@ def by_kinematics(run: Run) -> Trajectory:
         LogError: If it has no kinematics.
     """
     if run.tcp is None or run.robot is None:
-        raise LogError(lacking(run, *NO_ROBOT))
+        raise LogError(without_robot(run))
     if run.rows is None:
         position, quat = run.tcp.position, quaternions(run.tcp.euler_zyx, "zyx")
     else:
@@ -169,6 +170,12 @@ def joints_apart(reference: Trajectory, joints: tuple[str, ...], units: tuple[st
     turning = [reference.joint_units[place] for place in order]
     apart = [name for name, *pair in zip(joints, units, turning, strict=True) if pair[0] != pair[1]]
     return f"{', '.join(apart)} turn on one side and slide on the other" if apart else ""
+
+
+def without_robot(run: Run, *hints: Hint) -> Finding:
+    """Return that a run has no kinematics, and what to give: a recorded tool centre point will do as well."""
+    recorded = run.log.tcp_position is not None and not run.log.measured
+    return lacking(run, *NO_ROBOT, *((AS_RECORDED,) if recorded else ()), *hints)
 
 
 def lacking(run: Run, message: str, *hints: Hint, parameter: str | None = None) -> Finding:

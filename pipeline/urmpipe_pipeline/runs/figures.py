@@ -53,7 +53,8 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
         return
     axis = "time" if run.timed else "the rows"
     joints = f"Joint values of {run.name} over {axis}: {', '.join(run.log.joints)}."
-    after = joint_panels(run, "after" if run.audit else "joints", run.q, times_of(run), _marks(run))
+    panels = partial(joint_panels, run.log.joints, run.joint_units)
+    after = panels("after" if run.audit else "joints", run.q, times_of(run), _marks(run))
     if not run.timed:
         said = "A pose a row: no motion joins them."
         yield Figure("Joints", said, joints, (View("Joints", after),), share=JOINTS_SHARE)
@@ -65,7 +66,7 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
         return
     wraps, doubts = len(run.repolarizations), len(run.audit) - len(run.repolarizations)
     marked = f"{wraps} marked{f', {doubts} doubtful' if doubts else ''}"
-    before = joint_panels(run, "before", run.log.q, run.log.t_ns, _raw_marks(run))
+    before = panels("before", run.log.q, run.log.t_ns, _raw_marks(run))
     both = View("Joints in the file", before), View(f"Joints repolarized ({marked})", after)
     count = text.counted(wraps, "repolarization")
     caption = f"First as in the file, then repolarized. {count}: a triangle marks each, up where a turn was"
@@ -77,19 +78,25 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
 
 
 def joint_panels(
-    run: Run, title: str, values: FloatArray, t_ns: IntArray | None, marks: Sequence[Mark] = (), per: str = ""
+    names: Sequence[str],
+    units: Sequence[str],
+    title: str,
+    values: FloatArray,
+    t_ns: IntArray | None,
+    marks: Sequence[Mark] = (),
+    per: str = "",
 ) -> tuple[Panel, ...]:
     """Return joints over time, a panel for those that turn and one for those that slide.
 
     Args:
-        run: Whose joints they are.
+        names: Of the joints.
+        units: Of each, rad or m.
         title: What is plotted of them.
         values: In rad and m, divided by `per`, shape (n, joints).
         t_ns: Times in [ns], shape (n,); None: the rows are points.
         marks: Marks on them, by the names of the joints.
         per: "", "/s" or "/s2".
     """
-    names, units = run.log.joints, run.joint_units
     panels = []
     for unit in dict.fromkeys(units):
         own = [j for j, other in enumerate(units) if other == unit]
@@ -151,8 +158,9 @@ def coordinates(values: FloatArray) -> Line:
 
 def _derivatives(run: Run) -> Iterator[View]:
     if run.timed and run.log.joints and len(run.t_ns) > 1:
-        yield View("Joint rates", joint_panels(run, "rates", run.qd, run.t_ns, per="/s"))
-        yield View("Joint accelerations", joint_panels(run, "accelerations", run.qdd, run.t_ns, per="/s2"))
+        panels = partial(joint_panels, run.log.joints, run.joint_units)
+        yield View("Joint rates", panels("rates", run.qd, run.t_ns, per="/s"))
+        yield View("Joint accelerations", panels("accelerations", run.qdd, run.t_ns, per="/s2"))
 
 
 def _point(run: Run, tcp: PointLog) -> Iterator[View]:

@@ -8,7 +8,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_pipeline import text
-from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.joint_log import OWN, JointLog, LogWarning
 from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, SAMPLES, spread
 
 RECORDED_START = "recorded-tcp-start"
@@ -22,12 +22,13 @@ def outlying_start(robot: Chain | None, log: JointLog) -> tuple[int, float]:
 
     Elsewhere is in the frame of the tip, where a tool stays: the offset from the kinematics is there
     `CLEARLY` times further from the usual one than in any row that follows, and further than a calibration
-    makes. It is told in [m] as the median of these rows; inf of points of three zeros, which are none.
+    makes. It is told in [m] as the median of these rows; inf of points of three zeros, which are none
+    but in a plan.
     """
     if log.tcp_position is None or log.measured or log.rows < LEAST_ROWS:
         return 0, 0.0
     first = log.tcp_position[0]
-    zeros = 0 if first.any() else int(np.argmax(log.tcp_position.any(axis=1)))
+    zeros = 0 if first.any() or log.source == OWN else int(np.argmax(log.tcp_position.any(axis=1)))
     if robot is None or log.q.shape[1] != len(robot.moving):
         return zeros, np.inf
     rows, apart = _by_tool(robot, log, zeros)

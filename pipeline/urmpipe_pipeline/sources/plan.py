@@ -11,14 +11,21 @@ from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.clock import Clock, find_clocks
 from urmpipe_pipeline.sources.clocks.time_file import clock_of_file, time_file
-from urmpipe_pipeline.sources.columns.columns import Column, columns_of, given_units, refuse_twins
+from urmpipe_pipeline.sources.columns.columns import (
+    Column,
+    columns_named,
+    columns_of,
+    given_units,
+    refuse_twins,
+)
+from urmpipe_pipeline.sources.columns.own_log import own_joints
 from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_header
 from urmpipe_pipeline.sources.columns.roles import Roles, assign, joint_inference
 from urmpipe_pipeline.sources.columns.sides import of_side
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH, Tables
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.vocabulary import Unit
+from urmpipe_pipeline.sources.vocabulary import Patterns, Unit
 
 SHOWN_LOGS = 6
 """Files that are named where several logs stand for one."""
@@ -60,8 +67,20 @@ class Plan:
         return list(dict.fromkeys(column.table for column in self.roles.columns))
 
 
-def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan:
+def make_plan(
+    tables: Tables,
+    options: ReadOptions,
+    robot: Chain | None,
+    further: Mapping[str, Patterns] | None = None,
+) -> Plan:
     """Return what is to be read of a log's tables.
+
+    Args:
+        tables: The tables.
+        options: What the user says.
+        robot: The arm, or None.
+        further: Names of columns that are read beside the usual ones, by what they are: they are neither
+            a time nor anything else.
 
     Raises:
         LogError: If clock or joints cannot be told.
@@ -69,6 +88,8 @@ def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan
     """
     columns = columns_of(tables.layouts, tables.titles)
     units = given_units(columns, options)
+    beside = columns_named(columns, tables.layouts, further or {})
+    columns = tuple(column for column in columns if column not in beside.values())
     apart = None if options.time else time_file(tables, columns)
     if apart is None:
         clocks = find_clocks(tables, columns, options, units, len(robot.coordinates) if robot else None)
@@ -83,6 +104,7 @@ def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan
     rest = of_side(rest, options.side, tables.layouts[0].file)
     only = None if apart is None else 1 - apart
     roles = _renamed(_roles(rest, tables, options, robot, only), options.names)
+    roles = replace(roles, further=beside)
     if options.poses:
         return Plan(tables, clocks, roles, units, poses=True)
     told = options.period is not None or options.time not in (None, "none") or apart is not None
@@ -116,7 +138,9 @@ def _roles(
     if plots is not None:
         return _plots(*plots, tables)
     try:
-        roles = _by_names(columns, tables.layouts, options, robot)
+        ours = tables.known is not None and tables.known.own and not (tables.foreign or options.joints)
+        own = own_joints(columns) if ours else None
+        roles = _by_names(columns, tables.layouts, options, robot, own)
     except LogError:
         if several:
             _refuse_several_logs(columns, tables, options, robot)
@@ -127,10 +151,15 @@ def _roles(
 
 
 def _by_names(
-    columns: Sequence[Column], layouts: Sequence[Layout], options: ReadOptions, robot: Chain | None
+    columns: Sequence[Column],
+    layouts: Sequence[Layout],
+    options: ReadOptions,
+    robot: Chain | None,
+    own: tuple[Column, ...] | None = None,
 ) -> Roles:
-    """Return the roles of columns with names, each of which is there once."""
-    roles = assign(columns, layouts, options, robot, path=options.source == PATH)
+    """Return the roles of columns with names, each there once; a log of our own without joints is a path."""
+    path = options.source == PATH or own == ()
+    roles = assign(columns, layouts, options, robot, path=path, written=() if path else own or ())
     if not options.joints:
         refuse_twins(roles.joints, columns, layouts, Hint("joints", None, "says which: give their numbers"))
     refuse_twins(

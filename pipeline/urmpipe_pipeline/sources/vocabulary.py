@@ -49,11 +49,13 @@ class KnownSource:
         name: Its name.
         columns: Patterns that must each match a column's name; none if nothing gives it away.
         units: Unit of a quantity where a column's name does not say its own.
+        own: Whether urmpipe itself writes it: what it says of its columns is no matter of doubt.
     """
 
     name: str
     columns: Patterns
     units: Mapping[str, Unit]
+    own: bool = False
 
     def wrote(self, names: Sequence[str]) -> bool:
         """Return whether a file with these column names comes from this source."""
@@ -101,6 +103,7 @@ class Vocabulary:
     tcp_pose_vector: Patterns
     tcp_matrix: Patterns
     tcp_rotations: tuple[RotationWords, ...]
+    path: Mapping[str, Patterns]
     units: Mapping[str, Unit]
     missing: frozenset[str]
     sources: tuple[KnownSource, ...]
@@ -151,11 +154,15 @@ def vocabulary() -> Vocabulary:
         tcp_rotations=tuple(
             RotationWords(_compiled(one["patterns"]), tuple(one["forms"])) for one in tcp["rotation"]
         ),
+        path={name: _compiled(patterns) for name, patterns in data["path"].items()},
         units=units,
         missing=frozenset(data["missing"]["words"]),
         sources=tuple(
             KnownSource(
-                one["name"], _compiled(one["columns"]), {of: units[u] for of, u in one["units"].items()}
+                one["name"],
+                _compiled(one["columns"]),
+                {of: units[u] for of, u in one["units"].items()},
+                one.get("own", False),
             )
             for one in data["source"]
         ),

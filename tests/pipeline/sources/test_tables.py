@@ -282,6 +282,7 @@ def test_source_names() -> None:
     assert source_names() == (
         *(
             "coppeliasim",
+            "urmpipe",
             "ur-rtde",
             "libfranka",
             "ros",

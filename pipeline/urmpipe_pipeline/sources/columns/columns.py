@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
@@ -11,7 +11,7 @@ from urmpipe_models.messages import Hint
 from urmpipe_pipeline.sources.cells.cell import is_missing, is_text
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.vocabulary import Quantity, Unit, key, split_unit, vocabulary
+from urmpipe_pipeline.sources.vocabulary import Patterns, Quantity, Unit, key, split_unit, vocabulary
 
 _NAME_COLUMN = re.compile(r"(?P<before>.*?)name_?(?P<n>\d+)\Z")
 _NUMBERED = re.compile(r"(?P<before>.*?)(position|velocity|effort)_?(?P<n>\d+)\Z")
@@ -135,6 +135,28 @@ def columns_called(columns: Sequence[Column], text: str) -> list[Column]:
     exact = [column for column in columns if text in (column.header, column.name)]
     found = exact or [column for column in columns if key(text) == column.key != ""]
     return found or [column for column in columns if text == str(column.number)]
+
+
+def columns_named(
+    columns: Sequence[Column], layouts: Sequence[Layout], patterns: Mapping[str, Patterns]
+) -> dict[str, Column]:
+    """Return the columns whose names match patterns, by what the patterns are of.
+
+    Raises:
+        LogError: If several match the same, each of them named.
+    """
+    found = {
+        what: [column for column in columns if any(pattern.search(column.key) for pattern in alike)]
+        for what, alike in patterns.items()
+    }
+    several = [
+        Finding(f"found {listed(some)}, allowed: one of them", layouts[some[0].table].file)
+        for some in found.values()
+        if len(some) > 1
+    ]
+    if several:
+        raise LogError(*several)
+    return {what: some[0] for what, some in found.items() if some}
 
 
 def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Unit]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError
@@ -38,6 +38,7 @@ class Roles:
         inferences: What was found out.
         warnings: What a person should know.
         measured: Whether the tool centre point was measured from outside, in a frame of its own.
+        further: What else was asked for, by what it is.
     """
 
     joints: tuple[Column, ...] = ()
@@ -49,6 +50,7 @@ class Roles:
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
     measured: bool = False
+    further: Mapping[str, Column] = field(default_factory=dict)
 
     @property
     def groups(self) -> tuple[tuple[Column, ...], ...]:
@@ -57,8 +59,8 @@ class Roles:
 
     @property
     def columns(self) -> tuple[Column, ...]:
-        """All of them."""
-        return tuple(column for group in self.groups for column in group)
+        """All of them, what else was asked for at the end."""
+        return (*(column for group in self.groups for column in group), *self.further.values())
 
 
 def assign(
@@ -68,6 +70,7 @@ def assign(
     robot: Chain | None,
     *,
     path: bool = False,
+    written: tuple[Column, ...] = (),
 ) -> Roles:
     """Return the roles of the columns of a table with a header.
 
@@ -80,16 +83,18 @@ def assign(
         layouts: The tables.
         options: What the user says: joint columns, position, orientation.
         robot: The arm, or None.
-        path: The user says that it is a path: joints are not looked for.
+        path: It is a path, as the user says: joints are not looked for.
+        written: The joints of a log that urmpipe wrote.
 
     Raises:
         LogError: If the joints cannot be told, or are too few or too many for the robot.
     """
     file = layouts[0].file
     numeric = [column for column in columns if (path or not column.text) and not column.counts_rows]
-    if options.joints:
-        joints = tuple(find_column(columns, text, parameter="joints") for text in options.joints)
-        found = _Joints(joints, "given as an option", *_family_of(joints))
+    if options.joints or written:
+        joints = written or tuple(find_column(columns, text, parameter="joints") for text in options.joints)
+        evidence = "urmpipe wrote them" if written else "given as an option"
+        found = _Joints(joints, evidence, *_family_of(joints))
         pose = chosen_pose(columns, options) or find_pose([c for c in numeric if c not in joints], layouts)
     else:
         own = () if path else _called_as_joints(numeric, robot)

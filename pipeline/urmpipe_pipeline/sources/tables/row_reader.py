@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -109,7 +109,7 @@ class RowReader:
         layout: How the table is written.
         columns: Which columns hold numbers.
         clock: The columns of its clock.
-        allowed: What a cell may hold, for messages.
+        allowed: What a cell of a column may hold, for messages, where it is not as in a log.
         ended: Whether the next rows are not to be read: they are those of a second log.
     """
 
@@ -118,12 +118,12 @@ class RowReader:
         layout: Layout,
         columns: Sequence[int],
         clock: Sequence[ClockColumn],
-        allowed: str = MAY_BE_MISSING,
+        allowed: Mapping[int, str] | None = None,
     ) -> None:
         self.layout = layout
         self.columns = columns
         self.clock = clock
-        self.allowed = allowed
+        self.allowed = allowed or {}
         self._faults: list[_Fault] = []
         self._lasting: list[_Fault] = []
         self._wrong = 0
@@ -268,7 +268,8 @@ class RowReader:
         value = to_float(cells[column], self.layout.decimal)
         if value is not None:
             return value
-        self._report(f"found {_shown(cells[column])}, allowed: {self.allowed}", self.layout.names[column])
+        allowed = self.allowed.get(column, MAY_BE_MISSING)
+        self._report(f"found {_shown(cells[column])}, allowed: {allowed}", self.layout.names[column])
         return math.nan
 
     def _report(self, message: str, column: str | None = None, *, lasting: bool = False) -> None:

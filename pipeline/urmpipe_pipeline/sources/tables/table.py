@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.tables.block_parser import Scales, clock_scales, parse_block
 from urmpipe_pipeline.sources.tables.blocks import byte_encoding, end_of_rows, row_blocks
 from urmpipe_pipeline.sources.tables.numbers import ClockColumn, Numbers
-from urmpipe_pipeline.sources.tables.row_reader import MAY_BE_MISSING, RowReader
+from urmpipe_pipeline.sources.tables.row_reader import RowReader
 from urmpipe_pipeline.sources.tables.sniff import Layout
 
 READ_BY_ROW = 1 << 16
@@ -20,12 +20,16 @@ READ_BY_ROW = 1 << 16
 
 
 def read_table(
-    layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn], allowed: str = MAY_BE_MISSING
+    layout: Layout,
+    columns: Sequence[int],
+    clock: Sequence[ClockColumn],
+    allowed: Mapping[int, str] | None = None,
 ) -> Numbers:
     """Return the numbers of some columns, with a finding for each row and cell that holds none.
 
     Read row by row is also what the parser refuses though it is sound: blanks as missing samples, 1.5d0,
     comments. The values of the clock in [ns] are added; if they are text, their cells are read as they are.
+    What a cell may hold is told as in a log, or by its column in other words.
     """
     reader = RowReader(layout, columns, clock, allowed)
     scales = clock_scales(layout, clock)

@@ -7,12 +7,12 @@ rows of a table of targets stand each for itself.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference, LogWarning
@@ -21,14 +21,35 @@ from urmpipe_pipeline.sources.checks import find_errors, rebuilt, unknown_times
 from urmpipe_pipeline.sources.clocks.clock import PAPER_PERIOD, Clock
 from urmpipe_pipeline.sources.clocks.text_times import timed
 from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, Numbers, RowFault
 from urmpipe_pipeline.sources.tables.row_reader import data_lines
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.table import read_table
+from urmpipe_pipeline.sources.vocabulary import Patterns
 
 ALLOWED = "a finite number"
-"""What the cells of such a table may hold."""
+"""What the cells of a pose may hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class Further:
+    """A column beside the poses.
+
+    Attributes:
+        patterns: Of its name.
+        allowed: What a cell may hold, in words.
+        fits: Returns which numbers, in the file's own unit and of shape (n,), a cell may hold.
+        empty: What an empty cell stands for, in SI.
+        length: Whether it holds lengths.
+    """
+
+    patterns: Patterns
+    allowed: str
+    fits: Callable[[FloatArray], BoolArray]
+    empty: float
+    length: bool
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,56 +61,66 @@ class Rows:
             without meaning.
         clock: Times in [ns] on the file's clock, shape (n,); None without one. A row whose own time is
             not known stands between its neighbours.
-        faults: Data row from 1, and what is wrong with it in one line.
+        faults: Data row from 1, and all that is wrong with it.
         inferences: What was found out about the clock.
         warnings: What a person should know about the clock.
     """
 
     values: FloatArray
     clock: IntArray | None
-    faults: Mapping[int, str]
+    faults: Mapping[int, Sequence[RowFault]]
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
 
 
-def read_rows(plan: Plan) -> Rows:
+def read_rows(plan: Plan, further: Mapping[str, Further]) -> Rows:
     """Return the rows that a plan asks for, all in one table, with a fault where a row cannot be used.
 
-    A fault is a row that is not written like the others, a cell that is no finite number or a time that
-    is missing. Times that repeat or run backwards are an error of the file, as in a log: nothing tells
-    which of two rows is wrong.
+    A fault is a row that is not written like the others, a cell that holds no finite number, or in a further
+    column none that fits, or a time that is missing. Times that repeat or run backwards are an error of the
+    file, as in a log: nothing tells which of two rows is wrong.
 
     Raises:
         LogError: If there is no row, with what leaving out rows does not mend (the header again), or if the
             known times are no clock.
     """
-    columns = plan.roles.columns
     layout, clock = plan.tables.layouts[plan.main], plan.clocks[plan.main]
-    places = [column.index for column in columns]
-    read = read_table(layout, places, clock.parts, ALLOWED)
+    places = [column.index for column in plan.roles.columns]
+    allowed = dict.fromkeys(places, ALLOWED)
+    allowed |= {column.index: further[name].allowed for name, column in plan.roles.further.items()}
+    read = read_table(layout, places, clock.parts, allowed)
     if read.lasting:
         raise LogError(*read.lasting)
     numbers = _without_blank_end(layout, timed(layout, clock.parts, read))
     if not len(numbers.values):
         raise LogError(Finding("found no row with a number, allowed: at least one", layout.file))
-    faults = _faults(numbers, columns, clock)
+    faults = _faults(numbers, plan.roles, further, clock)
     times, about = _whole_clock(layout, numbers, clock)
     return Rows(numbers.values, times, faults, about.inferences, about.warnings)
 
 
-def _faults(numbers: Numbers, columns: Sequence[Column], clock: Clock) -> dict[int, str]:
-    """Return what is wrong with rows, in their order: all of it, each in one line."""
+def _faults(
+    numbers: Numbers, roles: Roles, further: Mapping[str, Further], clock: Clock
+) -> dict[int, list[RowFault]]:
+    """Return what is wrong with rows, in their order: all of it."""
     faults = {row + 1: list(of_row) for row, of_row in numbers.unread.items()}
     for one in unknown_times(numbers, clock):
         faults.setdefault(one.row or 0, []).append(RowFault(one.message, (one.column or "",)))
-    for row in np.flatnonzero(~np.isfinite(numbers.values).all(axis=1)).tolist():
+    beside = len(roles.further)
+    poses, others = np.split(numbers.values, [len(roles.columns) - beside], axis=1)
+    for row in np.flatnonzero(~np.isfinite(poses).all(axis=1)).tolist():
         told = faults.setdefault(row + 1, [])
         if not all(fault.columns for fault in told):
             continue  # the row as a whole
         reported = {name for fault in told for name in fault.columns}
-        cells = zip(columns, numbers.values[row].tolist(), strict=True)
+        cells = zip(roles.columns, poses[row].tolist(), strict=False)
         told += _not_finite((c, value) for c, value in cells if c.header not in reported)
-    return {row: "; ".join(map(str, faults[row])) for row in sorted(faults)}
+    for (name, column), values in zip(roles.further.items(), others.T, strict=True):
+        fits = further[name].fits(values) | np.isnan(values)
+        for row in np.flatnonzero(~fits).tolist():
+            said = f"found {values[row]:g}, allowed: {further[name].allowed}"
+            faults.setdefault(row + 1, []).append(RowFault(said, (column.header,)))
+    return {row: faults[row] for row in sorted(faults)}
 
 
 def _not_finite(cells: Iterable[tuple[Column, float]]) -> Iterator[RowFault]:

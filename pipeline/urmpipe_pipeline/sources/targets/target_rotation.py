@@ -14,7 +14,7 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, listed
 from urmpipe_pipeline.sources.columns.pose import ORTHOGONAL
 from urmpipe_pipeline.sources.columns.roles import Roles
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables.numbers import RowFault
 from urmpipe_pipeline.sources.units.rotation import PURE
 from urmpipe_pipeline.sources.units.unit_hints import unit_hints
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
@@ -31,31 +31,29 @@ MAP = Hint("log_map", None, 'says which: [tcp] position = ["X", "Y", "Z"], orien
 _OURS = frozenset(("rx", "ry", "rz"))
 _KUKA = frozenset("abc")
 
-FEWEST = 3
-"""An orientation has at least so many columns."""
-
 
 def target_form(
-    roles: Roles, columns: Sequence[Column], file: str, options: ReadOptions
+    roles: Roles, unused: Sequence[Column], file: str, given: RotationForm | None, *, named: bool
 ) -> tuple[RotationForm | None, list[LogWarning]]:
-    """Return the form of the targets' orientation, None if they are positions, and what was assumed.
+    """Return the form of an orientation, None if the rows are positions, and what was assumed.
 
     rz, ry, rx are angles about the moving axes Z, Y, X; a header in the order rx, ry, rz may also mean a
     rotation vector, as UR writes: it is taken as the angles, with a warning.
+
+    Args:
+        roles: What the columns are.
+        unused: The columns that are nothing.
+        file: The file, for errors.
+        given: The form that the user gives.
+        named: Whether the user names the columns of the pose.
 
     Raises:
         LogError: If only a part of an orientation is there, its form cannot be told, or it is told of none.
     """
     found = roles.rotation
     if not found:
-        unused = [column for column in columns if column not in roles.columns]
-        if options.rotation:
-            said = f"{options.rotation} given for {listed(roles.position)} and no orientation"
-            allowed = "its columns beside them"
-            raise LogError(
-                Finding(file=file, parameter="rotation", found=said, allowed=allowed, hints=(MAP,))
-            )
-        return None, [] if options.position else _without_orientation(roles, unused, file)
+        _refuse_half(roles, unused, file, given, named=named)
+        return None, []
     if len(roles.forms) == 1:
         return roles.forms[0], []
     if not all(column.words & _OURS for column in found):
@@ -94,13 +92,13 @@ def rotation_units(
 
 def target_rotations(
     columns: Sequence[Column], form: RotationForm, values: FloatArray
-) -> tuple[FloatArray, dict[int, str]]:
+) -> tuple[FloatArray, dict[int, RowFault]]:
     """Return the rotation matrices [-], shape (n, 3, 3), and by index what is wrong with rows that hold none.
 
     Values are in [rad] or [-], shape (n, columns); a row with NaN stays NaN and is not told of.
     """
-    names = f"columns {listed(columns)}"
-    faults = {row: f"{names}: {said}" for row, said in _no_rotations(values, form)}
+    names = tuple(column.header for column in columns)
+    faults = {row: RowFault(said, names) for row, said in _no_rotations(values, form)}
     sound = values.copy()
     sound[list(faults)] = np.nan
     return matrices(quaternions(sound, form)), faults
@@ -122,20 +120,21 @@ def _no_rotations(values: FloatArray, form: RotationForm) -> Iterator[tuple[int,
             yield row, f"found {found}, allowed: a rotation, {ORTHOGONAL:g} off at most, det R = 1"
 
 
-def _without_orientation(roles: Roles, unused: Sequence[Column], file: str) -> list[LogWarning]:
-    """Warn if enough columns are left for an orientation; refuse some that are called as a part of one."""
-    half = [column for column in unused if _is_part(column)]
+def _refuse_half(
+    roles: Roles, unused: Sequence[Column], file: str, given: RotationForm | None, *, named: bool
+) -> None:
+    """Raise a `LogError` if a form is given for positions, or half an orientation stands beside them."""
+    if given:
+        said, allowed = (
+            f"{given} given for {listed(roles.position)} and no orientation",
+            "its columns beside them",
+        )
+        raise LogError(Finding(file=file, parameter="rotation", found=said, allowed=allowed, hints=(MAP,)))
+    half = [] if named else [column for column in unused if _is_part(column)]
     if half:
         said = f"found {listed(half)} as a part of an orientation"
         allowed = "all of rz, ry, rx or of qx, qy, qz, qw, or none"
         raise LogError(Finding(f"{said}, allowed: {allowed}", file, hints=(MAP,)))
-    numbers = [column for column in unused if not column.text and not column.counts_rows]
-    if len(numbers) < FEWEST:
-        return []
-    said = (
-        f"{listed(roles.position)} are targets without an orientation: {listed(numbers, most=8)} are not used"
-    )
-    return [LogWarning("columns-not-used", said, hints=(MAP,))]
 
 
 def _is_part(column: Column) -> bool:

@@ -11,7 +11,7 @@ from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.units.unit_hints import unit_hints
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Quantity, Unit, vocabulary
 
-Teller = Literal["column", "name", "every angle", "source", "given source"]
+Teller = Literal["column", "name", "every angle", "source", "given source", "urmpipe"]
 
 GIVEN = "given as an option"
 
@@ -22,8 +22,8 @@ class Told:
 
     Attributes:
         unit: The unit.
-        by: Who tells it: the user of this very column, its name, the user of every angle, the source, or the
-            source as the user gave it.
+        by: Who tells it: the user of this very column, its name, the user of every angle, the source, the
+            source as the user gave it, or its name in a file that urmpipe wrote.
         evidence: The same in words.
     """
 
@@ -35,6 +35,11 @@ class Told:
     def given(self) -> bool:
         """Whether the user told it."""
         return self.by in ("column", "every angle", "given source")
+
+    @property
+    def certain(self) -> bool:
+        """Whether it is not to be doubted: the user told it, or urmpipe wrote it."""
+        return self.given or self.by == "urmpipe"
 
     @property
     def by_source(self) -> bool:
@@ -100,7 +105,8 @@ class Tellers:
         every = self.given.get(0) if "angle" in allowed else None
         own = self.own(column, allowed[0]) if every is None else column.unit
         if own is not None and own.quantity != "time" and own != every:
-            return Told(own, "name", "its name")
+            ours = self.source is not None and self.source.own
+            return Told(own, "urmpipe" if ours else "name", "its name")
         if every is not None:
             return Told(every, "every angle", GIVEN)
         default = self.source.units.get(allowed[0]) if self.source else None

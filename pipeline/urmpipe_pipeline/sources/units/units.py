@@ -129,7 +129,7 @@ class UnitFinder:
             units = self._joints_by_themselves(columns, told, values, t_ns, robot)
             proved = (False,) * len(columns)
         for name in ("rad", "deg"):
-            group = [j for j, one in enumerate(told) if one and not one.given and units[j].name == name]
+            group = [j for j, one in enumerate(told) if one and not one.certain and units[j].name == name]
             unproved = [j for j in group if not proved[j]]
             if unproved:
                 mine = values if len(unproved) == len(columns) else values[:, unproved]
@@ -168,7 +168,7 @@ class UnitFinder:
             hints = which_unit(columns, "m", every=False) if far else unit_hints(columns[:1], OTHER_UNIT["m"])
             self._assume(some, vocabulary().units["m"], POSITIONS, hints, why, asks=far)
         units = [unit or rest or vocabulary().units["m"] for unit in known]
-        by = {one for one in told if one and not one.given}
+        by = {one for one in told if one and not one.certain}
         if by and len(set(units)) == 1:
             self._doubt_lengths(columns, by, units[0], furthest)
         return units

@@ -1,0 +1,246 @@
+"""A table with a pose or a position a row, and columns beside it: targets, and the rows of a path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.messages import Hint
+from urmpipe_models.orientation import FORMS, RotationForm, width
+from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.sources.columns.columns import Column, columns_of, listed
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.plan import Plan, make_plan
+from urmpipe_pipeline.sources.tables.numbers import RowFault
+from urmpipe_pipeline.sources.tables.opening import PATH, open_tables
+from urmpipe_pipeline.sources.targets.row_faults import Further, Rows, read_rows
+from urmpipe_pipeline.sources.targets.sniff_targets import sniff_targets
+from urmpipe_pipeline.sources.targets.target_rotation import rotation_units, target_form, target_rotations
+from urmpipe_pipeline.sources.units.rotation import form_inference
+from urmpipe_pipeline.sources.units.told import Tellers
+from urmpipe_pipeline.sources.units.unit_hints import unit_inference
+from urmpipe_pipeline.sources.units.units import LONGEST_REACH, UnitFinder
+from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseTable:
+    """The rows of a table, in SI.
+
+    Attributes:
+        plan: What was read of which columns.
+        position: In [m], shape (n, 3); NaN in a row with a fault of its pose.
+        rotation: Matrices [-], shape (n, 3, 3), NaN in a row with a fault; None if the table has positions
+            only.
+        further: What stands beside the pose, by what it is: in [m] or [-], shape (n,).
+        clock: Times in integer [ns] on the table's clock, shape (n,); None without one.
+        faults: Data row from 1, and all that is wrong with it.
+        inferences: What was found out about the table.
+        warnings: What a person should know about it.
+    """
+
+    plan: Plan
+    position: FloatArray
+    rotation: FloatArray | None
+    further: Mapping[str, FloatArray]
+    clock: IntArray | None
+    faults: Mapping[int, Sequence[RowFault]]
+    inferences: tuple[Inference, ...]
+    warnings: tuple[LogWarning, ...]
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    @property
+    def unused(self) -> list[Column]:
+        """The columns that are neither a time nor have a role."""
+        return _unused(self.plan)
+
+    @property
+    def unused_numbers(self) -> list[Column]:
+        """Those of numbers, but for one that counts the rows."""
+        return [column for column in self.unused if not column.text and not column.counts_rows]
+
+
+def read_pose_table(
+    file: Path,
+    options: ReadOptions,
+    further: Mapping[str, Further] | None = None,
+    naming: str = "name the columns in a header",
+) -> PoseTable:
+    """Return the rows of a table: x, y, z, where it has one the orientation, and further columns.
+
+    Lengths are in m and angles in rad where neither the header nor the options tell; rz, ry, rx mean
+    R = Rz Ry Rx. A further length whose own name tells no unit is in that of x, y, z.
+
+    Args:
+        file: A text table, as a log may be.
+        options: What the user says where the file need not, or cannot, tell; what it says about joints is
+            not asked.
+        further: The columns to look for beside the poses, by what they are.
+        naming: What helps where columns have no names.
+
+    Raises:
+        LogError: If the file as a whole is wrong: no x, y, z, an unknown unit, no row, a clock that repeats
+            or runs backwards.
+        OptionError: If an option's value makes no sense.
+    """
+    further = further or {}
+    asked, length = _plain_length(replace(options, joints=(), names=(), signs=(), offsets=()))
+    tables = open_tables([file], asked, partial(sniff_targets, position=asked.position))
+    names = {name: one.patterns for name, one in further.items()}
+    plan = make_plan(tables, replace(asked, source=PATH), None, names)
+    if length is not None:  # what a column's own option says comes first
+        plain = dict.fromkeys((column.number for column in plan.roles.position), length)
+        plan = replace(plan, units={**plain, **plan.units})
+    named = bool(asked.position)
+    _refuse_unclear(plan, naming, named=named, timed=asked.time is not None)
+    form, assumed = target_form(plan.roles, _unused(plan), str(file), asked.rotation, named=named)
+    rows = read_rows(plan, further)
+    poses = _poses(plan, rows, form, further)
+    return replace(
+        poses,
+        inferences=(*_about_file(plan), *rows.inferences, *poses.inferences),
+        warnings=(*plan.clock.warnings, *rows.warnings, *assumed, *poses.warnings),
+    )
+
+
+def _plain_length(asked: ReadOptions) -> tuple[ReadOptions, Unit | None]:
+    """Return the options without a plain length (mm), and that unit, which is of x, y, z here."""
+    unit = vocabulary().unit(asked.unit.get("", ""))
+    if unit is None or unit.quantity != "length" or unit.order:
+        return asked, None
+    return replace(asked, unit={name: one for name, one in asked.unit.items() if name}), unit
+
+
+def _unused(plan: Plan) -> list[Column]:
+    """Return the columns that are neither a time nor have a role."""
+    used = {*plan.clock.columns, *plan.roles.columns}
+    return [column for column in columns_of(plan.tables.layouts, plan.tables.titles) if column not in used]
+
+
+def _poses(plan: Plan, rows: Rows, form: RotationForm | None, further: Mapping[str, Further]) -> PoseTable:
+    """Return the rows in SI, the pose of a row with a fault as NaN, and what was found out about units."""
+    finder = UnitFinder(Tellers(plan.units, plan.tables.known, str(plan.tables.paths[plan.main])))
+    columns = plan.roles.rotation
+    placed, turned, others = np.split(rows.values.copy(), [3, 3 + len(columns)], axis=1)
+    for part in (placed, turned):
+        part[_without_pose(plan, rows)] = np.nan
+    lengths, warnings = _length_units(plan, finder, placed)
+    position = placed * [unit.factor for unit in lengths]
+    beside, told = _further(plan, finder, others, further, lengths)
+    table = PoseTable(plan, position, None, beside, rows.clock, rows.faults, (), tuple(warnings))
+    if form is None:
+        return replace(table, inferences=(*finder.inferences, *told))
+    by_name = [one.unit if one else None for one in finder.rotations(columns, (form,))]
+    units, assumed = rotation_units(columns, form, _finite(turned), by_name)
+    rotation, none = target_rotations(columns, form, turned * [unit.factor for unit in units])
+    position[list(none)] = np.nan
+    faults = {row: [*rows.faults.get(row, ())] for row in sorted({*rows.faults, *(k + 1 for k in none)})}
+    for index, fault in none.items():
+        faults[index + 1].append(fault)
+    found = form_inference([column.header for column in columns], form, units[0], "their names, or as given")
+    return replace(
+        table,
+        rotation=rotation,
+        faults=faults,
+        inferences=(*finder.inferences, *told, found),
+        warnings=(*warnings, *assumed),
+    )
+
+
+def _without_pose(plan: Plan, rows: Rows) -> list[int]:
+    """Return the rows, from 0, in which something else is wrong than a further column."""
+    beside = {column.header for column in plan.roles.further.values()}
+    return [
+        row - 1
+        for row, faults in rows.faults.items()
+        if not all(fault.columns and beside.issuperset(fault.columns) for fault in faults)
+    ]
+
+
+def _length_units(plan: Plan, finder: UnitFinder, values: FloatArray) -> tuple[list[Unit], list[LogWarning]]:
+    """Return the units of x, y, z, m where none is told, and a warning if no row can be in m then.
+
+    What reaches further than an arm in m is a target out of reach.
+    """
+    columns = plan.roles.position
+    units = finder.positions(columns, np.zeros((1, 3)))
+    source = plan.tables.known.units if plan.tables.known else {}
+    told = "length" in source or any(one.unit or one.number in plan.units for one in columns)
+    nearest = np.abs(_finite(values)).max(axis=1).min(initial=np.inf)
+    if told or not LONGEST_REACH < nearest < np.inf:
+        return units, []
+    said = f"no unit is given for {listed(columns)}: they are taken as m, though every row is beyond any arm"
+    hints = (Hint("unit", {"": "mm"}, "reads them otherwise"),)
+    return units, [LogWarning("assumed-unit", said, hints=hints)]
+
+
+def _further(
+    plan: Plan,
+    finder: UnitFinder,
+    values: FloatArray,
+    further: Mapping[str, Further],
+    lengths: Sequence[Unit],
+) -> tuple[dict[str, FloatArray], list[Inference]]:
+    """Return what stands beside the poses in SI, and the units that columns share with x, y, z."""
+    found, said = {}, []
+    for (name, column), cells in zip(plan.roles.further.items(), values.T, strict=True):
+        factor = 1.0
+        if further[name].length and finder.tellers.of(column, ("length",)):
+            factor = finder.positions([column], np.zeros((1, 1)))[0].factor
+        elif further[name].length:
+            factor = lengths[0].factor
+            said.append(unit_inference([column], lengths[0].name, "as x, y, z", every=False))
+        found[name] = np.where(np.isnan(cells), further[name].empty, cells * factor)
+    return found, said
+
+
+def _finite(values: FloatArray) -> FloatArray:
+    """Return the rows without NaN."""
+    return values[np.isfinite(values).all(axis=1)]
+
+
+def _refuse_unclear(plan: Plan, naming: str, *, named: bool, timed: bool) -> None:
+    """Raise if columns without names are left over, or the orientation stands in another table.
+
+    Args:
+        plan: What is to be read.
+        naming: What helps where columns have no names.
+        named: Whether the user names the columns of the pose.
+        timed: Whether the user tells the time.
+
+    Raises:
+        LogError: With what may be read instead.
+    """
+    layout, used = plan.tables.layouts[plan.main], [*plan.clock.columns, *plan.roles.columns]
+    file = str(layout.segment.path)
+    if len(plan.used) > 1:
+        found = f"found {listed(plan.roles.rotation)} in another table than {listed(plan.roles.position)}"
+        raise LogError(Finding(f"{found}, allowed: one table", file))
+    cells = len(layout.names) - (not layout.names[-1])
+    if layout.header is None and cells > len(used) and not (plan.roles.rotation or named):
+        time = " beside the time" if plan.clock.columns else ""
+        count = cells - len(plan.clock.columns)
+        found = f"found {count} columns without names{time}, allowed: x, y, z alone or with an orientation"
+        raise LogError(Finding(found, file, hints=tuple(_remedies(count, naming, timed=timed or bool(time)))))
+
+
+def _remedies(count: int, naming: str, *, timed: bool) -> Iterator[Hint]:
+    """Yield what tells so many columns without names: a header, the form of the orientation, the time."""
+    yield Hint("", does=naming)
+    yield from (Hint("rotation", form, "says which") for form in FORMS if 3 + width(form) == count)
+    if not timed and count - 1 in {3, *(3 + width(form) for form in FORMS)}:
+        yield Hint("time", "1", "if the first is the time")
+
+
+def _about_file(plan: Plan) -> Iterator[Inference]:
+    """Yield what was found out about the file before its rows were read."""
+    for found in (plan.tables, plan.tables.layouts[plan.main], plan.clock, plan.roles):
+        yield from found.inferences
