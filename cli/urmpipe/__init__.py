@@ -8,6 +8,7 @@
     urmpipe.export(run, "log.parquet")
     simulation = urmpipe.simulate("log-to-delta", arguments={"log": "log.csv", "reference": "path.csv"})
     urmpipe.ik("targets.csv", robot="arm6").to_frame()
+    urmpipe.plan("contour.csv", robot="ur5e", output="plan.csv")
     urmpipe.build_fmu("kinematic_chain", robot="urm6")
 
 The functions are loaded when they are first used.
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from urmpipe.api.ik import ik as ik
     from urmpipe.api.ingest import ingest as ingest
     from urmpipe.api.load_robot import load_robot as load_robot
+    from urmpipe.api.plan import plan as plan
     from urmpipe.api.read_map import read_map as read_map
     from urmpipe.api.recordings import read_recording as read_recording
     from urmpipe.api.recordings import write_recording as write_recording
@@ -46,18 +48,21 @@ if TYPE_CHECKING:
     from urmpipe_models.errors import LogError as LogError
     from urmpipe_models.errors import OptionError as OptionError
     from urmpipe_models.errors import OutputError as OutputError
+    from urmpipe_models.errors import PathError as PathError
     from urmpipe_models.errors import RecordingError as RecordingError
     from urmpipe_models.errors import RobotError as RobotError
     from urmpipe_models.errors import UnitError as UnitError
     from urmpipe_models.errors import UrmpipeError as UrmpipeError
     from urmpipe_models.errors import ViewerError as ViewerError
     from urmpipe_models.inverse.targets import Targets as Targets
+    from urmpipe_models.planning.rows import PathRows as PathRows
     from urmpipe_models.robots.catalogue import robot_names as robot_names
     from urmpipe_models.transform import Transform as Transform
     from urmpipe_pipeline.comparison.comparison import Comparison as Comparison
     from urmpipe_pipeline.comparison.deviation import Deviation as Deviation
     from urmpipe_pipeline.diagnosis.result import Diagnosis as Diagnosis
     from urmpipe_pipeline.joint_log import JointLog as JointLog
+    from urmpipe_pipeline.planned_paths.result import PlannedPath as PlannedPath
     from urmpipe_pipeline.runs.results import Run as Run
     from urmpipe_pipeline.simulations.simulation import Simulation as Simulation
     from urmpipe_pipeline.solved_targets.result import SolvedTargets as SolvedTargets
@@ -84,6 +89,9 @@ _HOME = {
     "OptionError": "urmpipe_models.errors",
     "OutputError": "urmpipe_models.errors",
     "Reading": "urmpipe.reading",
+    "PathError": "urmpipe_models.errors",
+    "PathRows": "urmpipe_models.planning.rows",
+    "PlannedPath": "urmpipe_pipeline.planned_paths.result",
     "ReadOptions": "urmpipe_pipeline.sources",
     "RecordingError": "urmpipe_models.errors",
     "Report": "urmpipe.api.report",
@@ -104,6 +112,7 @@ _HOME = {
     "ik": "urmpipe.api.ik",
     "ingest": "urmpipe.api.ingest",
     "load_robot": "urmpipe.api.load_robot",
+    "plan": "urmpipe.api.plan",
     "read_map": "urmpipe.api.read_map",
     "read_recording": "urmpipe.api.recordings",
     "report": "urmpipe.api.report",

@@ -103,6 +103,12 @@ def _one_or_many(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
     return fit
 
 
+def _is_planned(value: Any) -> bool:
+    from urmpipe_models.planning.rows import PathRows
+
+    return isinstance(value, PathRows) or _is_path(value)
+
+
 def _one_of(*names: str) -> Kind:
     return Kind(lambda value: isinstance(value, str) and value in names, ", ".join(names))
 
@@ -126,8 +132,10 @@ LINK = Kind(_is_text, "the name of a link of the URDF")
 ROBOT_FILE = Kind(_is_path, "a name, or a TOML or URDF file")
 
 KINDS = {
+    "acceleration": Kind(_is_number, "a number, in m/s2"),
     "align": _one_of("none", "start", "rigid", "tool", "base+tool"),
     "arguments": Kind(_are_arguments, 'a mapping of names to texts or numbers, such as {"log": "log.csv"}'),
+    "arcs": _one_of("tangential", "total"),
     "audit": PATH,
     "backend": _one_of("native", "python"),
     "base_link": LINK,
@@ -145,7 +153,9 @@ KINDS = {
     ),
     "ik.tolerance": Kind(_is_number, "a number, in m"),
     "inputs": PATHS,
+    "jerk": Kind(_is_number, "a number, in m/s3"),
     "junit": PATH,
+    "law": _one_of("trapezoid", "jerk", "limits"),
     "lazy": FLAG,
     "log_map": Kind(_is_map, "a map (TOML), or what `read_map` returned"),
     "method": _one_of("auto", "closed", "iterative"),
@@ -154,6 +164,7 @@ KINDS = {
     "options": Kind(lambda value: isinstance(value, Mapping), 'a mapping, such as {"joints": 6}'),
     "output": PATH,
     "path": PATH,
+    "plan.path": Kind(_is_planned, 'a file, a test cube ("cube:..."), or PathRows'),
     "platforms": Kind(_one_or_many(_is_text), "linux64, win64 or a list of both"),
     "progress": TOLD,
     "restarts": COUNT,
@@ -177,6 +188,7 @@ KINDS = {
     "tolerance": KIND_OF_TOLERANCE,
     "tsp": SECONDS,
     "build_fmu.unit": Kind(_is_unit, "the name of a unit, a Python file with one, or a Unit"),
+    "velocity": Kind(_is_number, "a number, in m/s"),
     "voice": _one_of("python", "command line"),
     "within_pi": FLAG,
     "write_map": PATH,

@@ -38,6 +38,7 @@ COMMANDS = {
     "export": "Write a recording as CSV, Parquet, MAT or TUM.",
     "robot": "List, show and export robots.",
     "ik": "Find joint values for poses of the tool.",
+    "plan": "Plan a path of lines and arcs, and its time.",
     "fmu": "List units, build and check FMUs.",
     "simulate": "Run a system of blocks.",
 }
@@ -104,9 +105,10 @@ def cli() -> None:
       urmpipe report log-against-path.rrd
       urmpipe view log-against-path.rrd
       urmpipe ik path.csv --robot urm6 -o joints.csv
+      urmpipe plan contour.csv --robot ur5e -o plan.csv
 
     Exit codes: 0 within tolerance, 1 out of tolerance (ik: a target not reached, a jump, or a joint too
-    fast; fmu check: a problem), 2 bad input or usage.
+    fast; plan: the arm cannot move so; fmu check: a problem), 2 bad input or usage.
     """
 
 

@@ -108,8 +108,7 @@ def resolved(
     Raises:
         UrmpipeError: With everything that is wrong with the map, the arm or a keyword.
     """
-    given = reading.get("log_map")
-    log_map = given if isinstance(given, LogMap) else LogMap() if given is None else read_map(Path(given))
+    log_map = _map_of(reading)
     arm = robot if robot is not None else log_map.robot
     base = base if base is not None or not log_map.base else from_offset(log_map.base)
     tool = tool if tool is not None or not log_map.tool else from_offset(log_map.tool)
@@ -119,6 +118,20 @@ def resolved(
     )
     chain, options = for_each(lambda make: make(), parts)
     return Resolved(chain, arm, options)
+
+
+def options_of(reading: Mapping[str, Any]) -> ReadOptions:
+    """Return how a table is read, as keywords and map say, without their arm.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the map or a keyword.
+    """
+    return read_options(reading, _map_of(reading).read)
+
+
+def _map_of(reading: Mapping[str, Any]) -> LogMap:
+    given = reading.get("log_map")
+    return given if isinstance(given, LogMap) else LogMap() if given is None else read_map(Path(given))
 
 
 def map_files(reading: Mapping[str, Any]) -> list[Path]:

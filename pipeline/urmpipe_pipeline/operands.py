@@ -12,6 +12,7 @@ from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.diagnosis.result import Diagnosis
+from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.results import kind_of, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
@@ -32,7 +33,8 @@ SIMULATION = (
 )
 
 
-MadeRun: TypeAlias = Run | SolvedTargets
+MadeRun: TypeAlias = Run | SolvedTargets | PlannedPath
+MADE_RUNS: tuple[type[MadeRun], ...] = (Run, SolvedTargets, PlannedPath)
 """Results that are a run, or have one."""
 
 
@@ -134,7 +136,7 @@ def _told_apart(operands: Sequence[Path | MadeRun], runs: Sequence[Run]) -> list
 def _recorded(operand: Path, judged: Sequence[Hint]) -> MadeRun:
     """Return the run of a recording, or raise a `RecordingError` that says what else it is."""
     result = read_recording(operand)
-    if isinstance(result, (Run, SolvedTargets)):
+    if isinstance(result, MADE_RUNS):
         return result
     if isinstance(result, (Comparison, Diagnosis)):
         hints = judged if isinstance(result, Comparison) else ()

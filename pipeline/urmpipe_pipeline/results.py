@@ -16,6 +16,8 @@ from urmpipe_pipeline.comparison import presenter as comparison
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.diagnosis import presenter as diagnosis
 from urmpipe_pipeline.diagnosis.result import Diagnosis
+from urmpipe_pipeline.planned_paths import presenter as planned_paths
+from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Presentation
@@ -54,6 +56,7 @@ KINDS: tuple[Kind, ...] = (
     Kind("diagnosis", Diagnosis, diagnosis.present),
     Kind("simulation", Simulation, simulations.present, simulation_exports.exports),
     Kind("solved targets", SolvedTargets, solved_targets.present, solved_targets.exports),
+    Kind("plan", PlannedPath, planned_paths.present, planned_paths.exports),
 )
 """Every kind."""
 

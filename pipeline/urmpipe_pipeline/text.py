@@ -6,6 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
+from urmpipe_models.arrays import IntArray
 from urmpipe_models.measure_units import factor, units_of
 
 NOTHING = "–"
@@ -16,6 +19,9 @@ DIGITS = 4
 
 FINEST = 1e-3
 """The least standard error of a time that is said, in [ms]: a fit may claim less, but no clock keeps it."""
+
+NAMED = 6
+"""Rows or stretches of rows that are named in a sentence; the others are counted."""
 
 SHOWN = {si: (unit, factor(si, unit)) for si, unit in (("m", "mm"), ("rad", "deg"))}
 """The units that people read, and how many of them one of the SI unit is."""
@@ -64,6 +70,13 @@ def limit(value: float | None, unit: str = "m") -> str:
     return NOTHING if value is None else f"{value * SHOWN[unit][1]:.6g}"
 
 
+def in_words(value: float, unit: str) -> str:
+    """Return an angle, a length or a rate of one in [rad] or [m] for a sentence: "12.5 deg/s"."""
+    base, slash, per = unit.partition("/")
+    shown, scale = SHOWN[base]
+    return f"{value * scale:.4g} {shown}{slash}{per}"
+
+
 def allowed(value: float, unit: str = "m") -> str:
     """Return a tolerance with the unit that people read: "3.5 mm", "0.5 deg"."""
     return f"{limit(value, unit)} {SHOWN[unit][0]}"
@@ -88,10 +101,12 @@ def standard_error(value: float) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share 0..1 in [%], never rounded to 0 or to 100 when it is not."""
+    """Return a share in [%], never rounded to 0 or to 100 when it is not."""
     scaled = share * 100.0
     if scaled in (0.0, 100.0):
         return f"{scaled:.0f} %"
+    if scaled > 100.0:
+        return f"{max(scaled, 100.01):.2f} %" if scaled < 101.0 else f"{scaled:.1f} %"
     if scaled > 99.0:
         return f"{min(scaled, 99.99):.2f} %"
     return f"{scaled:.2g} %" if scaled < 1.0 else f"{scaled:.1f} %"
@@ -115,6 +130,20 @@ def portion(share: float) -> str:
 def counted(count: int, noun: str) -> str:
     """Return a count with its noun in the right number: "1 log", "2 logs"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def rows_text(rows: Sequence[int] | IntArray) -> str:
+    """Return rows, shape (n,), for a sentence: "row 3", "rows 3, 7-9 and 40 more"."""
+    rows = np.asarray(rows)
+    first = np.flatnonzero(np.diff(rows, prepend=rows[0] - 2) != 1)
+    last = np.append(first[1:], len(rows)) - 1
+    parts = [
+        str(rows[a]) if a == b else f"{rows[a]}-{rows[b]}"
+        for a, b in zip(first[:NAMED], last[:NAMED], strict=True)
+    ]
+    more = len(rows) - 1 - last[:NAMED][-1]
+    said = ", ".join(parts) + (f" and {more} more" if more else "")
+    return f"row{'' if len(rows) == 1 else 's'} {said}"
 
 
 def enumerated(words: Sequence[str]) -> str:

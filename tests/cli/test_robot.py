@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe.printing.chain_drawing import chain_svg
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.robots.robot_file import chain_from_dict
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_models.robots.urdf_writer import write_urdf
+from urmpipe_pipeline.projections import FRONT, SIDEWAYS, Sketch, chain_spots, projected
 
 NAMES = list(robot_names())
 
@@ -59,6 +60,20 @@ def test_show_prints_parameters_and_points(urmpipe: Any) -> None:
     assert "Parameters; 12 of value 0 not shown" in ran.out
     assert "p7      0.167397, 0, 1.10264   180, 0, 0" in ran.out
     assert "\x1b" not in ran.out  # no colours in a pipe
+
+
+def test_show_tells_what_limits_rates(urmpipe: Any, tmp_path: Path) -> None:
+    turn = '{ name = "turn", velocity = 90, acceleration = 360 }'
+    slide = '{ name = "slide", kind = "prismatic", upper = 0.5, acceleration = 2.5 }'
+    text = f'kind = "joints"\nangle_unit = "deg"\njoints = [{turn}, {slide}]\n'
+    (tmp_path / "arm.toml").write_text(text, encoding="utf-8")
+    lines = [" ".join(line.split()) for line in urmpipe("robot", "show", "arm.toml").out.splitlines()]
+    assert "turn revolute 0, 0, 1 no limit 90 deg/s 360 deg/s² 0 deg" in lines
+    assert "slide prismatic 0, 0, 1 -inf .. 0.5 m no limit 2.5 m/s² 0 m" in lines
+    joints = json.loads(urmpipe("robot", "show", "arm.toml", "--json").out)["joints"]
+    assert [(one["velocity"], one["acceleration"]) for one in joints] == [
+        (math.pi / 2, 2 * math.pi), (None, 2.5),
+    ]  # fmt: skip
 
 
 def test_show_as_json_is_the_chain_and_its_points(urmpipe: Any) -> None:
@@ -178,14 +193,18 @@ def test_export_replaces_an_export_and_nothing_else(urmpipe: Any, tmp_path: Path
 # --- the drawing -----------------------------------------------------------------------------------
 
 
+def picture(skeleton: FloatArray, title: str) -> str:
+    return projected(Sketch([skeleton], spots=chain_spots(skeleton)), (SIDEWAYS, FRONT), title)
+
+
 def test_an_arm_of_no_length_is_drawn() -> None:
     chain = Chain("spin", (Joint("a"), Joint("b")))
-    root = ET.fromstring(chain_svg(points_over_log(chain, np.zeros((1, 2)))[0], "spin"))
+    root = ET.fromstring(picture(points_over_log(chain, np.zeros((1, 2)))[0], "spin"))
     assert len(list(root.iter("{http://www.w3.org/2000/svg}circle"))) == 2 * 3
 
 
 def test_the_picture_is_svg_with_all_points() -> None:
-    root = ET.fromstring(chain_svg(skeleton("urm8"), "<urm8> & co"))
+    root = ET.fromstring(picture(skeleton("urm8"), "<urm8> & co"))
     texts = [element.text for element in root.iter("{http://www.w3.org/2000/svg}text")]
     assert texts[0] == "<urm8> & co"
     assert texts.count("p9") == 2

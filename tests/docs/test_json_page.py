@@ -103,6 +103,7 @@ CALLS = {
     "fmu list": "fmu list",
     "ik ik": "ik path.csv --robot urm6",
     "ingest ingest": "ingest log.csv --robot urm6 -o log.rrd",
+    "plan plan": "plan cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1 --robot irb60",
     "report report": "report log.rrd",
     "robot export": "robot export urm6 -o urm6.toml",
     "robot list": "robot list",

@@ -61,6 +61,23 @@ def test_how_much_of_a_tolerance_is_used_is_never_rounded_to_all_of_it(largest: 
 
 
 @pytest.mark.parametrize(
+    ("share", "written"),
+    [
+        (0.0, "0 %"),
+        (0.0012, "0.12 %"),
+        (0.5, "50.0 %"),
+        (0.99999, "99.99 %"),
+        (1.0, "100 %"),
+        (1.00001, "100.01 %"),
+        (1.005, "100.50 %"),
+        (7.586, "758.6 %"),
+    ],
+)
+def test_a_share_is_never_rounded_to_none_or_all_of_it(share: float, written: str) -> None:
+    assert text.percent(share) == written
+
+
+@pytest.mark.parametrize(
     ("word", "elsewhere", "on_windows"),
     [
         ("log.csv", "log.csv", "log.csv"),

@@ -79,6 +79,7 @@ def lay_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, source in named.items():
         (folder / f"{name}.csv").write_bytes((LOGS / f"{source}.csv").read_bytes())
     (folder / "targets.csv").write_text("x,y,z,rz,ry,rx\n0.1,0.05,0.25,0.3,0.4,0.1\n0,0,0.3,0,0,0\n")
+    (folder / "contour.csv").write_text("x,y,z,corner_r\n0.4,0.1,0.3,\n0.5,0.1,0.3,0.02\n0.5,-0.1,0.3,\n")
     (folder / "poses.csv").write_text("x,y,z,qx,qy,qz,qw\n0.4,0.1,0.3,1,0,0,0\n")
     (folder / "other.toml").write_text('robot = "urm6"\n')
     for name in ("robot_data", "monday", "tracker"):

@@ -31,9 +31,9 @@ def assert_same(found: Any, wanted: Any, place: str = "result") -> None:
 
 
 def _parts(whole: Any) -> dict[Any, Any] | None:
-    """Return the parts of a dataclass, a mapping or a tuple by name, key or place; None of anything else."""
+    """Return the parts of a dataclass, a mapping, a tuple or a list by name, key or place; else None."""
     if is_dataclass(whole) and not isinstance(whole, type):  # `recording` says where it stands: no part of it
         return {each.name: getattr(whole, each.name) for each in fields(whole) if each.name != "recording"}
     if isinstance(whole, Mapping):
         return dict(whole)
-    return dict(enumerate(whole)) if isinstance(whole, tuple) else None
+    return dict(enumerate(whole)) if isinstance(whole, (tuple, list)) else None

@@ -33,13 +33,12 @@ from urmpipe_pipeline.comparison.tables import statistics_rows
 from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.warnings import BEYOND, EXCHANGED, LARGE_NOISE, large_noises
-from urmpipe_pipeline.operands import WITH_BASELINE, MadeRun, is_log, load_comparison, load_runs
+from urmpipe_pipeline.operands import MADE_RUNS, WITH_BASELINE, MadeRun, is_log, load_comparison, load_runs
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.results import kind_of, present, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.recorded_tcp import LACKING_TOOL
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
 from urmpipe_pipeline.tables.table_csv import write_table
 
@@ -47,7 +46,7 @@ Operand = PathLike | MadeRun
 
 EARLIER = Hint("baseline", None, "names one")
 
-OPERANDS = f"a log, a path, a recording, a Run or SolvedTargets; {WRITTEN_FIRST}"
+OPERANDS = f"a log, a path, a recording, a Run, SolvedTargets or PlannedPath; {WRITTEN_FIRST}"
 
 
 @public_reading(Reading)
@@ -151,7 +150,7 @@ def compare(
 def _operands(reference: Operand | Comparison, logs: Sequence[Operand]) -> list[Any]:
     """Return all that is compared; raise an `OptionError` with everything that is no operand."""
     given = {"reference": [reference]} | ({"logs": logs} if logs else {})
-    for_each(lambda named: refuse_others(*named, (Run, SolvedTargets, Comparison), OPERANDS), given.items())
+    for_each(lambda named: refuse_others(*named, (*MADE_RUNS, Comparison), OPERANDS), given.items())
     return [reference, *logs]
 
 
@@ -209,7 +208,7 @@ def _made_before(reference: Operand | Comparison, output: PathLike | None) -> Co
     Raises:
         OptionError: If it is to be recorded again.
     """
-    if isinstance(reference, (Run, SolvedTargets)):
+    if not isinstance(reference, (str, Path, Comparison)):
         return None
     made = reference if isinstance(reference, Comparison) else load_comparison(Path(reference))
     if made is not None and output is not None:

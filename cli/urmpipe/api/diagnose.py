@@ -17,9 +17,8 @@ from urmpipe_pipeline.comparison.compare import Tcp
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.diagnosis.result import Diagnosis
+from urmpipe_pipeline.operands import MADE_RUNS
 from urmpipe_pipeline.runs.derivatives import Method
-from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.solved_targets.result import SolvedTargets
 
 
 @public_reading(Reading)
@@ -71,7 +70,7 @@ def diagnose(
         UrmpipeError: With everything that is wrong with the input or the output.
     """
     operands = {"reference": [reference]} | ({} if log is None else {"log": [log]})
-    for_each(lambda named: refuse_others(*named, (Run, SolvedTargets), OPERANDS), operands.items())
+    for_each(lambda named: refuse_others(*named, MADE_RUNS, OPERANDS), operands.items())
     made: Comparison = unwrap(
         compare
     )(  # without its checks of keywords and its warnings, which are given here

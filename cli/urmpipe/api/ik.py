@@ -19,7 +19,7 @@ from urmpipe_models.inverse.search import USUAL_SEARCH, Search
 from urmpipe_models.inverse.solve import Method
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.outputs import OutputKind, guarded_output, refuse_output
+from urmpipe_pipeline.outputs import NOUNS, OutputKind, guarded_output, refuse_output
 from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets, TargetsLike, given_targets
@@ -28,9 +28,6 @@ from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.solved_targets.solving import solve_targets
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables.joint_file import write_joint_log
-
-KINDS: dict[str, OutputKind] = {".csv": "joints", ".rrd": "recording"}
-"""Kinds of outputs by their suffix."""
 
 SOLVING = 0.7
 """Share of the work that solving is where something is written, too."""
@@ -101,7 +98,7 @@ def ik(
     said = resolved(reading, robot, base, tool, base_link, tip_link)
     parts: tuple[Callable[[], Any], ...] = (
         lambda: _arm_of(said),
-        lambda: _kind_of(path),
+        lambda: output_kind(path, "joints"),
         lambda: _given(targets, t, tsp, said.options),
     )
     arm, kind, given = for_each(lambda make: make(), parts)
@@ -140,17 +137,17 @@ def _arm_of(said: Resolved) -> Chain:
     return said.arm
 
 
-def _kind_of(output: Path | None) -> OutputKind | None:
-    """Return what an output is by its suffix; None without one.
+def output_kind(output: Path | None, log: OutputKind) -> OutputKind | None:
+    """Return what an output is by its suffix: a log of the kind given, or a recording; None without one.
 
     Raises:
         OptionError: If the suffix is another.
     """
     if output is None:
         return None
-    kind = KINDS.get(output.suffix.lower())
+    kind = {".csv": log, ".rrd": "recording"}.get(output.suffix.lower())
     if kind is None:
-        allowed = "a name that ends in .csv (a joint log) or .rrd (a recording)"
+        allowed = f"a name that ends in .csv (a {NOUNS.get(log, log)}) or .rrd (a recording)"
         raise OptionError(Finding(parameter="output", found=shown(str(output)), allowed=allowed))
     return kind
 
@@ -159,10 +156,14 @@ def _given(
     targets: TargetsLike, t: ArrayLike | None, tsp: float | None, read: ReadOptions | None
 ) -> GivenTargets:
     """Return targets with their rows and times; raise a `LogError` if they are a recording."""
-    if isinstance(targets, (str, Path)) and Path(targets).is_file() and is_recording(Path(targets)):
-        allowed = "a table (CSV) of targets"
-        raise LogError(Finding(file=str(targets), found="a recording", allowed=allowed))
+    refuse_recording(targets, "a table (CSV) of targets")
     return given_targets(targets, t, tsp, read)
+
+
+def refuse_recording(given: object, allowed: str) -> None:
+    """Raise a `LogError` if what was given is the file of a recording, where something else is allowed."""
+    if isinstance(given, (str, Path)) and Path(given).is_file() and is_recording(Path(given)):
+        raise LogError(Finding(file=str(given), found="a recording", allowed=allowed))
 
 
 def _write_joints(result: SolvedTargets, path: Path, kept: Sequence[Path]) -> None:

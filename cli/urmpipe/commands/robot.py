@@ -73,10 +73,10 @@ def show(
     """
     import numpy as np
 
-    from urmpipe.printing.chain_drawing import chain_svg
     from urmpipe.printing.robot import chain_at, print_chain
     from urmpipe_models.errors import Finding, OptionError
-    from urmpipe_models.robots.written import write_export
+    from urmpipe_models.robots.written import EXPORT_MARK, write_export
+    from urmpipe_pipeline.projections import FRONT, SIDEWAYS, Sketch, chain_spots, projected
     from urmpipe_pipeline.solved_targets.solution_warnings import start_warnings
 
     chain = _placed(name, placing)
@@ -87,7 +87,8 @@ def show(
     terminal.warn(list(start_warnings(chain, np.array(q), "q")))
     posed = chain_at(chain, q)
     if picture is not None:
-        write_export(picture, chain_svg(posed.skeleton, posed.title), Path(name))
+        sketch = Sketch([posed.skeleton], spots=chain_spots(posed.skeleton))
+        write_export(picture, projected(sketch, (SIDEWAYS, FRONT), posed.title, EXPORT_MARK), Path(name))
     terminal.answer(posed.to_dict, lambda: print_chain(posed))
     return 0
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.presentation.scene import Arrows, BoolArray, Path, Spot
+from urmpipe_pipeline.presentation.scene import Arrows, BoolArray, Path, Sheets, Spot
 
 Shape: TypeAlias = Literal["up", "down", "cross", "diamond"]
 
@@ -109,6 +109,7 @@ class Panel:
         tinted: Rows to tint besides those out of the limit, shape (n,); None for none.
         share: Height relative to other panels.
         display_unit: A unit that people prefer to `unit`, such as deg; empty for none.
+        limit_name: What a legend calls the limit.
     """
 
     title: str
@@ -125,6 +126,7 @@ class Panel:
     tinted: BoolArray | None = None
     share: float = 1.0
     display_unit: str = ""
+    limit_name: str = "tolerance"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,6 +172,7 @@ class SpaceFigure:
     paths: tuple[Path, ...]
     spots: tuple[Spot, ...] = ()
     arrows: Arrows | None = None
+    sheets: Sheets | None = None
 
 
 @dataclass(frozen=True, slots=True)

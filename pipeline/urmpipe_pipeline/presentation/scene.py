@@ -113,6 +113,21 @@ class Arrows:
     unit: str = "m"
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Sheets:
+    """Flat pieces of planes that one sees through.
+
+    Attributes:
+        name: What the legend calls them.
+        corners: Of rectangles, one after the other around each, in [m], shape (n, 4, 3).
+        colour: As #rrggbb.
+    """
+
+    name: str
+    corners: FloatArray
+    colour: str
+
+
 @dataclass(frozen=True, slots=True)
 class Spot:
     """A place with a word.

@@ -137,7 +137,7 @@ def _shown_unit(panel: Panel) -> tuple[str, float]:
     if panel.small and panel.unit in text.SHOWN:
         return text.SHOWN[panel.unit]
     unit, factor = text.display_unit(panel.unit, panel.display_unit)
-    return unit.replace("/s2", "/s²"), factor
+    return unit.replace("/s2", "/s²").replace("/s3", "/s³"), factor
 
 
 def drawn_panel(panel: Panel, number: int, names: Names, span: Span) -> spec.Panel:

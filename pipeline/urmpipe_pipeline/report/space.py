@@ -12,7 +12,7 @@ from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.palette import VALUE_SCALE
 from urmpipe_pipeline.presentation.figure import SpaceFigure
-from urmpipe_pipeline.presentation.scene import Arrows, Path, Spot
+from urmpipe_pipeline.presentation.scene import Arrows, Path, Sheets, Spot
 from urmpipe_pipeline.report.spec import Figure, Spec, base_layout, space_axis, typed
 from urmpipe_pipeline.report.traces import label, points_for
 
@@ -31,8 +31,11 @@ scene, draws the longest axis out of view."""
 SCENE_PX = 540
 """Height of a scene."""
 
-DOT_PX = 3
-"""Width of the dot that an arrow starts from."""
+DOT_PX, PLACE_PX = 3, 6
+"""Width of the dot that an arrow starts from, or a pose stands at; of a place that stands on a path."""
+
+TINT = 0.12
+"""Opacity of a sheet: several behind each other still let a path through."""
 
 BACK_PX, FRONT_PX, VALUES_PX = 2, 5, 6
 """Width of a path: of those in the back, of the one in front, and of one that its values colour."""
@@ -40,11 +43,18 @@ BACK_PX, FRONT_PX, VALUES_PX = 2, 5, 6
 
 def drawn_space(figure: SpaceFigure) -> Figure:
     """Return paths and places in space."""
-    traces = [_path(path, FRONT_PX if path is figure.paths[-1] else BACK_PX) for path in figure.paths]
+    lined = any(path.line for path in figure.paths)
+    traces = [
+        _path(path, FRONT_PX if path is figure.paths[-1] else BACK_PX, PLACE_PX if lined else DOT_PX)
+        for path in figure.paths
+    ]
     places = [np.asarray(path.position[:]) for path in figure.paths]
     if figure.arrows is not None:
         traces += _arrows(figure.arrows)
         places += [figure.arrows.start, figure.arrows.end]
+    if figure.sheets is not None and len(figure.sheets.corners):
+        traces = [*_sheets(figure.sheets), *traces]
+        places.append(figure.sheets.corners.reshape(-1, 3))
     return Figure(
         figure.title,
         f"{figure.caption} {HANDLING}",
@@ -55,8 +65,8 @@ def drawn_space(figure: SpaceFigure) -> Figure:
     )
 
 
-def _path(path: Path, width: int) -> Spec:
-    """Return a path; the pointer tells its time or row, its place and its value."""
+def _path(path: Path, width: int, dot: int) -> Spec:
+    """Return a path as a line or as dots; the pointer tells its time or row, its place and its value."""
     position = np.asarray(path.position[:])
     timed = path.t_ns is not None
     rows = np.arange(len(position)) if path.sample is None else np.asarray(path.sample)
@@ -73,7 +83,7 @@ def _path(path: Path, width: int) -> Spec:
     style = {"color": path.colour, "width": width}
     return _in_space(place) | {
         "mode": "lines" if path.line else "markers",
-        "marker": {"color": path.colour, "size": DOT_PX},
+        "marker": {"color": path.colour, "size": dot},
         "name": label(path.name),
         "showlegend": path.values is None,  # a line of many colours is told by its colour scale
         "customdata": typed(t if path.values is None else np.column_stack([t, shown]), "f8"),
@@ -108,6 +118,20 @@ def _by_value(name: str, values: FloatArray, unit: str) -> Spec:
             "yanchor": "top",
         },
     }
+
+
+def _sheets(sheets: Sheets) -> Iterator[Spec]:
+    """Yield sheets, two triangles each, and their outlines; one entry of the legend switches both."""
+    corners, name, first = sheets.corners, label(sheets.name), 4 * np.arange(len(sheets.corners))
+    shared = {"name": name, "legendgroup": name, "hoverinfo": "skip"}
+    triangles = np.concatenate([first + np.array([[0], [1], [2]]), first + np.array([[0], [2], [3]])], axis=1)
+    x, y, z = (typed(column) for column in corners.reshape(-1, 3).T)
+    faces = dict(zip("ijk", triangles.tolist(), strict=True))
+    look = {"color": sheets.colour, "opacity": TINT, "flatshading": True, "showlegend": False}
+    yield {"type": "mesh3d", "x": x, "y": y, "z": z} | faces | shared | look
+    closed = np.concatenate((corners, corners[:, :1], np.full_like(corners[:, :1], np.nan)), axis=1)
+    style = {"mode": "lines", "line": {"color": sheets.colour, "width": BACK_PX}}
+    yield _in_space(closed.reshape(-1, 3)) | shared | style
 
 
 def _arrows(arrows: Arrows) -> Iterator[Spec]:

@@ -19,7 +19,7 @@ from urmpipe_pipeline.presentation.parts import columns_of, recording_fact, spot
 from urmpipe_pipeline.presentation.section import Cell, Column, Event, Fact, Place, Table, Value
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.solved_targets.scene import ghosts
-from urmpipe_pipeline.solved_targets.wording import in_words, rows_text
+from urmpipe_pipeline.text import in_words, rows_text
 
 MANY = 10
 """Branches, jumps and stretches of joints too fast that are facts of each; the others are counted."""

@@ -14,8 +14,7 @@ from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.kinematics.singularity import NEAR_SINGULAR, singularity_over_log
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.solved_targets.wording import in_words, rows_text
-from urmpipe_pipeline.text import counted
+from urmpipe_pipeline.text import counted, in_words, rows_text
 
 MILLI = 1e-3
 """A target in mm that is read as m is a thousand times too far."""

@@ -17,7 +17,9 @@ from urmpipe_models.display import Shown
 from urmpipe_pipeline.comparison.change import Absent, BaselineComparison
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 
-OTHERS = {"LogMap", "LogReading", "ReadOptions", "Reading", "TableReading", "Targets", "Transform"}
+OTHERS = {
+    "LogMap", "LogReading", "PathRows", "ReadOptions", "Reading", "TableReading", "Targets", "Transform",
+}  # fmt: skip
 """Public classes that are no results: what they hold is what they show."""
 
 
@@ -39,6 +41,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         run, run.log, comparison, comparison.runs[0], diagnosis_of(comparison.runs[0]),
         urmpipe.load_robot("urm6"), urmpipe.ik([[0.4, 0.1, 0.4]], "ur5e"), simulation,
         urmpipe.build_fmu("dc_drive", backend="python", output=folder),
+        urmpipe.plan("cube:wall,a=0.2,r=0.02,x=0.5,y=0,z=0.3", "ur5e"),
         urmpipe.export(run, folder / "log.csv"), urmpipe.report([run], folder / "report.html"),
     ]  # fmt: skip
     return {type(one).__name__: one for one in made}

@@ -14,8 +14,10 @@ import urmpipe
 from urmpipe.kinds import KINDS, kind_of
 from urmpipe.systems.units import Backend
 from urmpipe_models.inverse.solve import METHODS
+from urmpipe_models.planning.stretches import ARCS
 from urmpipe_pipeline.comparison.compare import Tcp
 from urmpipe_pipeline.comparison.trajectory import AlignMode
+from urmpipe_pipeline.planned_paths.result import LAWS
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.tables.options import Format
 from urmpipe_pipeline.tables.options import RowNames as Rows
@@ -44,6 +46,8 @@ RIGHT = {
         "seed",
         "period",
         "time",
+        "velocity",
+        "acceleration",
     },
     "a list": {"logs", "inputs", "platforms", "formats", "joints", "measured"},
     "a mapping": {"arguments", "options", "unit", "interval"},
@@ -74,6 +78,8 @@ def given(function: str, run: urmpipe.Run, folder: Path) -> dict[str, Any]:
         "system": "one-drive", "unit": "kinematic_chain", "name_or_path": "urm6", "path": "lab.toml",
     }  # fmt: skip
     parameters = signature(FUNCTIONS[function]).parameters
+    if function == "plan":
+        one_of_each["path"] = "cube:wall,a=0.2,r=0.02,x=0.5,y=0,z=0.3"
     needed = {name: one_of_each[name] for name, one in parameters.items() if one.default is Parameter.empty}
     return needed | ({"robot": "ur5e"} if "robot" in parameters else {})
 
@@ -107,8 +113,10 @@ def test_each_kind_is_of_a_keyword() -> None:
     ("keyword", "names"),
     [
         ("align", get_args(AlignMode)),
+        ("arcs", ARCS),
         ("backend", get_args(Backend)),
         ("derivative", get_args(Method)),
+        ("law", LAWS),
         ("method", METHODS),
         ("rows", get_args(Rows)),
         ("tcp", get_args(Tcp)),

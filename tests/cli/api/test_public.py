@@ -93,7 +93,7 @@ def test_arrays_and_tables_are_told_the_way() -> None:
         assert str(error.value) == f"log: found {found}, allowed: {allowed}; {way}"
         with pytest.raises(urmpipe.OptionError) as error:
             urmpipe.compare("path.csv", given)  # type: ignore[arg-type]
-        allowed = "a log, a path, a recording, a Run or SolvedTargets"
+        allowed = "a log, a path, a recording, a Run, SolvedTargets or PlannedPath"
         assert str(error.value) == f"logs: found {found}, allowed: {allowed}; {way}"
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from made_plans import FAILED, SMALL, limited, planned
 from toys import eye_of
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.inverse.targets import Targets
@@ -341,3 +342,24 @@ def test_a_simulation_shows_its_arm_its_verdict_and_its_signals(
     left = picture[:, : picture.shape[1] // 2]
     assert pixels(left, run_colour(0)) > 50  # the way of the tip, and its ball
     assert complaints(viewer) == []
+
+
+def test_a_plan_in_the_viewer(viewer: Any, tmp_path: Path) -> None:
+    """The path is in the colour of its speed, at the largest one the darkest that is seen."""
+    plan = planned(limited("ur5e", velocity=1.0), SMALL)
+    path = write_recording(plan, tmp_path / "plan.rrd")
+    picture = look(viewer, path, 2.0, JOINT_COLOURS[:6])
+    assert complaints(viewer) == []
+    fast = "#d55e00"  # of VALUE_SCALE at 0.7
+    frames = [AXIS_COLOURS[axis] for axis in "xyz"]
+    assert_drawn(picture, left=[*JOINT_COLOURS[:5], fast, *frames], right=JOINT_COLOURS[:6])
+    assert {"s′ [m/s]", "Joints [rad]", "Rates, of their limits [%]", "σ min [-]"} <= view_names(viewer)
+
+
+def test_a_plan_that_fails_opens_where_it_does(viewer: Any, tmp_path: Path) -> None:
+    """At the last sample before it: the arm is still there."""
+    plan = FAILED["unreachable"]()
+    path = write_recording(plan, tmp_path / "plan.rrd")
+    opens = present(plan).opens_at_ns / 1e9
+    picture = look(viewer, path, opens, JOINT_COLOURS[:6])
+    assert_drawn(picture, left=[*JOINT_COLOURS[:4], DEVIATION_COLOUR], right=JOINT_COLOURS[:6])

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from asserting import there
+from made_plans import FAILED, SMALL, limited, planned
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, View
 from urmpipe_pipeline.presentation.section import Presentation, Section
@@ -138,6 +139,19 @@ def test_a_drawing_is_seen_and_runs_no_script(
     with opened(browser, path, width=390, phone=True) as page:
         scroll_through(page)
         assert sideways(page) == 0
+
+
+def test_plans_are_drawn_on_a_desk_and_on_a_phone(browser: Browser, tmp_path: Path) -> None:
+    plans = planned(limited("ur5e", acceleration=20.0), SMALL), FAILED["unreachable"]()
+    path = tmp_path / "plans.html"
+    path.write_text(render_report([present(plan) for plan in plans]), encoding="utf-8")
+    for width in (1280, 390):
+        with opened(browser, path, width=width, phone=width < 1000) as page:
+            scroll_through(page)
+            assert sideways(page) == 0
+            assert page.locator(".plot.space canvas").count() > 0
+            for image in page.locator(".drawing img").all():
+                assert image.evaluate("image => image.complete && image.naturalWidth > 300")
 
 
 def test_small_figures_stand_side_by_side(browser: Browser, tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from urmpipe_pipeline.presentation.figure import (
     Text,
     View,
 )
-from urmpipe_pipeline.presentation.scene import Arrows, Path, Spot
+from urmpipe_pipeline.presentation.scene import Arrows, Path, Sheets, Spot
 from urmpipe_pipeline.presentation.section import Block, Fact, Presentation, Section
 from urmpipe_pipeline.report import spec
 from urmpipe_pipeline.report.figures import drawn_figures, span_of
@@ -385,3 +385,34 @@ def test_arrows_are_told_by_their_rows_of_the_log() -> None:
     found = drawn_space(SpaceFigure("S", "C.", "A.", (), (), arrows))
     told = [numbers(one["customdata"]) for one in found.spec["data"] if "customdata" in one]
     np.testing.assert_array_equal(told, [np.column_stack((rows + 1, 1e3 * sizes))])
+
+
+def test_sheets_are_rectangles_of_two_triangles_with_an_outline() -> None:
+    corners = np.array(
+        [[[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], [[0, 0, 0], [0, 3, 0], [0, 3, 1], [0, 0, 1]]]
+    )
+    found = drawn_space(SpaceFigure("S", "C.", "A.", (), sheets=Sheets("planes", corners.astype(float), RED)))
+    go.Figure(found.spec)
+    faces, edges = found.spec["data"]
+    points = np.column_stack([numbers(faces[axis]) for axis in "xyz"])
+    np.testing.assert_array_equal(points, corners.reshape(-1, 3))
+    triangles = points[np.column_stack([faces[name] for name in "ijk"])]
+    sides = np.diff(triangles, axis=1)
+    areas = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    assert sorted(areas.tolist()) == [1.0, 1.0, 1.5, 1.5]
+    assert 0.0 < faces["opacity"] < 0.5
+    outline = np.column_stack([numbers(edges[axis]) for axis in "xyz"]).reshape(2, 6, 3)
+    np.testing.assert_array_equal(outline[:, :4], corners)
+    np.testing.assert_array_equal(outline[:, 4], corners[:, 0])
+    assert np.isnan(outline[:, 5]).all()
+    assert (edges.get("showlegend", True), faces["showlegend"]) == (True, False)
+    assert edges["legendgroup"] == faces["legendgroup"]  # one entry of the legend switches both
+
+
+def test_places_on_a_line_are_larger_than_poses_that_nothing_joins() -> None:
+    """They have to be seen on it."""
+    some = Path("stops", PLACES[:4], None, BLUE, line=False)
+    alone = trace(drawn_space(SpaceFigure("S", "C.", "A.", (some,))), "stops")
+    both = drawn_space(SpaceFigure("S", "C.", "A.", (Path("way", PLACES, T_NS, RED), some)))
+    assert trace(both, "stops")["marker"]["size"] >= trace(both, "way")["line"]["width"]
+    assert alone["marker"]["size"] < trace(both, "stops")["marker"]["size"]

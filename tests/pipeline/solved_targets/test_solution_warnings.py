@@ -24,7 +24,7 @@ from urmpipe_pipeline.solved_targets.solution_warnings import (
     start_warnings,
     within_pi_warnings,
 )
-from urmpipe_pipeline.solved_targets.wording import NAMED, rows_text
+from urmpipe_pipeline.text import NAMED, rows_text
 
 
 @pytest.mark.parametrize(

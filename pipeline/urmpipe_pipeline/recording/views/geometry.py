@@ -7,18 +7,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_models.orientation import matrices
-from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour
+from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, rgb
 from urmpipe_pipeline.presentation.scene import Arm, ArmMark, Arrows, Path, Scene, Targets
 from urmpipe_pipeline.recording.views.label_places import name_places, placed_names
 from urmpipe_pipeline.recording.views.shapes import Body, bodies_over_log
 from urmpipe_pipeline.recording.views.tracks import (
     MOST,
     beginnings,
+    coloured_lines,
     dashed,
     drawn_rows,
     endings,
@@ -114,11 +116,15 @@ class DrawnLabel:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnPath:
-    """A path in [m]: its lines, shape (any, 3) each, or single places, and the point that moves, (m, 3)."""
+    """A path in [m]: its lines, shape (any, 3) each, or single places, and the point that moves, (m, 3).
+
+    Its colours are one a line, shape (lines, 3), or one for all, shape (1, 3).
+    """
 
     path: Path
     places: FloatArray
     strips: tuple[FloatArray, ...]
+    colours: NDArray[np.uint8]
     moving: Moving
     position: FloatArray
 
@@ -207,7 +213,10 @@ def drawn_path(path: Path) -> DrawnPath:
     """Return a path as lines, and the point that moves on it, thinned out."""
     position = np.asarray(path.position)
     there = whole_rows(position)
+    colours = np.array([rgb(path.colour)], dtype=np.uint8)
     strips = lines_of(position, path.sample, path.kept) if path.line else ()
+    if path.line and path.values is not None:
+        strips, colours = coloured_lines(position, path.values, path.kept)
     none = np.empty(0, dtype=np.int64)
     moving, places = Moving(None, none, none), np.empty((0, 3))
     if path.t_ns is None and not path.line:
@@ -215,7 +224,8 @@ def drawn_path(path: Path) -> DrawnPath:
         places = position[known[:: math.ceil(len(known) / MOST) or 1]]
     if path.t_ns is not None:
         moving = _moving(path.t_ns, there, path.kept, vanishes=path.vanishes)
-    return DrawnPath(path, places, dashed(strips) if path.asked else strips, moving, position[moving.rows])
+    strips = dashed(strips) if path.asked else strips
+    return DrawnPath(path, places, strips, colours, moving, position[moving.rows])
 
 
 def drawn_targets(targets: Targets) -> DrawnTargets:

@@ -230,7 +230,7 @@ class Plots:
         for number, ((limit, signed), panel) in enumerate(limits.items()):
             t_ns, rows = _ends(panel)
             values = [limit, -limit] if signed else [limit]
-            said = f"tolerance {'±' if signed else ''}{limit:.6g} {shown_unit([panel])}"
+            said = f"{panel.limit_name} {'±' if signed else ''}{limit:.6g} {shown_unit([panel])}"
             colour = panel.lines[0].colours[0] if len(limits) > 1 else REFERENCE_COLOUR
             look = _Look((said,) * len(values), (colour,) * len(values), width=LIMIT_WIDTH)
             self._send(drawn, f"{root}/{number}", look, t_ns, rows, np.array([values] * len(rows)))

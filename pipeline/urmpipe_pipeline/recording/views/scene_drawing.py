@@ -170,7 +170,7 @@ def _draw_path(stream: RecordingStream, drawn: DrawnPath, key: str, size: float)
     path, colour = drawn.path, rgb(drawn.path.colour)
     if drawn.strips:
         strips = [strip.astype(np.float32) for strip in drawn.strips]
-        lines = rr.LineStrips3D(strips, colors=[colour], radii=[(ASKED if path.asked else DONE) * size])
+        lines = rr.LineStrips3D(strips, colors=drawn.colours, radii=[(ASKED if path.asked else DONE) * size])
         stream.log(shown_path("scene", "path", key), lines, static=True)
     if len(drawn.places):
         points = rr.Points3D(drawn.places.astype(np.float32), colors=[colour], radii=[TARGET * size])

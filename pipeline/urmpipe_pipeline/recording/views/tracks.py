@@ -10,8 +10,10 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_pipeline.palette import value_colours
 from urmpipe_pipeline.presentation.scene import BoolArray
 
 POSE_PERIOD = 0.02
@@ -19,6 +21,15 @@ POSE_PERIOD = 0.02
 
 MOST = 20_000
 """Poses of the arm, and vertices of a path, at most."""
+
+LEVELS = (64, 32, 16, 8, 4)
+"""Colours of a path that its values colour."""
+
+SEEN = 0.7
+"""Share of `VALUE_SCALE` that they use: what is darker is hardly seen on the viewer's dark ground."""
+
+COLOURED = 2_000
+"""Lines of such a path up to which it has many colours."""
 
 DASHES = 120
 """Dashes of a line that was asked for, at most."""
@@ -103,6 +114,37 @@ def lines_of(
         ]
         for start, end in zip(starts[lines].tolist(), ends[lines].tolist(), strict=True)
     )
+
+
+def coloured_lines(
+    position: FloatArray, values: FloatArray, kept: Sequence[int]
+) -> tuple[tuple[FloatArray, ...], NDArray[np.uint8]]:
+    """Return a path as lines, each in one colour of `VALUE_SCALE`, and their colours, shape (lines, 3).
+
+    A line goes as far as its values are on one level of the scale: there are as many levels as keep the lines
+    few enough.
+
+    Args:
+        position: In [m], shape (n, 3); the path is broken where it is NaN.
+        values: In any unit, shape (n,).
+        kept: Rows that are vertices in any case.
+    """
+    step = max(1, math.ceil(len(position) / MOST))
+    rows = np.union1d(np.arange(0, len(position), step), [len(position) - 1, *kept]).astype(np.int64)
+    there = whole_rows(position[rows])
+    share = np.nan_to_num(values[rows] / (np.nanmax(values, initial=0.0) or 1.0))
+    for levels in LEVELS:
+        level = np.where(there, np.floor(levels * share), -1.0)
+        starts = np.append(0, np.flatnonzero(np.diff(level)) + 1)
+        if len(starts) <= COLOURED:
+            break
+    strips, shown = [], []
+    for start, end in zip(starts, [*starts[1:], len(rows)], strict=True):
+        last = end + 1 if end < len(rows) and there[end] else end
+        if there[start] and last - start > 1:
+            strips.append(position[rows[start:last]])
+            shown.append(share[start:end].mean())
+    return tuple(strips), value_colours(np.append(shown, 1.0 / SEEN))[:-1]
 
 
 def dashed(strips: Sequence[FloatArray]) -> tuple[FloatArray, ...]:

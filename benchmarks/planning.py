@@ -1,0 +1,168 @@
+"""Planned paths: the law of the joints' limits beside TOPP-RA, and whole commands.
+
+python benchmarks/planning.py [--rounds N]
+
+TOPP-RA is given the joint values that urmpipe found, at the same places: its time is that of its passes
+alone, urmpipe's that of both passes with what makes the bounds. Both are run in turn in one process.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import sys
+import tempfile
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from pairs import Bound, machine, rounds, timed, write_results
+from toppra.algorithm import TOPPRA
+from toppra.constraint import DiscretizationType, JointAccelerationConstraint, JointVelocityConstraint
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.planning.cube import cube_rows
+from urmpipe_models.planning.fastest import JointLimits, fastest_law
+from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.joint_limits import joints_on_grid
+from urmpipe_models.planning.joint_motion import JointSlopes
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.robots.robot_file import robot_toml
+
+VELOCITY, ACCELERATION = 2.0, 5.0
+"""The largest rates [rad/s] and accelerations [rad/s2] of every joint."""
+
+DOWN = np.diag([1.0, -1.0, -1.0])
+CUBE = "cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sampled:
+    """Joint values at places as a path of TOPP-RA."""
+
+    s: FloatArray
+    slopes: JointSlopes
+    dof: int
+    waypoints: None = None
+
+    @property
+    def path_interval(self) -> FloatArray:
+        """Where the path begins and ends in [m], shape (2,)."""
+        return self.s[[0, -1]]
+
+    def __call__(self, places: FloatArray, order: int = 0) -> FloatArray:
+        """Return values, slopes or curvatures at places of the grid, shape (n, joints)."""
+        values = (self.slopes.q, self.slopes.dq, self.slopes.ddq)[order]
+        return np.asarray(values[np.searchsorted(self.s, np.clip(places, 0.0, self.s[-1]))])
+
+
+def jobs() -> dict[str, tuple[Chain, FloatArray, JointSlopes, JointSlopes]]:
+    """Return the joints of two arms along a wall: poses by a closed form, positions by least motion."""
+    small = cube_rows("wall", 0.3, 0.03, np.array([0.45, 0.0, 0.3]), rotation=DOWN)
+    high = cube_rows("wall", 0.3, 0.03, np.array([0.45, 0.0, 0.9]))
+    made = {}
+    for name, rows in (("ur5e", small), ("urm6", high)):
+        chain = load_robot(name)
+        found = joints_on_grid(chain, path_of(rows), None)
+        assert found is not None
+        made[name] = (chain, *found)
+    return made
+
+
+def by_toppra(chain: Chain, s: FloatArray, after: JointSlopes) -> float:
+    """Return the duration in [s] that TOPP-RA finds, by collocation: it knows one curvature at a place."""
+    both = np.ones((len(chain.coordinates), 2)) * [-1.0, 1.0]
+    scheme = DiscretizationType.Collocation
+    limits = [
+        JointVelocityConstraint(VELOCITY * both),
+        JointAccelerationConstraint(ACCELERATION * both, discretization_scheme=scheme),
+    ]
+    path = Sampled(s, after, len(chain.coordinates))
+    instance = TOPPRA(limits, path, gridpoints=s, parametrizer="ParametrizeConstAccel")
+    _, speeds, _ = instance.compute_parameterization(0.0, 0.0)
+    return float((2.0 * np.diff(s) / (speeds[1:] + speeds[:-1])).sum())
+
+
+def by_urmpipe(chain: Chain, s: FloatArray, after: JointSlopes, before: JointSlopes) -> float:
+    """Return the duration in [s] that urmpipe finds."""
+    joints = len(chain.coordinates)
+    limits = JointLimits(np.full(joints, VELOCITY), np.full(joints, ACCELERATION))
+    stop = np.zeros(len(s), dtype=bool)
+    stop[[0, -1]] = True
+    return fastest_law(s, after.rows(slice(None, -1)), before.rows(slice(1, None)), stop, limits).duration
+
+
+def median_of(taken: list[float]) -> str:
+    """Return the median and the span of times in [s]."""
+    return f"{statistics.median(taken):.3f} ({min(taken):.3f}-{max(taken):.3f})"
+
+
+def laws(count: int) -> tuple[list[str], list[Bound]]:
+    """Return the table of both laws, and what is held."""
+    lines = [
+        "| path | places | duration s, urmpipe | duration s, TOPP-RA | ratio | urmpipe s, median (min-max)"
+        " | TOPP-RA s, median (min-max) |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    bounds = []
+    for name, (chain, s, after, before) in jobs().items():
+        ways = (partial(by_urmpipe, chain, s, after, before), partial(by_toppra, chain, s, after))
+        own, theirs = (way() for way in ways)
+        taken = [[timed(way) for way in ways] for _ in range(count)]
+        mine, others = (list(times) for times in zip(*taken, strict=True))
+        lines.append(
+            f"| {name} | {len(s)} | {own:.5f} | {theirs:.5f} | {own / theirs:.4f}"
+            f" | {median_of(mine)} | {median_of(others)} |"
+        )
+        bounds.append(Bound(f"{name}: duration over that of TOPP-RA", own / theirs, least=0.999, most=1.01))
+    return lines, bounds
+
+
+def commands(count: int) -> tuple[list[str], list[Bound]]:
+    """Return the table of whole commands, and what is held."""
+    python, lines = [sys.executable, "-m", "urmpipe"], []
+    with tempfile.TemporaryDirectory() as folder:
+        ours, arm = Path(folder), load_robot("ur5e")
+        limited = replace(arm, joints=tuple(replace(one, acceleration=ACCELERATION) for one in arm.joints))
+        (ours / "arm.toml").write_text(robot_toml(limited), encoding="utf-8")
+        near = "cube:wall,a=0.3,r=0.03,x=0.45,y=0,z=0.3,rz=0,ry=180deg,rx=0"
+        told = {
+            "contour for irb60, CSV": [CUBE, "--robot", "irb60", "-o", f"{ours}/plan.csv"],
+            "contour for irb60, recording": [CUBE, "--robot", "irb60", "-o", f"{ours}/plan.rrd"],
+            "contour without a robot": [CUBE, "-o", f"{ours}/path.csv"],
+            "law of limits, ur5e": [near, "--robot", f"{ours}/arm.toml", "--law", "limits"],
+            "law of jerk, ur5e": [near, "--robot", "ur5e", "--law", "jerk", "--jerk", "60"],
+        }
+        taken = rounds({name: [*python, "plan", *given] for name, given in told.items()}, count)
+    lines = ["| command | wall s, median (min-max) | CPU s | MB |", "|---|---|---|---|"]
+    for name, usages in taken.items():
+        cpu, rss = (statistics.median(getattr(one, key) for one in usages) for key in ("cpu", "rss"))
+        lines.append(f"| {name} | {median_of([one.wall for one in usages])} | {cpu:.2f} | {rss:.0f} |")
+    wall = statistics.median(one.wall for one in taken["contour for irb60, CSV"])
+    return lines, [Bound("contour for irb60, whole command: s", wall, under=2.0)]
+
+
+def main() -> None:
+    """Measure and keep the results."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=5)
+    options = parser.parse_args()
+    of_laws, of_commands = laws(options.rounds), commands(options.rounds)
+    lines = [
+        f"# Planned paths: {options.rounds} rounds in turn",
+        "",
+        *machine("toppra", "ruckig"),
+        "The wall of a cube of 0.3 m with arcs of 0.03 m; every joint up to"
+        f" {VELOCITY:g} rad/s and {ACCELERATION:g} rad/s2. Both laws get the same joint values at the same"
+        " places.",
+        "",
+        *of_laws[0],
+        "",
+        *of_commands[0],
+    ]
+    write_results("planning", lines, [*of_laws[1], *of_commands[1]])
+
+
+main()

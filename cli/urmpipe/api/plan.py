@@ -1,0 +1,150 @@
+"""`urmpipe.plan`: from rows of points to a path, the law of its time, and the joints that follow it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Unpack
+
+import numpy as np
+
+from urmpipe.api.ik import output_kind, refuse_recording
+from urmpipe.arm_placing import NO_ROBOT, Frame, Robot
+from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_warnings
+from urmpipe.reading import TableReading, map_files, options_of, resolved
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import Finding, OptionError, for_each
+from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.planning.stretches import Arcs
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.outputs import PATH_ROW, guarded_output, refuse_output
+from urmpipe_pipeline.planned_paths.given_path import GivenPath, given_path
+from urmpipe_pipeline.planned_paths.planning import plan_path
+from urmpipe_pipeline.planned_paths.request import (
+    PERIOD,
+    Request,
+    Timing,
+    checked_timing,
+    refuse_unlimited,
+)
+from urmpipe_pipeline.planned_paths.result import Law, PlannedPath
+from urmpipe_pipeline.results import write_recording
+from urmpipe_pipeline.solved_targets.request import start_of
+from urmpipe_pipeline.tables.joint_file import write_joint_log
+
+PLANNING = 0.8
+"""Share of the work that planning is where something is written, too."""
+
+
+@public_reading(TableReading)
+def plan(
+    path: PathLike | PathRows,
+    robot: Robot | None = None,
+    *,
+    base: Frame | None = None,
+    tool: Frame | None = None,
+    base_link: str | None = None,
+    tip_link: str | None = None,
+    velocity: float | None = None,
+    acceleration: float | None = None,
+    law: Law = "trapezoid",
+    jerk: float | None = None,
+    arcs: Arcs = "tangential",
+    tsp: float = PERIOD,
+    start: Sequence[float] | FloatArray | None = None,
+    strict: bool = False,
+    output: PathLike | None = None,
+    inputs: Sequence[PathLike] = (),
+    progress: Callable[[float], None] | None = None,
+    **reading: Unpack[TableReading],
+) -> PlannedPath:
+    """Plan a path of lines and arcs, its time, and the joints of an arm along it. docs/plan.md tells how.
+
+    Args:
+        path: A file of rows x, y, z, r; a test cube, such as "cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1"; or rows.
+        robot: The arm; default: path and time alone.
+        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
+        tool: The tool centre point in the frame of the arm's tip, likewise.
+        base_link: Link of a URDF where the arm begins; default: its root.
+        tip_link: Link of a URDF where the arm ends; default: its end.
+        velocity: The largest speed along the path in [m/s]; default: 0.5, with the law limits none.
+        acceleration: The largest acceleration in [m/s2]; default: 6, with the law limits none.
+        law: trapezoid: within speed and acceleration; jerk: within a jerk, too; limits: in the least time
+            within the rates and accelerations of the joints.
+        jerk: The largest jerk of the law jerk in [m/s3].
+        arcs: tangential: the acceleration holds along the path; total: on arcs v^2 / r counts, too.
+        tsp: Time from sample to sample in [s].
+        start: Joint values in [rad] or [m] to be near to at the first sample, shape (joints,); default: the
+            robot's own.
+        strict: Whether a warning is an error.
+        output: A log (.csv) or a recording (.rrd) to write.
+        inputs: Files besides the path that are never replaced.
+        progress: Told the share that is done, 0..1.
+        **reading: How to read the file where it cannot tell by itself: unit, rotation, log_map and the others
+            of `urmpipe.TableReading`.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the path, the arm or an option; points that the arm
+            does not reach are. What keeps it from moving along them stands in the result (`obstacles`).
+
+    Source: [Iso9283]_ section 2, section 4 steps 1 to 19.
+    """
+    written = None if output is None else Path(output)
+    asked = Timing(law, velocity, acceleration, jerk, arcs, tsp)
+    parts: tuple[Callable[[], Any], ...] = (
+        lambda: _arm_and_start(resolved(reading, robot, base, tool, base_link, tip_link).arm, start),
+        lambda: _given(path, reading),
+        lambda: checked_timing(asked),
+        lambda: output_kind(written, "plan"),
+    )
+    (arm, begin), given, timing, kind = for_each(lambda make: make(), parts)
+    refuse_unlimited(timing, arm)
+    kept = [*([] if given.file is None else paths(str(path))), *map_files(reading), *paths(inputs)]
+    if written is not None:
+        refuse_output(written, kept, kind)
+    share = PLANNING if written else 1.0
+    planning = None if progress is None else lambda done: progress(share * done)
+    result = plan_path(given, Request(arm, begin, timing), planning)
+    refuse_warnings(strict, result.warnings)
+    if written is None:
+        return result
+    if kind == "recording":
+        writing = None if progress is None else lambda done: progress(share + (1.0 - share) * done)
+        result = replace(result, run=result.as_run())
+        write_recording(result, written, kept, writing)
+        return replace(result, recording=written)
+    if result.obstacles:
+        said = f"{written} is not written: the arm cannot move as planned"
+        return replace(result, warnings=(*result.warnings, LogWarning("not-written", said)))
+    _write_log(result, written, kept)
+    return replace(result, log=written)
+
+
+def _arm_and_start(
+    arm: Chain | None, start: Sequence[float] | FloatArray | None
+) -> tuple[Chain | None, FloatArray | None]:
+    """Return the arm and where it is to start; raise an `OptionError` for a start without an arm."""
+    if arm is not None:
+        return arm, start_of(arm, start)
+    if start is not None:
+        raise OptionError(Finding("found without a robot", parameter="start", hints=NO_ROBOT))
+    return None, None
+
+
+def _given(path: PathLike | PathRows, reading: Mapping[str, Any]) -> GivenPath:
+    """Return the rows of a path; raise a `LogError` if it is a recording."""
+    refuse_recording(path, "a table (CSV) of rows, or a test cube (cube:...)")
+    return given_path(path, options_of(reading))
+
+
+def _write_log(result: PlannedPath, path: Path, kept: Sequence[Path]) -> None:
+    """Write a plan as a log: times, joints, and the path as the recorded tool centre point."""
+    joints = result.joints
+    with guarded_output(path, kept, "plan") as part:
+        write_joint_log(
+            part, path, joints=result.robot.coordinates if result.robot else (), units=result.joint_units,
+            q=np.empty((len(result), 0)) if joints is None else joints.q, row=result.row, t_ns=result.t_ns,
+            position=result.position, quat_xyzw=result.quat_xyzw, row_column=PATH_ROW,
+        )  # fmt: skip

@@ -1,0 +1,95 @@
+"""`urmpipe plan`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import urmpipe
+from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.reading import table_options
+from urmpipe.options.types import DURATION, JointValuesType, NumberType, OneOf
+
+if TYPE_CHECKING:
+    from urmpipe_pipeline.planned_paths.result import PlannedPath
+
+
+@click.command(short_help="Plan a path of lines and arcs, and its time.")
+@click.argument("path", metavar="PATH.csv|cube:...")
+@output_option("PLAN.csv|PLAN.rrd", "Write a log that every command reads, or a recording.")
+@click.option(
+    "--velocity",
+    type=NumberType("M/S", "m/s"),
+    help="Largest speed [default: 0.5; with --law limits none].",
+)
+@click.option(
+    "--acceleration",
+    type=NumberType("M/S2", "m/s2"),
+    help="Largest acceleration along the path [default: 6; with --law limits none].",
+)
+@click.option(
+    "--law",
+    type=OneOf(["trapezoid", "jerk", "limits"]),
+    default="trapezoid",
+    show_default=True,
+    help="Within speed and acceleration; within --jerk, too; or as fast as the joints' limits allow.",
+)
+@click.option("--jerk", type=NumberType("M/S3", "m/s3"), help="Largest jerk along the path, of --law jerk.")
+@click.option(
+    "--arcs",
+    type=OneOf(["tangential", "total"]),
+    default="tangential",
+    show_default=True,
+    help="What the acceleration holds on arcs; total: v^2 / r counts, too.",
+)
+@click.option("--tsp", type=DURATION, default="5ms", show_default=True, help="Time from sample to sample.")
+@click.option(
+    "--start",
+    type=JointValuesType(),
+    help="Joint values to be near to at the first sample, in rad and m [default: the robot's own].",
+)
+@table_options
+@output_options
+def plan(path: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
+    """Plan a path of lines and arcs, the time along it, and the joints of an arm that follows it.
+
+    PATH.csv is a table of x, y, z (m) and r: the radius of an arc that begins at the row; as corner_r: that
+    rounds the corner at the row. Where it is 0 the path stops. rz, ry, rx (rad) or a quaternion turn the
+    tool.
+    cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1 is a test path after ISO 9283 (cube:diagonal is the other); plane=
+    names its plane (xy, xz, yz; c1 to c4). Without --robot path and time alone are planned.
+
+    \b
+    Examples:
+      urmpipe plan contour.csv -o planned.csv
+      urmpipe plan cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1 --robot irb60 -o plan.rrd
+      urmpipe plan contour.csv --robot ur5e --velocity 0.25 -o plan.csv
+      urmpipe plan contour.csv --robot ur5e --law jerk --jerk 60
+      urmpipe plan contour.csv --robot my-arm.toml --law limits --json
+
+    Exit codes: 0 the arm can move so (its speeds reduced to what the joints allow), 1 not so (a jump, a
+    singular pose, samples out of reach, less than 1 % of the speed left), 2 bad input or usage.
+    """
+    replaces = output is not None and output.exists()
+    with terminal.progress(f"Planning {path}") as progress:
+        result = urmpipe.plan(path, output=output, progress=progress, **options)
+    terminal.warn(result.warnings)
+    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces))
+    return 1 if result.verdict == "fail" else 0
+
+
+def _print(result: PlannedPath, replaces: bool) -> None:
+    """Print the plan, and what was written."""
+    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.terminal import print_recording, say
+    from urmpipe_models.spelling import pasted
+    from urmpipe_pipeline.results import present
+
+    print_presentation(present(result))
+    if result.recording is not None:
+        print_recording(result.recording, replaced=replaces)
+    elif result.log is not None:
+        earlier = "; it replaced an earlier one" if replaces else ""
+        say(f"Plan: {result.log}  (read it: urmpipe ingest {pasted(result.log)}{earlier})")

@@ -1,0 +1,233 @@
+"""Arms and a path seen along the axes of the world, as SVG: views of one scale, aligned with each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from html import escape
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.presentation.parts import spot_at
+from urmpipe_pipeline.presentation.scene import Spot
+
+SIZE = 420
+"""Longest extent of what is drawn, in pixels."""
+
+MARGIN = 50
+"""Free around what is drawn in each view, in pixels: a name stands beside its point."""
+
+SCALE_PX, TITLE_PX, HEAD_PX = 44, 30, 40
+"""Room for the numbers of an axis, for the title of a view, and for that of the picture, in pixels."""
+
+APART_PX = 50
+"""Pixels between two numbers of an axis, at least."""
+
+NEAR_PX = 10
+"""Spots nearer than this in a view have one name, in pixels."""
+
+HALO = 'stroke="white" stroke-width="4" paint-order="stroke"'
+"""Keeps a label readable over a line."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A look along one axis.
+
+    Attributes:
+        title: What it is called.
+        right: Number of the coordinate that goes to the right.
+        up: Number of the one that goes up.
+        column: Its place among the views from the left.
+        row: And from the top: views above each other share `right`, those beside each other `up`.
+    """
+
+    title: str
+    right: int
+    up: int
+    column: int
+    row: int
+
+
+SIDEWAYS = View("from the side", 0, 2, 0, 0)
+FRONT = View("from the front", 1, 2, 1, 0)
+ABOVE = View("from above", 0, 1, 0, 1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sketch:
+    """What is drawn, from the back to the front.
+
+    Attributes:
+        arms: The base and the points p1..pn of each arm in [m], shape (n + 1, 3).
+        path: Where a point goes in [m], shape (m, 3).
+        spots: Places with a word.
+    """
+
+    arms: Sequence[FloatArray]
+    path: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    spots: Sequence[Spot] = ()
+
+    @property
+    def extent(self) -> tuple[FloatArray, FloatArray]:
+        """Its least and its largest coordinates in [m], shape (3,) each."""
+        spots = np.array([spot.position for spot in self.spots]).reshape(-1, 3)
+        every = np.concatenate([*self.arms, self.path, spots])
+        every = every[np.isfinite(every).all(axis=1)]
+        return every.min(axis=0), every.max(axis=0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Frame:
+    """Where a view stands in the picture, in pixels: its left, top, width and height, and pixels per [m]."""
+
+    view: View
+    corner: FloatArray
+    size: FloatArray
+    low: FloatArray
+    scale: float
+
+    @property
+    def axes(self) -> list[int]:
+        return [self.view.right, self.view.up]
+
+    def placed(self, points: FloatArray) -> FloatArray:
+        """Return points in [m], shape (n, 3), in pixels, shape (n, 2)."""
+        flat = MARGIN + self.scale * (points - self.low)[:, self.axes]
+        return np.asarray(self.corner + [0.0, self.size[1]] + flat * [1.0, -1.0])
+
+    def ticks(self, axis: int) -> FloatArray:
+        """Return the values of one of its axes in [m] that have a number, shape (n,)."""
+        step = _round_step(APART_PX / self.scale)
+        first = self.low[self.axes[axis]] - MARGIN / self.scale
+        last = first + self.size[axis] / self.scale
+        return step * np.arange(math.ceil(first / step), math.floor(last / step) + 1)
+
+
+def projected(sketch: Sketch, views: Sequence[View], title: str, mark: str = "") -> str:
+    """Return views of a sketch, each with its axes.
+
+    Args:
+        sketch: What is drawn.
+        views: From where it is seen.
+        title: What the picture shows.
+        mark: A comment at its start, by which a file of ours is known.
+    """
+    frames = _frames(sketch, views)
+    width, height = np.max([one.corner + one.size for one in frames], axis=0) + np.array([20.0, SCALE_PX])
+    size = f'width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.0f} {height:.0f}"'
+    return "\n".join(
+        (
+            *([f"<!-- {mark} -->"] if mark else []),
+            f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="sans-serif" font-size="13">',
+            f"<title>{escape(title)}</title>",
+            '<rect width="100%" height="100%" fill="white"/>',
+            f'<text x="{SCALE_PX}" y="24" font-size="17">{escape(title)}</text>',
+            *(line for one in frames for line in (*_scales(one), *_drawn(sketch, one))),
+            "</svg>\n",
+        )
+    )
+
+
+def _frames(sketch: Sketch, views: Sequence[View]) -> list[_Frame]:
+    """Return where the views stand: columns as wide and rows as high as what is seen in them."""
+    low, high = sketch.extent
+    scale = SIZE / float((high - low).max() or 1.0)
+    sizes = 2 * MARGIN + scale * (high - low)
+    across = {view.column: sizes[view.right] + SCALE_PX for view in views}
+    down = {view.row: sizes[view.up] + SCALE_PX + TITLE_PX for view in views}
+    return [
+        _Frame(
+            view,
+            np.array(
+                [
+                    SCALE_PX + sum(across[k] for k in across if k < view.column),
+                    HEAD_PX + TITLE_PX + sum(down[k] for k in down if k < view.row),
+                ]
+            ),
+            sizes[[view.right, view.up]],
+            low,
+            scale,
+        )
+        for view in views
+    ]
+
+
+def _scales(frame: _Frame) -> Iterator[str]:
+    """Yield the title of a view, its frame, and lines at round values of its axes, with numbers."""
+    (left, top), (width, height) = frame.corner, frame.size
+    bottom, right = top + height, left + width
+    names = ["xyz"[axis] for axis in frame.axes]
+    yield f'<text x="{left:.1f}" y="{top - 8:.1f}" fill="#555">{escape(frame.view.title)}</text>'
+    box = f'x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}"'
+    yield f'<rect {box} fill="none" stroke="#c3cad0"/>'
+    grid, number = 'stroke="#e4e8eb"', 'fill="#5b6770" font-size="11"'
+    for value in frame.ticks(0).tolist():
+        x = frame.placed(_at(frame, 0, value))[0, 0]
+        yield f'<line x1="{x:.1f}" y1="{top:.1f}" x2="{x:.1f}" y2="{bottom:.1f}" {grid}/>'
+        yield f'<text x="{x:.1f}" y="{bottom + 15:.1f}" text-anchor="middle" {number}>{_number(value)}</text>'
+    for value in frame.ticks(1).tolist():
+        y = frame.placed(_at(frame, 1, value))[0, 1]
+        yield f'<line x1="{left:.1f}" y1="{y:.1f}" x2="{right:.1f}" y2="{y:.1f}" {grid}/>'
+        yield f'<text x="{left - 5:.1f}" y="{y + 4:.1f}" text-anchor="end" {number}>{_number(value)}</text>'
+    middle = left + width / 2.0
+    yield f'<text x="{middle:.1f}" y="{bottom + 30:.1f}" text-anchor="middle" {number}>{names[0]} [m]</text>'
+    yield f'<text x="{left - 5:.1f}" y="{top - 8:.1f}" text-anchor="end" {number}>{names[1]} [m]</text>'
+
+
+def _drawn(sketch: Sketch, frame: _Frame) -> Iterator[str]:
+    """Yield arms, path and spots in a view; several arms are lighter than one."""
+    alone = len(sketch.arms) == 1
+    width, opacity = (8, 1.0) if alone else (4, 0.4)
+    for arm in sketch.arms:
+        style = f'stroke="#4a7ba6" stroke-width="{width}" stroke-linejoin="round" opacity="{opacity:g}"'
+        yield _polyline(frame.placed(arm), style)
+    if len(sketch.path):
+        yield _polyline(frame.placed(sketch.path), 'stroke="#d55e00" stroke-width="2"')
+    placed = frame.placed(np.array([spot.position for spot in sketch.spots]).reshape(-1, 3))
+    for spot, (x, y) in zip(sketch.spots, placed.tolist(), strict=True):
+        yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{5 if alone else 3}" fill="{spot.colour}"/>'
+    for (x, y), words in _names(placed, [spot.words for spot in sketch.spots]):
+        yield f'<text x="{x + 8:.1f}" y="{y - 6:.1f}" {HALO}>{escape(words)}</text>'
+
+
+def _names(placed: FloatArray, words: Sequence[str]) -> Iterator[tuple[tuple[float, float], str]]:
+    """Yield where names stand, in pixels, and what they are: one of spots that are near to each other."""
+    left = list(range(len(placed)))
+    while left:
+        first = left[0]
+        near = [k for k in left if np.linalg.norm(placed[k] - placed[first]) < NEAR_PX]
+        left = [k for k in left if k not in near]
+        x, y = placed[first].tolist()
+        yield (x, y), ", ".join(dict.fromkeys(words[k] for k in near))
+
+
+def _polyline(points: FloatArray, style: str) -> str:
+    """Return a line through points in pixels, shape (n, 2)."""
+    way = " ".join(f"{x:.1f},{y:.1f}" for x, y in points[np.isfinite(points).all(axis=1)])
+    return f'<polyline points="{way}" fill="none" {style}/>'
+
+
+def _at(frame: _Frame, axis: int, value: float) -> FloatArray:
+    """Return a point of which one of the frame's coordinates has a value in [m], shape (1, 3)."""
+    point = frame.low.copy()
+    point[frame.axes[axis]] = value
+    return np.asarray(point[np.newaxis])
+
+
+def _round_step(least: float) -> float:
+    """Return the least of 1, 2, 5, 10, ... that is no less than a step in [m]."""
+    power = 10.0 ** math.floor(math.log10(least))
+    return next(digit * power for digit in (1.0, 2.0, 5.0, 10.0) if digit * power >= least * (1.0 - 1e-9))
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}" if abs(value) > 1e-9 else "0"
+
+
+def chain_spots(skeleton: FloatArray) -> list[Spot]:
+    """Return the names of the points of an arm: its skeleton in [m], shape (n + 1, 3)."""
+    names = [("base", "#222"), *((f"p{k}", "#d55e00") for k in range(1, len(skeleton)))]
+    return [Spot(spot_at(point), *name) for point, name in zip(skeleton, names, strict=True)]

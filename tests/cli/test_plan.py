@@ -1,0 +1,310 @@
+"""`urmpipe plan` and `urmpipe.plan` as a user runs them: rows in; a table, JSON, a log or a recording out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import urmpipe as package
+from asserting import refusal, there
+from urmpipe_models.errors import LogError, OptionError, PathError
+from urmpipe_models.planning.rows import path_rows
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.planned_paths.result import PlannedPath
+from urmpipe_pipeline.results import read_recording
+
+RunCommand = Callable[..., Any]
+"""What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""
+
+CUBE = "cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1"
+LENGTH, DURATION = 2.348496, 4.780324
+"""Of the paper's contour in [m], and at 0.5 m/s and 6 m/s2 in [s]."""
+
+CONTOUR = """x,y,z,r
+1.7,0.3,1,0
+1.97,0.3,1,0.03
+2,-0.27,1,0.03
+1.43,-0.3,1,0.03
+1.4,0.27,1,0.03
+1.7,0.3,1,0
+"""
+
+SINGULAR = "x,y,z\n0.6,0,1.6\n0.3,0,1.6\n-0.3,0,1.6\n"
+"""Rows over the axis of theta1 of irb60."""
+
+SHORT = "x,y,z,r\n0,0,0,0\n0.1,0,0,0\n"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path) -> Path:
+    """The folder of the command, with paths in it."""
+    (tmp_path / "path.csv").write_text(CONTOUR)
+    (tmp_path / "short.csv").write_text(SHORT)
+    (tmp_path / "load.csv").write_text("x,y,z,load\n0,0,0,3\n0.1,0,0,4\n")
+    (tmp_path / "singular.csv").write_text(SINGULAR)
+    return tmp_path
+
+
+def answer(urmpipe: RunCommand, code: int, *arguments: str | Path) -> dict[str, Any]:
+    """Return what a command prints as JSON."""
+    ran = urmpipe("plan", *arguments, "--json")
+    assert ran.code == code, ran.err
+    found: dict[str, Any] = json.loads(ran.out)
+    return found
+
+
+# --- the answer --------------------------------------------------------------------------------------
+
+
+def test_a_file_is_planned_without_a_robot(urmpipe: RunCommand, folder: Path) -> None:
+    before = sorted(folder.iterdir())
+    ran = urmpipe("plan", "path.csv")
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.out.splitlines()[:6] == [
+        "path: 2.348 m in 4.780 s (trapezoid), without a robot",
+        "      Length: 2.348496 m",
+        "      Duration: 4.780324 s",
+        "      Law: trapezoid, up to 0.5 m/s and 6 m/s² along the path",
+        "",
+        "Plan path: Segments (9)",
+    ]
+    assert sorted(folder.iterdir()) == before
+
+
+def test_json_of_the_papers_contour(urmpipe: RunCommand) -> None:
+    found = answer(urmpipe, 0, CUBE, "--robot", "irb60")
+    assert list(found) == [
+        "schema", "name", "robot", "length", "duration", "law", "velocity", "acceleration", "scaled",
+        "segments", "limits", "singularity", "obstacles", "verdict", "warnings", "output",
+    ]  # fmt: skip
+    assert (found["length"], found["duration"]) == pytest.approx((LENGTH, DURATION), abs=1e-6)
+    plain = ("schema", "name", "robot", "law", "velocity", "acceleration", "scaled", "verdict", "output")
+    assert [found[key] for key in plain] == [
+        1, "cube wall xy", "irb60", "trapezoid", 0.5, 6.0, 1.0, "pass", None,
+    ]  # fmt: skip
+    assert (found["obstacles"], found["warnings"]) == ([], [])
+    assert [list(one) for one in found["segments"]] == [
+        ["kind", "row", "length", "radius", "t", "duration"]
+    ] * 9
+    assert [one["length"] for one in found["segments"]] == pytest.approx(
+        [0.27, 0.047124, 0.54, 0.047124, 0.54, 0.047124, 0.54, 0.047124, 0.27], abs=1e-6
+    )
+    assert [one["radius"] for one in found["segments"]] == [None, *[0.03, None] * 4]
+    assert [list(one) for one in found["limits"]] == [
+        ["joint", "velocity_share", "acceleration_share", "t"]
+    ] * 4
+    assert [one["joint"] for one in found["limits"]] == ["theta1", "theta2", "theta3", "theta4"]
+    assert list(found["singularity"]) == ["row", "t", "smallest", "manipulability"]
+
+
+def test_json_of_a_file_is_that_of_the_cube(urmpipe: RunCommand) -> None:
+    file, cube = answer(urmpipe, 0, "path.csv"), answer(urmpipe, 0, CUBE)
+    assert (file.pop("name"), cube.pop("name")) == ("path", "cube wall xy")
+    for ours, theirs in zip(file.pop("segments"), cube.pop("segments"), strict=True):
+        assert ours == pytest.approx(theirs, abs=1e-9)  # decimal fractions, or sums of halves
+    for key in ("length", "duration"):
+        assert file.pop(key) == pytest.approx(cube.pop(key), abs=1e-9)
+    assert file == cube
+    assert (file["robot"], file["verdict"], file["limits"], file["singularity"]) == (None, None, [], None)
+
+
+@pytest.mark.parametrize(
+    ("options", "duration"),
+    [
+        (("--arcs", "total"), 4.855270),
+        (("--velocity", "0.25", "--acceleration", "3"), 4.0 * 2.348496 + 0.25 / 3.0),
+        (("--law", "jerk", "--jerk", "1e9"), DURATION),
+    ],
+)
+def test_options_of_the_law(urmpipe: RunCommand, options: tuple[str, ...], duration: float) -> None:
+    # from rest to rest L / v + v / a; a jerk without end is none; L is known to 1e-6
+    assert answer(urmpipe, 0, CUBE, *options)["duration"] == pytest.approx(duration, abs=5e-6)
+
+
+def test_a_plan_that_fails_is_exit_1(urmpipe: RunCommand) -> None:
+    ran = urmpipe("plan", "singular.csv", "--robot", "irb60")
+    assert (ran.code, ran.err) == (1, "")
+    words = "at t = 1.325 s (segment 2, row 2, joint theta3): the arm passes a singular pose"
+    assert ran.out.splitlines()[:2] == [
+        f"FAIL  singular: irb60 cannot run 0.9 m in 1.967 s (trapezoid): singular {words}",
+        f"      In the way: {words}",
+    ]
+    found = answer(urmpipe, 1, "singular.csv", "--robot", "irb60")
+    assert found["verdict"] == "fail"
+    assert found["obstacles"] == [
+        {"kind": "singular", "segment": 1, "row": 2, "t": 1.325, "joint": "theta3",
+         "message": "the arm passes a singular pose"}
+    ]  # fmt: skip
+
+
+def test_quiet_prints_nothing(urmpipe: RunCommand) -> None:
+    for arguments, code in ((("path.csv",), 0), (("singular.csv", "--robot", "irb60"), 1)):
+        ran = urmpipe("plan", *arguments, "-q")
+        assert (ran.code, ran.out, ran.err) == (code, "", "")
+
+
+def test_a_warning_is_told_and_strict_refuses_it(urmpipe: RunCommand, folder: Path) -> None:
+    said = (
+        "load is not used; name what a path has so in the header: x, y, z, an orientation, r or corner_r,"
+        " variant"
+    )
+    ran = urmpipe("plan", "load.csv")
+    assert (ran.code, ran.err) == (0, f"warning: {said}\n")
+    ran = urmpipe("plan", "load.csv", "--strict", "-o", "plan.csv")
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.splitlines() == ["error: --strict: found 1 warning, allowed: none", f"error: {said}"]
+    assert not (folder / "plan.csv").exists()
+
+
+def test_help_has_examples(urmpipe: RunCommand) -> None:
+    ran = urmpipe("plan", "--help")
+    assert ran.code == 0
+    examples = ran.out.partition("Examples:\n")[2].partition("\n\n")[0].splitlines()
+    assert len(examples) == 5
+    assert all(line.startswith("    urmpipe plan ") for line in examples)
+
+
+def test_start_chooses_the_branch(urmpipe: RunCommand, folder: Path) -> None:
+    """The elbow of ur5e up or down at the first sample."""
+    (folder / "arm.csv").write_text(
+        "x,y,z,rz,ry,rx\n0.5,0.1,0.3,0,0,3.141592653589793\n0.5,0.2,0.3,0,0,3.141592653589793\n"
+    )
+    first = {}
+    for sign, start in ((1, "0,-1.6,1.6,-1.6,-1.57,0"), (-1, "0,-0.5,-1.6,-1,-1.57,0")):
+        ran = urmpipe("plan", "arm.csv", "--robot", "ur5e", "--start", start, "-o", f"{sign}.csv")
+        assert ran.code == 0, ran.out
+        first[sign] = float(pd.read_csv(folder / f"{sign}.csv")["elbow_joint (rad)"][0])
+    assert first[-1] < 0.0 < first[1]
+
+
+# --- what is written ---------------------------------------------------------------------------------
+
+
+def test_a_csv_has_the_samples_at_their_times(urmpipe: RunCommand, folder: Path) -> None:
+    ran = urmpipe("plan", CUBE, "--robot", "irb60", "--tsp", "10ms", "-o", "plan.csv")
+    assert ran.code == 0
+    assert ran.out.splitlines()[-1] == "Plan: plan.csv  (read it: urmpipe ingest plan.csv)"
+    frame = pd.read_csv(folder / "plan.csv")
+    wanted = package.plan(CUBE, "irb60", tsp=0.01)
+    assert len(frame) == len(wanted) == 480
+    np.testing.assert_array_equal(frame["t (s)"], np.arange(480) / 100)
+    names = [f"{name} (rad)" for name in load_robot("irb60").coordinates]
+    np.testing.assert_array_equal(frame[names], there(wanted.joints).q)
+    np.testing.assert_array_equal(frame[["x (m)", "y (m)", "z (m)"]], wanted.position)
+    assert answer(urmpipe, 0, CUBE, "-o", "again.csv")["output"] == "again.csv"
+
+
+def test_a_recording_is_the_plan(urmpipe: RunCommand, folder: Path) -> None:
+    ran = urmpipe("plan", "path.csv", "--robot", "irb60", "-o", "plan.rrd")
+    assert ran.code == 0
+    assert ran.out.splitlines()[-1] == "Recording: plan.rrd  (open it: urmpipe view plan.rrd)"
+    back = read_recording(folder / "plan.rrd")
+    assert isinstance(back, PlannedPath)
+    wanted = package.plan(folder / "path.csv", "irb60")
+    np.testing.assert_array_equal(there(back.joints).q, there(wanted.joints).q)
+    assert [one.name for one in back.provenance.inputs] == ["path.csv"]
+
+
+def test_a_csv_is_replaced_by_another_plan_alone(urmpipe: RunCommand, folder: Path) -> None:
+    assert urmpipe("plan", "path.csv", "-o", "plan.csv").code == 0
+    ran = urmpipe("plan", CUBE, "--robot", "irb60", "-o", "plan.csv")
+    assert ran.code == 0
+    assert ran.out.splitlines()[-1].endswith("(read it: urmpipe ingest plan.csv; it replaced an earlier one)")
+    assert "theta1 (rad)" in (folder / "plan.csv").read_text().splitlines()[0]
+    for arguments, said in (
+        (
+            (CUBE, "-o", "path.csv"),
+            "a file that is no plan of urmpipe's, allowed: a new name, or such a plan to replace",
+        ),
+        (
+            ("path.csv", "-o", "path.csv"),
+            "an input of this command, allowed: any other name for the plan",
+        ),
+    ):
+        ran = urmpipe("plan", *arguments)
+        assert (ran.code, ran.out, ran.err) == (2, "", f"error: path.csv: found {said}\n")
+        assert (folder / "path.csv").read_text() == CONTOUR
+
+
+def test_a_plan_that_fails_writes_no_csv_but_a_recording(urmpipe: RunCommand, folder: Path) -> None:
+    ran = urmpipe("plan", "singular.csv", "--robot", "irb60", "-o", "plan.csv")
+    assert (ran.code, ran.err) == (
+        1, "warning: plan.csv is not written: the arm cannot move as planned\n",
+    )  # fmt: skip
+    assert not (folder / "plan.csv").exists()
+    found = answer(urmpipe, 1, "singular.csv", "--robot", "irb60", "-o", "plan.csv")
+    assert found["output"] is None
+    assert [one["kind"] for one in found["warnings"]] == ["not-written"]
+    assert urmpipe("plan", "singular.csv", "--robot", "irb60", "-o", "plan.rrd", "-q").code == 1
+    back = read_recording(folder / "plan.rrd")
+    assert isinstance(back, PlannedPath)
+    assert back.verdict == "fail"
+
+
+def test_compare_passes_in_both_orders(urmpipe: RunCommand, folder: Path) -> None:
+    assert urmpipe("plan", "path.csv", "-o", "alone.csv", "-q").code == 0
+    assert urmpipe("plan", "path.csv", "--robot", "irb60", "-o", "plan.csv", "-q").code == 0
+    for files in (("alone.csv", "plan.csv"), ("plan.csv", "alone.csv")):
+        ran = urmpipe("compare", *files, "--json", "--output", "both.rrd")
+        assert ran.code == 0, ran.err
+        found = json.loads(ran.out)
+        assert found["verdict"] == "pass"
+        assert found["runs"][0]["delta"]["norm"]["max"] < 1e-9  # the tool is on the curve
+
+
+# --- in Python ---------------------------------------------------------------------------------------
+
+
+def test_rows_of_arrays_are_a_path() -> None:
+    points = np.array(
+        [[1.7, 0.3, 1], [2.0, 0.3, 1], [2.0, -0.3, 1], [1.4, -0.3, 1], [1.4, 0.3, 1], [1.7, 0.3, 1]]
+    )
+    rows = path_rows(points, 0.03, corner=True)
+    found = package.plan(rows, "irb60")
+    assert (found.path.total, found.duration) == pytest.approx((LENGTH, DURATION), abs=1e-6)
+    assert (found.verdict, found.robot, found.law) == ("pass", load_robot("irb60"), "trapezoid")
+    assert (found.recording, found.log, found.output, found.provenance.inputs) == (None, None, None, ())
+    assert found.to_dict() == package.plan(rows, load_robot("irb60")).to_dict()
+    np.testing.assert_allclose(found.corners, points[1:-1], rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(found.stops, points[[0, -1]])
+    frame = found.to_frame()
+    assert list(frame.columns) == [
+        "t", "row", "s", "v", "a", "j", "x", "y", "z",
+        *(f"{prefix}theta{k}" for prefix in ("", "d_", "dd_") for k in (1, 2, 3, 4)),
+    ]  # fmt: skip
+    assert len(frame) == len(found) == 958
+
+
+def test_progress_rises_to_one(folder: Path) -> None:
+    done: list[float] = []
+    package.plan(CUBE, "irb60", output=folder / "plan.rrd", progress=done.append)
+    assert done == sorted(done)
+    assert (done[0], done[-1]) == (0.0, 1.0)
+    assert len({*done}) > 3
+
+
+def test_what_is_wrong_is_raised_at_once() -> None:
+    points = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0]], dtype=float)
+    tight = path_rows(points, 0.2, corner=True)
+    line = (
+        "path, row 2, column corner_r: found 0.2 m, whose arc needs 0.2 m on the line from row {} to row {}"
+    )
+    assert refusal(PathError, package.plan, tight) == "\n".join(
+        f"{line.format(first, first + 1)}, allowed: its length, 0.1 m" for first in (1, 2)
+    )
+    assert refusal(OptionError, package.plan, path_rows(points, -0.01), velocity=0.0, start=[0.0]) == (
+        "start: found without a robot; robot=NAME|FILE gives one\n"
+        "row 2, column radius: path: found -0.01 m, allowed: finite, 0 or more\n"
+        "velocity: found 0.0, allowed: a finite number of m/s above 0"
+    )
+    array: Any = points
+    assert refusal(OptionError, package.plan, array) == (
+        'path: found a ndarray, allowed: a file, a test cube ("cube:..."), or PathRows'
+    )
+    assert refusal(LogError, package.plan, "nowhere.csv") == "nowhere.csv: found no such file"

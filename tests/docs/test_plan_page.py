@@ -1,0 +1,96 @@
+"""docs/plan.md against the code: each table and each cube of the page reads as the page says."""
+
+from __future__ import annotations
+
+import math
+import re
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from asserting import there
+from urmpipe_models.errors import LogError
+from urmpipe_models.planning.cube import PLANES
+from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.stretches import ARCS, Arcs
+from urmpipe_models.planning.trapezoid import trapezoid_law
+from urmpipe_pipeline.planned_paths.given_path import given_path
+from urmpipe_pipeline.planned_paths.path_file import PathFile, read_path
+from urmpipe_pipeline.planned_paths.presenter import CHECKS
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGE = (DOCS / "plan.md").read_text(encoding="utf-8")
+TANGENTS, CORNERS, TURNED, WRONG = re.findall(r"```csv\n(.*?)```", PAGE, re.DOTALL)
+REASONS = PAGE.split("```text\n")[1].split("```")[0].splitlines()
+CUBES = re.findall(r"^    (cube:\S+)$", PAGE, re.MULTILINE)
+
+
+def rows_of(folder: Path, text: str) -> PathFile:
+    (folder / "path.csv").write_text(text, encoding="utf-8")
+    return read_path(folder / "path.csv")
+
+
+def test_the_contour_of_the_paper_is_the_cube_s(tmp_path: Path) -> None:
+    found, cube = rows_of(tmp_path, TANGENTS), given_path(CUBES[0]).rows
+    # The cube's tangent points are computed: a few roundings of 2 m.
+    np.testing.assert_allclose(found.rows.position, cube.position, rtol=0, atol=1e-15)
+    assert (found.rows.radius.tolist(), found.warnings) == (cube.radius.tolist(), ())
+
+
+def test_the_corners_of_the_page_are_r_before_its_tangent_points(tmp_path: Path) -> None:
+    tangents, corners = rows_of(tmp_path, TANGENTS).rows, rows_of(tmp_path, CORNERS)
+    assert (tangents.corner, corners.rows.corner, corners.warnings) == (False, True, ())
+    assert corners.rows.radius.tolist() == tangents.radius.tolist()
+    ahead = np.diff(corners.rows.position, axis=0)
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    before = corners.rows.position[1:] - tangents.radius[1:, np.newaxis] * ahead
+    np.testing.assert_allclose(before, tangents.position[1:], rtol=0, atol=1e-15)  # a few roundings of 2 m
+
+
+def test_the_orientations_of_the_page_are_read(tmp_path: Path) -> None:
+    found = rows_of(tmp_path, TURNED)
+    turned = Rotation.from_euler("ZYX", [[0, 180, 0], [0, 180, 0], [90, 180, 0]], degrees=True).as_matrix()
+    # Sines and cosines of quarter turns, rounded.
+    np.testing.assert_allclose(there(found.rows.rotation), turned, rtol=0, atol=1e-15)
+
+
+def test_the_picture_is_what_its_script_draws() -> None:
+    drawn = runpy.run_path(str(DOCS / "plan_figures.py"))
+    texts = drawn["picture"](), drawn["PICTURE"].read_text(encoding="utf-8")
+    number = re.compile(r"\d+(?:\.\d+)?")
+    assert number.sub("", texts[0]) == number.sub("", texts[1])
+    computed, kept = ([float(one) for one in number.findall(text)] for text in texts)
+    assert computed == pytest.approx(kept, abs=0.15)  # a tenth of a pixel, rounded
+
+
+@pytest.mark.parametrize("arcs", ARCS)
+def test_the_times_of_the_page_are_those_of_the_contour(arcs: Arcs) -> None:
+    law = trapezoid_law(path_of(given_path(CUBES[0]).rows), 0.5, 6.0, arcs)
+    assert f"{law.duration:.6f} s" in PAGE
+
+
+def test_everything_in_the_way_is_on_the_page() -> None:
+    assert set(re.findall(r"^\| `([a-z-]+)` \|", PAGE, re.MULTILINE)) >= set(CHECKS)
+
+
+def test_wrong_rows_are_refused_as_the_page_says(tmp_path: Path) -> None:
+    with pytest.raises(LogError) as caught:
+        rows_of(tmp_path, WRONG)
+    assert [str(one).replace(f"{tmp_path}/", "") for one in caught.value.findings] == REASONS
+
+
+def test_the_cubes_of_the_page_are_read() -> None:
+    assert [given_path(cube).name for cube in CUBES] == ["cube wall xy", "cube wall xz", "cube diagonal c2"]
+    names = re.findall(r"`(\w\w)`", next(line for line in PAGE.splitlines() if line.startswith("| `plane`")))
+    assert names == [plane for planes in PLANES.values() for plane in planes]
+
+
+@pytest.mark.parametrize(
+    ("length", "sides"), [(2.348496, 4 * 0.6), (2.845552, 2 * 0.6 + 2 * 0.6 * math.sqrt(2.0))]
+)
+def test_the_lengths_of_the_page_are_those_of_its_sum(length: float, sides: float) -> None:
+    assert f"{length}" in PAGE
+    assert sides - 8 * 0.03 + 2 * math.pi * 0.03 == pytest.approx(length, abs=5e-7, rel=0)  # six decimals

@@ -1,0 +1,268 @@
+"""Plans: joints on their path, speeds within limits, and what keeps an arm from moving as planned."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from asserting import there
+from made_plans import (
+    CONTOUR,
+    DOWN,
+    SMALL,
+    across_the_base,
+    behind_the_arm,
+    limited,
+    over_its_axis,
+    planned,
+)
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import OptionError, PathError
+from urmpipe_models.inverse.targets import Targets, misses
+from urmpipe_models.orientation import matrices
+from urmpipe_models.planning.cube import cube_rows
+from urmpipe_models.planning.rows import PathRows, path_rows
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.planned_paths.request import Timing, checked_timing, refuse_unlimited
+from urmpipe_pipeline.planned_paths.result import PlannedJoints, PlannedPath
+
+KEPT = 1.0 + 1e-9
+"""So much of a limit may be used: rounding."""
+
+
+def largest(rates: FloatArray) -> list[float]:
+    return [float(value) for value in np.abs(rates).max(axis=0)]
+
+
+def joints_of(plan: PlannedPath) -> PlannedJoints:
+    return there(plan.joints)
+
+
+def test_the_papers_contour_by_its_arm() -> None:
+    plan = planned(load_robot("irb60"), CONTOUR)
+    assert plan.verdict == "pass"
+    assert plan.duration == pytest.approx(4.780324, abs=1e-6)
+    assert (len(plan), plan.scaled, plan.speed) == (958, 1.0, 0.5)
+    joints = joints_of(plan)
+    np.testing.assert_array_equal(joints.q[:, 3], 0.0)
+    miss = misses(load_robot("irb60"), joints.q, Targets(plan.position))[0]
+    assert np.linalg.norm(miss, axis=1).max() < 1e-9
+    np.testing.assert_allclose(plan.stops, [[1.7, 0.3, 1.0]] * 2, atol=1e-15)
+    np.testing.assert_allclose(plan.corners[1], [2.0, -0.3, 1.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("law", [{}, {"arcs": "total"}, {"law": "jerk", "jerk": 40.0}])
+def test_rates_are_the_derivatives_of_the_joints(law: dict[str, Any]) -> None:
+    """At a fine period, away from the times at which the law's acceleration steps."""
+    plan = planned(load_robot("ur5e"), SMALL, tsp=0.0005, **law)
+    joints, tsp = joints_of(plan), plan.tsp
+    steady = np.abs(np.diff(plan.motion.a, n=2, prepend=0, append=0)) < 1e-2
+    steady &= np.roll(steady, 1) & np.roll(steady, -1)
+    segment = plan.path.segment_at(plan.motion.s)
+    steady &= (segment == np.roll(segment, 2)) & (segment == np.roll(segment, -2))
+    steady[[0, 1, -2, -1]] = False
+    assert steady.mean() > 0.8
+    for values, rates in ((joints.q, joints.qd), (joints.qd, joints.qdd)):
+        found = np.gradient(values, tsp, axis=0)[steady]
+        # errors of a difference over 1 ms: third derivatives of some 1000 rad/s3
+        np.testing.assert_allclose(found, rates[steady], atol=2e-3 * max(1.0, np.abs(rates).max()))
+
+
+def test_it_is_at_rest_at_its_ends_and_holds_the_last_point() -> None:
+    plan = planned(load_robot("ur5e"), SMALL, tsp=0.01)
+    assert plan.t[-1] - plan.tsp < plan.duration <= plan.t[-1]
+    np.testing.assert_array_equal(plan.t_ns, np.arange(len(plan)) * 10_000_000)
+    np.testing.assert_array_equal([plan.motion.v[[0, -1]], plan.motion.a[[-1, -1]]], 0.0)
+    np.testing.assert_allclose(plan.position[-1], SMALL.position[-1], atol=1e-15)
+    np.testing.assert_array_equal(joints_of(plan).qd[-1], 0.0)
+
+
+@pytest.mark.parametrize("law", [{}, {"arcs": "total"}, {"law": "jerk", "jerk": 40.0}])
+def test_a_joint_that_is_twice_too_fast_halves_the_speed(law: dict[str, Any]) -> None:
+    free = planned(limited("ur5e", velocity=math.inf), SMALL, **law)
+    most = largest(joints_of(free).qd)
+    velocity = [math.inf] * 6
+    velocity[2] = 0.5 * most[2]
+    plan = planned(limited("ur5e", velocity=velocity), SMALL, **law)
+    assert plan.verdict == "pass"
+    assert plan.scaled == pytest.approx(0.5, rel=1e-3)
+    assert plan.duration == pytest.approx(free.duration / plan.scaled, rel=1e-12)
+    assert plan.speed == pytest.approx(0.25, rel=1e-3)
+    assert joints_of(plan).velocity_share.max() <= KEPT
+
+
+def test_a_joint_that_accelerates_four_times_too_much_halves_the_speed() -> None:
+    free = planned(limited("ur5e", velocity=math.inf), SMALL)
+    most = largest(joints_of(free).qdd)
+    plan = planned(
+        limited("ur5e", velocity=math.inf, acceleration=[0.25 * one + 1e-9 for one in most]), SMALL
+    )
+    # its samples stand elsewhere: accelerations step where an arc begins, so that the largest may be another
+    assert plan.scaled == pytest.approx(0.5, rel=2e-2)
+    assert joints_of(plan).acceleration_share.max() <= KEPT
+
+
+def test_less_than_a_hundredth_of_the_speed_is_no_plan() -> None:
+    free = planned(limited("ur5e", velocity=math.inf), SMALL)
+    most = largest(joints_of(free).qd)
+    velocity = [math.inf] * 6
+    velocity[0] = most[0] / 250.0
+    plan = planned(limited("ur5e", velocity=velocity), SMALL)
+    (obstacle,) = plan.obstacles
+    assert (plan.verdict, plan.scaled, plan.duration) == ("fail", 1.0, free.duration)
+    assert (obstacle.kind, obstacle.joint) == ("too-slow", "shoulder_pan_joint")
+    assert obstacle.words == "shoulder_pan_joint allows 0.4 % of the speed, allowed: 1 % or more"
+    sample = int(np.abs(joints_of(free).qd[:, 0]).argmax())
+    assert obstacle.t == free.t[sample]
+    assert obstacle.row == free.row[sample]
+    assert plan.path.row[obstacle.segment] + 1 == obstacle.row
+
+
+def test_a_determinant_that_passes_through_zero_is_no_plan() -> None:
+    plan = over_its_axis()
+    (obstacle,) = plan.obstacles
+    assert (obstacle.kind, obstacle.segment, obstacle.row) == ("singular", 1, 2)
+    assert obstacle.words == "the arm passes a singular pose"
+    at = round(obstacle.t / plan.tsp)
+    assert plan.position[at - 1, 0] > 0.0 >= plan.position[at, 0] - 1e-12
+
+
+def test_a_jump_is_no_plan() -> None:
+    plan = behind_the_arm()
+    jumps = [one for one in plan.obstacles if one.kind == "jump"]
+    assert (plan.verdict, jumps[0].row, jumps[0].joint) == ("fail", 1, "theta1")
+
+
+def test_samples_out_of_reach_between_rows_are_told() -> None:
+    plan = across_the_base()
+    (obstacle,) = plan.obstacles
+    assert (obstacle.kind, obstacle.row, obstacle.joint) == ("unreachable", 1, "")
+    missed = int((~plan.reached).sum())
+    assert obstacle.words == (
+        f"the wrist is 0.1326 m from axis 1, allowed: at least 0.1333 m, and {missed - 1} samples after it"
+    )
+
+
+def test_rows_out_of_reach_are_all_told_by_their_distance() -> None:
+    rows = cube_rows("wall", 0.3, 0.03, np.array([0.75, 0.0, 0.6]), rotation=DOWN)
+    with pytest.raises(PathError) as raised:
+        planned(load_robot("ur5e"), rows)
+    reached = "m out of reach of ur5e, allowed: a point that the arm reaches"
+    assert [str(one) for one in raised.value.findings] == [
+        f"path, row 1: found (0.75, 0.15, 0.6) m, 0.023 {reached}",
+        f"path, row 2: found (0.87, 0.15, 0.6) m, 0.101 {reached}",
+        f"path, row 3: found (0.9, -0.12, 0.6) m, 0.119 {reached}",
+        f"path, row 6: found (0.75, 0.15, 0.6) m, 0.023 {reached}",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("robot", "rows"),
+    [("ur5e", SMALL), ("urm6", cube_rows("wall", 0.3, 0.03, np.array([0.45, 0.0, 0.9])))],
+    ids=["ur5e", "urm6"],
+)
+def test_the_law_of_limits_keeps_them(robot: str, rows: PathRows) -> None:
+    plan = planned(limited(robot, velocity=1.5, acceleration=8.0), rows, law="limits")
+    joints = joints_of(plan)
+    assert plan.verdict == "pass"
+    assert (plan.velocity, plan.acceleration, plan.speed, plan.scaled) == (None, None, None, 1.0)
+    assert joints.velocity_share.max() <= KEPT
+    assert joints.acceleration_share.max() <= KEPT
+    slower = planned(limited(robot, velocity=1.5, acceleration=8.0), rows)
+    assert plan.duration < slower.duration
+
+
+def test_the_law_of_limits_without_reach_tells_where() -> None:
+    points = np.array([[0.3, 0.3, 0.3], [-0.3, -0.3, 0.3]])
+    plan = planned(limited("ur5e", acceleration=5.0), path_rows(points, rotation=DOWN), law="limits")
+    assert [one.kind for one in plan.obstacles] == ["unreachable"]
+
+
+def test_the_tool_is_turned_as_the_rows_say() -> None:
+    turned = np.array([DOWN, DOWN @ [[0, -1, 0], [1, 0, 0], [0, 0, 1]], DOWN])
+    points = np.array([[0.4, -0.2, 0.3], [0.5, 0.0, 0.3], [0.4, 0.2, 0.3]])
+    plan = planned(
+        load_robot("ur5e"), path_rows(points, np.array([0, 0.05, 0]), corner=True, rotation=turned)
+    )
+    (warning,) = plan.warnings
+    assert str(warning) == (
+        "the tool's turn changes its rate while it moves, in row 2: there the joints' speeds step"
+    )
+    wanted = Targets(plan.position, matrices(there(plan.quat_xyzw)))
+    miss = np.hstack(misses(load_robot("ur5e"), joints_of(plan).q, wanted))
+    assert np.abs(miss).max() < 1e-9
+
+
+def test_without_a_robot_it_is_path_and_time() -> None:
+    plan = planned(None, CONTOUR)
+    assert (plan.verdict, plan.joints, plan.obstacles) == (None, None, ())
+    assert plan.duration == pytest.approx(4.780324, abs=1e-6)
+    assert plan.as_run().log.joints == ()
+    np.testing.assert_array_equal(plan.as_run().log.tcp_position, plan.position)
+
+
+def test_segments_have_their_times() -> None:
+    """Without acceleration on the way a segment takes its length over the speed."""
+    segments = planned(None, CONTOUR).to_dict()["segments"]
+    assert [(one["kind"], one["row"]) for one in segments] == [
+        ("line", 1), ("arc", 2), ("line", 2), ("arc", 3), ("line", 3), ("arc", 4), ("line", 4), ("arc", 5),
+        ("line", 5),
+    ]  # fmt: skip
+    assert segments[0]["t"] == 0.0
+    for one in segments[1:-1]:
+        assert one["duration"] == pytest.approx(one["length"] / 0.5, abs=1e-9)
+    assert sum(one["duration"] for one in segments) == pytest.approx(4.780324, abs=1e-6)
+
+
+def test_what_is_told_of_limits() -> None:
+    plan = planned(limited("ur5e", velocity=3.0, acceleration=[50.0, *[math.inf] * 5]), SMALL)
+    told = plan.to_dict()["limits"]
+    joints = joints_of(plan)
+    assert [one["joint"] for one in told] == list(load_robot("ur5e").coordinates)
+    assert told[0]["acceleration_share"] == joints.acceleration_share[:, 0].max()
+    assert told[1]["acceleration_share"] is None
+    for k, one in enumerate(told):
+        assert one["velocity_share"] == joints.velocity_share[:, k].max()
+    assert told[1]["t"] == plan.t[joints.velocity_share[:, 1].argmax()]
+
+
+def refused(arm: Chain | None = None, **timing: Any) -> list[str]:
+    with pytest.raises(OptionError) as raised:
+        refuse_unlimited(checked_timing(Timing(**timing)), arm)
+    return [str(one) for one in raised.value.findings]
+
+
+def test_values_that_make_no_sense_are_refused_together() -> None:
+    assert refused(law="fast", arcs="both", velocity=0.0, acceleration=math.inf, jerk=-1, tsp=math.nan) == [
+        "law: found 'fast', allowed: trapezoid, jerk, limits",
+        "arcs: found 'both', allowed: tangential, total",
+        "velocity: found 0.0, allowed: a finite number of m/s above 0",
+        "acceleration: found inf, allowed: a finite number of m/s2 above 0",
+        "jerk: found -1, allowed: a finite number of m/s3 above 0",
+        "tsp: found nan, allowed: a finite number of s above 0",
+        "jerk: found one with the law fast, allowed: with the law jerk",
+    ]
+    assert refused(law="jerk") == ["jerk: found none with the law jerk, allowed: a number of m/s3"]
+    assert refused(law="limits", arcs="total") == [
+        "arcs: found total with the law limits, allowed: with the laws trapezoid and jerk"
+    ]
+
+
+def test_the_law_of_limits_names_the_key_that_it_lacks() -> None:
+    assert refused(law="limits") == ["law: found limits without a robot, allowed: with a robot"]
+    assert refused(limited("ur5e", acceleration=[5.0] * 4 + [math.inf] * 2), law="limits") == [
+        "robot: found ur5e without the largest acceleration of wrist_2_joint, wrist_3_joint,"
+        " allowed: a robot file with the key acceleration in limits, in rad/s2 or m/s2"
+    ]
+
+
+def test_too_many_samples_are_refused() -> None:
+    with pytest.raises(OptionError) as raised:
+        planned(None, CONTOUR, tsp=1e-7)
+    assert str(raised.value) == (
+        "tsp: found 1e-07 s, allowed: a period that makes up to 20000000 samples of 4.78032 s"
+    )
