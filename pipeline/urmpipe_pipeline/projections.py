@@ -91,6 +91,7 @@ class _Frame:
 
     @property
     def axes(self) -> list[int]:
+        """The coordinates of the scene that run right and up: 0, 1, 2 for x, y, z."""
         return [self.view.right, self.view.up]
 
     def placed(self, points: FloatArray) -> FloatArray:

@@ -28,7 +28,7 @@ def _sync(text: str) -> str | float:
 
 
 def _tolerance(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> str:
-    """Return what is allowed, which can be read; given several times, it is all of it."""
+    """Return the text of all tolerances, joined by commas, after a check that it can be read."""
     from urmpipe_pipeline.comparison.tolerance import parse_tolerance
 
     text = ",".join(values)

@@ -51,11 +51,6 @@ class Arc:
         """
         return self.radius * math.tan(0.5 * self.angle)
 
-    @property
-    def corner(self) -> FloatArray:
-        """Where its tangents at both ends meet in [m], shape (3,)."""
-        return self.start + self.leg * self.tangent
-
 
 def unit(vector: FloatArray) -> FloatArray:
     """Return a vector of shape (3,) with length 1 [-]; of length 0 as it is."""

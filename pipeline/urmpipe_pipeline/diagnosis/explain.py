@@ -188,7 +188,7 @@ class Explained:
         return "" if decides is None else self.names[decides]
 
     def _joints_of(self, one: Explanation) -> set[int | None]:
-        """Return the joints that an explanation is of; None among them for what is of no joint."""
+        """Return the joints that an explanation changes, with None if a part of it changes no joint."""
         of_edits: set[int | None] = {j for edit in one.state.edits for j in edit.joints}
         return of_edits | {self.model.groups[g].joint for g in one.subset}
 

@@ -105,6 +105,7 @@ def normal_equations(model: Model, state: State, rows: Rows, groups: Sequence[Gr
     now = state.values[columns]
 
     def of_block(block: slice) -> Normal:
+        """Return the normal equations of one block of rows."""
         left, jacobian = model.linear(state, rows.at[block], taken)
         known = np.isfinite(left).all(axis=0)
         y = (left + np.tensordot(now, jacobian, 1))[:, known] * rows.weight[:, np.newaxis]
@@ -124,6 +125,7 @@ def residual(model: Model, state: State, rows: IntArray) -> FloatArray:
     left = np.empty((len(model.blocks), len(rows)))
 
     def work(block: slice) -> None:
+        """Write what is left of one block of rows."""
         left[:, block] = model.residual(state, rows[block])
 
     side_by_side(work, row_blocks(len(rows)))

@@ -160,7 +160,7 @@ def joints_words(names: Sequence[str]) -> str:
 
 
 def _needs(of: str = "") -> Callable[[Cause], str]:
-    """Return a function that says what a cause adds to something, by default to what the cause names."""
+    """Return a function that writes "d_1 needs -9.3 mm", with a given name or else that of the cause."""
     return lambda one: f"{of or one.name} needs {value_words(one)}"
 
 

@@ -49,6 +49,7 @@ def given_path(given: PathLike, options: ReadOptions | None = None) -> GivenPath
     Raises:
         LogError: With all that is wrong with the file, its rows, and the curve that they would make.
         OptionError: With all that is wrong with a cube, or with rows that are given as arrays.
+        PathError: With all that is wrong with the curve that rows given as arrays would make.
     """
     if isinstance(given, PathRows):
         return GivenPath("path", checked_rows(given))

@@ -92,6 +92,7 @@ def _reached(piece: _Piece, speed: float, jerk: float) -> float:
         return min(speed, piece.fastest)
 
     def beyond(end: float) -> float:
+        """Return how far in [m] the change to a speed in [m/s] leads beyond the piece."""
         change = end - speed
         duration = 2.0 * math.sqrt(change / jerk) if change < a * a / jerk else change / a + a / jerk
         return 0.5 * (speed + end) * duration - (1.0 - SPARE) * piece.length

@@ -107,9 +107,11 @@ def joints_table(plan: PlannedPath, joints: PlannedJoints) -> Table:
     )
 
     def largest(values: FloatArray, per: str) -> Cells:
+        """Return the cells of the largest values, shape (N, n), of the joints."""
         return lambda j: Value(float(values[:, j].max()), f"{units[j]}/{per}")
 
     def limit(key: str, per: str) -> Cells:
+        """Return the cells of a limit of the joints."""
         return lambda j: _limit(getattr(moving[j], key), f"{units[j]}/{per}")
 
     heads: dict[str, tuple[str, Cells]] = {

@@ -11,7 +11,6 @@ import numpy as np
 from urmpipe_models.arrays import BoolArray, FloatArray
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
-from urmpipe_models.planning.from_rows import end_faults
 from urmpipe_models.planning.rows import PROPER, PathRows
 from urmpipe_pipeline.joint_log import Inference, LogWarning, SourceFile
 from urmpipe_pipeline.planned_paths.row_checks import VARIANTS, curve_faults
@@ -51,7 +50,7 @@ class PathFile:
     warnings: tuple[LogWarning, ...] = ()
 
 
-def read_path(file: Path, options: ReadOptions | None = None, *, curve: bool = True) -> PathFile:
+def read_path(file: Path, options: ReadOptions | None = None) -> PathFile:
     """Return the rows of a path: x, y, z, where it has one the orientation, r or corner_r, and variant.
 
     The table is read as one of targets is. A radius whose own name tells no unit is in that of x, y, z; an
@@ -59,9 +58,8 @@ def read_path(file: Path, options: ReadOptions | None = None, *, curve: bool = T
 
     Args:
         file: A text table, as a log may be.
-        options: What the user says where the file need not, or cannot, tell; what it says about joints and
-            times is not asked.
-        curve: Whether rows that make no curve are refused, too.
+        options: What the user says where the file need not, or cannot, tell; those about joints and times
+            are not used.
 
     Raises:
         LogError: With all that is wrong with the file, its rows, and the curve that they would make.
@@ -72,7 +70,7 @@ def read_path(file: Path, options: ReadOptions | None = None, *, curve: bool = T
     asked = options or ReadOptions()
     table = read_pose_table(Path(file), replace(asked, time="none"), _further(), NAMING)
     rows = _rows(table)
-    findings = [*_faults(table, curve_faults(rows) if curve else end_faults(rows))]
+    findings = [*_faults(table, curve_faults(rows))]
     if findings:
         raise LogError(*capped(findings, str(file)))
     said = (one for one in table.inferences if one.what != "time column")  # a path has none

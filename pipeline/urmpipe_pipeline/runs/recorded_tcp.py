@@ -183,7 +183,7 @@ def _given(edit: Edit, log: JointLog) -> tuple[str, Hint]:
         return f"those of {edit.name} agree", Hint("robot", edit.name, "takes it")
     names = " and ".join(log.joints[j] for j in edit.joints)
     if edit.kind == "joint_sign":
-        hint = Hint("log_map", None, f"says so with sign = -1 for {names}")
+        hint = Hint("log_map", None, f"reads {names} so, with sign = -1")
         return f"with {names} counted the other way they agree", hint
     order, (first, second) = _called(log), edit.joints
     order[first], order[second] = order[second], order[first]

@@ -69,8 +69,8 @@ def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | No
 
     Args:
         file: A text table, as a log may be.
-        options: What the user says where the file need not, or cannot, tell; what it says about joints is
-            not asked. Its period is the same as `tsp`.
+        options: What the user says where the file need not, or cannot, tell; those about joints are not
+            used. Its period is the same as `tsp`.
         tsp: Time between the rows in [s], of a file without one.
 
     Raises:

@@ -22,12 +22,12 @@ Read = Callable[..., PathFile]
 
 @pytest.fixture
 def read(tmp_path: Path) -> Read:
-    """Write a file and read its rows, whether they make a curve or not."""
+    """Write a file and read its rows."""
 
-    def read(text: str, *, curve: bool = False, **options: Any) -> PathFile:
+    def read(text: str, **options: Any) -> PathFile:
         path = tmp_path / "path.csv"
         path.write_text(text, encoding="utf-8")
-        return read_path(path, ReadOptions(**options), curve=curve)
+        return read_path(path, ReadOptions(**options))
 
     return read
 
@@ -38,7 +38,7 @@ def wrong(read: Read, tmp_path: Path) -> Callable[..., list[str]]:
 
     def wrong(text: str, **options: Any) -> list[str]:
         with pytest.raises(UrmpipeError) as caught:
-            read(text, curve=True, **options)
+            read(text, **options)
         return [str(finding).replace(f"{tmp_path}/", "") for finding in caught.value.findings]
 
     return wrong

@@ -81,8 +81,8 @@ def read_pose_table(
 
     Args:
         file: A text table, as a log may be.
-        options: What the user says where the file need not, or cannot, tell; what it says about joints is
-            not asked.
+        options: What the user says where the file need not, or cannot, tell; those about joints are not
+            used.
         further: The columns to look for beside the poses, by what they are.
         naming: What helps where columns have no names.
 
