@@ -97,6 +97,21 @@ def test_a_table_has_its_units_in_the_heads_and_no_column_without_a_value(capsys
     )
 
 
+def test_a_column_of_several_units_has_them_in_its_cells(capsys: Captured) -> None:
+    columns = (
+        Column("joint", "Joint", ["rail", "turn"]),
+        Column("max", "max", [Value(0.5, "m"), Value(0.5, "rad")]),
+        Column("share", "used", [Value(0.5, "%"), Value(0.25, "%")]),
+    )
+    mixed = Table("Joints", columns)
+    lines = printed(shown(tables=[mixed]), capsys)
+    start = lines.index("Comparison: Joints")
+    assert [line.split() for line in lines[start + 1 : start + 5] if not line.startswith("─")] == [
+        ["Joint", "max", "used"],
+        ["rail", "500.0000", "mm", "50.0", "%"], ["turn", "28.6479", "deg", "25.0", "%"],
+    ]  # fmt: skip
+
+
 def test_of_a_long_ranking_the_worst_are_shown_and_the_others_counted(capsys: Captured) -> None:
     lines = printed(shown(tables=[table(LISTED + 10)]), capsys)
     rows = [line for line in lines if line.startswith("log ")]

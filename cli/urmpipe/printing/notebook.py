@@ -9,7 +9,7 @@ from typing import Any
 from urmpipe_models.display import HEAD
 from urmpipe_models.messages import one_line
 from urmpipe_pipeline.presentation.brief import brief_columns, brief_facts, brief_tables, head, rows_within
-from urmpipe_pipeline.presentation.digits import written
+from urmpipe_pipeline.presentation.digits import units_differ, written
 from urmpipe_pipeline.presentation.section import Fact, Section, Table
 
 
@@ -46,8 +46,9 @@ def _table(table: Table) -> str:
     columns, shown = list(brief_columns(table)), rows_within(table, HEAD)
     count = len(columns[0].cells)
     heads = "".join(f"<th>{_plain(head(one))}</th>" for one in columns)
-    rows = zip(*(one.cells[shown] for one in columns), strict=True)
-    lines = (f"<tr>{''.join(f'<td>{_plain(written(cell))}</td>' for cell in row)}</tr>" for row in rows)
+    cells = ([written(cell, unit=units_differ(one.cells)) for cell in one.cells[shown]] for one in columns)
+    rows = zip(*cells, strict=True)
+    lines = (f"<tr>{''.join(f'<td>{_plain(cell)}</td>' for cell in row)}</tr>" for row in rows)
     more = f"<p>{HEAD} of {count} rows</p>" if count > HEAD else ""
     return f"<p>{_plain(table.title)}</p><table><tr>{heads}</tr>{''.join(lines)}</table>{more}"
 

@@ -10,7 +10,7 @@ from urmpipe.printing.terminal import LISTED, judged, judged_line, new_console
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation import section as shown
 from urmpipe_pipeline.presentation.brief import brief_columns, brief_facts, brief_tables, head, rows_within
-from urmpipe_pipeline.presentation.digits import written
+from urmpipe_pipeline.presentation.digits import units_differ, written
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -77,7 +77,7 @@ def _print_table(console: Console, section: shown.Section, table: shown.Table, *
     columns = [
         Column(
             head(one, "\n"),
-            [_cell(cell) for cell in one.cells[rows]],
+            [_cell(cell, unit=units_differ(one.cells)) for cell in one.cells[rows]],
             key=not number,
             words=all(isinstance(cell, (str, shown.Ref, shown.Advice, type(None))) for cell in one.cells),
         )
@@ -88,8 +88,8 @@ def _print_table(console: Console, section: shown.Section, table: shown.Table, *
         console.print(f"... and {more} more; --json lists all")
 
 
-def _cell(cell: shown.Cell) -> str | Text:
-    return judged(cell.verdict) if isinstance(cell, shown.Judged) else written(cell)
+def _cell(cell: shown.Cell, *, unit: bool) -> str | Text:
+    return judged(cell.verdict) if isinstance(cell, shown.Judged) else written(cell, unit=unit)
 
 
 def _fact(one: shown.Fact) -> str:

@@ -51,11 +51,20 @@ def allowed_words(value: Value) -> str:
 
 def unit_of(cells: Iterable[Cell]) -> str:
     """Return the unit that all values of a column are shown in; empty where they differ or have none."""
-    units = {cell.unit for cell in cells if isinstance(cell, Value) and cell.number is not None}
+    units = _units(cells)
     places = any(isinstance(cell, Place) for cell in cells)
     if places or len(units) != 1:
         return "m" if places and not units else ""
     return _shown_unit(units.pop())
+
+
+def units_differ(cells: Iterable[Cell]) -> bool:
+    """Return whether values of a column are in different units: then each cell shows its own."""
+    return len(_units(cells)) > 1
+
+
+def _units(cells: Iterable[Cell]) -> set[str]:
+    return {cell.unit for cell in cells if isinstance(cell, Value) and cell.number is not None}
 
 
 def _shown_unit(si: str) -> str:

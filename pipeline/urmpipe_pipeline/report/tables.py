@@ -9,7 +9,7 @@ from typing import TypeAlias
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.brief import head
-from urmpipe_pipeline.presentation.digits import held, written
+from urmpipe_pipeline.presentation.digits import held, units_differ, written
 from urmpipe_pipeline.presentation.section import (
     Cell,
     Column,
@@ -160,9 +160,9 @@ def _is_number(column: Column) -> bool:
 
 def _cells(column: Column, href: Href) -> Iterator[ShownCell]:
     """Yield the cells of a column; each has its unit if they differ."""
-    units = {cell.unit for cell in column.cells if isinstance(cell, Value) and cell.number is not None}
+    unit = units_differ(column.cells)
     for cell in column.cells[:MOST]:
-        shown = ShownCell(written(cell, unit=len(units) > 1), href=href(cell))
+        shown = ShownCell(written(cell, unit=unit), href=href(cell))
         match cell:
             case Ref():
                 yield replace(shown, colour=cell.colour)

@@ -9,7 +9,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import colour_word
 from urmpipe_pipeline.presentation.brief import brief_columns, brief_facts, brief_tables, head, rows_within
-from urmpipe_pipeline.presentation.digits import written
+from urmpipe_pipeline.presentation.digits import units_differ, written
 from urmpipe_pipeline.presentation.scene import Path, Scene
 from urmpipe_pipeline.presentation.section import Cell, Fact, Judged, Presentation, Ref, Section, Table
 
@@ -76,8 +76,9 @@ def _table(table: Table) -> Iterator[str]:
     """Yield the brief columns, and as many rows as fit."""
     columns, rows = list(brief_columns(table)), rows_within(table, ROWS)
     yield from ("", _row(map(head, columns)), f"|{' --- |' * len(columns)}")
+    units = [units_differ(one.cells) for one in columns]
     for cells in zip(*(one.cells[rows] for one in columns), strict=True):
-        yield _row(map(_coloured, cells))
+        yield _row(_coloured(cell, unit=unit) for cell, unit in zip(cells, units, strict=True))
     if (left := len(columns[0].cells) - ROWS) > 0:
         yield from ("", f"and {left} more, all in the report")
 
