@@ -22,12 +22,10 @@ from toppra.algorithm import TOPPRA
 from toppra.constraint import DiscretizationType, JointAccelerationConstraint, JointVelocityConstraint
 
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
 from urmpipe_models.planning.cube import cube_rows
 from urmpipe_models.planning.fastest import JointLimits, fastest_law
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.joint_limits import joints_on_grid
-from urmpipe_models.planning.joint_motion import JointSlopes
+from urmpipe_models.planning.path_joints import PathJoints, joints_along
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.robot_file import robot_toml
 
@@ -42,56 +40,54 @@ CUBE = "cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1"
 class Sampled:
     """Joint values at places as a path of TOPP-RA."""
 
-    s: FloatArray
-    slopes: JointSlopes
-    dof: int
+    joints: PathJoints
     waypoints: None = None
 
     @property
     def path_interval(self) -> FloatArray:
         """Where the path begins and ends in [m], shape (2,)."""
-        return self.s[[0, -1]]
+        return self.joints.s[[0, -1]]
+
+    @property
+    def dof(self) -> int:
+        """How many joints there are."""
+        return len(self.joints.chain.coordinates)
 
     def __call__(self, places: FloatArray, order: int = 0) -> FloatArray:
         """Return values, slopes or curvatures at places of the grid, shape (n, joints)."""
-        values = (self.slopes.q, self.slopes.dq, self.slopes.ddq)[order]
-        return np.asarray(values[np.searchsorted(self.s, np.clip(places, 0.0, self.s[-1]))])
+        after, before = self.joints.after, self.joints.before
+        ahead, ends = ((one.q, one.dq, one.ddq)[order] for one in (after, before))
+        values = np.vstack((ahead, ends[-1:]))
+        return np.asarray(values[np.searchsorted(self.joints.s, np.clip(places, 0.0, self.joints.s[-1]))])
 
 
-def jobs() -> dict[str, tuple[Chain, FloatArray, JointSlopes, JointSlopes]]:
+def jobs() -> dict[str, PathJoints]:
     """Return the joints of two arms along a wall: poses by a closed form, positions by least motion."""
     small = cube_rows("wall", 0.3, 0.03, np.array([0.45, 0.0, 0.3]), rotation=DOWN)
     high = cube_rows("wall", 0.3, 0.03, np.array([0.45, 0.0, 0.9]))
-    made = {}
-    for name, rows in (("ur5e", small), ("urm6", high)):
-        chain = load_robot(name)
-        found = joints_on_grid(chain, path_of(rows), None)
-        assert found is not None
-        made[name] = (chain, *found)
-    return made
+    rows = {"ur5e": small, "urm6": high}
+    return {name: joints_along(load_robot(name), path_of(rows[name])) for name in rows}
 
 
-def by_toppra(chain: Chain, s: FloatArray, after: JointSlopes) -> float:
+def by_toppra(joints: PathJoints) -> float:
     """Return the duration in [s] that TOPP-RA finds, by collocation: it knows one curvature at a place."""
-    both = np.ones((len(chain.coordinates), 2)) * [-1.0, 1.0]
+    path, both = Sampled(joints), np.ones((len(joints.chain.coordinates), 2)) * [-1.0, 1.0]
     scheme = DiscretizationType.Collocation
     limits = [
         JointVelocityConstraint(VELOCITY * both),
         JointAccelerationConstraint(ACCELERATION * both, discretization_scheme=scheme),
     ]
-    path = Sampled(s, after, len(chain.coordinates))
-    instance = TOPPRA(limits, path, gridpoints=s, parametrizer="ParametrizeConstAccel")
+    instance = TOPPRA(limits, path, gridpoints=joints.s, parametrizer="ParametrizeConstAccel")
     _, speeds, _ = instance.compute_parameterization(0.0, 0.0)
-    return float((2.0 * np.diff(s) / (speeds[1:] + speeds[:-1])).sum())
+    return float((2.0 * np.diff(joints.s) / (speeds[1:] + speeds[:-1])).sum())
 
 
-def by_urmpipe(chain: Chain, s: FloatArray, after: JointSlopes, before: JointSlopes) -> float:
+def by_urmpipe(joints: PathJoints) -> float:
     """Return the duration in [s] that urmpipe finds."""
-    joints = len(chain.coordinates)
-    limits = JointLimits(np.full(joints, VELOCITY), np.full(joints, ACCELERATION))
-    stop = np.zeros(len(s), dtype=bool)
-    stop[[0, -1]] = True
-    return fastest_law(s, after.rows(slice(None, -1)), before.rows(slice(1, None)), stop, limits).duration
+    count = len(joints.chain.coordinates)
+    limits = JointLimits(np.full(count, VELOCITY), np.full(count, ACCELERATION))
+    stop = np.isin(joints.s, joints.s[[0, -1]])
+    return fastest_law(joints.s, joints.after, joints.before, stop, limits).duration
 
 
 def median_of(taken: list[float]) -> str:
@@ -107,13 +103,13 @@ def laws(count: int) -> tuple[list[str], list[Bound]]:
         "|---|---|---|---|---|---|---|",
     ]
     bounds = []
-    for name, (chain, s, after, before) in jobs().items():
-        ways = (partial(by_urmpipe, chain, s, after, before), partial(by_toppra, chain, s, after))
+    for name, joints in jobs().items():
+        ways = (partial(by_urmpipe, joints), partial(by_toppra, joints))
         own, theirs = (way() for way in ways)
         taken = [[timed(way) for way in ways] for _ in range(count)]
         mine, others = (list(times) for times in zip(*taken, strict=True))
         lines.append(
-            f"| {name} | {len(s)} | {own:.5f} | {theirs:.5f} | {own / theirs:.4f}"
+            f"| {name} | {len(joints.s)} | {own:.5f} | {theirs:.5f} | {own / theirs:.4f}"
             f" | {median_of(mine)} | {median_of(others)} |"
         )
         bounds.append(Bound(f"{name}: duration over that of TOPP-RA", own / theirs, least=0.999, most=1.01))

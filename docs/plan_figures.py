@@ -12,7 +12,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.planning.from_rows import path_of
 from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.rows import PathRows, path_rows
+from urmpipe_models.planning.rows import PathRows
 
 PICTURE = Path(__file__).resolve().parent / "pictures" / "plan.svg"
 RADIUS = 0.12
@@ -25,14 +25,14 @@ TEXT = 'font-family="sans-serif" font-size="13"'
 
 def panels() -> list[tuple[str, str, PathRows]]:
     """Return title, column and rows of each panel: one curve by both meanings, and the other variant."""
-    corners = path_rows(CORNERS, RADIUS, corner=True)
+    corners = PathRows(CORNERS, RADIUS, corner=True)
     path = path_of(corners)
     first = CORNERS.copy()
     first[path.row[path.arcs]] = path.start[path.arcs]
-    away = path_rows(CORNERS, RADIUS / 2.0, corner=True, variant=np.array([2, 2, 1, 2]))
+    away = PathRows(CORNERS, RADIUS / 2.0, corner=True, variant=np.array([2, 2, 1, 2]))
     return [
         ("corner_r: the row is the corner", "corner_r", corners),
-        ("r: the row is the arc's first point", "r", path_rows(first, RADIUS)),
+        ("r: the row is the arc's first point", "r", PathRows(first, RADIUS)),
         ("variant 1 in row 3", "corner_r", away),
     ]
 

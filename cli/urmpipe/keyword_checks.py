@@ -138,6 +138,12 @@ def refuse_foreign(files: Sequence[Path]) -> None:
         raise RecordingError(*(Finding(message, file=str(path)) for path in foreign))
 
 
+def refuse_recording(given: object, allowed: str) -> None:
+    """Raise a `LogError` if the file of a recording was given where something else is allowed."""
+    if isinstance(given, (str, Path)) and Path(given).is_file() and is_recording(Path(given)):
+        raise LogError(Finding(file=str(given), found="a recording", allowed=allowed))
+
+
 def refuse_warnings(strict: bool, found: Sequence[LogWarning]) -> None:
     """Raise a `LogError` with all warnings if they are to be errors."""
     if strict and found:

@@ -23,7 +23,7 @@ class Kind(NamedTuple):
 
 
 def kind_of(function: str, keyword: str) -> Kind | None:
-    """Return what a keyword of a function takes; None of one that is checked by what it means."""
+    """Return what a keyword of a function takes; None if only its meaning is checked."""
     return KINDS.get(f"{function}.{keyword}", KINDS.get(keyword))
 
 
@@ -95,7 +95,7 @@ def _is_table(value: Any) -> bool:
 
 
 def _one_or_many(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    """Return what tells whether a value is of a kind, or a list of such; a table or a mapping is no list."""
+    """Return a check that accepts one value of a kind or a list of them; tables and mappings are no lists."""
 
     def fit(value: Any) -> bool:
         return fits(value) or (isinstance(value, (list, tuple, set)) and all(map(fits, value)))
@@ -127,7 +127,7 @@ KIND_OF_TOLERANCE = Kind(
     'a number in m, a text such as "axis=3.5mm,angle=0.5deg", or a mapping of kinds to m or rad, such as'
     ' {"axis": 0.0035, "angle": 0.01}',
 )
-TOLD = Kind(callable, "a function of the share that is done, 0 to 1, such as print")
+PROGRESS = Kind(callable, "a function of the share that is done, 0 to 1, such as print")
 LINK = Kind(_is_text, "the name of a link of the URDF")
 ROBOT_FILE = Kind(_is_path, "a name, or a TOML or URDF file")
 
@@ -166,7 +166,7 @@ KINDS = {
     "path": PATH,
     "plan.path": Kind(_is_planned, 'a file, a test cube ("cube:..."), or PathRows'),
     "platforms": Kind(_one_or_many(_is_text), "linux64, win64 or a list of both"),
-    "progress": TOLD,
+    "progress": PROGRESS,
     "restarts": COUNT,
     "robot": Kind(_is_robot, "a name, a TOML or URDF file, or a Chain, such as urmpipe.load_robot(NAME)"),
     "rows": _one_of("grid", "file"),

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TypeVar
 
 from urmpipe.keyword_checks import PathLike
-from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.outputs import OutputKind, guarded_output, refuse_output
+from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_pipeline.outputs import NOUNS, OutputKind, guarded_output, refuse_output
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.recording import import_ahead
 from urmpipe_pipeline.results import write_recording
@@ -66,6 +66,21 @@ def recorded(
         return result
     written = write_recording(result, Path(output), inputs, progress)
     return replace(result, recording=written)  # type: ignore[type-var]
+
+
+def output_kind(output: Path | None, log: OutputKind) -> OutputKind | None:
+    """Return the kind of an output by its suffix: a log of the kind given, or a recording; None without one.
+
+    Raises:
+        OptionError: If the suffix is another.
+    """
+    if output is None:
+        return None
+    kind = {".csv": log, ".rrd": "recording"}.get(output.suffix.lower())
+    if kind is None:
+        allowed = f"a name that ends in .csv (a {NOUNS.get(log, log)}) or .rrd (a recording)"
+        raise OptionError(Finding(parameter="output", found=shown(str(output)), allowed=allowed))
+    return kind
 
 
 def _refuse_shared(targets: Mapping[OutputKind, Path]) -> None:

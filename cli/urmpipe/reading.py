@@ -17,25 +17,34 @@ from urmpipe_pipeline.sources import LogMap, ReadOptions, read_map
 from urmpipe_pipeline.sources.options import read_options
 
 
-class TableReading(TypedDict, total=False):
-    """How a table is read where it cannot tell by itself; None means that it tells.
+class UntimedReading(TypedDict, total=False):
+    """How a table without times is read where it does not show it itself; None means that it does.
 
     Attributes:
         log_map: A map (TOML) or what `read_map` returned; what is given beside it comes first.
         rotation: Form of the orientation.
         delimiter: Sign between cells, or comma, semicolon, tab, spaces, bar.
         decimal: Decimal sign, or point, comma.
-        time: Name or number (from 1) of the time column; "none" if there is none.
         unit: Unit of every angle of which neither its name nor the kinematics tell one, such as "deg"; or by
-            column, such as {"q1": "deg"}.
+            column, such as {"q1": "deg"}. Of targets and paths
+            a length, such as "mm", is the unit of x, y, z.
     """
 
     log_map: PathLike | LogMap | None
     rotation: RotationForm | None
     delimiter: str | None
     decimal: str | None
-    time: str | int | None
     unit: str | Mapping[str, str] | None
+
+
+class TableReading(UntimedReading, total=False):
+    """How a table is read.
+
+    Attributes:
+        time: Name or number (from 1) of the time column; "none" if there is none.
+    """
+
+    time: str | int | None
 
 
 class LogReading(TableReading, total=False):

@@ -16,6 +16,7 @@ from urmpipe.commands.export import export
 from urmpipe.commands.fmu import fmu
 from urmpipe.commands.ik import ik
 from urmpipe.commands.ingest import ingest
+from urmpipe.commands.plan import plan
 from urmpipe.commands.report import report
 from urmpipe.commands.simulate import simulate
 from urmpipe.commands.view import view
@@ -28,6 +29,7 @@ COMMANDS: dict[str, tuple[click.Command, Callable[..., Any]]] = {
     "export": (export, urmpipe.export),
     "ik": (ik, urmpipe.ik),
     "ingest": (ingest, urmpipe.ingest),
+    "plan": (plan, urmpipe.plan),
     "report": (report, urmpipe.report),
     "simulate": (simulate, urmpipe.simulate),
     "view": (view, urmpipe.view),
@@ -40,6 +42,7 @@ OPERANDS = {
     "export": {"result"},
     "ik": {"targets"},
     "ingest": {"log"},
+    "plan": {"path"},
     "report": {"results"},
     "simulate": {"system"},
     "view": {"recordings"},

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,11 @@ import pytest
 
 import urmpipe as package
 from asserting import refusal, there
+from plan_logs import gantry
 from urmpipe_models.errors import LogError, OptionError, PathError
-from urmpipe_models.planning.rows import path_rows
+from urmpipe_models.planning.rows import PathRows
 from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.robots.robot_file import robot_toml
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.results import read_recording
 
@@ -128,19 +131,21 @@ def test_options_of_the_law(urmpipe: RunCommand, options: tuple[str, ...], durat
 
 
 def test_a_plan_that_fails_is_exit_1(urmpipe: RunCommand) -> None:
-    ran = urmpipe("plan", "singular.csv", "--robot", "irb60")
-    assert (ran.code, ran.err) == (1, "")
-    words = "at t = 1.325 s (segment 2, row 2, joint theta3): the arm passes a singular pose"
-    assert ran.out.splitlines()[:2] == [
-        f"FAIL  singular: irb60 cannot run 0.9 m in 1.967 s (trapezoid): singular {words}",
-        f"      In the way: {words}",
-    ]
     found = answer(urmpipe, 1, "singular.csv", "--robot", "irb60")
     assert found["verdict"] == "fail"
+    at = [found["obstacles"][0].pop(key) for key in ("s", "t")]
+    # Two stops, and half of the second line: 0.6 m / v + 1.5 v / a; the path is looked at on a grid.
+    assert at == pytest.approx([0.6, 1.325], abs=4e-4)
     assert found["obstacles"] == [
-        {"kind": "singular", "segment": 1, "row": 2, "t": 1.325, "joint": "theta3",
+        {"kind": "singular", "segment": 1, "row": 2, "joint": "theta3",
          "message": "the arm passes a singular pose"}
     ]  # fmt: skip
+    ran = urmpipe("plan", "singular.csv", "--robot", "irb60")
+    assert (ran.code, ran.err) == (1, "")
+    assert ran.out.splitlines()[:2] == [
+        "FAIL  singular: irb60 cannot run 0.9 m in 1.967 s (trapezoid): singular at t = 1.325 s (row 2)",
+        "      In the way: at t = 1.325 s (segment 2, row 2, joint theta3): the arm passes a singular pose",
+    ]
 
 
 def test_quiet_prints_nothing(urmpipe: RunCommand) -> None:
@@ -150,10 +155,7 @@ def test_quiet_prints_nothing(urmpipe: RunCommand) -> None:
 
 
 def test_a_warning_is_told_and_strict_refuses_it(urmpipe: RunCommand, folder: Path) -> None:
-    said = (
-        "load is not used; name what a path has so in the header: x, y, z, an orientation, r or corner_r,"
-        " variant"
-    )
+    said = "load is not used; a path uses columns named x, y, z, an orientation, r or corner_r, variant"
     ran = urmpipe("plan", "load.csv")
     assert (ran.code, ran.err) == (0, f"warning: {said}\n")
     ran = urmpipe("plan", "load.csv", "--strict", "-o", "plan.csv")
@@ -211,6 +213,29 @@ def test_a_recording_is_the_plan(urmpipe: RunCommand, folder: Path) -> None:
     assert [one.name for one in back.provenance.inputs] == ["path.csv"]
 
 
+def test_how_to_read_a_plan_names_what_is_not_in_the_file(urmpipe: RunCommand, folder: Path) -> None:
+    (folder / "arm.toml").write_text(robot_toml(load_robot("irb60")), encoding="utf-8")
+    for options, read in (
+        (["--robot", "arm.toml"], "plan.csv --robot arm.toml"),
+        (["--robot", "irb60", "--tool", "0,0,-0.1"], "plan.csv --robot irb60 with the same --tool"),
+        ([], "plan.csv"),
+    ):
+        ran = urmpipe("plan", CUBE, *options, "-o", "plan.csv")
+        assert ran.out.splitlines()[-1].startswith(f"Plan: plan.csv  (read it: urmpipe ingest {read}")
+        command = read.split(" with the same ")[0].split()
+        again = urmpipe("ingest", *command, *options[2:], "--strict")
+        assert again.code == 0, again.err
+
+
+def test_joints_that_slide_and_turn_have_their_units_in_a_notebook() -> None:
+    arm, rows = gantry(), PathRows(np.array([[0.5, 0.1, 0.6], [0.6, 0.1, 0.6]]))
+    page = there(package.plan(rows, arm)._repr_html_())
+    cells = re.findall("<td>([^<]*)</td>", page)
+    assert {"x", "t"} <= {*cells}
+    assert any(cell.endswith(" mm") for cell in cells)
+    assert any(cell.endswith(" deg") for cell in cells)
+
+
 def test_a_csv_is_replaced_by_another_plan_alone(urmpipe: RunCommand, folder: Path) -> None:
     assert urmpipe("plan", "path.csv", "-o", "plan.csv").code == 0
     ran = urmpipe("plan", CUBE, "--robot", "irb60", "-o", "plan.csv")
@@ -265,7 +290,7 @@ def test_rows_of_arrays_are_a_path() -> None:
     points = np.array(
         [[1.7, 0.3, 1], [2.0, 0.3, 1], [2.0, -0.3, 1], [1.4, -0.3, 1], [1.4, 0.3, 1], [1.7, 0.3, 1]]
     )
-    rows = path_rows(points, 0.03, corner=True)
+    rows = PathRows(points, 0.03, corner=True)
     found = package.plan(rows, "irb60")
     assert (found.path.total, found.duration) == pytest.approx((LENGTH, DURATION), abs=1e-6)
     assert (found.verdict, found.robot, found.law) == ("pass", load_robot("irb60"), "trapezoid")
@@ -291,14 +316,14 @@ def test_progress_rises_to_one(folder: Path) -> None:
 
 def test_what_is_wrong_is_raised_at_once() -> None:
     points = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0]], dtype=float)
-    tight = path_rows(points, 0.2, corner=True)
+    tight = PathRows(points, 0.2, corner=True)
     line = (
         "path, row 2, column corner_r: found 0.2 m, whose arc needs 0.2 m on the line from row {} to row {}"
     )
     assert refusal(PathError, package.plan, tight) == "\n".join(
         f"{line.format(first, first + 1)}, allowed: its length, 0.1 m" for first in (1, 2)
     )
-    assert refusal(OptionError, package.plan, path_rows(points, -0.01), velocity=0.0, start=[0.0]) == (
+    assert refusal(OptionError, package.plan, PathRows(points, -0.01), velocity=0.0, start=[0.0]) == (
         "start: found without a robot; robot=NAME|FILE gives one\n"
         "row 2, column radius: path: found -0.01 m, allowed: finite, 0 or more\n"
         "velocity: found 0.0, allowed: a finite number of m/s above 0"
@@ -308,3 +333,5 @@ def test_what_is_wrong_is_raised_at_once() -> None:
         'path: found a ndarray, allowed: a file, a test cube ("cube:..."), or PathRows'
     )
     assert refusal(LogError, package.plan, "nowhere.csv") == "nowhere.csv: found no such file"
+    time: Any = {"time": "t"}
+    assert "'time'" in refusal(TypeError, package.plan, CUBE, **time)

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import click
 import pytest
 
+from urmpipe.commands.plan import plan
 from urmpipe.main import run
+from urmpipe_models.planning.stretches import ARCS
+from urmpipe_pipeline.planned_paths.request import LAWS
 
 Captured = pytest.CaptureFixture[str]
 
@@ -31,6 +35,11 @@ def refused(capsys: Captured, *arguments: str) -> list[str]:
     return [line.removeprefix("error: ") for line in err.splitlines()]
 
 
+def test_laws_and_arcs_are_those_of_the_planner() -> None:
+    choices = {one.name: tuple(one.type.choices) for one in plan.params if isinstance(one.type, click.Choice)}
+    assert (choices["law"], choices["arcs"]) == (LAWS, ARCS)
+
+
 def test_all_that_is_wrong_is_told_at_once(capsys: Captured) -> None:
     cube = "cube:wall,a=0.06,r=0.03,x=1.7,y=0,z=1,plane=zz"
     options = ["--velocity", "0", "--acceleration", "nan", "--jerk", "3", "-o", "plan.txt"]
@@ -39,7 +48,7 @@ def test_all_that_is_wrong_is_told_at_once(capsys: Captured) -> None:
         "PATH: found a = 0.06 m, allowed: more than 2 r = 0.06 m",
         "--velocity: found 0.0, allowed: a finite number of m/s above 0",
         "--acceleration: found nan, allowed: a finite number of m/s2 above 0",
-        "--jerk: found one with the law trapezoid, allowed: with the law jerk",
+        "--jerk: found a jerk with the law trapezoid, allowed: with the law jerk",
         "--output: found 'plan.txt', allowed: a name that ends in .csv (a plan) or .rrd (a recording)",
     ]
     unknown, *rest = refused(capsys, cube, *options, "--robot", "ur55")
@@ -49,6 +58,24 @@ def test_all_that_is_wrong_is_told_at_once(capsys: Captured) -> None:
         "--start: found 2 values, allowed: 4, one for each of theta1, theta2, theta3, theta4",
         *timing,
     ]
+
+
+def test_a_law_that_the_arm_does_not_suit_is_told_beside_wrong_rows(capsys: Captured, folder: Path) -> None:
+    (folder / "path.csv").write_text("x,y,z,r\n0,0,0,0\n0.1,0,0,-0.03\n0.1,0.1,0,0\n")
+    row = "path.csv:3, column r: found -0.03, allowed: 0 or more, or an empty cell"
+    lacks, no_robot, start = (
+        "--robot: found irb60 without the largest acceleration of theta1, theta2, theta3, allowed: a robot"
+        " file with the key acceleration in limits, in rad/s2 or m/s2",
+        "--law: found limits without a robot, allowed: with a robot",
+        "--start: found without a robot; --robot NAME|FILE gives one",
+    )
+    for options, said in ((["--robot", "irb60"], [lacks]), (["--start", "1"], [start, no_robot])):
+        assert refused(capsys, "path.csv", "--law", "limits", *options) == [*said, row]
+
+
+def test_a_path_has_no_time(capsys: Captured) -> None:
+    (said,) = refused(capsys, "path.csv", "--time", "t")
+    assert said == "--time: no such option; see urmpipe plan --help"
 
 
 def test_a_map_that_is_not_there_is_told_once(capsys: Captured) -> None:
@@ -76,16 +103,14 @@ REACH = "allowed: a point that the arm reaches"
          ["path.csv:3, column r: found -0.03, allowed: 0 or more, or an empty cell",
           "path.csv:4, column r: found 'x', allowed: 0 or more, or an empty cell"]),
         ("x,y,z,r\n0,0,0,0\n0.1,0,0,0.03\n0.2,0,0,0.03\n0.3,0,0,0\n", [],
-         ["path.csv:3, column r: found 0.03 m on one line with rows 1 and 3, allowed: 0, or a point off"
-          " that line",
-          "path.csv:4, column r: found 0.03 m on one line with rows 2 and 4, allowed: 0, or a point off"
-          " that line"]),
+         ["path.csv:3, column r: found a radius of 0.03 m where the path goes straight on, allowed: 0, or row"
+          " 3 off that line"]),
         ("x,y,z,corner_r\n0,0,0,0\n0.1,0,0,0.3\n0.1,0.5,0,0\n", [],
          ["path.csv:3, column corner_r: found 0.3 m, whose arc needs 0.3 m on the line from row 1 to row"
           " 2, allowed: its length, 0.1 m"]),
         ("x,y,z\n2,0,0.3\n0.4,0,0.3\n0,3,0\n", ["--robot", "ur5e"],
-         [f"path.csv, row 1: found (2, 0, 0.3) m, 1.04 m out of reach of ur5e, {REACH}",
-          f"path.csv, row 3: found (0, 3, 0) m, 2.04 m out of reach of ur5e, {REACH}"]),
+         [f"path.csv:2: found (2, 0, 0.3) m, 1.04 m out of reach of ur5e, {REACH}",
+          f"path.csv:4: found (0, 3, 0) m, 2.04 m out of reach of ur5e, {REACH}"]),
         ("x,y,z,r\n0,0,0,0\n", [], ["path.csv: found 1 row, allowed: 2 or more"]),
     ],
     ids=["no radius", "collinear", "too large", "out of reach", "one row"],
@@ -106,22 +131,24 @@ def test_rows_that_make_no_path(
         (["--velocity", "inf"], "--velocity: found inf, allowed: a finite number of m/s above 0"),
         (["--tsp", "0s"], "--tsp: found '0s', allowed: a positive time in s, such as 0.005 or 5ms"),
         (["--tsp", "1e-9"],
-         "--tsp: found 1e-09 s, allowed: a period that makes up to 20000000 samples of 4.78032 s"),
+         "--tsp: found 1e-09 s, allowed: a period that makes up to 1000000 samples of 4.78032 s"),
         (["--law", "limit"], "--law: found 'limit' (did you mean limits?), allowed: trapezoid, jerk, limits"),
-        (["--law", "jerk"], "--jerk: found none with the law jerk, allowed: a number of m/s3"),
-        (["--jerk", "5"], "--jerk: found one with the law trapezoid, allowed: with the law jerk"),
+        (["--law", "jerk"], "--jerk: found no jerk with the law jerk, allowed: a number of m/s3"),
+        (["--jerk", "5"], "--jerk: found a jerk with the law trapezoid, allowed: with the law jerk"),
         (["--law", "limits"], "--law: found limits without a robot, allowed: with a robot"),
         (["--law", "limits", "--robot", "irb60"],
          "--robot: found irb60 without the largest acceleration of theta1, theta2, theta3, allowed: a robot"
          " file with the key acceleration in limits, in rad/s2 or m/s2"),
-        (["--law", "limits", "--arcs", "total"],
+        (["--law", "limits", "--arcs", "total", "--robot", "irb60"],
+         "--robot: found irb60 without the largest acceleration of theta1, theta2, theta3, allowed: a robot"
+         " file with the key acceleration in limits, in rad/s2 or m/s2\n"
          "--arcs: found total with the law limits, allowed: with the laws trapezoid and jerk"),
         (["--start", "0,0,0,0"], "--start: found without a robot; --robot NAME|FILE gives one"),
         (["--tool", "0,0,0.1"], "--tool: found without a robot; --robot NAME|FILE gives one"),
     ],
 )  # fmt: skip
 def test_values_that_are_refused(capsys: Captured, options: list[str], said: str) -> None:
-    assert refused(capsys, CUBE, *options) == [said]
+    assert refused(capsys, CUBE, *options) == said.splitlines()
 
 
 @pytest.mark.parametrize(

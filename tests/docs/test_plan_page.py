@@ -6,31 +6,46 @@ import math
 import re
 import runpy
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from asserting import there
+from pages import command_lines, indented, run_in_process
 from urmpipe_models.errors import LogError
 from urmpipe_models.planning.cube import PLANES
 from urmpipe_models.planning.from_rows import path_of
 from urmpipe_models.planning.stretches import ARCS, Arcs
 from urmpipe_models.planning.trapezoid import trapezoid_law
 from urmpipe_pipeline.planned_paths.given_path import given_path
-from urmpipe_pipeline.planned_paths.path_file import PathFile, read_path
+from urmpipe_pipeline.planned_paths.path_file import GivenPath, read_path
 from urmpipe_pipeline.planned_paths.presenter import CHECKS
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "plan.md").read_text(encoding="utf-8")
-TANGENTS, CORNERS, TURNED, WRONG = re.findall(r"```csv\n(.*?)```", PAGE, re.DOTALL)
+FIRST, TANGENTS, CORNERS, TURNED, WRONG = re.findall(r"```csv\n(.*?)```", PAGE, re.DOTALL)
 REASONS = PAGE.split("```text\n")[1].split("```")[0].splitlines()
 CUBES = re.findall(r"^    (cube:\S+)$", PAGE, re.MULTILINE)
 
 
-def rows_of(folder: Path, text: str) -> PathFile:
+def rows_of(folder: Path, text: str) -> GivenPath:
     (folder / "path.csv").write_text(text, encoding="utf-8")
     return read_path(folder / "path.csv")
+
+
+def test_commands_and_code_of_the_page_run_with_its_contour(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("contour.csv").write_text(FIRST, encoding="utf-8")
+    lines = command_lines("docs/plan.md")
+    assert {line: run_in_process(line) for line in lines} == dict.fromkeys(lines, 0)
+    names: dict[str, Any] = {}
+    exec(indented("docs/plan.md", "import numpy as np"), names)
+    plan, rows = names["plan"], rows_of(tmp_path, FIRST).rows
+    assert (plan.verdict, names["rows"].position.tolist()) == ("pass", rows.position.tolist())
 
 
 def test_the_contour_of_the_paper_is_the_cube_s(tmp_path: Path) -> None:
@@ -55,6 +70,17 @@ def test_the_orientations_of_the_page_are_read(tmp_path: Path) -> None:
     turned = Rotation.from_euler("ZYX", [[0, 180, 0], [0, 180, 0], [90, 180, 0]], degrees=True).as_matrix()
     # Sines and cosines of quarter turns, rounded.
     np.testing.assert_allclose(there(found.rows.rotation), turned, rtol=0, atol=1e-15)
+
+
+def test_a_tool_turns_the_shorter_way_and_never_in_place(tmp_path: Path) -> None:
+    header, first, *_ = TURNED.splitlines()
+    turned = [f"0.5{first[3:]}", f"0.5{first[3:]}".replace(",0,3.14", f",{2.0 * math.pi!r},3.14")]
+    turning = there(path_of(rows_of(tmp_path, "\n".join((header, first, turned[1]))).rows).turning)
+    quaternions = turning.quaternions(np.linspace(0.0, 0.1, 5))
+    np.testing.assert_allclose(quaternions, quaternions[:1].repeat(5, axis=0), rtol=0, atol=1e-15)
+    in_place = "\n".join((header, first, turned[0], turned[0].replace(",0,3.14", ",1,3.14")))
+    with pytest.raises(LogError, match=r"path\.csv:4"):
+        rows_of(tmp_path, in_place)
 
 
 def test_the_picture_is_what_its_script_draws() -> None:

@@ -11,12 +11,13 @@ import numpy as np
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.planning.cube import cube_rows
-from urmpipe_models.planning.rows import PathRows, path_rows
+from urmpipe_models.planning.rows import PathRows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.planned_paths.given_path import given_path
+from urmpipe_pipeline.planned_paths.obstacles import ObstacleKind
 from urmpipe_pipeline.planned_paths.planning import plan_path
 from urmpipe_pipeline.planned_paths.request import Request, Timing, checked_timing
-from urmpipe_pipeline.planned_paths.result import ObstacleKind, PlannedPath
+from urmpipe_pipeline.planned_paths.result import PlannedPath
 
 DOWN = np.diag([1.0, -1.0, -1.0])
 CONTOUR = cube_rows("wall", 0.6, 0.03, np.array([1.7, 0.0, 1.0]))
@@ -42,20 +43,20 @@ def planned(arm: Chain | None, rows: PathRows, **timing: Any) -> PlannedPath:
 def across_the_base() -> PlannedPath:
     """Return a plan between rows that are reached, across the column of the arm."""
     points = np.array([[0.3, 0.3, 0.3], [-0.3, -0.3, 0.3]])
-    return planned(load_robot("ur5e"), path_rows(points, rotation=DOWN))
+    return planned(load_robot("ur5e"), PathRows(points, rotation=DOWN))
 
 
 def behind_the_arm() -> PlannedPath:
     """Return a plan past the limit of the first joint, of an arm that cannot bend over back."""
     points = np.array([[-1.5, 0.3, 1.0], [-1.5, -0.3, 1.0]])
     arm = limited("irb60", lower=[-3.14, 0.0, -1.0, 0.0], upper=[3.14, 1.5, 1.5, 0.0])
-    return planned(arm, path_rows(points))
+    return planned(arm, PathRows(points))
 
 
 def over_its_axis() -> PlannedPath:
     """Return a plan over the axis of theta1, along which the joints go on without a jump."""
     points = np.array([[0.6, 0.0, 1.6], [0.3, 0.0, 1.6], [-0.3, 0.0, 1.6]])
-    return planned(load_robot("irb60"), path_rows(points))
+    return planned(load_robot("irb60"), PathRows(points))
 
 
 def by_a_slow_joint() -> PlannedPath:

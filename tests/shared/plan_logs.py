@@ -1,27 +1,21 @@
-"""Motions from rest to rest of arms of all kinds, written as the log that a plan is."""
+"""Paths of arms of all kinds, planned and written as logs."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+import urmpipe
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.planning.rows import PathRows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import from_offset
-from urmpipe_pipeline.outputs import PATH_ROW, guarded_output
-from urmpipe_pipeline.tables.joint_file import write_joint_log
-
-STEP_NS = 5_000_000
-TURNED = (0.9, -0.6, 0.5, 0.8, -0.7, 0.4)
-"""How far each joint goes, in [rad] or [m], as a share."""
+from urmpipe_pipeline.planned_paths.result import PlannedPath
 
 Y = (0.0, 1.0, 0.0)
 
@@ -57,64 +51,59 @@ def gantry() -> Chain:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Planned:
-    """A plan of an arm, or of none.
-
-    Attributes:
-        robot: The arm.
-        q: In [rad] and [m], shape (n, joints).
-        position: In [m], shape (n, 3).
-        quat_xyzw: Of the tool [-], shape (n, 4); None where a plan leaves it open.
-        row: Of the path, shape (n,).
-    """
-
-    robot: Chain | None
-    q: FloatArray
-    position: FloatArray
-    quat_xyzw: FloatArray | None
-    row: IntArray
-
-    def write(self, path: Path) -> Path:
-        """Write it as `plan` does, and return where."""
-        moving = () if self.robot is None else self.robot.moving
-        units = ["m" if joint.kind == "prismatic" else "rad" for joint in moving]
-        t_ns = np.arange(len(self.q), dtype=np.int64) * STEP_NS
-        with guarded_output(path, [], "plan") as part:
-            write_joint_log(
-                part, path, joints=[joint.name for joint in moving], units=units, q=self.q, row=self.row,
-                t_ns=t_ns, position=self.position, quat_xyzw=self.quat_xyzw, row_column=PATH_ROW,
-            )  # fmt: skip
-        return path
-
-    def alone(self) -> Planned:
-        """Return the same path of no arm."""
-        return Planned(None, np.empty((len(self.q), 0)), self.position, None, self.row)
+def of_joints(arm: Chain, q: FloatArray, *, oriented: bool) -> tuple[Chain, PathRows]:
+    """Return an arm with stops where it has joint values in [rad] and [m], shape (n, joints)."""
+    position, rotation = poses_over_log(arm, q)
+    return arm, PathRows(position, rotation=rotation if oriented else None)
 
 
-def planned(robot: Chain, *, oriented: bool, amplitude: float = 0.4, rows: int = 200) -> Planned:
-    """Return a plan of an arm that starts beside its own start; a joint whose limits are equal stays.
-
-    All joints go along 10 s^3 - 15 s^4 + 6 s^5, s from 0 to 1.
-    """
-    s = np.linspace(0.0, 1.0, rows)[:, np.newaxis]
-    share = np.where([joint.lower == joint.upper for joint in robot.moving], 0.0, TURNED[: len(robot.moving)])
-    q = np.asarray(np.array(robot.start) + share * (0.2 + amplitude * (10 * s**3 - 15 * s**4 + 6 * s**5)))
-    position, rotation = poses_over_log(robot, q)
-    quat = continuous_quaternions(quaternions(rotation.reshape(-1, 9), "matrix")) if oriented else None
-    return Planned(robot, q, position, quat, np.arange(rows) // 50 + 1)
+def between(arm: Chain, first: list[float], last: list[float], *, oriented: bool) -> tuple[Chain, PathRows]:
+    """Return an arm with three stops: where it has some joint values, in the middle, and others."""
+    return of_joints(arm, np.linspace(first, last, 3), oriented=oriented)
 
 
-PLANS: Mapping[str, Callable[[], Planned]] = {
-    "ur5e": lambda: planned(load_robot("ur5e"), oriented=True),
-    "ur5e, a millimetre": lambda: planned(load_robot("ur5e"), oriented=True, amplitude=1e-3),
-    "urm6": lambda: planned(load_robot("urm6"), oriented=False),
-    "urm6, many turns": lambda: planned(
-        load_robot("urm6"), oriented=False, amplitude=9.0 * math.pi, rows=4000
+def around(arm: Chain, turns: int) -> tuple[Chain, PathRows]:
+    """Return an arm with a path round the axis of its first joint, of so many turns with corners."""
+    q = np.tile(np.add(arm.start, [0.0, 0.9, -1.2, 0.4, 0.5, 0.0]), (8 * turns + 1, 1))
+    q[:, 0] += np.arange(len(q)) * math.pi / 4.0
+    position, _ = poses_over_log(arm, q)
+    return arm, PathRows(position, 0.02, corner=True)
+
+
+PATHS: Mapping[str, Callable[[], tuple[Chain, PathRows]]] = {
+    "ur5e": lambda: between(
+        load_robot("ur5e"),
+        [0.2, -1.4, 1.2, -1.3, -1.5, 0.1],
+        [0.6, -1.7, 1.5, -1.0, -1.2, 0.3],
+        oriented=True,
     ),
-    "level": lambda: planned(absolute_angles(), oriented=True),
-    "level, position only": lambda: planned(absolute_angles(), oriented=False),
-    "sliding": lambda: planned(sliding(), oriented=False),
-    "gantry": lambda: planned(gantry(), oriented=True),
+    "ur5e, a millimetre": lambda: between(
+        load_robot("ur5e"),
+        [0.2, -1.4, 1.2, -1.3, -1.5, 0.1],
+        [0.201, -1.4, 1.201, -1.3, -1.5, 0.1],
+        oriented=True,
+    ),
+    "urm6": lambda: between(
+        load_robot("urm6"), [0.2, 2.5, 0.1, 3.3, -0.1, 3.2], [0.6, 2.2, 0.3, 3.6, -0.2, 3.3], oriented=False
+    ),
+    "urm6, many turns": lambda: around(load_robot("urm6"), 5),
+    "level": lambda: between(absolute_angles(), [0.4, 0.2, 0.3, 0.0], [0.4, 0.5, 0.1, 0.0], oriented=True),
+    "level, position only": lambda: between(
+        absolute_angles(), [0.1, 0.2, 0.3, 0.0], [0.6, 0.5, 0.1, 0.0], oriented=False
+    ),
+    "sliding": lambda: between(sliding(), [0.0, 0.1, 0.2], [0.5, -0.3, 0.4], oriented=False),
+    "gantry": lambda: between(gantry(), [0.0, 0.1, 0.2, 0.3], [0.5, -0.3, 0.4, 1.1], oriented=True),
 }
-"""Plans by what is odd about them."""
+"""Arms and paths by what is odd about them."""
+
+
+def planned(name: str, log: Path) -> PlannedPath:
+    """Return the plan of a path for its arm, written as a log."""
+    arm, rows = PATHS[name]()
+    return urmpipe.plan(rows, arm, output=log)
+
+
+def planned_alone(name: str, log: Path) -> PlannedPath:
+    """Return the plan of the same path without an arm and an orientation, likewise."""
+    _, rows = PATHS[name]()
+    return urmpipe.plan(PathRows(rows.position, rows.radius, rows.corner), output=log)

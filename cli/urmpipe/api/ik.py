@@ -10,17 +10,17 @@ from typing import Any, Unpack
 from numpy.typing import ArrayLike
 
 from urmpipe.arm_placing import Frame, Robot
-from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_warnings
+from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_recording, refuse_warnings
+from urmpipe.output_files import output_kind
 from urmpipe.reading import Resolved, TableReading, map_files, resolved
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError, OptionError, for_each, shown
+from urmpipe_models.errors import Finding, OptionError, for_each
 from urmpipe_models.inverse.search import USUAL_SEARCH, Search
 from urmpipe_models.inverse.solve import Method
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.outputs import NOUNS, OutputKind, guarded_output, refuse_output
-from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.outputs import guarded_output, refuse_output
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets, TargetsLike, given_targets
 from urmpipe_pipeline.solved_targets.request import Request, refuse_unsolvable, start_of
@@ -60,7 +60,7 @@ def ik(
     progress: Callable[[float], None] | None = None,
     **reading: Unpack[TableReading],
 ) -> SolvedTargets:
-    """Find the joint values that bring an arm's tool to targets, limits kept. docs/ik.md tells how.
+    """Find the joint values that bring an arm's tool to targets, limits kept. See docs/ik.md.
 
     Targets without times stand for themselves; with times they are a path, followed without a jump where
     the arm can.
@@ -73,7 +73,7 @@ def ik(
         base_link: Link of a URDF where the arm begins; default: its root.
         tip_link: Link of a URDF where the arm ends; default: its end.
         t: Times of arrays in [s], shape (n,).
-        tsp: Time from target to target in [s] where none is told.
+        tsp: Time from target to target in [s] where the targets have no times.
         start: Joint values in [rad] or [m] to be near to, shape (joints,); default: the robot's own.
         every: Collect all solutions of any arm, and record every branch as a ghost arm.
         tolerance: A target out of reach takes the nearest point within this on each axis, in [m].
@@ -84,8 +84,8 @@ def ik(
         strict: Whether a warning is an error.
         output: A joint log (.csv) or a recording (.rrd) to write.
         inputs: Files besides the targets that are never replaced.
-        progress: Told the share that is done, 0..1.
-        **reading: How to read the file where it cannot tell by itself: unit, time, rotation, log_map and the
+        progress: Called with the share that is done, 0..1.
+        **reading: How to read the file where it does not show it: unit, time, rotation, log_map and the
             others of `urmpipe.TableReading`.
 
     Raises:
@@ -137,33 +137,12 @@ def _arm_of(said: Resolved) -> Chain:
     return said.arm
 
 
-def output_kind(output: Path | None, log: OutputKind) -> OutputKind | None:
-    """Return what an output is by its suffix: a log of the kind given, or a recording; None without one.
-
-    Raises:
-        OptionError: If the suffix is another.
-    """
-    if output is None:
-        return None
-    kind = {".csv": log, ".rrd": "recording"}.get(output.suffix.lower())
-    if kind is None:
-        allowed = f"a name that ends in .csv (a {NOUNS.get(log, log)}) or .rrd (a recording)"
-        raise OptionError(Finding(parameter="output", found=shown(str(output)), allowed=allowed))
-    return kind
-
-
 def _given(
     targets: TargetsLike, t: ArrayLike | None, tsp: float | None, read: ReadOptions | None
 ) -> GivenTargets:
     """Return targets with their rows and times; raise a `LogError` if they are a recording."""
     refuse_recording(targets, "a table (CSV) of targets")
     return given_targets(targets, t, tsp, read)
-
-
-def refuse_recording(given: object, allowed: str) -> None:
-    """Raise a `LogError` if what was given is the file of a recording, where something else is allowed."""
-    if isinstance(given, (str, Path)) and Path(given).is_file() and is_recording(Path(given)):
-        raise LogError(Finding(file=str(given), found="a recording", allowed=allowed))
 
 
 def _write_joints(result: SolvedTargets, path: Path, kept: Sequence[Path]) -> None:
@@ -182,7 +161,7 @@ def _write_joints(result: SolvedTargets, path: Path, kept: Sequence[Path]) -> No
 def _parts(
     progress: Callable[[float], None] | None, writes: bool
 ) -> tuple[Callable[[float], None] | None, Callable[[float], None] | None]:
-    """Return what to tell the progress of solving and of writing; None where nobody is told."""
+    """Return the progress functions of solving and of writing; None where no progress is reported."""
     if progress is None:
         return None, None
     share = SOLVING if writes else 1.0

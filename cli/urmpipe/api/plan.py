@@ -9,10 +9,10 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from urmpipe.api.ik import output_kind, refuse_recording
 from urmpipe.arm_placing import NO_ROBOT, Frame, Robot
-from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_warnings
-from urmpipe.reading import TableReading, map_files, options_of, resolved
+from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_recording, refuse_warnings
+from urmpipe.output_files import output_kind
+from urmpipe.reading import UntimedReading, map_files, options_of, resolved
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, for_each
@@ -20,16 +20,18 @@ from urmpipe_models.planning.rows import PathRows
 from urmpipe_models.planning.stretches import Arcs
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import PATH_ROW, guarded_output, refuse_output
-from urmpipe_pipeline.planned_paths.given_path import GivenPath, given_path
+from urmpipe_pipeline.planned_paths.given_path import given_path
+from urmpipe_pipeline.planned_paths.path_file import GivenPath
 from urmpipe_pipeline.planned_paths.planning import plan_path
 from urmpipe_pipeline.planned_paths.request import (
     PERIOD,
+    Law,
     Request,
     Timing,
     checked_timing,
     refuse_unlimited,
 )
-from urmpipe_pipeline.planned_paths.result import Law, PlannedPath
+from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.solved_targets.request import start_of
 from urmpipe_pipeline.tables.joint_file import write_joint_log
@@ -38,7 +40,7 @@ PLANNING = 0.8
 """Share of the work that planning is where something is written, too."""
 
 
-@public_reading(TableReading)
+@public_reading(UntimedReading)
 def plan(
     path: PathLike | PathRows,
     robot: Robot | None = None,
@@ -58,9 +60,9 @@ def plan(
     output: PathLike | None = None,
     inputs: Sequence[PathLike] = (),
     progress: Callable[[float], None] | None = None,
-    **reading: Unpack[TableReading],
+    **reading: Unpack[UntimedReading],
 ) -> PlannedPath:
-    """Plan a path of lines and arcs, its time, and the joints of an arm along it. docs/plan.md tells how.
+    """Plan a path of lines and arcs, its time, and the joints of an arm along it. See docs/plan.md.
 
     Args:
         path: A file of rows x, y, z, r; a test cube, such as "cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1"; or rows.
@@ -74,45 +76,51 @@ def plan(
         law: trapezoid: within speed and acceleration; jerk: within a jerk, too; limits: in the least time
             within the rates and accelerations of the joints.
         jerk: The largest jerk of the law jerk in [m/s3].
-        arcs: tangential: the acceleration holds along the path; total: on arcs v^2 / r counts, too.
+        arcs: What the acceleration limits on arcs; tangential: that along the path; total: v^2 / r, too.
         tsp: Time from sample to sample in [s].
         start: Joint values in [rad] or [m] to be near to at the first sample, shape (joints,); default: the
             robot's own.
         strict: Whether a warning is an error.
         output: A log (.csv) or a recording (.rrd) to write.
         inputs: Files besides the path that are never replaced.
-        progress: Told the share that is done, 0..1.
-        **reading: How to read the file where it cannot tell by itself: unit, rotation, log_map and the others
-            of `urmpipe.TableReading`.
+        progress: Called with the share that is done, 0..1.
+        **reading: How to read the file where it does not show it: log_map, rotation, delimiter, decimal and
+            unit, as of a table of targets. A path has no time.
+
+    Returns:
+        The plan, a row a sample: `t` in [s], shape (n,), `motion` (arc length `s` in [m] and its derivatives
+        `v`, `a`, `j`, each of shape (n,)), `position` in [m], shape (n, 3), `joints` (`q` in [rad] or
+        [m], `qd` in [rad/s] or [m/s], `qdd` in [rad/s2] or [m/s2], each of shape (n, joints); None without a
+        robot). Of the whole: `duration` in [s], `scaled` (the share of the speed that is left), `obstacles`
+        (what is in the arm's way), `verdict` ("pass", or "fail" with obstacles; None without a robot),
+        `warnings`, `to_frame()`.
 
     Raises:
-        UrmpipeError: With everything that is wrong with the path, the arm or an option; points that the arm
-            does not reach are. What keeps it from moving along them stands in the result (`obstacles`).
+        UrmpipeError: With everything that is wrong with the path, the arm or an option. A row out of reach is
+            an error; what keeps the arm from moving between the rows stands in the result (`obstacles`).
 
     Source: [Iso9283]_ section 2, section 4 steps 1 to 19.
     """
     written = None if output is None else Path(output)
-    asked = Timing(law, velocity, acceleration, jerk, arcs, tsp)
+    timing = Timing(law, velocity, acceleration, jerk, arcs, tsp)
     parts: tuple[Callable[[], Any], ...] = (
-        lambda: _arm_and_start(resolved(reading, robot, base, tool, base_link, tip_link).arm, start),
+        lambda: _request(resolved(reading, robot, base, tool, base_link, tip_link).arm, start, timing),
         lambda: _given(path, reading),
-        lambda: checked_timing(asked),
+        lambda: checked_timing(timing),
         lambda: output_kind(written, "plan"),
     )
-    (arm, begin), given, timing, kind = for_each(lambda make: make(), parts)
-    refuse_unlimited(timing, arm)
+    request, given, _, kind = for_each(lambda make: make(), parts)
     kept = [*([] if given.file is None else paths(str(path))), *map_files(reading), *paths(inputs)]
     if written is not None:
         refuse_output(written, kept, kind)
     share = PLANNING if written else 1.0
     planning = None if progress is None else lambda done: progress(share * done)
-    result = plan_path(given, Request(arm, begin, timing), planning)
+    result = plan_path(given, request, planning)
     refuse_warnings(strict, result.warnings)
     if written is None:
         return result
     if kind == "recording":
         writing = None if progress is None else lambda done: progress(share + (1.0 - share) * done)
-        result = replace(result, run=result.as_run())
         write_recording(result, written, kept, writing)
         return replace(result, recording=written)
     if result.obstacles:
@@ -122,15 +130,23 @@ def plan(
     return replace(result, log=written)
 
 
-def _arm_and_start(
-    arm: Chain | None, start: Sequence[float] | FloatArray | None
-) -> tuple[Chain | None, FloatArray | None]:
-    """Return the arm and where it is to start; raise an `OptionError` for a start without an arm."""
+def _request(arm: Chain | None, start: Sequence[float] | FloatArray | None, timing: Timing) -> Request:
+    """Return the request; raise an `OptionError` if the arm suits neither the start nor the law."""
+    parts: tuple[Callable[[], Any], ...] = (
+        lambda: _start(arm, start),
+        lambda: refuse_unlimited(timing, arm),
+    )
+    begin, _ = for_each(lambda make: make(), parts)
+    return Request(arm, begin, timing)
+
+
+def _start(arm: Chain | None, start: Sequence[float] | FloatArray | None) -> FloatArray | None:
+    """Return joint values to start at, shape (joints,); raise an `OptionError` if there is no arm."""
     if arm is not None:
-        return arm, start_of(arm, start)
+        return start_of(arm, start)
     if start is not None:
         raise OptionError(Finding("found without a robot", parameter="start", hints=NO_ROBOT))
-    return None, None
+    return None
 
 
 def _given(path: PathLike | PathRows, reading: Mapping[str, Any]) -> GivenPath:

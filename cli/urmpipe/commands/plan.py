@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,11 +10,14 @@ import click
 
 import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.reading import table_options
+from urmpipe.options.reading import path_options
 from urmpipe.options.types import DURATION, JointValuesType, NumberType, OneOf
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.planned_paths.result import PlannedPath
+
+PLACED = ("base", "tool", "base_link", "tip_link")
+"""Options that place the arm: what reads the plan needs them again."""
 
 
 @click.command(short_help="Plan a path of lines and arcs, and its time.")
@@ -42,7 +46,7 @@ if TYPE_CHECKING:
     type=OneOf(["tangential", "total"]),
     default="tangential",
     show_default=True,
-    help="What the acceleration holds on arcs; total: v^2 / r counts, too.",
+    help="What the acceleration limits on arcs; total: v^2 / r counts, too.",
 )
 @click.option("--tsp", type=DURATION, default="5ms", show_default=True, help="Time from sample to sample.")
 @click.option(
@@ -50,7 +54,7 @@ if TYPE_CHECKING:
     type=JointValuesType(),
     help="Joint values to be near to at the first sample, in rad and m [default: the robot's own].",
 )
-@table_options
+@path_options
 @output_options
 def plan(path: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
     """Plan a path of lines and arcs, the time along it, and the joints of an arm that follows it.
@@ -76,15 +80,14 @@ def plan(path: str, output: Path | None, terminal: Terminal, **options: Any) -> 
     with terminal.progress(f"Planning {path}") as progress:
         result = urmpipe.plan(path, output=output, progress=progress, **options)
     terminal.warn(result.warnings)
-    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces))
+    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, options, replaces))
     return 1 if result.verdict == "fail" else 0
 
 
-def _print(result: PlannedPath, replaces: bool) -> None:
+def _print(result: PlannedPath, options: Mapping[str, Any], replaces: bool) -> None:
     """Print the plan, and what was written."""
     from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
-    from urmpipe_models.spelling import pasted
     from urmpipe_pipeline.results import present
 
     print_presentation(present(result))
@@ -92,4 +95,16 @@ def _print(result: PlannedPath, replaces: bool) -> None:
         print_recording(result.recording, replaced=replaces)
     elif result.log is not None:
         earlier = "; it replaced an earlier one" if replaces else ""
-        say(f"Plan: {result.log}  (read it: urmpipe ingest {pasted(result.log)}{earlier})")
+        say(f"Plan: {result.log}  (read it: {_reading(result.log, options)}{earlier})")
+
+
+def _reading(log: Path, options: Mapping[str, Any]) -> str:
+    """Return the command that reads a plan: an arm of the catalogue is found by its joints and its path."""
+    from urmpipe_models.robots.catalogue import robot_names
+    from urmpipe_models.spelling import option_of, pasted
+
+    placed = [option_of(name) for name in PLACED if options[name] is not None]
+    command = f"urmpipe ingest {pasted(log)}"
+    if options["robot"] is not None and (placed or options["robot"] not in robot_names()):
+        command += f" --robot {pasted(options['robot'])}"
+    return f"{command} with the same {', '.join(placed)}" if placed else command

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -66,7 +67,14 @@ PLACING = (
         "--tip-link", "--tip", metavar="LINK", help="Link of a URDF where the arm ends [default: its end]."
     ),
 )
-TABLE = (
+
+
+def _unit_option(help: str) -> Callable[[Command], Command]:
+    """Return the option --unit."""
+    return click.option("--unit", multiple=True, callback=_units, metavar="[COLUMN=]UNIT", help=help)
+
+
+UNTIMED = (
     MAP_OPTION,
     click.option("--rotation", type=OneOf(FORMS), help="Form of the recorded orientation, if it is open."),
     click.option(
@@ -75,14 +83,11 @@ TABLE = (
         help="What parts the columns, or the sign itself in quotes.",
     ),
     click.option("--decimal", type=OneOf(["point", "comma", ".", ","]), help="The decimal sign."),
+)
+TABLE = (
+    *UNTIMED,
     click.option("--time", metavar="COLUMN", help="The time column."),
-    click.option(
-        "--unit",
-        multiple=True,
-        callback=_units,
-        metavar="[COLUMN=]UNIT",
-        help="Unit of angles whose names tell none (rad, deg), or of one column.",
-    ),
+    _unit_option("Unit of angles whose names tell none (rad, deg), or of one column."),
 )
 ROWS = (
     click.option("--source", metavar="NAME", help="Who wrote the log: coppeliasim, solidworks, ..."),
@@ -131,6 +136,12 @@ def placing_options(command: Command) -> Command:
 def table_options(command: Command) -> Command:
     """Add the arm, how any table is read, and --strict."""
     return with_options(command, STRICT_OPTION, *TABLE, ROBOT_OPTION, *PLACING)
+
+
+def path_options(command: Command) -> Command:
+    """Add the arm, how the rows of a path are read, and --strict."""
+    unit = _unit_option("Unit of x, y, z and r (mm), of angles (deg), or of one column (COLUMN=mm).")
+    return with_options(command, STRICT_OPTION, *UNTIMED, unit, ROBOT_OPTION, *PLACING)
 
 
 def row_options(command: Command) -> Command:

@@ -53,9 +53,8 @@ class Arc:
 
 
 def unit(vector: FloatArray) -> FloatArray:
-    """Return a vector of shape (3,) with length 1 [-]; of length 0 as it is."""
-    length = float(np.linalg.norm(vector))
-    return vector / length if length else vector
+    """Return the direction of a vector, shape (3,), with length 1 [-]."""
+    return vector / np.linalg.norm(vector)
 
 
 def towards(tangent: FloatArray, onward: FloatArray) -> FloatArray | None:
@@ -93,14 +92,15 @@ def arc_at_corner(
 
 
 def arc_from(
-    start: FloatArray, tangent: FloatArray, onward: FloatArray, radius: float, variant: int
+    start: FloatArray, tangent: FloatArray, onward: FloatArray, radius: float, variant: int, within: float
 ) -> tuple[Arc, float] | None:
     """Return the arc that leaves a line and leads towards a point, and how far it is from its end to it.
 
     In the plane of both, with x along the line, y to the side of the centre C = (0, r), and the point at
     (a, b): D = |(a, b - r)|, the way on is l = sqrt(D^2 - r^2), and the arc turns by
     atan2(b - r, a) + atan2(r, l). Of the two tangents from the point to the circle this is the one along
-    which the motion goes on.
+    which the motion goes on. Of a point on the circle l = 0, since sqrt(2 r (D - r)) makes a line of what is
+    rounding.
 
     Args:
         start: Where the arc begins in [m], shape (3,).
@@ -108,6 +108,7 @@ def arc_from(
         onward: From there to the point in [m], shape (3,).
         radius: In [m].
         variant: 2 for the centre on the side of the point, 1 for the other side.
+        within: How far from its circle a point on it may be in [m]: rounding of coordinates.
 
     Returns:
         The arc and l in [m]; None where the point lies on the line, or within the circle.
@@ -118,12 +119,12 @@ def arc_from(
     if side is None:
         return None
     normal = side if variant == PROPER else -side
-    a, b = float(onward @ tangent), float(onward @ normal) - radius
-    square = a * a + b * b - radius * radius
-    if square < 0.0:
+    a, across = float(onward @ tangent), float(onward @ normal)
+    square, rounding = float(onward @ onward) - 2.0 * radius * across, 2.0 * radius * within
+    if square < -rounding:
         return None
-    way = math.sqrt(square)
-    angle = (math.atan2(b, a) + math.atan2(radius, way)) % (2.0 * math.pi)
+    way = math.sqrt(square) if square > rounding else 0.0
+    angle = (math.atan2(across - radius, a) + math.atan2(radius, way)) % (2.0 * math.pi)
     return Arc(start, tangent, normal, radius, angle), way
 
 

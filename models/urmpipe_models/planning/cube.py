@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.names import not_among
-from urmpipe_models.planning.rows import PathRows, path_rows
+from urmpipe_models.planning.rows import PathRows
 
 Axis: TypeAlias = tuple[int, int, int]
 
@@ -73,11 +73,18 @@ def cube_rows(
     ahead = np.diff(corners, axis=0)
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     corners[1:-1] -= radius * ahead[:-1]
-    return path_rows(corners, radius, rotation=rotation)
+    return PathRows(corners, radius, rotation=rotation)
 
 
 def cube_faults(kind: str, plane: str | None, side: float, radius: float) -> Iterator[Finding]:
-    """Yield what is wrong with a contour whose edge and radius in [m] are NaN where they are not known."""
+    """Yield what is wrong with a contour.
+
+    Args:
+        kind: Of its section, a name in `PLANES`.
+        plane: Name of the section; None for the first.
+        side: Edge of the cube in [m]; NaN where it is not known.
+        radius: Of its arcs in [m]; NaN where it is not known.
+    """
     if kind not in PLANES:
         yield Finding(not_among(kind, PLANES))
     elif plane is not None and plane not in PLANES[kind]:

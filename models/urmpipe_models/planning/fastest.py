@@ -9,6 +9,7 @@ Source: [Iso9283]_ section 2 (approximately optimum time); [PhamPham2018]_ (both
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,18 +65,35 @@ def fastest_law(
         before: Slopes where each one ends, n rows: where segments meet they are others.
         stop: Where the path stops, shape (n + 1,); the first and the last are stops.
         limits: Of joints and tool.
+
+    Source: [PhamPham2018]_.
     """
     step = np.diff(s)
-    x = _run(step, bounds_of(step, after, before, stop, limits))
+    bounds = bounds_of(step, after, before, limits)
+    x = _run(step, bounds, stop)
     v = np.sqrt(x)
-    durations = 2.0 * step / (v[1:] + v[:-1])
+    moves = v[1:] + v[:-1] > 0.0
+    with np.errstate(divide="ignore"):
+        durations = 2.0 * step / (v[1:] + v[:-1])
     rows = (durations, s[:-1], v[:-1], 0.5 * np.diff(x) / step)
-    return TimeLaw([Phase(*row) for row in zip(*(part.tolist() for part in rows), strict=True)])
+    phases: list[Phase] = []
+    for i, row in enumerate(zip(*(part.tolist() for part in rows), strict=True)):
+        phases += [Phase(*row)] if moves[i] else _from_rest_to_rest(bounds, i, float(s[i]), float(step[i]))
+    return TimeLaw(phases)
 
 
-def bounds_of(
-    step: FloatArray, after: JointSlopes, before: JointSlopes, stop: BoolArray, limits: JointLimits
-) -> Bounds:
+def _from_rest_to_rest(bounds: Bounds, i: int, s: float, step: float) -> list[Phase]:
+    """Return how an interval from s on in [m] is passed from rest to rest: faster to its middle, then slower.
+
+    With u constant x rises to u step: |u + slope x| <= most holds where u (1 + |slope| step) <= most.
+    """
+    u = float((bounds.most[i] / (1.0 + np.abs(bounds.slope[i]) * step)).min())
+    u = min(u, float(bounds.fastest[i : i + 2].min()) / step)
+    half = math.sqrt(step / u)
+    return [Phase(half, s, 0.0, u), Phase(half, s + 0.5 * step, u * half, -u)]
+
+
+def bounds_of(step: FloatArray, after: JointSlopes, before: JointSlopes, limits: JointLimits) -> Bounds:
     """Return the bounds that limits set at both ends of each interval.
 
     At its end x + 2 step u stands for x: |(dq + 2 step ddq) u + ddq x| <= a.
@@ -84,13 +102,12 @@ def bounds_of(
         step: Lengths of the intervals in [m], shape (n,).
         after: Slopes where each interval begins, n rows.
         before: Slopes where each one ends, n rows.
-        stop: Where the path stops, shape (n + 1,).
         limits: Of joints and tool.
     """
     along = np.hstack((after.dq, before.dq + 2.0 * step[:, None] * before.ddq))
     across = np.hstack((after.ddq, before.ddq))
     limit = np.tile(limits.acceleration, 2)
-    fastest = np.full(len(stop), limits.speed**2)
+    fastest = np.full(len(step) + 1, limits.speed**2)
     with np.errstate(divide="ignore", invalid="ignore"):
         for part, ends in ((after.dq, slice(None, -1)), (before.dq, slice(1, None))):
             rate = np.square(limits.velocity / np.abs(part)).min(axis=1)
@@ -102,15 +119,14 @@ def bounds_of(
             for own, none in ((across / along, 0.0), (limit / np.abs(along), np.inf))
         )
     fastest[:-1] = np.minimum(fastest[:-1], alone)
-    fastest[stop] = 0.0
     tool = np.zeros((len(step), 1))
     return Bounds(np.hstack((slope, tool)), np.hstack((most, tool + limits.tangential)), fastest)
 
 
-def _run(step: FloatArray, bounds: Bounds) -> FloatArray:
-    """Return x in [m2/s2] on the grid, shape (n + 1,)."""
+def _run(step: FloatArray, bounds: Bounds, stop: BoolArray) -> FloatArray:
+    """Return x in [m2/s2] on the grid, shape (n + 1,); 0 at stops."""
     half = 0.5 / step
-    most = bounds.fastest.copy()
+    most = np.where(stop, 0.0, bounds.fastest)
     most[:-1] = np.minimum(most[:-1], _feasible(bounds, half))
     for i in range(len(step) - 1, -1, -1):  # the least u that is allowed has to lead to most[i + 1] or below
         steepness = half[i] - bounds.slope[i]

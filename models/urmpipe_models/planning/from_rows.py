@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,7 +16,11 @@ from urmpipe_models.planning.rows import PathRows
 from urmpipe_models.planning.turning import turning_of
 
 SHORTEST = 1e-12
-"""A line shorter than this, in [m], is rounding: two arcs touch there."""
+"""Shorter than this is rounding: in [m], or of coordinates beyond 1 m as a share of the largest.
+
+A coordinate is rounded by 1e-16 of itself. That turns an arc, by more the shorter the line before it is, and
+each arc passes it on to the next: 1e4 times as much is left for that.
+"""
 
 
 def path_of(rows: PathRows) -> LineArcPath:
@@ -28,18 +33,41 @@ def path_of(rows: PathRows) -> LineArcPath:
         rows: Two or more; the first and the last one are stops.
 
     Raises:
-        PathError: With every row that makes no path: its radius is too large, it lies on a line with its
-            neighbours but has a radius, it repeats the one before.
+        PathError: With every row that makes no path; see `path_faults`.
 
     Source: [Iso9283]_ section 2, section 4 steps 3 to 10.
     """
-    faults = [*end_faults(rows), *_repeated(rows)]
-    if faults:
-        raise PathError(*faults)
-    made = _at_corners(rows, faults) if rows.corner else _from_first_points(rows, faults)
+    made, faults = _made(rows)
     if faults:
         raise PathError(*faults)
     return made.path(rows)
+
+
+def path_faults(rows: PathRows) -> list[Finding]:
+    """Return every row that makes no path, with its reason.
+
+    Its radius is too large, the path goes straight on or reverses there but it has a radius, it repeats the
+    one before. What may change once a row is mended is not reported: so no radius, NaN, makes none.
+
+    Args:
+        rows: Two or more, their positions finite.
+    """
+    return _made(rows)[1]
+
+
+def _made(rows: PathRows) -> tuple[_Segments, list[Finding]]:
+    """Return the segments of rows, and what is wrong with the rows."""
+    faults = [*end_faults(rows), *_repeated(rows)]
+    radius = rows.radius.copy()
+    radius[[0, -1]] = 0.0
+    inner = replace(rows, radius=radius)
+    made = _at_corners(inner, faults) if rows.corner else _from_first_points(inner, faults)
+    return made, faults
+
+
+def _rounding(rows: PathRows) -> float:
+    """Return what is rounding in [m]."""
+    return SHORTEST * max(1.0, float(np.abs(rows.position).max()))
 
 
 def end_faults(rows: PathRows) -> Iterator[Finding]:
@@ -52,21 +80,22 @@ def end_faults(rows: PathRows) -> Iterator[Finding]:
 
 def _repeated(rows: PathRows) -> Iterator[Finding]:
     """Yield which rows are where the one before is."""
-    for row in np.flatnonzero(np.linalg.norm(np.diff(rows.position, axis=0), axis=1) <= SHORTEST) + 1:
-        allowed = "a point away from it"
-        yield Finding(row=int(row) + 1, found=f"the point of row {row} again", allowed=allowed)
+    for row in np.flatnonzero(np.linalg.norm(np.diff(rows.position, axis=0), axis=1) <= _rounding(rows)) + 1:
+        allowed = "another point" + ("" if rows.rotation is None else ": the tool does not turn on the spot")
+        yield Finding(row=int(row) + 1, found=f"the same point as row {row}", allowed=allowed)
 
 
 @dataclass(eq=False)
 class _Segments:
-    """The segments made so far: lines and arcs by their rows."""
+    """The segments made so far: lines, but for those as short as rounding in [m], and arcs by their rows."""
 
+    rounding: float
     parts: list[tuple[Arc, float]] = field(default_factory=list)
     rows: list[int] = field(default_factory=list)
 
     def line(self, start: FloatArray, tangent: FloatArray, length: float, row: int) -> None:
         """Add a line, unless it is as short as rounding."""
-        if length > SHORTEST:
+        if length > self.rounding:
             self._add(Arc(start, tangent, np.zeros(3), np.inf, 0.0), length, row)
 
     def arc(self, arc: Arc, row: int) -> None:
@@ -103,23 +132,28 @@ class _Segments:
 
 def _at_corners(rows: PathRows, faults: list[Finding]) -> _Segments:
     """Return the segments of rows that are corners; faults are added to those found."""
+    rounding = _rounding(rows)
     way = np.diff(rows.position, axis=0)
     leg = np.linalg.norm(way, axis=1)
-    along = way / leg[:, None]
+    apart = leg > rounding
+    along = way / np.where(apart, leg, 1.0)[:, None]
     arcs: dict[int, Arc] = {}
     for row in np.flatnonzero(rows.radius > 0.0).tolist():
+        if not apart[row - 1 : row + 1].all():
+            continue
         arc = arc_at_corner(
             rows.position[row], along[row - 1], along[row], float(rows.radius[row]), int(rows.variant[row])
         )
         if arc is None:
-            faults.append(_collinear(rows, row))
+            faults.append(_parallel(rows, row, along[row - 1], along[row]))
         else:
             arcs[row] = arc
-    made, last = _Segments(), len(rows) - 2
-    for row in range(last + 1):
-        needed = sum(arcs[k].leg for k in (row, row + 1) if k in arcs)
-        if needed > leg[row] + SHORTEST:
-            faults.append(_too_short(rows, row, needed, float(leg[row])))
+    made = _Segments(rounding)
+    for row in range(len(rows) - 1):
+        ends = [k for k in (row, row + 1) if k in arcs]
+        needed = sum(arcs[k].leg for k in ends)
+        if needed > leg[row] + rounding:
+            faults.append(_too_short(rows, row, ends, needed, float(leg[row])))
             continue
         start, tangent = rows.position[row], along[row]
         if row in arcs:
@@ -130,26 +164,31 @@ def _at_corners(rows: PathRows, faults: list[Finding]) -> _Segments:
 
 
 def _from_first_points(rows: PathRows, faults: list[Finding]) -> _Segments:
-    """Return the segments of rows that are the first points of their arcs; faults are added."""
-    made = _Segments()
-    tangent = np.zeros(3)
+    """Return the segments of rows that are the first points of their arcs; faults are added.
+
+    After a fault the direction of the motion is not known until the path stops.
+    """
+    rounding = _rounding(rows)
+    made = _Segments(rounding)
+    tangent: FloatArray | None = None
     for row in range(len(rows) - 1):
         start, onward = rows.position[row], rows.position[row + 1] - rows.position[row]
-        radius = float(rows.radius[row])
-        if radius == 0.0:
-            tangent = unit(onward)
-            made.line(start, tangent, float(np.linalg.norm(onward)), row)
-            continue
-        found = arc_from(start, tangent, onward, radius, int(rows.variant[row]))
-        if found is None:
-            straight = towards(tangent, unit(onward)) is None
-            faults.append(_collinear(rows, row) if straight else _too_large(rows, row, tangent, onward))
-            tangent = unit(onward)
-            continue
-        arc, way = found
-        made.arc(arc, row)
-        tangent = arc.end_tangent
-        made.line(arc.end, tangent, way, row)
+        radius, length = float(rows.radius[row]), float(np.linalg.norm(onward))
+        if length <= rounding or math.isnan(radius):
+            tangent = None
+        elif radius == 0.0:
+            tangent = onward / length
+            made.line(start, tangent, length, row)
+        elif tangent is not None:
+            found = arc_from(start, tangent, onward, radius, int(rows.variant[row]), rounding)
+            if found is None:
+                faults.append(_no_arc(rows, row, tangent, onward))
+                tangent = None
+                continue
+            arc, way = found
+            made.arc(arc, row)
+            tangent = arc.end_tangent
+            made.line(arc.end, tangent, way, row)
     return made
 
 
@@ -158,26 +197,37 @@ def _column(rows: PathRows) -> str:
     return "corner_r" if rows.corner else "r"
 
 
-def _collinear(rows: PathRows, row: int) -> Finding:
-    """Say that a row with a radius lies on one line with its neighbours."""
-    found = f"{rows.radius[row]:g} m on one line with rows {row} and {row + 2}"
-    return Finding(row=row + 1, column=_column(rows), found=found, allowed="0, or a point off that line")
+def _parallel(rows: PathRows, row: int, tangent: FloatArray, onward: FloatArray) -> Finding:
+    """Say that the path leaves a row with a radius along the direction in which it gets there."""
+    where = "goes straight on" if onward @ tangent > 0.0 else "reverses"
+    found = f"a radius of {rows.radius[row]:g} m where the path {where}"
+    return Finding(
+        row=row + 1, column=_column(rows), found=found, allowed=f"0, or row {row + 2} off that line"
+    )
 
 
-def _too_short(rows: PathRows, row: int, needed: float, leg: float) -> Finding:
-    """Say that the arcs at both ends of a line need more than its length."""
-    arcs = [k for k in (row, row + 1) if rows.radius[k] > 0.0]
+def _too_short(rows: PathRows, row: int, arcs: Sequence[int], needed: float, leg: float) -> Finding:
+    """Say that the arcs at the ends of a line need more than its length."""
     radii = " and ".join(f"{rows.radius[k]:g}" for k in arcs)
     where = f"on the line from row {row + 1} to row {row + 2}"
+    need, most = _unlike(needed, leg)
     return Finding(
         row=arcs[-1] + 1, column=_column(rows),
-        found=f"{radii} m, whose {'arcs need' if len(arcs) > 1 else 'arc needs'} {needed:.6g} m {where}",
-        allowed=f"its length, {leg:.6g} m",
+        found=f"{radii} m, whose {'arcs need' if len(arcs) > 1 else 'arc needs'} {need} m {where}",
+        allowed=f"its length, {most} m",
     )  # fmt: skip
 
 
-def _too_large(rows: PathRows, row: int, tangent: FloatArray, onward: FloatArray) -> Finding:
-    """Say that the next row lies within the circle of an arc."""
-    found = f"{rows.radius[row]:g} m, a circle around row {row + 2}"
-    most = largest_radius(tangent, onward)
-    return Finding(row=row + 1, column=_column(rows), found=found, allowed=f"up to {most:.6g} m")
+def _no_arc(rows: PathRows, row: int, tangent: FloatArray, onward: FloatArray) -> Finding:
+    """Say that the next row lies along the direction of the motion, or within the circle of an arc."""
+    if towards(tangent, unit(onward)) is None:
+        return _parallel(rows, row, tangent, onward)
+    radius, most = _unlike(float(rows.radius[row]), largest_radius(tangent, onward))
+    found = f"{radius} m, with row {row + 2} inside its circle"
+    return Finding(row=row + 1, column=_column(rows), found=found, allowed=f"up to {most} m")
+
+
+def _unlike(found: float, allowed: float) -> tuple[str, str]:
+    """Return two numbers with so many digits, six or more, that they differ."""
+    texts = ((f"{found:.{digits}g}", f"{allowed:.{digits}g}") for digits in range(6, 18))
+    return next((one, other) for one, other in texts if one != other)

@@ -1,89 +1,103 @@
-"""From an arm and a path to the law in the least time: a grid, the joints on it, their limits."""
+"""The limits of joints along a path: the law that runs at them, and how much of them a law uses."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.along_path.path import follow
 from urmpipe_models.planning.fastest import JointLimits, fastest_law
-from urmpipe_models.planning.joint_motion import JointSlopes, joint_slopes, targets_at
-from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.time_law import TimeLaw
+from urmpipe_models.planning.joint_motion import JointSlopes
+from urmpipe_models.planning.path_joints import PathJoints, rests_of
+from urmpipe_models.planning.time_law import PathMotion, TimeLaw
 
-GRID = 4000
-"""Intervals of a grid: the time of the paper's contour is then within 0.3 % of that on ever finer ones."""
+INSIDE = 1e-6
+"""How far inside an interval its ends are looked at, as a share of it: where s'' steps a side is plain."""
 
-LEAST = 30
-"""Intervals of a segment at least."""
-
-
-def rests_of(path: LineArcPath) -> FloatArray:
-    """Return where joints with finite accelerations have to rest in [m], shape (k,).
-
-    At stops, and where the tool's turn changes its rate.
-    """
-    return path.stops if path.turning is None else np.append(path.stops, path.at[path.turning.uneven])
+SIDE = 1e-9
+"""How far from the time at which phases meet both are looked at, as a share of it."""
 
 
-def law_of_limits(
-    chain: Chain, path: LineArcPath, start: FloatArray | None, speed: float, tangential: float
-) -> TimeLaw | None:
-    """Return the law in the least time within the rates and accelerations of the joints.
-
-    The limits hold on the grid; between its places they are exceeded by less than its step squared makes.
-    Where the tool's turn changes its rate the path stops: no finite acceleration follows it.
+def limits_of_joints(chain: Chain, speed: float = np.inf, tangential: float = np.inf) -> JointLimits:
+    """Return the largest rates and accelerations of an arm, and of its tool along the path.
 
     Args:
         chain: The arm.
-        path: The path.
-        start: Joint values to be near to at its first place in [rad] or [m], shape (joints,).
-        speed: The largest s' in [m/s], too; infinity for none.
-        tangential: The largest s'' in [m/s2], too; infinity for none.
-
-    Returns:
-        The law; None where the arm does not reach the whole path.
+        speed: The largest s' in [m/s]; infinity for none.
+        tangential: The largest s'' in [m/s2]; infinity for none.
     """
-    found = joints_on_grid(chain, path, start)
-    if found is None:
-        return None
-    s, after, before = found
-    stop = np.isin(s, rests_of(path))
-    limits = JointLimits(
+    return JointLimits(
         np.array([joint.velocity for joint in chain.moving]),
         np.array([joint.acceleration for joint in chain.moving]),
         speed,
         tangential,
     )
-    return fastest_law(s, after.rows(slice(None, -1)), before.rows(slice(1, None)), stop, limits)
 
 
-def joints_on_grid(
-    chain: Chain, path: LineArcPath, start: FloatArray | None
-) -> tuple[FloatArray, JointSlopes, JointSlopes] | None:
-    """Return places of a path, and the joints there, as they go on and as they come; None out of reach.
+def law_of_limits(joints: PathJoints, speed: float = np.inf, tangential: float = np.inf) -> TimeLaw:
+    """Return the law in the least time within the rates and accelerations of the joints.
+
+    The limits hold on the grid of the joints; between its places they are exceeded by less than its step
+    squared makes. Where the rates of the joints step, as where the tool's turn changes its rate or a joint
+    comes to a limit, the path stops: no finite acceleration follows that.
 
     Args:
-        chain: The arm.
-        path: The path.
-        start: Joint values to be near to at its first place in [rad] or [m], shape (joints,).
-
-    Returns:
-        Arc lengths in [m], shape (n + 1,), and slopes of n + 1 rows: after each place, and before it.
+        joints: The joints along a path that the arm reaches everywhere.
+        speed: The largest s' in [m/s], too; infinity for none.
+        tangential: The largest s'' in [m/s2], too; infinity for none.
     """
-    s = _grid(path)
-    followed = follow(chain, targets_at(path, s), np.arange(len(s)), start=start)
-    if not followed.reached.all():
-        return None
-    after, before = (joint_slopes(chain, path, followed.q, s, before=one) for one in (False, True))
-    return s, after, before
+    stop = np.isin(joints.s, rests_of(joints.path))
+    stop[joints.rate_steps] = True
+    limits = limits_of_joints(joints.chain, speed, tangential)
+    return fastest_law(joints.s, joints.after, joints.before, stop, limits)
 
 
-def _grid(path: LineArcPath) -> FloatArray:
-    """Return arc lengths in [m] that hold the ends of all segments and all rows, shape (n + 1,)."""
-    places = np.unique(np.concatenate((path.bounds, path.at)))
-    lengths = np.diff(places)
-    counts = np.maximum(np.ceil(GRID * lengths / path.total), LEAST).astype(int)
-    parts = zip(places[:-1], places[1:], counts, strict=True)
-    return np.append(np.concatenate([np.linspace(a, b, n, endpoint=False) for a, b, n in parts]), places[-1])
+class Usage(NamedTuple):
+    """The largest use of a limit along a path.
+
+    Attributes:
+        share: max(|q'| / limit, sqrt(|q''| / limit)) [-]: with speeds divided by it the limit holds.
+        s: Where, in [m].
+        joint: Which of the moving joints, from 0.
+    """
+
+    share: float
+    s: float
+    joint: int
+
+
+def largest_usage(joints: PathJoints, law: TimeLaw, *, between: bool = False) -> Usage:
+    """Return the largest use of a joint's limit by a law.
+
+    It is looked for in the middle and just inside both ends of each interval of the grid, and on both sides
+    of the times at which phases of the law meet: rates and accelerations step at both.
+
+    Args:
+        joints: The joints along a path that the arm reaches everywhere.
+        law: The law.
+        between: Whether the middles alone are looked at, since the law holds the limits on the grid.
+
+    Source: [Iso9283]_ section 4, steps 17 and 18.
+    """
+    limits = limits_of_joints(joints.chain)
+    if not np.isfinite([limits.velocity, limits.acceleration]).any():
+        return Usage(0.0, 0.0, 0)
+    s, step = joints.s, INSIDE * np.diff(joints.s)
+    middle = 0.5 * (s[1:] + s[:-1])
+    looked = [_usage(joints.at(middle), law.at(law.time_at(middle)), limits)]
+    if not between:
+        for slopes, places in ((joints.after, s[:-1] + step), (joints.before, s[1:] - step)):
+            looked.append(_usage(slopes, law.at(law.time_at(places)), limits))
+        sides = np.concatenate((law.ends * (1.0 - SIDE), law.ends * (1.0 + SIDE)))
+        motion = law.at(np.minimum(sides, law.duration))
+        looked.append(_usage(joints.at(np.clip(motion.s, 0.0, s[-1])), motion, limits))
+    return max(looked)
+
+
+def _usage(slopes: JointSlopes, motion: PathMotion, limits: JointLimits) -> Usage:
+    """Return the largest use of a limit, of n places."""
+    rates, accelerations = slopes.rates(motion.v, motion.a)
+    share = np.maximum(np.abs(rates) / limits.velocity, np.sqrt(np.abs(accelerations) / limits.acceleration))
+    place, joint = np.unravel_index(int(share.argmax()), share.shape)
+    return Usage(float(share[place, joint]), float(motion.s[place]), int(joint))

@@ -8,7 +8,6 @@ import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.limits import LIMIT_ROUNDING, limits_of
 from urmpipe_models.inverse.targets import Targets, misses
 from urmpipe_models.kinematics.forward import bias_over_log, jacobian_over_log
 from urmpipe_models.planning.line_arc import LineArcPath
@@ -16,8 +15,14 @@ from urmpipe_models.planning.line_arc import LineArcPath
 NUDGE = 1e-6
 """Step of the fastest joint, in [rad] or [m], for a difference of Jacobians: error 1e-12, rounding 1e-10."""
 
-NEAR = 1e-13
+NEAR = 1e-14
 """The tool within this of its path, in [m] and [rad], is on it: rounding."""
+
+STEPS = 4
+"""Newton steps at most: three square an error of 1e-2 down to rounding."""
+
+SINGULAR = 1e-9
+"""Singular values of a Jacobian below this share of the largest are 0: rounding."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,10 +38,6 @@ class JointSlopes:
     q: FloatArray
     dq: FloatArray
     ddq: FloatArray
-
-    def rows(self, chosen: slice) -> JointSlopes:
-        """Return the chosen rows."""
-        return JointSlopes(self.q[chosen], self.dq[chosen], self.ddq[chosen])
 
     def rates(self, v: FloatArray, a: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return q' = dq s' and q'' = ddq s'^2 + dq s'', each of shape (n, joints), in SI.
@@ -55,19 +56,20 @@ def targets_at(path: LineArcPath, s: FloatArray) -> Targets:
 
 
 def joint_slopes(
-    chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray, *, before: bool = False
+    chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray, moves: BoolArray, *, before: bool = False
 ) -> JointSlopes:
     """Return the slopes of joint values that lead the tool along a path with the least motion.
 
     With x' = (t, turn rate) and x'' = (curvature, 0): q' = J+ x', and differentiated once more, with
     y = J+^T q', q'' = J+ (x'' - J' q') + (1 - J+ J) J'^T y; the last term is 0 where J is square. Joints
-    whose limits are equal, or that stay on a limit, have no column in J.
+    that do not move have no column in J.
 
     Args:
         chain: The arm.
         path: The path.
         q: Joint values along it in [rad] or [m], shape (n, joints); a row of NaN has slopes of NaN.
         s: Arc lengths in [m], shape (n,).
+        moves: Which joints move, shape (n, joints).
         before: Whether slopes that jump, where two segments meet, are those before it; else after it.
     """
     points = path.points(s, before=before)
@@ -77,44 +79,41 @@ def joint_slopes(
         second = np.hstack((second, np.zeros_like(second)))
     dq, ddq = np.full(q.shape, np.nan), np.full(q.shape, np.nan)
     known = np.isfinite(q).all(axis=1)
-    moves = _moving(chain, q)
     for pattern in np.unique(moves[known], axis=0):
         rows = np.flatnonzero(known & (moves == pattern).all(axis=1))
         dq[rows], ddq[rows] = _slopes(chain, q[rows], first[rows], second[rows], pattern)
     return JointSlopes(q, dq, ddq)
 
 
-def polished(chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray) -> FloatArray:
-    """Return joint values in [rad] or [m], shape (n, joints), with the tool on the path to the last digits.
+def polished(chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray, moves: BoolArray) -> FloatArray:
+    """Return joint values with the tool on the path to the last digits, by Newton steps q + J+ (x - FK(q)).
 
-    A path is followed to 1e-9 m; a Newton step q + J+ (x - FK(q)) leaves the square of that. What is nearer
-    than `NEAR` stays.
+    Each step leaves the square of what it finds. What is nearer than `NEAR` stays, and so does, in a singular
+    pose, what no step removes.
 
     Args:
         chain: The arm.
         path: The path.
-        q: Joint values along it in [rad] or [m], shape (n, joints), NaN where there are none.
+        q: Joint values near it in [rad] or [m], shape (n, joints), NaN where there are none.
         s: Arc lengths in [m], shape (n,).
+        moves: Which joints move, shape (n, joints).
+
+    Returns:
+        In [rad] or [m], shape (n, joints).
     """
-    miss = np.hstack(misses(chain, q, targets_at(path, s)))[:, : 3 if path.turning is None else 6]
-    better = q.copy()
-    off = np.asarray(np.abs(miss).max(axis=1) > NEAR)  # false where there is no solution
-    moves = _moving(chain, q)
-    for pattern in np.unique(moves[off], axis=0):
-        rows = np.flatnonzero(off & (moves == pattern).all(axis=1))
-        J = jacobian_over_log(chain, q[rows])[:, : miss.shape[1], pattern]
-        better[np.ix_(rows, pattern)] += _times(np.asarray(np.linalg.pinv(J), dtype=float), miss[rows])
+    better, off = q.copy(), np.flatnonzero(np.isfinite(q).all(axis=1))
+    for _ in range(STEPS):
+        miss = np.hstack(misses(chain, better[off], targets_at(path, s[off])))
+        miss = miss[:, : 3 if path.turning is None else 6]
+        far = np.abs(miss).max(axis=1) > NEAR
+        off, miss = off[far], miss[far]
+        for pattern in np.unique(moves[off], axis=0):
+            chosen = (moves[off] == pattern).all(axis=1)
+            rows = off[chosen]
+            J = jacobian_over_log(chain, better[rows])[:, : miss.shape[1], pattern]
+            inverse = np.asarray(np.linalg.pinv(J, rcond=SINGULAR), dtype=float)
+            better[np.ix_(rows, pattern)] += _times(inverse, miss[chosen])
     return better
-
-
-def _moving(chain: Chain, q: FloatArray) -> BoolArray:
-    """Return which joints are free to move, shape (n, joints): not those that rest on a limit."""
-    lower, upper = limits_of(chain)
-    on = (np.abs(q - lower) <= LIMIT_ROUNDING) | (np.abs(q - upper) <= LIMIT_ROUNDING)
-    still = np.zeros_like(on)
-    still[1:] = np.abs(np.diff(q, axis=0)) <= LIMIT_ROUNDING
-    still[:-1] |= still[1:]
-    return np.asarray((lower < upper) & ~(on & still))
 
 
 def _slopes(

@@ -9,6 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IndexArray
+from urmpipe_models.planning.arcs import STRAIGHT
 from urmpipe_models.planning.turning import Turning, part_at
 
 SegmentKind = Literal["line", "arc"]
@@ -87,9 +88,13 @@ class LineArcPath:
 
     @property
     def corners(self) -> FloatArray:
-        """Where the tangents at both ends of each arc meet in [m], shape (arcs, 3): what it rounds."""
+        """Where the tangents at both ends of each arc meet in [m], shape (arcs, 3): what it rounds.
+
+        NaN of an arc whose tangents are parallel: one of half a turn, or of a whole one.
+        """
         k = self.arcs
-        leg = self.radius[k] * np.tan(0.5 * self.length[k] / self.radius[k])
+        angle = self.length[k] / self.radius[k]
+        leg = self.radius[k] * np.where(np.abs(np.sin(angle)) > STRAIGHT, np.tan(0.5 * angle), np.nan)
         return np.asarray(self.start[k] + leg[:, None] * self.tangent[k])
 
     def segment_at(self, s: FloatArray, *, before: bool = False) -> IndexArray:

@@ -17,7 +17,7 @@ HALF = 0.5
 """m = k^2 of the elliptic functions of a swing [-]: let go a quarter turn above rest, k = sin(pi / 4)."""
 
 MET = 1e-12
-"""Within this of the end of a phase, in [m], it is over: where it comes to rest, s tells no time any more."""
+"""Within this share of the whole way of its end a phase is over: where it comes to rest, s tells no time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +53,8 @@ class Phase(NamedTuple):
         j: s''' in [m/s3].
         radius: Of the arc of a swing in [m]; 0 for constant jerk.
         w: Where a swing begins, w0 [-].
+
+    Source: [Dlmf]_ 22.19(i) (the pendulum).
     """
 
     duration: float
@@ -95,16 +97,20 @@ class TimeLaw:
         return self._within(k, since)
 
     def time_at(self, s: FloatArray) -> FloatArray:
-        """Return when the motion is at arc lengths in [m], shape (n,), in [s], shape (n,); the first time."""
+        """Return when the motion is at arc lengths in [m], shape (n,), in [s], shape (n,); the first time.
+
+        Near a stop s tells the time no better than sqrt(2 e / a), e the rounding of s.
+        """
         begin = self._table[:, 1]
         k = np.clip(np.searchsorted(begin, s, side="left") - 1, 0, None)
-        last = np.append(begin[1:], self._within(np.array([-1]), self._table[-1:, 0]).s)[k]
+        whole = self._within(np.array([-1]), self._table[-1:, 0]).s
+        last = np.append(begin[1:], whole)[k]
         low, high = np.zeros(len(s)), self._table[k, 0].copy()
         for _ in range(60):  # halves of a phase down to the last bit: s(t) rises
             middle = 0.5 * (low + high)
             before = self._within(k, middle).s < s
             low, high = np.where(before, middle, low), np.where(before, high, middle)
-        found = np.where(s >= last - MET, self.ends[k], self.ends[k] - self._table[k, 0] + high)
+        found = np.where(s >= last - MET * whole, self.ends[k], self.ends[k] - self._table[k, 0] + high)
         return np.where(s <= begin[0], 0.0, found)
 
     def slower(self, factor: float) -> TimeLaw:
@@ -133,6 +139,8 @@ def swing_at(speed: FloatArray | float, a: float, radius: float) -> FloatArray:
         speed: v in [m/s], shape (n,) or one, 0 to sqrt(a r).
         a: The total acceleration in [m/s2].
         radius: Of the arc in [m].
+
+    Source: [Dlmf]_ 22.15 (inverse of cn).
     """
     return np.asarray(-ellipkinc(np.arccos(np.minimum(speed / np.sqrt(a * radius), 1.0)), HALF))
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
 
 from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.stretches import Arcs, Piece, stretches
+from urmpipe_models.planning.stretches import Arcs, Piece, speeds, stretches
 from urmpipe_models.planning.time_law import Phase, TimeLaw, swing_at
 
 
@@ -34,20 +34,11 @@ def trapezoid_law(
     phases: list[Phase] = []
     begin = 0.0
     for pieces in stretches(path, velocity, acceleration, arcs):
-        for piece, (entry, leave) in zip(pieces, pairwise(_speeds(pieces, acceleration)), strict=True):
-            phases += _phases(piece, begin, entry, leave, acceleration)
+        met = speeds(pieces, lambda piece, speed: _reached(piece, speed, acceleration))
+        for piece, (entry, leave) in zip(pieces, pairwise(met), strict=True):
+            phases += piece_phases(piece, begin, entry, leave, acceleration)
             begin += piece.length
     return TimeLaw(phases)
-
-
-def _speeds(pieces: Sequence[Piece], a: float) -> list[float]:
-    """Return the speeds in [m/s] where pieces begin, and where the last one ends, 0 at both ends."""
-    caps = [0.0, *(min(one.fastest, other.fastest) for one, other in pairwise(pieces)), 0.0]
-    for k, piece in enumerate(pieces[:-1]):
-        caps[k + 1] = min(caps[k + 1], _reached(piece, caps[k], a))
-    for k in range(len(pieces) - 1, 0, -1):
-        caps[k] = min(caps[k], _reached(pieces[k], caps[k + 1], a))
-    return caps
 
 
 def _reached(piece: Piece, speed: float, a: float) -> float:
@@ -59,8 +50,16 @@ def _reached(piece: Piece, speed: float, a: float) -> float:
     return min(piece.fastest, math.sqrt(most * math.sin(min(angle, 0.5 * math.pi))))
 
 
-def _phases(piece: Piece, begin: float, entry: float, leave: float, a: float) -> Iterator[Phase]:
-    """Yield how a piece is passed: faster, on, slower; none of no duration."""
+def piece_phases(piece: Piece, begin: float, entry: float, leave: float, a: float) -> Iterator[Phase]:
+    """Yield how a piece is passed in the least time: faster, on, slower; none of no duration.
+
+    Args:
+        piece: The piece.
+        begin: Where it begins along the path in [m].
+        entry: s' there in [m/s].
+        leave: s' at its end in [m/s]; one that the acceleration allows from `entry`.
+        a: The largest acceleration in [m/s2]: of s'', or on an arc in total.
+    """
     rise = _line_rise if math.isinf(piece.radius) else _arc_rise
     peak, up, down = rise(piece, entry, leave, a)
     level = piece.length - up.s - down.s

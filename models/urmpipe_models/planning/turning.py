@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IndexArray
+from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.orientation import conjugate, matrices, product, quaternions, rotation_vectors
 
-UNEVEN = 1e-9
-"""Rates that differ by less, in [rad/m], are one: rounding of the rows."""
+UNEVEN = 2e-5
+"""Turns from row to row that differ by less, in [rad], may be one even turn whose angles have six digits:
+each is then off by up to 5e-6, and a difference of turns has three of them, that of the middle row twice."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -19,7 +21,7 @@ class Turning:
 
     Attributes:
         at: Where the rows are along the path in [m], rising, shape (n,).
-        quat_xyzw: The orientation there [-], shape (n, 4).
+        quat_xyzw: The orientation there [-], shape (n, 4), of the sign that is nearest to the one before.
         rate: From each to the next about a fixed axis, d theta / ds in [rad/m], in the world, shape
             (n - 1, 3).
     """
@@ -44,8 +46,12 @@ class Turning:
 
     @property
     def uneven(self) -> IndexArray:
-        """Rows, from 0, that the tool passes while the rate of its turn changes [-], shape (k,)."""
-        change = np.abs(np.diff(self.rate, axis=0)).max(axis=1, initial=0.0)
+        """Rows, from 0, that the tool passes while the rate of its turn changes [-], shape (k,).
+
+        By an angle that is more than rounding of the rows: over the shorter way to a row beside it.
+        """
+        way = np.diff(self.at)
+        change = np.linalg.norm(np.diff(self.rate, axis=0), axis=1) * np.minimum(way[:-1], way[1:])
         return np.flatnonzero(change > UNEVEN) + 1
 
 
@@ -68,6 +74,6 @@ def turning_of(rotation: FloatArray, at: FloatArray) -> Turning:
         rotation: Matrices at the rows [-], shape (n, 3, 3).
         at: Where the rows are along the path in [m], rising, shape (n,).
     """
-    quats = quaternions(rotation.reshape(-1, 9), "matrix")
+    quats = continuous_quaternions(quaternions(rotation.reshape(-1, 9), "matrix"))
     turn = rotation_vectors(product(quats[1:], conjugate(quats[:-1])))
     return Turning(at, quats, turn / np.diff(at)[:, None])

@@ -26,11 +26,11 @@ KEYS = (*LENGTH_KEYS, PLANE, *ANGLE_KEYS)
 
 
 def read_cube(text: str) -> tuple[str, PathRows]:
-    """Return the name and the rows of the contour that a text tells of.
+    """Return the name and the rows of the contour that a text describes.
 
-    Behind the kind, wall or diagonal, stand the edge a, the radius r and the centre x, y, z, in m or with a
-    unit (a=600mm); plane= names another section than the first, and rz, ry, rx in rad, or with a unit, hold
-    the tool so: R = Rz Ry Rx.
+    The kind, wall or diagonal, is followed by the edge a, the radius r and the centre x, y, z, in m or with a
+    unit (a=600mm). plane= names another section than the first. rz, ry, rx, in rad or with a unit, hold the
+    tool at R = Rz Ry Rx.
 
     Raises:
         OptionError: With everything that is wrong with it.
@@ -55,9 +55,9 @@ def _pairs(parts: list[str], faults: list[Finding]) -> Iterator[tuple[str, str]]
     for part in parts:
         key, sign, text = (one.strip() for one in part.partition("="))
         if not sign:
-            faults.append(Finding(found=repr(part), allowed="KEY=VALUE, such as a=0.6"))
+            faults.append(Finding(found=repr(part), allowed="KEY=VALUE with a decimal point, such as a=0.6"))
         elif key not in KEYS:
-            faults.append(Finding(not_among(key, KEYS)))
+            faults.append(Finding(f"key: {not_among(key, KEYS)}"))
         elif key in seen:
             faults.append(Finding(found=f"{key} twice", allowed="each key once"))
         else:
@@ -66,7 +66,7 @@ def _pairs(parts: list[str], faults: list[Finding]) -> Iterator[tuple[str, str]]
 
 
 def _values(given: Mapping[str, str], faults: list[Finding]) -> Iterator[tuple[str, float]]:
-    """Yield lengths in [m] and angles in [rad], having added what is none to the faults."""
+    """Yield lengths in [m] and angles in [rad], having added the other values to the faults."""
     for key, text in given.items():
         if key == PLANE:
             continue
@@ -93,7 +93,7 @@ def _missing(given: Mapping[str, str]) -> Iterator[Finding]:
 
 
 def _rotation(values: Mapping[str, float]) -> FloatArray | None:
-    """Return how the tool is held, a matrix of shape (3, 3) [-]; None where nothing says so."""
+    """Return how the tool is held, a matrix of shape (3, 3) [-]; None if that is left open."""
     if ANGLE_KEYS[0] not in values:
         return None
     turns = np.array([[values[key] for key in ANGLE_KEYS]])

@@ -11,7 +11,8 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.planned_paths.parts import passes_ns
-from urmpipe_pipeline.planned_paths.result import FOLLOWED, PlannedJoints, PlannedPath
+from urmpipe_pipeline.planned_paths.planned_joints import FOLLOWED, PlannedJoints
+from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Panel, View
 from urmpipe_pipeline.runs.figures import joint_panels
 
@@ -72,7 +73,7 @@ def law_figure(plan: PlannedPath) -> Figure:
 
 def joints_figure(plan: PlannedPath, joints: PlannedJoints) -> Figure:
     """Return joint values, rates and accelerations, each of these with its shares of the limits."""
-    moving, names = joints.path.chain.moving, joints.path.chain.coordinates
+    moving, names = joints.chain.moving, joints.chain.coordinates
     panels = partial(joint_panels, names, plan.joint_units)
     rates = joints.velocity_share, [one.velocity for one in moving]
     rises = joints.acceleration_share, [one.acceleration for one in moving]
@@ -90,7 +91,7 @@ def joints_figure(plan: PlannedPath, joints: PlannedJoints) -> Figure:
     return Figure(
         "Joints over time",
         caption,
-        f"Values, rates and accelerations of {', '.join(names)} of {joints.path.chain.name} over time.",
+        f"Values, rates and accelerations of {', '.join(names)} of {joints.chain.name} over time.",
         views,
         instants(plan),
         share=3.2,
@@ -99,11 +100,11 @@ def joints_figure(plan: PlannedPath, joints: PlannedJoints) -> Figure:
 
 def singular_figure(plan: PlannedPath, joints: PlannedJoints) -> Figure:
     """Return the smallest singular value and, of a square Jacobian, the determinant."""
-    near, nearest = joints.path.singularity, joints.path.nearest_singularity
+    near, nearest = joints.singularity, joints.nearest_singularity
     views = [_singular_view(plan, nearest, "σ min", "", near.smallest)]
     caption = "σ min is the smallest singular value of the Jacobian, lengths divided by that of the arm."
     if near.determinant is not None:
-        slides = sum(one.kind == "prismatic" and one.lower < one.upper for one in joints.path.chain.moving)
+        slides = sum(one.kind == "prismatic" and one.lower < one.upper for one in joints.chain.moving)
         views.append(_singular_view(plan, nearest, "det J", POWERS[min(slides, 3)], near.determinant))
         caption += " det J is its determinant. Both are"
     else:
@@ -111,7 +112,7 @@ def singular_figure(plan: PlannedPath, joints: PlannedJoints) -> Figure:
     return Figure(
         "Distance from singular poses",
         f"{caption} 0 in a singular pose; a diamond marks the nearest.",
-        f"Distance of {joints.path.chain.name} from singular poses along {plan.name} over time: the smallest"
+        f"Distance of {joints.chain.name} from singular poses along {plan.name} over time: the smallest"
         f" singular value is {np.nanmin(near.smallest):.4g} at least.",
         tuple(views),
         instants(plan),
@@ -149,7 +150,7 @@ def _shares(
     own = np.flatnonzero(np.isfinite(limits))
     if not len(own) or plan.joints is None:
         return
-    names, known = plan.joints.path.chain.coordinates, 100.0 * shares[:, own]
+    names, known = plan.joints.chain.coordinates, 100.0 * shares[:, own]
     sample, column = np.unravel_index(int(np.nanargmax(known)), known.shape)
     joint, largest = int(own[column]), float(known[sample, column])
     words = f"{names[joint]}: {text.percent(largest / 100.0)} of its limit"

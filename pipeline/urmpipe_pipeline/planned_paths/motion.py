@@ -10,46 +10,48 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.orientation import NAMES
 from urmpipe_pipeline.joint_log import SOLVED, JointLog, LogColumn, LogWarning
+from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.ingest import run_of
+from urmpipe_pipeline.runs.ingest import kinematics
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.sources import ReadOptions
 
 
 def run_of_plan(
     name: str,
-    chain: Chain | None,
+    joints: PlannedJoints | None,
+    tsp: float,
     t_ns: IntArray,
-    q: FloatArray | None,
     position: FloatArray,
     quat_xyzw: FloatArray | None,
     warnings: tuple[LogWarning, ...],
     made: Provenance,
 ) -> Run:
-    """Return a plan as a run.
+    """Return a plan as a run, its rates and accelerations as they were planned.
 
     Args:
         name: What to call it.
-        chain: The arm, with base and tool; None without one.
+        joints: The joints, n rows; None without an arm.
+        tsp: From sample to sample in [s].
         t_ns: Times in integer [ns], shape (n,).
-        q: Joint values in [rad] or [m], shape (n, joints), NaN where there is none; None without an arm.
         position: Where the tool shall be in [m], shape (n, 3).
         quat_xyzw: How it shall be turned [-], shape (n, 4); None where that is left open.
         warnings: What a person should know.
         made: How it was planned.
-
-    Raises:
-        LogError: If the times need a grid without end.
     """
+    chain, none = None if joints is None else joints.chain, np.empty((len(t_ns), 0))
+    q, qd, qdd = (none, none, none) if joints is None else (joints.q, joints.qd, joints.qdd)
     log = JointLog(
         name=name, source=SOLVED, files=made.inputs, t_ns=t_ns,
-        joints=() if chain is None else chain.coordinates,
-        q=np.empty((len(t_ns), 0)) if q is None else q,
+        joints=() if chain is None else chain.coordinates, q=q,
         tcp_position=position, tcp_rotation=quat_xyzw,
         rotation_form=None if quat_xyzw is None else "quat_xyzw",
         columns=tuple(_columns(chain, turned=quat_xyzw is not None)), warnings=warnings,
     )  # fmt: skip
-    return run_of(log, chain, ReadOptions(), made=made)
+    tcp, noticed = kinematics(chain, q, qd, qdd)
+    return Run(
+        name=name, log=log, robot=chain, tsp=tsp, t_ns=t_ns, q=q, qd=qd, qdd=qdd, tcp=tcp,
+        tcp_recorded=position, audit=(), warnings=(*warnings, *noticed), provenance=made,
+    )  # fmt: skip
 
 
 def _columns(chain: Chain | None, *, turned: bool) -> Iterator[LogColumn]:

@@ -1,99 +1,109 @@
-"""Why an arm cannot move as planned: samples it does not reach, jumps, singular poses, speeds near zero."""
+"""Why an arm cannot move as planned: places it does not reach, jumps, singular poses, speeds near zero."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray
+from urmpipe_models.arrays import BoolArray
 from urmpipe_models.inverse.along_path.joint_path import JointPath
 from urmpipe_models.inverse.along_path.stretches import stretches
-from urmpipe_models.planning.joint_limits import rests_of
-from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.time_law import PathMotion
-from urmpipe_pipeline.planned_paths.result import Obstacle, ObstacleKind, PlannedJoints
-from urmpipe_pipeline.text import counted, in_words
+from urmpipe_models.planning.joint_limits import Usage
+from urmpipe_models.planning.path_joints import PathJoints
+from urmpipe_models.planning.time_law import TimeLaw
+from urmpipe_pipeline.text import in_words
 
-SINGULAR = 1e-9
-"""Smallest singular value [-] of a singular pose but for rounding."""
+SINGULAR = 1e-7
+"""Smallest singular value [-] of a singular pose: a path is followed to 1e-9 m, joints to 1e-2 rad there."""
 
 WORTH_MOVING = 0.01
 """Speeds that would have to fall below this share are no plan: another path has to be taken (step 18)."""
 
+ObstacleKind = Literal["unreachable", "jump", "singular", "too-slow"]
 
-def obstacles_of(
-    path: LineArcPath, motion: PathMotion, t: FloatArray, joints: PlannedJoints
-) -> Iterator[Obstacle]:
-    """Yield where an arm does not get along a path at all, each kind for itself.
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """Why an arm cannot move as planned.
+
+    Attributes:
+        kind: What is in the way: places without a solution, a jump, a singular pose, or speeds that would
+            have to fall below what is worth moving.
+        segment: Number of the segment, from 0.
+        row: Row of the path that the segment belongs to, from 1.
+        s: Where along the path, in [m].
+        t: When, in [s].
+        joint: The joint that is concerned most; empty where it is the arm as a whole.
+        words: What is in the way, without its place.
+    """
+
+    kind: ObstacleKind
+    segment: int
+    row: int
+    s: float
+    t: float
+    joint: str
+    words: str
+
+
+def obstacles_of(joints: PathJoints, law: TimeLaw) -> Iterator[Obstacle]:
+    """Yield where an arm does not get along a path, whatever its speed, each kind for itself.
 
     Args:
-        path: The path.
-        motion: Along it, n samples.
-        t: Their times in [s], shape (n,).
-        joints: What follows them.
+        joints: The joints along the path.
+        law: The law, which tells when a place is passed.
+
+    Source: [Iso9283]_ section 4, step 17.
     """
-    at = _Places(path, motion.s, t)
-    for first, last in stretches(~joints.path.reached):
-        more = "" if first == last else f", and {counted(last - first, 'sample')} after it"
-        yield at.obstacle(first, "unreachable", f"{joints.path.reasons[first]}{more}")
-    for jump in joints.path.jumps:
+    grid, s, names = joints.grid, joints.s, joints.chain.coordinates
+    for first, last in stretches(~grid.reached):
+        along = f"; so it is along {s[last] - s[first]:.3g} m" if last > first else ""
+        yield _obstacle(joints, law, float(s[first]), "unreachable", f"{grid.reasons[first]}{along}")
+    for jump in grid.jumps:
         moved = ", ".join(f"{one.joint} by {in_words(one.step, one.unit)}" for one in jump.joints)
-        yield at.obstacle(jump.sample, "jump", f"the joints jump: {moved}", jump.joints[0].joint)
-    names = joints.path.chain.coordinates
-    for first in _crawling(path, motion):
-        slow = int(np.nanargmax(joints.velocity_share[first]))
-        words = f"the joints all but stop it, at {motion.v[first]:.3g} m/s"
-        yield at.obstacle(first, "too-slow", words, names[slow])
-    for first, _ in stretches(_singular(joints.path)):
-        joint = names[int(np.argmax(np.abs(joints.path.q[first] - joints.path.q[max(first - 1, 0)])))]
-        yield at.obstacle(first, "singular", "the arm passes a singular pose", joint)
+        words = f"the joints jump: {moved}"
+        yield _obstacle(joints, law, float(s[jump.sample]), "jump", words, jump.joints[0].joint)
+    for first, _ in stretches(_singular(grid)):
+        moved_most = int(np.argmax(np.abs(grid.q[first] - grid.q[max(first - 1, 0)])))
+        words = "the arm passes a singular pose"
+        yield _obstacle(joints, law, float(s[first]), "singular", words, names[moved_most])
 
 
-def too_slow(
-    path: LineArcPath, s: FloatArray, t: FloatArray, sample: int, joint: str, factor: float
-) -> Obstacle:
-    """Return the obstacle that speeds would have to fall by a factor [-] for a joint at a sample.
+def too_slow(joints: PathJoints, law: TimeLaw, usage: Usage, factor: float) -> Obstacle:
+    """Return the obstacle that speeds would have to fall by a factor [-] for a joint.
 
     Args:
-        path: The path.
-        s: Arc lengths of the samples in [m], shape (n,).
-        t: Their times in [s], shape (n,).
-        sample: Where the joint exceeds its limit most.
-        joint: Its name.
+        joints: The joints along the path.
+        law: The law at its full speed.
+        usage: Where the joint exceeds its limit most.
         factor: What the speeds would have to be multiplied by [-].
+
+    Source: [Iso9283]_ section 4, step 18.
     """
-    words = f"{joint} allows {100.0 * factor:.2g} % of the speed, allowed: {100.0 * WORTH_MOVING:g} % or more"
-    return _Places(path, s, t).obstacle(sample, "too-slow", words, joint)
+    name = joints.chain.coordinates[usage.joint]
+    words = f"{name} allows {100.0 * factor:.2g} % of the speed, allowed: {100.0 * WORTH_MOVING:g} % or more"
+    return _obstacle(joints, law, usage.s, "too-slow", words, name)
 
 
-def _crawling(path: LineArcPath, motion: PathMotion) -> Iterator[int]:
-    """Yield the first sample of each stretch in which a law all but stops where nothing makes it stop."""
-    rests = rests_of(path)
-    for first, last in stretches(motion.v < WORTH_MOVING * motion.v.max()):
-        ends = motion.s[[max(first - 1, 0), min(last + 1, len(motion.s) - 1)]]
-        if not ((ends[0] <= rests) & (rests <= ends[1])).any():
-            yield first
+def _obstacle(
+    joints: PathJoints, law: TimeLaw, s: float, kind: ObstacleKind, words: str, joint: str = ""
+) -> Obstacle:
+    """Return an obstacle at an arc length in [m]."""
+    place = np.array([s])
+    segment = int(joints.path.segment_at(place)[0])
+    t = float(law.time_at(place)[0])
+    return Obstacle(kind, segment, int(joints.path.row[segment]) + 1, s, t, joint, words)
 
 
-class _Places:
-    """Where and when samples are along a path."""
-
-    def __init__(self, path: LineArcPath, s: FloatArray, t: FloatArray) -> None:
-        self._segment, self._row, self._t = path.segment_at(s), path.row, t
-
-    def obstacle(self, sample: int, kind: ObstacleKind, words: str, joint: str = "") -> Obstacle:
-        """Return an obstacle at a sample."""
-        k = int(self._segment[sample])
-        return Obstacle(kind, k, int(self._row[k]) + 1, float(self._t[sample]), joint, words)
-
-
-def _singular(path: JointPath) -> BoolArray:
-    """Return which samples are singular, or have the first determinant of another sign, shape (n,)."""
-    found = np.asarray(path.singularity.smallest <= SINGULAR)
-    determinant = path.singularity.determinant
+def _singular(grid: JointPath) -> BoolArray:
+    """Return which places are singular, or have the first determinant of another sign, shape (n,)."""
+    found = np.asarray(grid.singularity.smallest <= SINGULAR)
+    determinant = grid.singularity.determinant
     if determinant is not None:
-        jumping = np.zeros(len(path), dtype=bool)
-        jumping[[one.sample for one in path.jumps]] = True
+        jumping = np.zeros(len(grid), dtype=bool)
+        jumping[[one.sample for one in grid.jumps]] = True
         found[1:] |= (determinant[1:] * determinant[:-1] < 0.0) & ~jumping[1:]
     return found

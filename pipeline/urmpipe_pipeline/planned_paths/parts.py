@@ -8,7 +8,9 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.planned_paths.result import FOLLOWED, Obstacle, PlannedJoints, PlannedPath
+from urmpipe_pipeline.planned_paths.obstacles import Obstacle
+from urmpipe_pipeline.planned_paths.planned_joints import FOLLOWED, PlannedJoints
+from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.presentation.parts import columns_of
 from urmpipe_pipeline.presentation.section import Cell, Event, Fact, Table, Value
 
@@ -29,15 +31,17 @@ def facts(plan: PlannedPath) -> Iterator[Fact]:
     yield from (Fact("In the way", obstacle_words(one)) for one in plan.obstacles[:MANY])
     if (more := len(plan.obstacles) - MANY) > 0:
         yield Fact("In the way", f"and {more} more")
-    yield Fact("Rows", _rows_words(plan), brief=False)
+    stops_often = len(plan.path.stop_row) == len(plan.rows) > 2  # as where the name of a radius is misspelt
+    yield Fact("Rows", _rows_words(plan), brief=stops_often)
     yield Fact("Length", f"{plan.path.total:.6f} m")
     yield Fact("Duration", Value(plan.duration, "s"))
     yield Fact("Law", law_words(plan))
     joints = plan.joints
     if joints is None or not plan.reached.any():
         return
-    yield Fact("Reduced", reduced_words(plan, joints))
-    yield Fact(LIMITS, limit_words(plan, joints))
+    if not plan.obstacles:  # else the speeds stand as they were requested, whatever the joints allow
+        yield Fact("Reduced", reduced_words(plan, joints))
+        yield Fact(LIMITS, limit_words(plan, joints))
     yield Fact("Nearest to a singularity", _singular_words(plan, joints))
 
 
@@ -54,32 +58,33 @@ def reduced_words(plan: PlannedPath, joints: PlannedJoints) -> str:
     """Return what the speeds were reduced to, and what a joint would have needed; empty if they were not."""
     if plan.scaled == 1.0:
         return ""
-    name, limit, share, _ = joints.most_used
-    needed = share / plan.scaled ** (1 if limit == "largest rate" else 2)
-    said = f"to {text.percent(plan.scaled)} of the speed"
-    return f"{said}: {name} would need {text.portion(needed)} its {limit}"
+    name, limit, _, _ = joints.most_used
+    needed = plan.scaled ** (-1 if limit == "largest rate" else -2)
+    left = f"to {text.percent(plan.scaled)} of the speed, {plan.speed:.4g} m/s"
+    return f"{left}: {name} would need {text.portion(needed)} its {limit}"
 
 
 def limit_words(plan: PlannedPath, joints: PlannedJoints) -> str:
     """Return which joint uses most of its limits, and when."""
     if not joints.limited:
-        return "no largest rate or acceleration of a joint is known"
+        return "the robot has no velocity or acceleration limits"
     name, limit, share, sample = joints.most_used
-    return f"{name} uses {text.portion(share)} its {limit}, at t = {text.seconds(float(plan.t[sample]))} s"
+    used = text.portion(round(share, ROUNDED))
+    return f"{name} uses {used} its {limit}, at t = {text.seconds(float(plan.t[sample]))} s"
 
 
 def decisive_fact(plan: PlannedPath) -> Iterator[Fact]:
-    """Yield the largest share of a limit that is used; nothing where none is known."""
+    """Yield the largest share of a limit that a plan uses; nothing where none is known, or it fails."""
     joints = plan.joints
-    if joints is not None and plan.reached.any() and joints.limited:
+    if joints is not None and not plan.obstacles and joints.limited:
         name, limit, share, _ = joints.most_used
         yield Fact(f"{limit.capitalize()}: {name}", _share(share), brief=False)
 
 
 def obstacle_words(one: Obstacle) -> str:
-    """Return what is in the way, with its time, segment, row, and joint unless the words name it."""
+    """Return what is in the way, with its time to 1 ms, segment, row, and joint unless the words name it."""
     joint = f", joint {one.joint}" if one.joint and one.joint not in one.words else ""
-    return f"at t = {text.seconds(one.t)} s (segment {one.segment + 1}, row {one.row}{joint}): {one.words}"
+    return f"at t = {one.t:.3f} s (segment {one.segment + 1}, row {one.row}{joint}): {one.words}"
 
 
 def segments_table(plan: PlannedPath) -> Table:
@@ -100,7 +105,7 @@ def segments_table(plan: PlannedPath) -> Table:
 
 def joints_table(plan: PlannedPath, joints: PlannedJoints) -> Table:
     """Return the range of each joint, and its largest rate and acceleration beside their limits."""
-    moving, units, used = joints.path.chain.moving, plan.joint_units, plan.limits()
+    moving, units, used = joints.chain.moving, plan.joint_units, plan.limits()
     q, rate, rise = (
         np.round(some[plan.reached], ROUNDED) + 0.0  # no -0.0
         for some in (joints.q, np.abs(joints.qd), np.abs(joints.qdd))
@@ -143,7 +148,7 @@ def events(plan: PlannedPath) -> Iterator[Event]:
 
 def passes_ns(plan: PlannedPath) -> list[int]:
     """Return when each row is passed, in [ns]."""
-    return [round(1e9 * t) for t in plan.passes.tolist()]
+    return [round(1e9 * t) for t in plan.row_times.tolist()]
 
 
 def _rows_words(plan: PlannedPath) -> str:
@@ -157,7 +162,7 @@ def _rows_words(plan: PlannedPath) -> str:
 
 def _singular_words(plan: PlannedPath, joints: PlannedJoints) -> str:
     """Return where the arm comes nearest to a singular pose."""
-    nearest, near = joints.path.nearest_singularity, joints.path.singularity
+    nearest, near = joints.nearest_singularity, joints.singularity
     if nearest is None:
         return ""
     at = f"at t = {text.seconds(float(plan.t[nearest]))} s (row {plan.row[nearest]})"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +11,9 @@ import numpy as np
 from urmpipe_models.arrays import BoolArray, FloatArray
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
-from urmpipe_models.planning.rows import PROPER, PathRows
-from urmpipe_pipeline.joint_log import Inference, LogWarning, SourceFile
-from urmpipe_pipeline.planned_paths.row_checks import VARIANTS, curve_faults
+from urmpipe_models.planning.rows import PROPER, VARIANTS, PathRows
+from urmpipe_pipeline.joint_log import LogWarning, SourceFile
+from urmpipe_pipeline.planned_paths.row_checks import curve_faults
 from urmpipe_pipeline.sources.clocks.clock_columns import time_columns
 from urmpipe_pipeline.sources.columns.columns import Column, listed
 from urmpipe_pipeline.sources.options import ReadOptions
@@ -21,7 +21,7 @@ from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.sources.targets.pose_table import PoseTable, read_pose_table
-from urmpipe_pipeline.sources.targets.row_faults import Further
+from urmpipe_pipeline.sources.targets.row_faults import ExtraColumn
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 MEANINGS = {
@@ -34,32 +34,40 @@ NAMING = "name the columns in a header: x,y,z,r or x,y,z,corner_r"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PathFile:
-    """The rows of a path in a file.
+class GivenPath:
+    """The rows of a path, and where they come from.
 
     Attributes:
-        file: The file.
-        rows: The points with their radii, in SI.
-        inferences: What was found out about the file.
-        warnings: What a person should know about it.
+        name: The name of the path.
+        rows: Its rows, in SI.
+        file: Their file; None for a cube and for arrays.
+        warnings: What a person should know about the file.
+        lines: The line of the file of each row, both from 1.
+        place: The file as it was given, as messages name it; empty for a cube and for arrays.
     """
 
-    file: SourceFile
+    name: str
     rows: PathRows
-    inferences: tuple[Inference, ...] = ()
+    file: SourceFile | None = None
     warnings: tuple[LogWarning, ...] = ()
+    lines: Mapping[int, int] = field(default_factory=dict)
+    place: str = ""
+
+    def finding(self, row: int, found: str, allowed: str) -> Finding:
+        """Return what is wrong with a row, from 1, at its line of the file."""
+        place = self.place or self.name
+        return Finding(file=place, line=self.lines.get(row), row=row, found=found, allowed=allowed)
 
 
-def read_path(file: Path, options: ReadOptions | None = None) -> PathFile:
+def read_path(file: Path, options: ReadOptions | None = None) -> GivenPath:
     """Return the rows of a path: x, y, z, where it has one the orientation, r or corner_r, and variant.
 
-    The table is read as one of targets is. A radius whose own name tells no unit is in that of x, y, z; an
-    empty cell is 0, a stop, and that of a variant 2. Without a radius every row is a stop.
+    The table is read as a table of targets. A radius without a unit in its own name has the unit of x, y, z;
+    an empty cell is 0, a stop, and an empty variant 2. Without a radius every row is a stop.
 
     Args:
         file: A text table, as a log may be.
-        options: What the user says where the file need not, or cannot, tell; those about joints and times
-            are not used.
+        options: How to read the file where it does not show it; those about joints and times are not used.
 
     Raises:
         LogError: With all that is wrong with the file, its rows, and the curve that they would make.
@@ -67,30 +75,23 @@ def read_path(file: Path, options: ReadOptions | None = None) -> PathFile:
 
     Source: [Iso9283]_ section 2, section 4 step 1.
     """
-    asked = options or ReadOptions()
-    table = read_pose_table(Path(file), replace(asked, time="none"), _further(), NAMING)
+    timeless = replace(options or ReadOptions(), time="none")
+    table = read_pose_table(file, timeless, _extra_columns(), NAMING)
     rows = _rows(table)
     findings = [*_faults(table, curve_faults(rows))]
     if findings:
         raise LogError(*capped(findings, str(file)))
-    said = (one for one in table.inferences if one.what != "time column")  # a path has none
-    return PathFile(
-        file=fingerprint(Path(file)),
-        rows=rows,
-        inferences=(*said, _meaning(table)),
-        warnings=(*table.warnings, *_not_used(table)),
-    )
+    warnings = (*table.warnings, *_not_used(table))
+    lines = lines_of_rows(table.plan.tables.layouts[table.plan.main], range(1, len(rows) + 1))
+    return GivenPath(file.stem, rows, fingerprint(file), warnings, lines, str(file))
 
 
-def _further() -> dict[str, Further]:
-    """Return the columns that a path has beside its points."""
-    names = vocabulary().path
-    radius = Further((), "0 or more, or an empty cell", _are_radii, empty=0.0, length=True)
-    variant = Further((), "1, 2 or an empty cell", _are_variants, empty=PROPER, length=False)
+def _extra_columns() -> dict[str, ExtraColumn]:
+    """Return the columns that a path may have beside its points."""
+    names, radius, variant = vocabulary().path, "0 or more, or an empty cell", "1, 2 or an empty cell"
     return {
-        "r": replace(radius, patterns=names["r"]),
-        "corner_r": replace(radius, patterns=names["corner_r"]),
-        "variant": replace(variant, patterns=names["variant"]),
+        **{name: ExtraColumn(names[name], radius, _are_radii, empty=0.0, length=True) for name in MEANINGS},
+        "variant": ExtraColumn(names["variant"], variant, _are_variants, empty=PROPER, length=False),
     }
 
 
@@ -102,21 +103,16 @@ def _are_variants(values: FloatArray) -> BoolArray:
     return np.isin(values, VARIANTS)
 
 
-def _radius_column(table: PoseTable) -> str | None:
-    """Return r or corner_r, whichever there is."""
-    return next((name for name in MEANINGS if name in table.further), None)
-
-
 def _rows(table: PoseTable) -> PathRows:
-    """Return the rows of a table; of a radius or a variant that is none 0 and 2."""
-    name, count = _radius_column(table), len(table)
-    radius = np.zeros(count) if name is None else table.further[name]
-    variant = table.further.get("variant", np.full(count, PROPER))
+    """Return the rows of a table, with NaN in place of a wrong radius and 2 in place of a wrong variant."""
+    name = next((name for name in MEANINGS if name in table.further), None)
+    radius = table.further[name] if name else np.zeros(())
+    variant = table.further.get("variant", np.array(PROPER))
     return PathRows(
         position=table.position,
-        radius=np.where(_are_radii(radius), radius, 0.0),
+        radius=np.where(_are_radii(radius), radius, np.nan),
         corner=name == "corner_r",
-        variant=np.where(_are_variants(variant), variant, PROPER).astype(np.int64),
+        variant=np.where(_are_variants(variant), variant, PROPER),
         rotation=table.rotation,
     )
 
@@ -139,31 +135,22 @@ def _faults(table: PoseTable, of_curve: Iterable[Finding]) -> Iterator[Finding]:
         yield replace(one, file=layout.file, line=lines.get(one.row or 0))
 
 
-def _meaning(table: PoseTable) -> Inference:
-    """Return what is taken for what a row is."""
-    name = _radius_column(table)
-    if name is None:
-        return Inference("rows", "every row is a stop", "there is no column r or corner_r")
-    column = table.plan.roles.further[name]
-    return Inference("rows", f"a row is {MEANINGS[name]}", f"column {column.name}", columns=(column.name,))
-
-
 def _not_used(table: PoseTable) -> Iterator[LogWarning]:
     """Yield a warning about a time, and one about other columns of numbers that are no part of a path."""
     times = _times(table)
     if times:
-        said = f"{listed(times)} {'is' if len(times) == 1 else 'are'} not used: a plan makes its own time"
-        yield LogWarning("time-not-used", said)
+        words = f"{listed(times)} {'is' if len(times) == 1 else 'are'} not used: a plan makes its own time"
+        yield LogWarning("time-not-used", words)
     others = [column for column in table.unused_numbers if column not in times]
     if others:
-        said = f"{listed(others, most=8)} {'is' if len(others) == 1 else 'are'} not used"
+        words = f"{listed(others, most=8)} {'is' if len(others) == 1 else 'are'} not used"
         parts = "x, y, z, an orientation, r or corner_r, variant"
-        hint = Hint("", does=f"name what a path has so in the header: {parts}")
-        yield LogWarning("columns-not-used", said, hints=(hint,))
+        hint = Hint("", does=f"a path uses columns named {parts}")
+        yield LogWarning("columns-not-used", words, hints=(hint,))
 
 
 def _times(table: PoseTable) -> tuple[Column, ...]:
-    """Return the columns that hold a time, if a header tells."""
+    """Return the columns that hold a time, if a header names them."""
     layout, unused = table.plan.tables.layouts[table.plan.main], table.unused
     if layout.header is None or not unused:
         return ()

@@ -1,4 +1,4 @@
-"""From rows to a plan: the path, its law, the joints, and what their limits leave of the law's speeds."""
+"""From rows to a plan: the path, the joints along it, a law within their limits, and its samples."""
 
 from __future__ import annotations
 
@@ -11,35 +11,38 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, PathError
-from urmpipe_models.inverse.along_path.path import follow
 from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.solve import solve
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.joint_limits import law_of_limits
-from urmpipe_models.planning.joint_motion import joint_slopes, polished, targets_at
+from urmpipe_models.planning.jerk import jerk_law
+from urmpipe_models.planning.joint_limits import largest_usage, law_of_limits
+from urmpipe_models.planning.joint_motion import targets_at
 from urmpipe_models.planning.line_arc import LineArcPath
+from urmpipe_models.planning.path_joints import PathJoints, joints_along
 from urmpipe_models.planning.time_law import PathMotion, TimeLaw
 from urmpipe_models.planning.trapezoid import trapezoid_law
+from urmpipe_models.planning.turning import UNEVEN
 from urmpipe_pipeline.joint_log import LogWarning, seconds
-from urmpipe_pipeline.planned_paths.given_path import GivenPath
-from urmpipe_pipeline.planned_paths.jerk_law import jerk_law
-from urmpipe_pipeline.planned_paths.obstacles import WORTH_MOVING, obstacles_of, too_slow
-from urmpipe_pipeline.planned_paths.request import ACCELERATION, VELOCITY, Request
-from urmpipe_pipeline.planned_paths.result import FOLLOWED, Obstacle, PlannedJoints, PlannedPath
+from urmpipe_pipeline.planned_paths.obstacles import WORTH_MOVING, Obstacle, obstacles_of, too_slow
+from urmpipe_pipeline.planned_paths.path_file import GivenPath
+from urmpipe_pipeline.planned_paths.planned_joints import FOLLOWED, PlannedJoints
+from urmpipe_pipeline.planned_paths.request import Request, Timing
+from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.text import rows_text
+from urmpipe_pipeline.text import NAMED, counted, rows_text
+from urmpipe_pipeline.text import seconds as in_seconds
 
-AGAIN = 1.0 - 1e-4
-"""What speeds are reduced by further from the second time on, so that a few times are enough [-]."""
+SPARE = 1.0 - 1e-4
+"""What reduced speeds are multiplied by further, since limits are looked at on a grid [-]."""
 
 ON_TIME = 1e-6
 """A law that ends within this share of a period after a sample ends at it."""
 
-ANYWHERE = 1e3
-"""How far from an arm, in [m], a point may be for the nearest one that it reaches to be looked for."""
+ANYWHERE = 1e9
+"""How far from an arm, in [m], a point may be for the nearest place that it reaches to be looked for."""
 
-MOST = 20_000_000
-"""Samples of a plan: more come of a mistyped period and would fill the memory."""
+MOST = 1_000_000
+"""Samples of a plan: more come of a mistyped period, and would fill the memory with 3 GB."""
 
 Progress = Callable[[float], None] | None
 
@@ -50,7 +53,7 @@ def plan_path(given: GivenPath, request: Request, progress: Progress = None) -> 
     Args:
         given: Its rows.
         request: What is to be planned; `request` has checked it.
-        progress: Told the share that is done, 0..1.
+        progress: Called with the share that is done, 0..1.
 
     Raises:
         PathError: With every row that the arm does not reach, and by how much.
@@ -58,20 +61,22 @@ def plan_path(given: GivenPath, request: Request, progress: Progress = None) -> 
 
     Source: [Iso9283]_ section 4, steps 7 to 18.
     """
-    path = path_of(given.rows)
-    if request.arm is not None:
-        _refuse_out_of_reach(given, path, request.arm, request.start)
-    timing = request.timing
-    law = _law(path, request)
-    law, scaled, sampled = _within_limits(path, law, request, _sampled(path, law, request, progress))
-    options = timing.options | {"robot": request.arm.name if request.arm else None}
+    path, arm, timing = path_of(given.rows), request.arm, request.timing
+    joints = None
+    if arm is not None:
+        _refuse_out_of_reach(given, path, arm, request.start)
+        joints = joints_along(arm, path, request.start, progress)
+    timed, samples = _within_limits(path, joints, _timed(path, joints, timing))
+    law = timed.law
+    options = timing.options | {"robot": arm.name if arm else None}
+    options |= {"start": None if request.start is None else request.start.tolist()}
     return PlannedPath(
-        name=given.name, robot=request.arm, rows=given.rows, law=timing.law, arcs=timing.arcs,
-        velocity=timing.speed, acceleration=timing.rise, jerk=timing.jerk,
-        scaled=1.0 if timing.law == "limits" else scaled, tsp=timing.tsp,
-        duration=law.duration, t_ns=sampled.t_ns, motion=sampled.motion, begins=law.time_at(path.bounds),
-        passes=law.time_at(path.at),
-        joints=sampled.joints, obstacles=sampled.obstacles, warnings=(*given.warnings, *_warnings(path)),
+        name=given.name, robot=arm, rows=given.rows, law=timed.timing.law, arcs=timing.arcs,
+        velocity=timed.timing.velocity_limit, acceleration=timed.timing.acceleration_limit, jerk=timing.jerk,
+        scaled=1.0 if timing.law == "limits" else timed.scaled, tsp=timing.tsp, duration=law.duration,
+        t_ns=samples.t_ns, motion=samples.motion, segment_times=law.time_at(path.bounds),
+        row_times=law.time_at(path.at), joints=samples.joints, obstacles=timed.obstacles,
+        warnings=(*given.warnings, *_warnings(path, joints, timed)),
         provenance=provenance("plan", options, [given.file] if given.file else []),
     )  # fmt: skip
 
@@ -88,93 +93,114 @@ def _refuse_out_of_reach(given: GivenPath, path: LineArcPath, arm: Chain, start:
     for k, row in enumerate(out.tolist()):
         gap = float(near.shortfall[k, 0])
         away = f"{gap:.3g} m out of reach of {arm.name}" if gap > 0.0 else f"{arm.name}: {found.reason(row)}"
-        point = ", ".join(f"{value:.6g}" for value in targets.position[row])
-        allowed = "a point that the arm reaches"
-        faults.append(Finding(file=given.source, row=row + 1, found=f"({point}) m, {away}", allowed=allowed))
+        point = ", ".join(f"{value:.6g}" for value in np.round(targets.position[row], 9) + 0.0)
+        faults.append(given.finding(row + 1, f"({point}) m, {away}", "a point that the arm reaches"))
     raise PathError(*faults)
 
 
-def _law(path: LineArcPath, request: Request) -> TimeLaw:
-    """Return the law that was asked for, the limits of the joints asked only by that of limits."""
-    timing = request.timing
-    speed, rise = timing.speed or math.inf, timing.rise or math.inf
-    if timing.law == "jerk":
-        return jerk_law(path, speed, rise, timing.jerk or math.inf, timing.arcs)
-    if timing.law == "limits" and request.arm is not None:
-        law = law_of_limits(request.arm, path, request.start, speed, rise)
-        if law is not None:
-            return law
-        # What the arm does not reach is told of any law.
-        speed, rise = VELOCITY, ACCELERATION
-    return trapezoid_law(path, speed, rise, timing.arcs)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class _Sampled:
-    """A law at its samples: times in [ns], the motion along the path, the joints, what is in their way."""
+class _Samples:
+    """A law at its samples: times in [ns], the motion along the path, the joints."""
 
     t_ns: IntArray
     motion: PathMotion
-    joints: PlannedJoints | None = None
+    joints: PlannedJoints | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Timed:
+    """How time runs along a path, by which law, what its speeds were multiplied by, what is in the way."""
+
+    timing: Timing
+    law: TimeLaw
     obstacles: tuple[Obstacle, ...] = ()
-
-    @property
-    def t(self) -> FloatArray:
-        """Times in [s], shape (n,)."""
-        return seconds(self.t_ns)
+    scaled: float = 1.0
 
 
-def _sampled(path: LineArcPath, law: TimeLaw, request: Request, progress: Progress) -> _Sampled:
+def _timed(path: LineArcPath, joints: PathJoints | None, timing: Timing) -> _Timed:
+    """Return the law that was requested; where the arm does not get along the path, one that shows where.
+
+    There the law of limits has no limits to run at: the default one stands for it.
+    """
+    usual = replace(timing, law="trapezoid") if timing.law == "limits" else timing
+    speed, rise = usual.velocity_limit or math.inf, usual.acceleration_limit or math.inf
+    if timing.law == "jerk":
+        law = jerk_law(path, speed, rise, timing.jerk or math.inf, timing.arcs)
+    else:
+        law = trapezoid_law(path, speed, rise, timing.arcs)
+    obstacles = [] if joints is None else sorted(obstacles_of(joints, law), key=lambda one: one.t)
+    if joints is None or obstacles or timing.law != "limits":
+        return _Timed(usual, law, tuple(obstacles))
+    speed, rise = timing.velocity_limit or math.inf, timing.acceleration_limit or math.inf
+    return _Timed(timing, law_of_limits(joints, speed, rise))
+
+
+def _within_limits(path: LineArcPath, joints: PathJoints | None, timed: _Timed) -> tuple[_Timed, _Samples]:
+    """Return a law with its speeds reduced so that no joint exceeds a limit, and its samples.
+
+    Rates fall with the factor, accelerations with its square. Samples stand beside the places at which the
+    limits were looked at, so the speeds are reduced until none of them exceeds a limit.
+    """
+    law, scaled, tsp = timed.law, 1.0, timed.timing.tsp
+    if joints is None or timed.obstacles:
+        return timed, _sampled(path, joints, law, tsp)
+    usage = largest_usage(joints, law, between=timed.timing.law == "limits")
+    if usage.share > FOLLOWED:
+        scaled = SPARE / usage.share
+        if scaled < WORTH_MOVING:
+            slow = too_slow(joints, law, usage, scaled)
+            return replace(timed, obstacles=(slow,)), _sampled(path, joints, law, tsp)
+        law = law.slower(scaled)
+    samples = _sampled(path, joints, law, tsp)
+    while samples.joints is not None and (share := samples.joints.speed_share) > FOLLOWED:
+        law, scaled = law.slower(SPARE / share), scaled * SPARE / share
+        samples = _sampled(path, joints, law, tsp)
+    return replace(timed, law=law, scaled=scaled), samples
+
+
+def _sampled(path: LineArcPath, joints: PathJoints | None, law: TimeLaw, tsp: float) -> _Samples:
     """Return a law at its samples: at rest at the first one and at the last, up to a period after its end."""
-    period = request.timing.tsp
-    count = math.ceil(law.duration / period - ON_TIME) + 1
+    count = max(math.ceil(law.duration / tsp - ON_TIME), 1) + 1
     if count > MOST:
         allowed = f"a period that makes up to {MOST} samples of {law.duration:.6g} s"
-        raise OptionError(Finding(parameter="tsp", found=f"{period:g} s", allowed=allowed))
-    t_ns = np.round(np.arange(count) * (period * 1e9)).astype(np.int64)
-    moves = (seconds(t_ns) < law.duration).astype(float)
-    along = law.at(np.minimum(seconds(t_ns), law.duration))
-    s = np.where(moves == 1.0, np.clip(along.s, 0.0, path.total), path.total)
+        raise OptionError(Finding(parameter="tsp", found=f"{tsp:g} s", allowed=allowed))
+    t_ns = np.round(np.arange(count) * (tsp * 1e9)).astype(np.int64)
+    t = np.minimum(seconds(t_ns), law.duration)
+    along = law.at(t)
+    moves = np.append(np.ones(count - 1), 0.0)
+    s = np.append(np.clip(along.s[:-1], 0.0, path.total), path.total)
     motion = PathMotion(s, along.v * moves, along.a * moves, along.j * moves)
-    if request.arm is None:
-        return _Sampled(t_ns, motion)
-    followed = follow(request.arm, targets_at(path, s), t_ns, start=request.start, progress=progress)
-    followed = replace(followed, q=polished(request.arm, path, followed.q, s))
-    slopes = joint_slopes(request.arm, path, followed.q, s)
-    joints = PlannedJoints(followed, *slopes.rates(motion.v, motion.a))
-    found = tuple(sorted(obstacles_of(path, motion, seconds(t_ns), joints), key=lambda one: one.t))
-    return _Sampled(t_ns, motion, joints, found)
+    if joints is None:
+        return _Samples(t_ns, motion, None)
+    slopes = joints.at(s)
+    rates = slopes.rates(motion.v, motion.a)
+    return _Samples(t_ns, motion, PlannedJoints(joints.chain, slopes.q, *rates, path.turning is not None))
 
 
-def _within_limits(
-    path: LineArcPath, law: TimeLaw, request: Request, sampled: _Sampled
-) -> tuple[TimeLaw, float, _Sampled]:
-    """Return the law with its speeds reduced so that no joint exceeds a limit, the factor, and its samples.
-
-    Rates fall with the factor, accelerations with its square. Its samples stand elsewhere on the path, so it
-    is done again until none of them exceeds a limit.
-    """
-    scaled, slower, found = 1.0, law, sampled
-    while found.joints is not None and not found.obstacles:
-        shares = np.stack((found.joints.velocity_share, np.sqrt(found.joints.acceleration_share)))
-        _, sample, joint = np.unravel_index(int(np.nanargmax(shares)), shares.shape)
-        if shares.max() <= FOLLOWED:
-            break
-        factor = float(1.0 / shares.max()) * (1.0 if scaled == 1.0 else AGAIN)
-        scaled *= factor
-        if scaled < WORTH_MOVING:
-            name = found.joints.path.chain.coordinates[joint]
-            slow = too_slow(path, sampled.motion.s, sampled.t, int(sample), name, scaled)
-            return law, 1.0, replace(sampled, obstacles=(slow,))
-        slower = slower.slower(factor)
-        found = _sampled(path, slower, request, None)
-    return slower, scaled, found
-
-
-def _warnings(path: LineArcPath) -> Iterator[LogWarning]:
-    """Yield what a person should know of a path: where the tool's turn changes its rate on the way."""
+def _warnings(path: LineArcPath, joints: PathJoints | None, timed: _Timed) -> Iterator[LogWarning]:
+    """Yield what is open about the tool's turn, and where the joints' rates step: the law of limits rests."""
+    yield from _half_turns(path)
+    if timed.timing.law == "limits":
+        return
     uneven = [] if path.turning is None else [int(k) for k in path.turning.uneven if k not in path.stop_row]
     if uneven:
         rows = rows_text(np.array(uneven) + 1)
-        said = f"the tool's turn changes its rate while it moves, in {rows}: there the joints' speeds step"
-        yield LogWarning("uneven-turn", said)
+        words = f"the tool's angular rate steps in {rows} while it moves, and so do the joints' rates"
+        yield LogWarning("uneven-turn", words)
+    if joints is not None and not timed.obstacles and len(steps := joints.rate_steps):
+        t = timed.law.time_at(joints.s[steps]).tolist()
+        places = ", ".join(f"{in_seconds(one)} s" for one in t[:NAMED])
+        more = f" and {counted(len(t) - NAMED, 'other time')}" if len(t) > NAMED else ""
+        words = f"a joint comes to a limit, or leaves it, at t = {places}{more}: there the joints' rates step"
+        yield LogWarning("limit-contact", words)
+
+
+def _half_turns(path: LineArcPath) -> Iterator[LogWarning]:
+    """Yield from which rows the tool turns by 180 deg to the next."""
+    if path.turning is None:
+        return
+    turned = np.linalg.norm(path.turning.rate, axis=1) * np.diff(path.at)
+    rows = np.flatnonzero(turned > math.pi - UNEVEN)
+    if len(rows):
+        words = f"the tool turns by 180 deg from {rows_text(rows + 1)} to the next: either way is as short"
+        yield LogWarning("half-turn", words)

@@ -9,6 +9,7 @@ from typing import Any
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.planned_paths.figures import plan_figures
+from urmpipe_pipeline.planned_paths.obstacles import ObstacleKind
 from urmpipe_pipeline.planned_paths.parts import (
     LIMITS,
     decisive_fact,
@@ -18,7 +19,7 @@ from urmpipe_pipeline.planned_paths.parts import (
     obstacle_words,
     segments_table,
 )
-from urmpipe_pipeline.planned_paths.result import ObstacleKind, PlannedPath
+from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.planned_paths.scene import arm_drawing, opening_ns, path_figure, scene
 from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table, recording_fact
@@ -38,7 +39,7 @@ CHECKS: dict[ObstacleKind, str] = {
     "unreachable": "every sample reached",
     "jump": "no jump",
     "singular": "no singular pose",
-    "too-slow": "speed worth moving",
+    "too-slow": "at least 1 % of the speed left",
 }
 """What is judged of a plan, by what may be in its way."""
 
@@ -81,7 +82,7 @@ def present(plan: PlannedPath) -> Presentation:
                 "Law": plan.law,
                 "Length": Value(plan.path.total, "m"),
                 "Duration": Value(plan.duration, "s"),
-                "Speed left": Value(plan.scaled, "%"),
+                "Speed left": Value(None if plan.obstacles else plan.scaled, "%"),
                 "Warnings": Value(len(plan.warnings)),
             },
         ),
@@ -100,8 +101,9 @@ def headline(plan: PlannedPath) -> str:
     if plan.robot is None:
         return f"{plan.name}: {way}, without a robot"
     if plan.obstacles:
-        first = f"{plan.obstacles[0].kind} {obstacle_words(plan.obstacles[0])}"
-        return f"{plan.name}: {plan.robot.name} cannot run {way}: {first}"
+        first = plan.obstacles[0]
+        what = f"{first.kind} at t = {first.t:.3f} s (row {first.row})"
+        return f"{plan.name}: {plan.robot.name} cannot run {way}: {what}"
     said = f"{plan.name}: {plan.robot.name} runs {way}"
     if plan.scaled == 1.0 or plan.joints is None:
         return said

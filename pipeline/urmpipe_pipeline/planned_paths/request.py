@@ -6,19 +6,25 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any
+from typing import Any, Literal
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.planning.stretches import ARCS, Arcs
-from urmpipe_pipeline.planned_paths.result import LAWS, Law
+
+Law = Literal["trapezoid", "jerk", "limits"]
+LAWS: tuple[Law, ...] = ("trapezoid", "jerk", "limits")
+"""How time runs: within a speed and an acceleration, within a jerk, too, or as the joints allow."""
 
 VELOCITY, ACCELERATION = 0.5, 6.0
 """The largest speed [m/s] and acceleration [m/s2] where none is given: those of the paper's section 5."""
 
 PERIOD = 0.005
 """From sample to sample in [s] where nothing else is given."""
+
+NANOSECOND = 1e-9
+"""What times are counted in [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,12 +48,12 @@ class Timing:
     tsp: float = PERIOD
 
     @property
-    def speed(self) -> float | None:
+    def velocity_limit(self) -> float | None:
         """The largest speed that holds in [m/s]; None where only the joints limit it."""
         return VELOCITY if self.velocity is None and self.law != "limits" else self.velocity
 
     @property
-    def rise(self) -> float | None:
+    def acceleration_limit(self) -> float | None:
         """The largest acceleration that holds in [m/s2], likewise."""
         return ACCELERATION if self.acceleration is None and self.law != "limits" else self.acceleration
 
@@ -81,14 +87,18 @@ def _bad_values(timing: Timing) -> Iterator[Finding]:
         value = getattr(timing, name)
         if value is not None and not (isinstance(value, Real) and 0.0 < float(value) < math.inf):
             yield Finding(parameter=name, found=shown(value), allowed=f"a finite number of {unit} above 0")
+        elif name == "tsp" and timing.tsp < NANOSECOND:
+            yield Finding(parameter=name, found=shown(value), allowed="1e-09 s or more: times are in ns")
 
 
 def _bad_pairs(timing: Timing) -> Iterator[Finding]:
     """Yield which values do not go with the law."""
     if timing.law == "jerk" and timing.jerk is None:
-        yield Finding(parameter="jerk", found="none with the law jerk", allowed="a number of m/s3")
+        yield Finding(parameter="jerk", found="no jerk with the law jerk", allowed="a number of m/s3")
     if timing.law != "jerk" and timing.jerk is not None:
-        yield Finding(parameter="jerk", found=f"one with the law {timing.law}", allowed="with the law jerk")
+        yield Finding(
+            parameter="jerk", found=f"a jerk with the law {timing.law}", allowed="with the law jerk"
+        )
     if timing.law == "limits" and timing.arcs != "tangential":
         allowed = "with the laws trapezoid and jerk"
         yield Finding(parameter="arcs", found=f"{timing.arcs} with the law limits", allowed=allowed)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.display import line_of
-from urmpipe_models.inverse.along_path.joint_path import JointPath
 from urmpipe_models.planning.from_rows import path_of
 from urmpipe_models.planning.line_arc import LineArcPath
 from urmpipe_models.planning.rows import PathRows
@@ -22,87 +21,15 @@ from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
 from urmpipe_pipeline.planned_paths.motion import run_of_plan
+from urmpipe_pipeline.planned_paths.obstacles import Obstacle
+from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints
+from urmpipe_pipeline.planned_paths.request import Law
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.results import SCHEMA, Run
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Law = Literal["trapezoid", "jerk", "limits"]
-LAWS: tuple[Law, ...] = ("trapezoid", "jerk", "limits")
-"""How time runs: within a speed and an acceleration, within a jerk, too, or as the joints allow."""
-
-FOLLOWED = 1.0 + 1e-9
-"""So much of a limit may be used: rounding."""
-
-ObstacleKind = Literal["unreachable", "jump", "singular", "too-slow"]
-
-
-@dataclass(frozen=True, slots=True)
-class Obstacle:
-    """Why an arm cannot move as planned.
-
-    Attributes:
-        kind: What is in the way: samples without a solution, a jump, a singular pose, or speeds that would
-            have to fall below what is worth moving.
-        segment: Number of the segment, from 0.
-        row: Row of the path that the segment belongs to, from 1.
-        t: When, in [s].
-        joint: The joint that is concerned most; empty where it is the arm as a whole.
-        words: What is in the way, without its place.
-    """
-
-    kind: ObstacleKind
-    segment: int
-    row: int
-    t: float
-    joint: str
-    words: str
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PlannedJoints:
-    """The joints along a plan, a row a sample.
-
-    Attributes:
-        path: Joint values and how they follow each other.
-        qd: Rates in [rad/s] or [m/s], shape (n, joints); exact, not by differences.
-        qdd: Second derivatives in [rad/s2] or [m/s2], shape (n, joints); likewise.
-    """
-
-    path: JointPath
-    qd: FloatArray
-    qdd: FloatArray
-
-    @property
-    def q(self) -> FloatArray:
-        """Joint values in [rad] or [m], shape (n, joints); NaN where there is no solution."""
-        return self.path.q
-
-    @property
-    def velocity_share(self) -> FloatArray:
-        """How much of its largest rate each joint uses, |q'| / limit [-], shape (n, joints); 0 without."""
-        return np.asarray(np.abs(self.qd) / [joint.velocity for joint in self.path.chain.moving])
-
-    @property
-    def acceleration_share(self) -> FloatArray:
-        """How much of its largest acceleration each joint uses [-], shape (n, joints); 0 without one."""
-        return np.asarray(np.abs(self.qdd) / [joint.acceleration for joint in self.path.chain.moving])
-
-    @property
-    def limited(self) -> bool:
-        """Whether a limit of any rate or acceleration is known."""
-        moving = self.path.chain.moving
-        return any(np.isfinite(one.velocity) or np.isfinite(one.acceleration) for one in moving)
-
-    @property
-    def most_used(self) -> tuple[str, str, float, int]:
-        """The joint that uses most of a limit, which limit that is, how much of it [-], and the sample."""
-        shares = np.stack((self.velocity_share, self.acceleration_share))
-        kind, sample, joint = np.unravel_index(int(np.nanargmax(shares)), shares.shape)
-        limit = ("largest rate", "largest acceleration")[int(kind)]
-        return self.path.chain.coordinates[joint], limit, float(shares[kind, sample, joint]), int(sample)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,18 +45,18 @@ class PlannedPath(Result):
         velocity: The largest speed that was asked for in [m/s]; None: only the joints limit it.
         acceleration: The largest acceleration likewise in [m/s2].
         jerk: The largest jerk likewise in [m/s3].
-        scaled: By which factor the law's speeds were reduced for the joints, 1 for not at all.
+        scaled: By which factor the law's speeds were reduced for the joints, 1 for not at all; of the law of
+            limits always 1, since it is made from them.
         tsp: From sample to sample in [s].
         duration: From the first stop to the last one in [s]; the last sample may be later by less than tsp.
         t_ns: Times in integer [ns], shape (n,).
         motion: Arc length and its derivatives at the samples.
-        begins: When each segment begins, and when the last one ends, in [s], shape (segments + 1,).
-        passes: When each row is passed in [s], shape (rows,).
+        segment_times: When each segment begins, and when the last one ends, in [s], shape (segments + 1,).
+        row_times: When each row is passed in [s], shape (rows,).
         joints: The joints; None without a robot.
         obstacles: Why the arm cannot move so; none of a plan that holds.
         warnings: What a person should know.
         provenance: How to repeat it.
-        run: The plan as a run; None where it was not computed (`as_run`).
         recording: Where it was written.
         log: The log (CSV) that was written.
     """
@@ -147,13 +74,12 @@ class PlannedPath(Result):
     duration: float
     t_ns: IntArray
     motion: PathMotion
-    begins: FloatArray
-    passes: FloatArray
+    segment_times: FloatArray
+    row_times: FloatArray
     joints: PlannedJoints | None
     obstacles: tuple[Obstacle, ...]
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
-    run: Run | None = None
     recording: Path | None = field(default=None, metadata={"stored": False})
     log: Path | None = field(default=None, metadata={"stored": False})
 
@@ -217,7 +143,7 @@ class PlannedPath(Result):
     @property
     def reached(self) -> BoolArray:
         """True of samples that the arm reaches, shape (n,); all of them without a robot."""
-        return np.ones(len(self), dtype=bool) if self.joints is None else self.joints.path.reached
+        return np.ones(len(self), dtype=bool) if self.joints is None else self.joints.reached
 
     @property
     def output(self) -> Path | None:
@@ -225,14 +151,10 @@ class PlannedPath(Result):
         return self.recording or self.log
 
     def as_run(self) -> Run:
-        """Return the plan as a run: its joints, and the path as the recorded tool centre point.
-
-        Raises:
-            LogError: If the times need a grid without end.
-        """
-        return self.run or run_of_plan(
-            self.name, self.robot, self.t_ns, None if self.joints is None else self.joints.q,
-            self.position, self.quat_xyzw, self.warnings, self.provenance,
+        """Return the plan as a run: its joints, and the path as the recorded tool centre point."""
+        return run_of_plan(
+            self.name, self.joints, self.tsp, self.t_ns, self.position, self.quat_xyzw, self.warnings,
+            self.provenance,
         )  # fmt: skip
 
     def _headline(self) -> str:
@@ -244,7 +166,8 @@ class PlannedPath(Result):
         """Return one row a sample.
 
         Its columns: t [s], row, s [m], v, a, j [m/s, m/s2, m/s3], x, y, z [m], qx..qw [-] where it has an
-        orientation, and of an arm the joints [rad] or [m], their rates (d_) and second derivatives (dd_).
+        orientation, and of an arm the joints [rad] or [m], their rates (d_) and second derivatives (dd_). The
+        names of joints begin with q_ where one is that of another column.
         """
         import pandas as pd
 
@@ -255,10 +178,10 @@ class PlannedPath(Result):
         if self.quat_xyzw is not None:
             columns |= dict(zip(("qx", "qy", "qz", "qw"), self.quat_xyzw.T, strict=True))
         if self.joints is not None:
-            found = (("", self.joints.q), ("d_", self.joints.qd), ("dd_", self.joints.qdd))
-            for prefix, values in found:
-                names = (f"{prefix}{name}" for name in self.joints.path.chain.coordinates)
-                columns |= dict(zip(names, values.T, strict=True))
+            before = "q_" if columns.keys() & {*self.joints.chain.coordinates} else ""
+            names = [f"{before}{name}" for name in self.joints.chain.coordinates]
+            for prefix, values in (("", self.joints.q), ("d_", self.joints.qd), ("dd_", self.joints.qdd)):
+                columns |= dict(zip((f"{prefix}{name}" for name in names), values.T, strict=True))
         return pd.DataFrame(columns)
 
     def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
@@ -277,7 +200,7 @@ class PlannedPath(Result):
             "limits": self.limits(),
             "singularity": self._singularity(),
             "obstacles": [
-                {"kind": one.kind, "segment": one.segment, "row": one.row, "t": one.t,
+                {"kind": one.kind, "segment": one.segment, "row": one.row, "s": one.s, "t": one.t,
                  "joint": one.joint or None, "message": one.words}
                 for one in self.obstacles
             ],
@@ -288,15 +211,15 @@ class PlannedPath(Result):
 
     def segments(self) -> list[dict[str, Any]]:
         """Return the segments as --json has them: lengths in [m], times in [s]."""
-        path, begins = self.path, self.begins.tolist()
+        path, t = self.path, self.segment_times.tolist()
         return [
             {
                 "kind": kind,
                 "row": int(path.row[k]) + 1,
                 "length": float(path.length[k]),
                 "radius": float(path.radius[k]) if kind == "arc" else None,
-                "t": begins[k],
-                "duration": begins[k + 1] - begins[k],
+                "t": t[k],
+                "duration": t[k + 1] - t[k],
             }
             for k, kind in enumerate(path.kinds)
         ]
@@ -307,7 +230,7 @@ class PlannedPath(Result):
             return []
         velocity, acceleration = self.joints.velocity_share, self.joints.acceleration_share
         found = []
-        for k, joint in enumerate(self.joints.path.chain.moving):
+        for k, joint in enumerate(self.joints.chain.moving):
             shares = np.fmax(velocity[:, k], acceleration[:, k])
             found.append(
                 {
@@ -321,10 +244,10 @@ class PlannedPath(Result):
 
     def _singularity(self) -> dict[str, Any] | None:
         """Return where the arm comes nearest to a singular pose, as `ik` does."""
-        nearest = None if self.joints is None else self.joints.path.nearest_singularity
+        nearest = None if self.joints is None else self.joints.nearest_singularity
         if nearest is None or self.joints is None:
             return None
-        near = self.joints.path.singularity
+        near = self.joints.singularity
         return {
             "row": int(self.row[nearest]),
             "t": float(self.t[nearest]),

@@ -30,7 +30,7 @@ def scene(plan: PlannedPath) -> Scene:
     at = samples_of_rows(plan)
     arms: tuple[Arm, ...] = ()
     if plan.joints is not None:
-        chain, q = plan.joints.path.chain, plan.joints.q
+        chain, q = plan.joints.chain, plan.joints.q
         arms = (Arm(chain, q, plan.t_ns, run_colour(0), vanishes=True, kept=tuple(at.tolist())),)
     targets = Targets(plan.path.points(plan.path.at).position, _quaternions(plan, at), plan.reached[at], None)
     speed = f"coloured by speed: blue 0, red {plan.motion.v.max():.4g} m/s"
@@ -79,7 +79,7 @@ def arm_drawing(plan: PlannedPath) -> Iterator[Drawing]:
         rows = rows[np.linspace(0, len(rows) - 1, NAMED).astype(np.intp)]
     if not len(rows):
         return
-    at, chain = samples_of_rows(plan)[rows], plan.joints.path.chain
+    at, chain = samples_of_rows(plan)[rows], plan.joints.chain
     arms = points_over_log(chain, plan.joints.q[at])
     spots = [
         Spot(spot_at(place), str(row + 1), INK_COLOUR)
@@ -127,10 +127,10 @@ def _row_spots(plan: PlannedPath) -> Iterator[Spot]:
 def _obstacle_spots(plan: PlannedPath) -> tuple[Spot, ...]:
     """Return where the arm cannot move as planned."""
     shown = plan.obstacles[:NAMED]
-    samples = np.clip(np.searchsorted(plan.t, [one.t for one in shown]), 0, len(plan) - 1)
+    places = plan.path.points(np.array([one.s for one in shown])).position
     return tuple(
         Spot(spot_at(place), f"{one.kind}, row {one.row}", DEVIATION_COLOUR)
-        for one, place in zip(shown, plan.position[samples], strict=True)
+        for one, place in zip(shown, places, strict=True)
     )
 
 
@@ -140,5 +140,5 @@ def _quaternions(plan: PlannedPath, at: IndexArray) -> FloatArray | None:
         return plan.path.turning.quaternions(plan.path.at)
     if plan.joints is None or not plan.reached[at].all():
         return None
-    rotation = poses_over_log(plan.joints.path.chain, plan.joints.q[at])[1]
+    rotation = poses_over_log(plan.joints.chain, plan.joints.q[at])[1]
     return quaternions(rotation.reshape(-1, 9), "matrix")

@@ -30,7 +30,7 @@ class TargetFile:
         file: The file.
         row: Its data rows, from 1, shape (n,).
         t_ns: Time of each row in integer [ns] from the first, shape (n,), rising: the targets are a path.
-            None where nothing tells a time: each target stands for itself. A faulty row whose own time is
+            None without times: each target stands for itself. A faulty row whose own time is
             not known has one between its neighbours'.
         position: In [m], shape (n, 3); NaN in a row with a fault.
         rotation: Matrices [-], shape (n, 3, 3), NaN in a row with a fault; None if the file has positions
@@ -63,14 +63,14 @@ class TargetFile:
 def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | None = None) -> TargetFile:
     """Return the targets of a file: x, y, z and, where it has one, the orientation.
 
-    Lengths are in m and angles in rad where neither the header nor the options tell; rz, ry, rx mean
+    Lengths are in m and angles in rad unless the header or the options give a unit; rz, ry, rx mean
     R = Rz Ry Rx. A file with a time is a path, and so is one without if the time between its rows is
     given: t = i Tsp.
 
     Args:
         file: A text table, as a log may be.
-        options: What the user says where the file need not, or cannot, tell; those about joints are not
-            used. Its period is the same as `tsp`.
+        options: How to read the file where it does not show it; those about joints are not used. Its period
+            is the same as `tsp`.
         tsp: Time between the rows in [s], of a file without one.
 
     Raises:

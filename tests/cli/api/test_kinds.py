@@ -17,7 +17,7 @@ from urmpipe_models.inverse.solve import METHODS
 from urmpipe_models.planning.stretches import ARCS
 from urmpipe_pipeline.comparison.compare import Tcp
 from urmpipe_pipeline.comparison.trajectory import AlignMode
-from urmpipe_pipeline.planned_paths.result import LAWS
+from urmpipe_pipeline.planned_paths.request import LAWS
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.tables.options import Format
 from urmpipe_pipeline.tables.options import RowNames as Rows

@@ -1,39 +1,46 @@
-"""Random rows that make a path: corners in space, and radii that fit them."""
+"""Random rows that make a path: corners in space, and arcs that leave a line between them, or touch."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from hypothesis import assume
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn
 
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.rows import PathRows, path_rows
+from urmpipe_models.planning.rows import PathRows
 
-SHARPEST, FLATTEST = 2.9, 0.05
-"""Angles of corners in [rad] that are drawn: between them an arc fits, and its plane is known to 1e-14."""
+legs = st.integers(50, 500).map(lambda mm: mm / 1000.0)
+"""What an arc takes from a line, and what is left of it, in [m]."""
 
-shares = st.floats(0.1, 0.9)
-coordinates = st.integers(-1000, 1000).map(lambda mm: mm / 1000.0)
+turns = st.floats(0.05, 2.9)
+"""Angles of corners in [rad]: the plane of each is known to 1e-14, and its radius is more than 5 mm."""
+
+rolls = st.floats(0.0, 2.0 * math.pi)
+"""Angles of the planes of corners about the lines before them in [rad]."""
 
 
 @st.composite
 def corner_rows(draw: DrawFn, variants: bool = False) -> PathRows:
-    """Draw 3 to 20 corners: each is a stop, or rounded by an arc of less than half of both lines."""
+    """Draw 3 to 20 corners: each is a stop, or rounded by an arc, which may touch the next one."""
     count = draw(st.integers(3, 20))
-    points = np.array(draw(st.lists(st.tuples(*[coordinates] * 3), min_size=count, max_size=count)))
-    way = np.diff(points, axis=0)
-    leg = np.linalg.norm(way, axis=1)
-    assume((leg > 0.05).all())
-    along = way / leg[:, None]
-    across = np.linalg.norm(np.cross(along[:-1], along[1:]), axis=1)
-    turn = np.arctan2(across, (along[:-1] * along[1:]).sum(axis=1))
-    assume(((turn > FLATTEST) & (turn < SHARPEST)).all())
-    share = np.array(draw(st.lists(st.just(0.0) | shares, min_size=count - 2, max_size=count - 2)))
+    cut = np.zeros(count)
+    cut[1:-1] = draw(st.lists(st.just(0.0) | legs, min_size=count - 2, max_size=count - 2))
+    turn, roll = (draw(st.lists(each, min_size=count - 2, max_size=count - 2)) for each in (turns, rolls))
+    along, normal, points = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), [np.zeros(3)]
+    for k in range(count - 1):
+        # an arc that touches a stop has no first point of its own
+        between = draw(st.just(0.0) | legs if cut[k] > 0.0 and cut[k + 1] > 0.0 else legs)
+        points.append(points[-1] + (cut[k] + between + cut[k + 1]) * along)
+        if k < count - 2:
+            side = math.cos(roll[k]) * normal + math.sin(roll[k]) * np.cross(along, normal)
+            cosine, sine = math.cos(turn[k]), math.sin(turn[k])
+            along, normal = cosine * along + sine * side, cosine * side - sine * along
     radius = np.zeros(count)
-    radius[1:-1] = 0.5 * share * np.minimum(leg[:-1], leg[1:]) / np.tan(0.5 * turn)
+    radius[1:-1] = cut[1:-1] / np.tan(0.5 * np.array(turn))
     variant = draw(st.lists(st.sampled_from([1, 2]), min_size=count, max_size=count)) if variants else 2
-    return path_rows(points, radius, corner=True, variant=np.array(variant))
+    return PathRows(np.array(points), radius, corner=True, variant=variant)
 
 
 def by_first_points(rows: PathRows) -> PathRows:
@@ -41,4 +48,4 @@ def by_first_points(rows: PathRows) -> PathRows:
     path = path_of(rows)
     position = rows.position.copy()
     position[path.row[path.arcs]] = path.start[path.arcs]
-    return path_rows(position, rows.radius, variant=rows.variant)
+    return PathRows(position, rows.radius, variant=rows.variant)

@@ -11,20 +11,20 @@ import pytest
 
 from made_plans import CONTOUR, SMALL, limited, planned
 from urmpipe_models.errors import UrmpipeError
-from urmpipe_models.planning.rows import path_rows
+from urmpipe_models.planning.rows import PathRows
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.planned_paths.path_file import PathFile, read_path
+from urmpipe_pipeline.planned_paths.path_file import GivenPath, read_path
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.sources import ReadOptions
 
-Read = Callable[..., PathFile]
+Read = Callable[..., GivenPath]
 
 
 @pytest.fixture
 def read(tmp_path: Path) -> Read:
     """Write a file and read its rows."""
 
-    def read(text: str, **options: Any) -> PathFile:
+    def read(text: str, **options: Any) -> GivenPath:
         path = tmp_path / "path.csv"
         path.write_text(text, encoding="utf-8")
         return read_path(path, ReadOptions(**options))
@@ -65,7 +65,7 @@ def ring() -> PlannedPath:
     turn = np.linspace(0.0, 2.0 * np.pi, 100)
     points = np.stack([1.7 + 0.3 * np.cos(turn), 0.3 * np.sin(turn), np.ones(100)], axis=1)
     points[-1] = points[0]
-    return planned(load_robot("irb60"), path_rows(points, 0.05, corner=True))
+    return planned(load_robot("irb60"), PathRows(points, 0.05, corner=True))
 
 
 @pytest.fixture(scope="session")
@@ -74,4 +74,4 @@ def alone() -> PlannedPath:
     points = np.array(
         [[0, 0, 0], [0.4, 0, 0], [0.4, 0.4, 0.1], [0.8, 0.4, 0.5], [0.8, 0.9, 0.3]], dtype=float
     )
-    return planned(None, path_rows(points, np.array([0, 0.05, 0.08, 0, 0.0]), corner=True))
+    return planned(None, PathRows(points, np.array([0, 0.05, 0.08, 0, 0.0]), corner=True))

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from asserting import there
 from urmpipe_models.errors import LogError, OptionError, PathError, UrmpipeError
 from urmpipe_models.planning.cube import PLANES, cube_rows
-from urmpipe_models.planning.rows import PathRows, path_rows
+from urmpipe_models.planning.rows import PathRows
 from urmpipe_pipeline.planned_paths.given_path import PathLike, given_path
 from urmpipe_pipeline.sources import ReadOptions
 
@@ -102,8 +102,8 @@ NEEDED = "allowed: all of a, r, x, y, z"
         (
             "cube:diagonal,a=-2,x=q,foo,side=1,a=3,plane=xy,rz=1mm",
             [
-                "found 'foo', allowed: KEY=VALUE, such as a=0.6",
-                "found 'side', allowed: a, r, x, y, z, plane, rz, ry, rx",
+                "found 'foo', allowed: KEY=VALUE with a decimal point, such as a=0.6",
+                "key: found 'side', allowed: a, r, x, y, z, plane, rz, ry, rx",
                 "found a twice, allowed: each key once",
                 f"found x=q, {LENGTH}",
                 f"found rz=1mm, {ANGLE}",
@@ -123,10 +123,11 @@ def test_all_that_is_wrong_with_a_cube_is_said(text: str, said: list[str]) -> No
 
 
 def test_rows_are_taken_as_they_are() -> None:
-    rows = path_rows(np.array(LINE), 0.1, corner=True, rotation=np.eye(3))
-    found = given_path(rows)
+    """One radius, variant or rotation is that of all rows."""
+    found = given_path(PathRows(LINE, 0.1, corner=True, variant=1, rotation=np.eye(3)))
     assert found.rows.position.tolist() == LINE
     assert (found.rows.radius.tolist(), found.rows.corner) == ([0.0, 0.1, 0.0], True)
+    assert found.rows.variant.tolist() == [1, 1, 1]
     assert there(found.rows.rotation).tolist() == [np.eye(3).tolist()] * 3
     assert (found.name, len(found.rows), found.file) == ("path", 3, None)
 
@@ -134,7 +135,7 @@ def test_rows_are_taken_as_they_are() -> None:
 def test_a_rotation_of_seven_digits_becomes_the_nearest() -> None:
     """As of targets."""
     turned = Rotation.from_euler("ZYX", [0.3, -0.2, 0.1]).as_matrix()
-    rotation = there(given_path(path_rows(np.array(LINE), rotation=np.round(turned, 7))).rows.rotation)
+    rotation = there(given_path(PathRows(np.array(LINE), rotation=np.round(turned, 7))).rows.rotation)
     np.testing.assert_allclose(rotation @ rotation.transpose(0, 2, 1), [np.eye(3)] * 3, rtol=0, atol=1e-15)
     np.testing.assert_allclose(rotation, [turned] * 3, rtol=0, atol=1e-7)
 
@@ -153,11 +154,18 @@ def with_(**changed: Any) -> PathRows:
             ["found position of shape (3, 2), allowed: numbers of shape (n, 3)"],
         ),
         (
-            {"radius": None, "variant": [[1], [2, 3]], "rotation": np.eye(3)},
+            {"radius": None, "variant": [[1], [2, 3]], "rotation": np.eye(2)},
             [
-                "found radius of shape (), allowed: numbers of shape (n,)",
+                "found radius that is no array of numbers, allowed: numbers of shape (n,)",
                 "found variant that is no array of numbers, allowed: numbers of shape (n,)",
-                "found rotation of shape (3, 3), allowed: numbers of shape (n, 3, 3)",
+                "found rotation of shape (2, 2), allowed: numbers of shape (n, 3, 3)",
+            ],
+        ),
+        (
+            {"position": None, "radius": [0], "variant": 1, "rotation": "z"},
+            [
+                "found position that is no array of numbers, allowed: numbers of shape (n, 3)",
+                "found rotation that is no array of numbers, allowed: numbers of shape (n, 3, 3)",
             ],
         ),
         (
@@ -177,7 +185,7 @@ def test_all_that_is_wrong_with_rows_is_said() -> None:
     rows = with_(
         position=position,
         radius=np.array([0.1, -1.0, np.inf]),
-        variant=np.array([1, 3, 2]),
+        variant=[1, 3, np.nan],
         rotation=rotation,
     )
     assert refused(rows) == [
@@ -187,6 +195,7 @@ def test_all_that_is_wrong_with_rows_is_said() -> None:
         "row 2, column radius: path: found -1 m, allowed: finite, 0 or more",
         "row 3, column radius: path: found inf m, allowed: finite, 0 or more",
         "row 2, column variant: path: found 3, allowed: 1 or 2",
+        "row 3, column variant: path: found nan, allowed: 1 or 2",
     ]
 
 

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from asserting import there
-from urmpipe_pipeline.planned_paths.path_file import PathFile, read_path
+from urmpipe_pipeline.planned_paths.path_file import GivenPath, read_path
 from urmpipe_pipeline.sources import read_map
 
-Read = Callable[..., PathFile]
+Read = Callable[..., GivenPath]
 Wrong = Callable[..., list[str]]
 
 PAPER = """x,y,z,r
@@ -29,13 +29,8 @@ PAPER = """x,y,z,r
 """Source: [Iso9283]_ section 5."""
 
 
-def said(found: PathFile) -> list[tuple[str, str]]:
+def said(found: GivenPath) -> list[tuple[str, str]]:
     return [(warning.kind, str(warning)) for warning in found.warnings]
-
-
-def meaning(found: PathFile) -> tuple[str, str]:
-    (one,) = (one for one in found.inferences if one.what == "rows")
-    return one.value, one.evidence
 
 
 def test_the_contour_of_the_paper_is_read(read: Read) -> None:
@@ -44,27 +39,36 @@ def test_the_contour_of_the_paper_is_read(read: Read) -> None:
     assert found.rows.radius.tolist() == [0.0, 0.03, 0.03, 0.03, 0.03, 0.0]
     assert found.rows.variant.tolist() == [2] * 6
     assert (found.rows.corner, found.rows.rotation, said(found)) == (False, None, [])
-    assert (len(found.rows), found.file.name) == (6, "path.csv")
-    assert meaning(found) == ("a row is the first tangent point of the arc of radius r", "column r")
+    assert (len(found.rows), found.name, there(found.file).name) == (6, "path", "path.csv")
 
 
 def test_the_header_says_that_a_row_is_a_corner(read: Read) -> None:
     found = read("x,y,z,corner_r\n0,0,0,\n1,0,0,0.1\n1,1,0,\n")
     assert (found.rows.corner, found.rows.radius.tolist()) == (True, [0.0, 0.1, 0.0])
-    assert meaning(found) == ("a row is the corner that an arc of radius corner_r rounds", "column corner_r")
 
 
 @pytest.mark.parametrize("text", ["x,y,z\n0,0,0\n1,0,0\n", "0,0,0\n1,0,0\n", "x,y,z\n0,0,0\n1,0,0\n,,\n"])
 def test_without_a_radius_every_row_is_a_stop(read: Read, text: str) -> None:
     found = read(text)
     assert (found.rows.radius.tolist(), found.rows.position.tolist()) == ([0.0, 0.0], [[0, 0, 0], [1, 0, 0]])
-    assert (meaning(found), said(found)) == (("every row is a stop", "there is no column r or corner_r"), [])
+    assert said(found) == []
 
 
 def test_empty_cells_are_no_radius_and_the_proper_variant(read: Read) -> None:
     found = read("x,y,z,r,variant\n0,0,0,,\n1,0,0,0.1,1\n1,1,0,0.2,\n2,1,0,-,NaN\n")
     assert found.rows.radius.tolist() == [0.0, 0.1, 0.2, 0.0]
     assert found.rows.variant.tolist() == [2, 1, 2, 2]
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"), [("radius", 1.0), ("Radius [mm]", 1e-3), ("radius_cm", 1e-2), ("RADIUS (m)", 1.0)]
+)
+def test_a_radius_may_be_spelled_out(read: Read, name: str, factor: float) -> None:
+    for prefix, corner in (("", False), ("corner ", True)):
+        radius = 0.1 / factor
+        found = read(f"x,y,z,{prefix}{name}\n0,0,0,0\n1,0,0,{radius!r}\n1,1,0,0\n")
+        assert (found.rows.corner, said(found)) == (corner, [])
+        assert found.rows.radius.tolist() == pytest.approx([0.0, 0.1, 0.0], rel=1e-15)  # one product
 
 
 # Units: the radius has its own, else that of x, y, z.
@@ -161,14 +165,13 @@ def test_a_time_is_not_used_whatever_it_holds(read: Read, time: str) -> None:
     found = read("time,x,y,z,corner_r\n" + "".join(rows))
     assert said(found) == [("time-not-used", "time is not used: a plan makes its own time")]
     assert found.rows.position[:, 0].tolist() == [0.0, 1.0, 2.0]
-    assert "time column" not in [one.what for one in found.inferences]
 
 
 @pytest.mark.parametrize(
     ("names", "told"),
     [
         ("W,P,R", "W, P are"),
-        ("radius,r", "radius is"),
+        ("diameter,r", "diameter is"),
         ("nr,name,r", None),
         ("speed,acc,r", "speed, acc are"),
     ],
@@ -176,7 +179,7 @@ def test_a_time_is_not_used_whatever_it_holds(read: Read, time: str) -> None:
 def test_other_columns_of_numbers_are_told_of(read: Read, names: str, told: str | None) -> None:
     cells = ",".join("home" if name == "name" else "0" for name in names.split(","))
     found = read(f"x,y,z,{names}\n0,0,0,{cells}\n1,0,0,{cells}\n")
-    hint = "; name what a path has so in the header: x, y, z, an orientation, r or corner_r, variant"
+    hint = "; a path uses columns named x, y, z, an orientation, r or corner_r, variant"
     assert said(found) == ([] if told is None else [("columns-not-used", f"{told} not used{hint}")])
 
 
@@ -224,9 +227,10 @@ def test_both_meanings_in_one_file_are_refused_with_its_rows(wrong: Wrong) -> No
 
 
 def test_a_column_twice_is_refused(wrong: Wrong) -> None:
-    assert wrong("x,y,z,r,r [mm]\n0,0,0,0,0\n1,0,0,0,0\n") == [
-        "path.csv: found r, r [mm], allowed: one of them"
-    ]
+    for other in ("r [mm]", "radius"):
+        assert wrong(f"x,y,z,r,{other}\n0,0,0,0,0\n1,0,0,0,0\n") == [
+            f"path.csv: found r, {other}, allowed: one of them"
+        ]
 
 
 def test_a_path_has_two_rows_and_rests_at_its_ends(wrong: Wrong) -> None:
@@ -288,3 +292,18 @@ def test_what_is_written_is_read(
     assert found.radius.tolist() == (values[:, 3] * factor).tolist()
     assert found.variant.tolist() == values[:, 4].tolist()
     assert found.corner == corner
+
+
+def test_what_follows_from_a_wrong_radius_is_not_reported(wrong: Wrong) -> None:
+    """With a right one the path might not go straight on in row 3, nor would row 4 be inside its circle."""
+    assert wrong("x,y,z,r\n0,0,0,0\n1,0,0,-0.05\n1.1,0,0,0.2\n1.2,0.1,0,0\n") == [
+        "path.csv:3, column r: found -0.05, allowed: 0 or more, or an empty cell"
+    ]
+
+
+def test_a_row_far_beyond_any_arm_is_refused(wrong: Wrong) -> None:
+    assert wrong("x,y,z,r\n0,0,0,0\n1e300,0,0,x\n1,0,0,0.1\n") == [
+        "path.csv:3, column r: found 'x', allowed: 0 or more, or an empty cell",
+        "path.csv:3: found a coordinate of 1e+300 m, allowed: up to 1e+09 m",
+        "path.csv:4, column r: found 0.1 m, allowed: 0, since a path starts and ends at rest",
+    ]

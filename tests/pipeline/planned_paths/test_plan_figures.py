@@ -12,10 +12,11 @@ from made_plans import FAILED, SMALL, limited, over_its_axis, planned
 from presented import figures
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.planning.rows import path_rows
+from urmpipe_models.planning.rows import PathRows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.planned_paths.figures import MARKED
-from urmpipe_pipeline.planned_paths.result import FOLLOWED, PlannedPath
+from urmpipe_pipeline.planned_paths.planned_joints import FOLLOWED
+from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.presentation.figure import Figure, Panel
 from urmpipe_pipeline.results import present
 
@@ -69,7 +70,7 @@ def test_without_limits_of_the_law_none_are_drawn() -> None:
 def test_arcs_are_tinted(alone: PlannedPath) -> None:
     tinted = there(panels(drawn(alone)[LAW])["s′"].tinted)
     for k, kind in enumerate(alone.path.kinds):
-        within = (alone.t > alone.begins[k]) & (alone.t < alone.begins[k + 1])
+        within = (alone.t > alone.segment_times[k]) & (alone.t < alone.segment_times[k + 1])
         assert (tinted[within] == (kind == "arc")).all()
     assert panels(drawn(over_its_axis())[LAW])["s"].tinted is None
 
@@ -86,7 +87,7 @@ def test_stops_on_the_way_are_lines_in_every_plot(alone: PlannedPath, contour: P
 
 def test_many_stops_have_no_lines_and_what_is_in_the_way_has() -> None:
     corners = np.array([[0.1 * k, 0.05 * (k % 2), 0.0] for k in range(MARKED + 3)])
-    assert drawn(planned(None, path_rows(corners)))[LAW].instants == {}
+    assert drawn(planned(None, PathRows(corners)))[LAW].instants == {}
     plan = FAILED["unreachable"]()
     (one,) = plan.obstacles
     assert drawn(plan)[JOINTS].instants == {round(1e9 * one.t): "unreachable, row 1"}
@@ -129,7 +130,7 @@ def test_without_any_limit_no_shares_are_drawn(contour: PlannedPath) -> None:
 
 
 def test_the_distance_from_singular_poses_is_that_of_the_plan(slowed: PlannedPath) -> None:
-    near, shown = there(slowed.joints).path.singularity, panels(drawn(slowed)[SINGULAR])
+    near, shown = there(slowed.joints).singularity, panels(drawn(slowed)[SINGULAR])
     np.testing.assert_array_equal(values(shown["σ min"]), near.smallest)
     np.testing.assert_array_equal(values(shown["det J"]), there(near.determinant))
     nearest = near.smallest.argmin()
@@ -155,7 +156,7 @@ def test_the_unit_of_the_determinant_follows_its_joints() -> None:
     """Each row of a velocity has a length, but for the columns of joints that slide."""
     axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     slides = Chain("gantry", tuple(Joint(f"s{k}", "prismatic", axis=axis) for k, axis in enumerate(axes)))
-    rows = path_rows(np.array([[0.0, 0.0, 0.0], [0.3, 0.2, 0.1]]))
+    rows = PathRows(np.array([[0.0, 0.0, 0.0], [0.3, 0.2, 0.1]]))
     for arm, given, unit in ((slides, rows, ""), (load_robot("ur5e"), SMALL, "m³")):
         assert panels(drawn(planned(arm, given))[SINGULAR])["det J"].unit == unit
     assert panels(drawn(planned(slides, rows))[JOINTS])["q′"].unit == "m/s"

@@ -16,9 +16,10 @@ from presented import cells, facts, figures
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.planned_paths.obstacles import ObstacleKind
 from urmpipe_pipeline.planned_paths.parts import MANY, obstacle_words
 from urmpipe_pipeline.planned_paths.presenter import CHECKS
-from urmpipe_pipeline.planned_paths.result import ObstacleKind, PlannedPath
+from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.presentation.figure import Drawing
 from urmpipe_pipeline.presentation.section import Table, Value
 from urmpipe_pipeline.results import present
@@ -53,10 +54,10 @@ def test_headline_and_facts_of_a_plan_that_holds(contour: PlannedPath) -> None:
         "Duration": contour.duration,
         "Law": "trapezoid, up to 0.5 m/s and 6 m/s² along the path",
         "Reduced": "",
-        "Limits": "no largest rate or acceleration of a joint is known",
+        "Limits": "the robot has no velocity or acceleration limits",
         "Recording": "",
     }
-    smallest = there(contour.joints).path.singularity.smallest
+    smallest = there(contour.joints).singularity.smallest
     k = int(np.argmin(smallest))
     assert near.startswith(
         f"at t = {contour.t[k]:.3f} s (row {contour.row[k]}): smallest singular value {smallest[k]:.4g}, "
@@ -75,7 +76,8 @@ def test_headline_and_facts_of_a_plan_that_a_joint_slows_down(slowed: PlannedPat
     unreduced = np.abs(joints.qd[:, 0]).max() / slowed.scaled / 0.5
     assert told["Law"] == "jerk, up to 0.5 m/s, 6 m/s² and 100 m/s³ along the path"
     assert told["Reduced"] == (
-        f"to {share} of the speed: shoulder_pan_joint would need {unreduced:.3g} times its largest rate"
+        f"to {share} of the speed, {slowed.speed:.4g} m/s:"
+        f" shoulder_pan_joint would need {unreduced:.3g} times its largest rate"
     )
     used, t = told["Limits"].split(" of its largest rate, at t = ")
     assert used in ("shoulder_pan_joint uses 100 %", "shoulder_pan_joint uses 99.99 %")  # rounding of 1
@@ -144,8 +146,11 @@ def test_what_is_in_the_way_is_headline_fact_check_and_event(kind: ObstacleKind,
     words = [obstacle_words(one) for one in plan.obstacles]
     way = f"{plan.path.total:.4g} m in {plan.duration:.3f} s (trapezoid)"
     cannot = f"path: {there(plan.robot).name} cannot run {way}"
-    assert shown.headline == f"{cannot}: {plan.obstacles[0].kind} {words[0]}"
+    first = plan.obstacles[0]
+    assert shown.headline == f"{cannot}: {first.kind} at t = {first.t:.3f} s (row {first.row})"
     assert [fact.value for fact in shown.facts if fact.name == "In the way"] == words
+    assert not {fact.name for fact in shown.body.facts} & {"Limits", "Reduced"}  # of speeds that are not run
+    assert not any(isinstance(fact.value, Value) and fact.value.limit for fact in shown.body.facts)
     found: dict[str, str] = {}
     for one in plan.obstacles:
         joint = f", joint {one.joint}" if one.kind == "singular" else ""
@@ -276,4 +281,4 @@ def test_warnings_are_events_at_their_rows(contour: PlannedPath) -> None:
     some = LogWarning("columns-not-used", "w is not used"), LogWarning("uneven-turn", "rates step", row=3)
     plan = replace(contour, warnings=some)
     found = {event.words: event.t_ns for event in present(plan).body.events() if event.level == "warning"}
-    assert found == {some[0]: None, some[1]: round(1e9 * contour.passes[2])}
+    assert found == {some[0]: None, some[1]: round(1e9 * contour.row_times[2])}

@@ -14,9 +14,10 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_models.orientation import matrices
 from urmpipe_models.planning.cube import cube_rows
-from urmpipe_models.planning.rows import path_rows
+from urmpipe_models.planning.rows import PathRows
+from urmpipe_pipeline.planned_paths.obstacles import ObstacleKind
 from urmpipe_pipeline.planned_paths.planes import outlines
-from urmpipe_pipeline.planned_paths.result import ObstacleKind, PlannedPath
+from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.planned_paths.scene import ARCS, NAMED, samples_of_rows
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
 from urmpipe_pipeline.presentation.scene import Path
@@ -77,7 +78,7 @@ def test_arcs_of_more_than_half_a_turn_have_finite_planes() -> None:
     """There the tangents meet behind the arc, or nowhere."""
     points = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.2, 0.0]])
     for radius in (0.05, 0.1):  # beyond half a turn, and half of one
-        path = planned(None, path_rows(points, np.array([0.0, radius, 0.0]))).path
+        path = planned(None, PathRows(points, np.array([0.0, radius, 0.0]))).path
         (rectangle,) = outlines(path)
         assert off(path.points(np.linspace(0.0, path.total, 200)).position, rectangle).max() < 1e-12
         assert np.ptp(rectangle, axis=0).max() < 1.0
@@ -199,7 +200,7 @@ def test_the_scene_without_a_robot_is_the_path(alone: PlannedPath) -> None:
 
 def test_of_many_rows_the_stops_are_named(ring: PlannedPath) -> None:
     assert [spot.words for spot in scene_of(present(ring)).spots] == ["rows 1, 100: stop"]
-    stops = planned(None, path_rows(np.arange(3.0 * (NAMED + 1)).reshape(-1, 3) ** 1.5))
+    stops = planned(None, PathRows(np.arange(3.0 * (NAMED + 1)).reshape(-1, 3) ** 1.5))
     assert scene_of(present(stops)).spots == ()
 
 
@@ -207,7 +208,7 @@ def test_of_many_rows_the_stops_are_named(ring: PlannedPath) -> None:
 def test_what_is_in_the_way_is_marked(kind: ObstacleKind) -> None:
     plan = FAILED[kind]()
     wanted = [
-        (f"{one.kind}, row {one.row}", tuple(plan.position[np.flatnonzero(plan.t == one.t)[0]]))
+        (f"{one.kind}, row {one.row}", tuple(plan.path.points(np.array([one.s])).position[0]))
         for one in plan.obstacles
     ]
     shown = [(spot.words, spot.position) for spot in scene_of(present(plan)).spots]

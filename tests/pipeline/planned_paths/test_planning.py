@@ -20,15 +20,19 @@ from made_plans import (
     planned,
 )
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.errors import OptionError, PathError
 from urmpipe_models.inverse.targets import Targets, misses
-from urmpipe_models.orientation import matrices
+from urmpipe_models.orientation import matrices, quaternions
 from urmpipe_models.planning.cube import cube_rows
-from urmpipe_models.planning.rows import PathRows, path_rows
+from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.rows import PathRows
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.planned_paths.request import Timing, checked_timing, refuse_unlimited
-from urmpipe_pipeline.planned_paths.result import PlannedJoints, PlannedPath
+from urmpipe_pipeline.planned_paths.given_path import given_path
+from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints
+from urmpipe_pipeline.planned_paths.planning import plan_path
+from urmpipe_pipeline.planned_paths.request import Request, Timing, checked_timing, refuse_unlimited
+from urmpipe_pipeline.planned_paths.result import PlannedPath
 
 KEPT = 1.0 + 1e-9
 """So much of a limit may be used: rounding."""
@@ -83,7 +87,7 @@ def test_it_is_at_rest_at_its_ends_and_holds_the_last_point() -> None:
 
 @pytest.mark.parametrize("law", [{}, {"arcs": "total"}, {"law": "jerk", "jerk": 40.0}])
 def test_a_joint_that_is_twice_too_fast_halves_the_speed(law: dict[str, Any]) -> None:
-    free = planned(limited("ur5e", velocity=math.inf), SMALL, **law)
+    free = planned(limited("ur5e", velocity=math.inf), SMALL, tsp=0.0005, **law)
     most = largest(joints_of(free).qd)
     velocity = [math.inf] * 6
     velocity[2] = 0.5 * most[2]
@@ -96,18 +100,55 @@ def test_a_joint_that_is_twice_too_fast_halves_the_speed(law: dict[str, Any]) ->
 
 
 def test_a_joint_that_accelerates_four_times_too_much_halves_the_speed() -> None:
-    free = planned(limited("ur5e", velocity=math.inf), SMALL)
+    free = planned(limited("ur5e", velocity=math.inf), SMALL, tsp=0.0001)
     most = largest(joints_of(free).qdd)
     plan = planned(
         limited("ur5e", velocity=math.inf, acceleration=[0.25 * one + 1e-9 for one in most]), SMALL
     )
-    # its samples stand elsewhere: accelerations step where an arc begins, so that the largest may be another
-    assert plan.scaled == pytest.approx(0.5, rel=2e-2)
+    assert plan.scaled == pytest.approx(0.5, rel=1e-3)
     assert joints_of(plan).acceleration_share.max() <= KEPT
 
 
+@pytest.mark.parametrize("tsp", [0.0007, 0.02, 0.5])
+@pytest.mark.parametrize(
+    ("limits", "law"),
+    [
+        ({"velocity": 0.6, "acceleration": 4.0}, {}),
+        ({"velocity": math.inf, "acceleration": 12.0}, {"law": "jerk", "jerk": 40.0}),
+        ({"velocity": 1.5, "acceleration": 8.0}, {"law": "limits"}),
+    ],
+)
+def test_the_period_changes_no_speed(limits: dict[str, float], law: dict[str, Any], tsp: float) -> None:
+    """Limits are looked at along the path, whatever samples are taken of it."""
+    arm = limited("ur5e", **limits)
+    plan, other = planned(arm, SMALL, **law), planned(arm, SMALL, tsp=tsp, **law)
+    assert other.scaled == pytest.approx(plan.scaled, rel=2e-4)  # samples beside the grid: 1e-4 once more
+    assert other.duration == pytest.approx(plan.duration, rel=2e-4)
+
+
+def test_arcs_shorter_than_a_period_count() -> None:
+    """An arc of 0.5 mm is passed between two samples, and its acceleration is 20 times what is allowed."""
+    rows = cube_rows("wall", 0.3, 0.0005, np.array([0.45, 0.0, 0.3]), rotation=DOWN)
+    plan = planned(limited("ur5e", velocity=math.inf, acceleration=15.0), rows)
+    fine = planned(limited("ur5e", velocity=math.inf, acceleration=15.0), rows, tsp=0.0005)
+    assert plan.scaled < 0.2
+    assert fine.scaled == pytest.approx(plan.scaled, rel=2e-4)
+    assert joints_of(fine).acceleration_share.max() == pytest.approx(1.0, abs=0.01)  # 30 samples an arc
+
+
+@pytest.mark.parametrize("tsp", [0.005, 7.0])
+def test_the_period_hides_no_obstacle(tsp: float) -> None:
+    singular = np.array([[0.6, 0.0, 1.6], [0.3, 0.0, 1.6], [-0.3, 0.0, 1.6]])
+    assert [one.kind for one in planned(load_robot("irb60"), PathRows(singular), tsp=tsp).obstacles] == [
+        "singular"
+    ]
+    points = np.array([[0.3, 0.3, 0.3], [-0.3, -0.3, 0.3]])
+    plan = planned(load_robot("ur5e"), PathRows(points, rotation=DOWN), tsp=tsp)
+    assert [one.kind for one in plan.obstacles] == ["unreachable"]
+
+
 def test_less_than_a_hundredth_of_the_speed_is_no_plan() -> None:
-    free = planned(limited("ur5e", velocity=math.inf), SMALL)
+    free = planned(limited("ur5e", velocity=math.inf), SMALL, tsp=0.0005)
     most = largest(joints_of(free).qd)
     velocity = [math.inf] * 6
     velocity[0] = most[0] / 250.0
@@ -117,9 +158,40 @@ def test_less_than_a_hundredth_of_the_speed_is_no_plan() -> None:
     assert (obstacle.kind, obstacle.joint) == ("too-slow", "shoulder_pan_joint")
     assert obstacle.words == "shoulder_pan_joint allows 0.4 % of the speed, allowed: 1 % or more"
     sample = int(np.abs(joints_of(free).qd[:, 0]).argmax())
-    assert obstacle.t == free.t[sample]
+    assert obstacle.t == pytest.approx(free.t[sample], abs=free.tsp)
     assert obstacle.row == free.row[sample]
     assert plan.path.row[obstacle.segment] + 1 == obstacle.row
+
+
+@pytest.mark.parametrize("y", [1e-3, 1.6e-3, 2e-3])
+def test_past_the_axis_the_first_joint_takes_the_speed(y: float) -> None:
+    """At a distance y from it the joint turns at v / y: with v = 0.5 m/s, and 6 rad/s allowed."""
+    points = np.array([[0.8, y, 1.5], [-0.8, y, 1.5]])
+    joints = [6.0, *[math.inf] * 3]
+    plan = planned(limited("irb60", velocity=joints), PathRows(points))
+    share = 6.0 * y / 0.5
+    if share > 0.01:
+        assert plan.verdict == "pass"
+        assert plan.scaled == pytest.approx(share, rel=2e-3)
+    else:
+        assert [one.kind for one in plan.obstacles] == ["too-slow"]
+        assert plan.obstacles[0].t == pytest.approx(0.5 * plan.duration, abs=0.01)
+
+
+@pytest.mark.parametrize("y", [1e-2, 1e-3, 1e-4])
+def test_the_law_of_limits_turns_the_arm_near_its_axis(y: float) -> None:
+    """However near it passes, half a turn of the first joint takes what its limits allow, and hardly more."""
+    points = np.array([[0.8, y, 1.5], [-0.8, y, 1.5]])
+    plan = planned(limited("irb60", velocity=6.0, acceleration=10.0), PathRows(points), law="limits")
+    assert plan.verdict == "pass"
+    assert joints_of(plan).velocity_share.max() <= KEPT
+    assert joints_of(plan).acceleration_share.max() <= KEPT
+    far = planned(
+        limited("irb60", velocity=6.0, acceleration=10.0),
+        PathRows(points + np.array([0.0, 0.05, 0.0])),
+        law="limits",
+    )
+    assert far.duration < plan.duration < far.duration + 2.0 * math.sqrt(math.pi / 10.0)
 
 
 def test_a_determinant_that_passes_through_zero_is_no_plan() -> None:
@@ -127,8 +199,8 @@ def test_a_determinant_that_passes_through_zero_is_no_plan() -> None:
     (obstacle,) = plan.obstacles
     assert (obstacle.kind, obstacle.segment, obstacle.row) == ("singular", 1, 2)
     assert obstacle.words == "the arm passes a singular pose"
-    at = round(obstacle.t / plan.tsp)
-    assert plan.position[at - 1, 0] > 0.0 >= plan.position[at, 0] - 1e-12
+    at = np.interp(obstacle.t, plan.t, plan.position[:, 0])
+    assert at == pytest.approx(0.0, abs=2.0 * plan.path.total / 4000)  # found by the step of the grid
 
 
 def test_a_jump_is_no_plan() -> None:
@@ -141,10 +213,10 @@ def test_samples_out_of_reach_between_rows_are_told() -> None:
     plan = across_the_base()
     (obstacle,) = plan.obstacles
     assert (obstacle.kind, obstacle.row, obstacle.joint) == ("unreachable", 1, "")
-    missed = int((~plan.reached).sum())
-    assert obstacle.words == (
-        f"the wrist is 0.1326 m from axis 1, allowed: at least 0.1333 m, and {missed - 1} samples after it"
-    )
+    away = "the wrist is 0.1332 m from axis 1, allowed: at least 0.1333 m"
+    assert obstacle.words == f"{away}; so it is along 0.266 m"
+    s = plan.motion.s[~plan.reached]
+    assert s[-1] - s[0] == pytest.approx(0.266, abs=2 * 0.5 * plan.tsp)  # a sample at each end
 
 
 def test_rows_out_of_reach_are_all_told_by_their_distance() -> None:
@@ -178,23 +250,91 @@ def test_the_law_of_limits_keeps_them(robot: str, rows: PathRows) -> None:
 
 def test_the_law_of_limits_without_reach_tells_where() -> None:
     points = np.array([[0.3, 0.3, 0.3], [-0.3, -0.3, 0.3]])
-    plan = planned(limited("ur5e", acceleration=5.0), path_rows(points, rotation=DOWN), law="limits")
+    plan = planned(limited("ur5e", acceleration=5.0), PathRows(points, rotation=DOWN), law="limits")
     assert [one.kind for one in plan.obstacles] == ["unreachable"]
+    assert (plan.law, plan.velocity, plan.acceleration) == ("trapezoid", 0.5, 6.0)  # what its times are of
 
 
 def test_the_tool_is_turned_as_the_rows_say() -> None:
     turned = np.array([DOWN, DOWN @ [[0, -1, 0], [1, 0, 0], [0, 0, 1]], DOWN])
     points = np.array([[0.4, -0.2, 0.3], [0.5, 0.0, 0.3], [0.4, 0.2, 0.3]])
-    plan = planned(
-        load_robot("ur5e"), path_rows(points, np.array([0, 0.05, 0]), corner=True, rotation=turned)
-    )
+    plan = planned(load_robot("ur5e"), PathRows(points, np.array([0, 0.05, 0]), corner=True, rotation=turned))
     (warning,) = plan.warnings
     assert str(warning) == (
-        "the tool's turn changes its rate while it moves, in row 2: there the joints' speeds step"
+        "the tool's angular rate steps in row 2 while it moves, and so do the joints' rates"
     )
     wanted = Targets(plan.position, matrices(there(plan.quat_xyzw)))
     miss = np.hstack(misses(load_robot("ur5e"), joints_of(plan).q, wanted))
     assert np.abs(miss).max() < 1e-9
+
+
+def test_the_law_of_limits_stops_where_the_turn_changes_and_does_not_warn() -> None:
+    turned = np.array([DOWN, DOWN @ [[0, -1, 0], [1, 0, 0], [0, 0, 1]], DOWN])
+    points = np.array([[0.4, -0.2, 0.3], [0.5, 0.0, 0.3], [0.4, 0.2, 0.3]])
+    rows = PathRows(points, np.array([0, 0.05, 0]), corner=True, rotation=turned)
+    plan = planned(limited("ur5e", acceleration=10.0), rows, law="limits")
+    assert plan.warnings == ()
+    assert plan.motion.v[np.abs(plan.t - plan.row_times[1]).argmin()] < 10.0 * plan.tsp
+
+
+@pytest.mark.parametrize("digits", [6, 15])
+def test_an_even_turn_that_was_rounded_is_no_step(digits: int) -> None:
+    points = np.array([[0.4, -0.2, 0.3], [0.5, -0.1, 0.3], [0.5, 0.0, 0.3], [0.4, 0.2, 0.3]])
+    radius = np.array([0.0, 0.02, 0.02, 0.0])
+    at = path_of(PathRows(points, radius, corner=True)).at
+    turned = matrices(quaternions(np.round(2.0 * at, digits)[:, None] * [0.0, 0.0, 1.0], "vector")) @ DOWN
+    rows = PathRows(points, radius, corner=True, rotation=turned)
+    plan = planned(limited("ur5e", acceleration=8.0), rows, law="limits")
+    assert planned(limited("ur5e", acceleration=8.0), rows).warnings == plan.warnings == ()
+    assert plan.motion.v[10:-10].min() > 0.05
+
+
+def test_half_a_turn_is_as_short_either_way() -> None:
+    back = DOWN @ np.diag([-1.0, -1.0, 1.0])
+    points = np.array([[0.4, -0.2, 0.3], [0.4, 0.0, 0.3], [0.4, 0.2, 0.3]])
+    plan = planned(load_robot("ur5e"), PathRows(points, rotation=np.array([DOWN, DOWN, back])))
+    assert [(one.kind, str(one)) for one in plan.warnings] == [
+        ("half-turn", "the tool turns by 180 deg from row 2 to the next: either way is as short")
+    ]
+
+
+def test_a_joint_that_comes_to_a_limit_is_warned_of() -> None:
+    """The third joint of panda may hardly turn, so that it rests on its limits for most of the way."""
+    chain = load_robot("panda")
+    lower, upper = ([getattr(one, key) for one in chain.moving] for key in ("lower", "upper"))
+    lower[2], upper[2] = -0.02, 0.02
+    rows = cube_rows("wall", 0.2, 0.02, np.array([0.45, 0.0, 0.4]))
+    plan = planned(limited("panda", lower=lower, upper=upper), rows, tsp=0.001)
+    (warning,) = plan.warnings
+    words, times = str(warning).split(" at t = ")
+    assert (warning.kind, words) == ("limit-contact", "a joint comes to a limit, or leaves it,")
+    found = [float(part) for part in times.split(" s: there the joints' rates step")[0].split(" s, ")]
+    rests = np.abs(joints_of(plan).q[:, 2]) >= 0.02 - 1e-11
+    changes = plan.t[np.flatnonzero(np.diff(rests[2:])) + 3]  # at its start the arm is at rest
+    assert len(changes) > 0
+    np.testing.assert_allclose(found, changes, atol=2.0 * plan.tsp)  # found by the step of the grid
+    arm = limited("panda", lower=lower, upper=upper, acceleration=15.0)
+    assert planned(arm, rows, law="limits").warnings == ()
+
+
+def test_a_table_has_columns_of_its_own_for_joints_of_any_name() -> None:
+    """A gantry whose joints are called as places are: x, y, z, and one as the time."""
+    steps = (("x", (1.0, 0.0, 0.0)), ("t", (0.0, 1.0, 0.0)), ("z", (0.0, 0.0, 1.0)))
+    gantry = Chain("gantry", tuple(Joint(name, "prismatic", axis=axis) for name, axis in steps))
+    plan = planned(gantry, PathRows(np.array([[0.0, 0.0, 0.0], [0.3, 0.2, 0.1]])))
+    frame = plan.to_frame()
+    np.testing.assert_array_equal(frame[["t", "x", "y", "z"]], np.column_stack((plan.t, plan.position)))
+    np.testing.assert_array_equal(frame[["q_x", "q_t", "q_z"]], joints_of(plan).q)
+    np.testing.assert_array_equal(frame[["d_q_x", "d_q_t", "d_q_z"]], joints_of(plan).qd)
+
+
+def test_what_is_needed_to_repeat_it_is_kept() -> None:
+    start = np.array([0.0, -1.5, 1.5, -1.5, -1.5, 0.0])
+    request = Request(load_robot("ur5e"), start, checked_timing(Timing(arcs="total")))
+    options = plan_path(given_path(SMALL), request).provenance.options
+    assert options == {
+        "law": "trapezoid", "arcs": "total", "tsp": 0.005, "robot": "ur5e", "start": start.tolist()
+    }  # fmt: skip
 
 
 def test_without_a_robot_it_is_path_and_time() -> None:
@@ -244,9 +384,9 @@ def test_values_that_make_no_sense_are_refused_together() -> None:
         "acceleration: found inf, allowed: a finite number of m/s2 above 0",
         "jerk: found -1, allowed: a finite number of m/s3 above 0",
         "tsp: found nan, allowed: a finite number of s above 0",
-        "jerk: found one with the law fast, allowed: with the law jerk",
+        "jerk: found a jerk with the law fast, allowed: with the law jerk",
     ]
-    assert refused(law="jerk") == ["jerk: found none with the law jerk, allowed: a number of m/s3"]
+    assert refused(law="jerk") == ["jerk: found no jerk with the law jerk, allowed: a number of m/s3"]
     assert refused(law="limits", arcs="total") == [
         "arcs: found total with the law limits, allowed: with the laws trapezoid and jerk"
     ]
@@ -260,9 +400,18 @@ def test_the_law_of_limits_names_the_key_that_it_lacks() -> None:
     ]
 
 
+def test_times_are_in_ns() -> None:
+    assert refused(tsp=4e-10) == ["tsp: found 4e-10, allowed: 1e-09 s or more: times are in ns"]
+
+
+def test_a_period_longer_than_a_plan_has_both_ends() -> None:
+    plan = planned(None, PathRows(np.array([[0.0, 0.0, 0.0], [1e-6, 0.0, 0.0]])), tsp=1000.0)
+    np.testing.assert_array_equal(plan.motion.s, [0.0, plan.path.total])
+
+
 def test_too_many_samples_are_refused() -> None:
     with pytest.raises(OptionError) as raised:
         planned(None, CONTOUR, tsp=1e-7)
     assert str(raised.value) == (
-        "tsp: found 1e-07 s, allowed: a period that makes up to 20000000 samples of 4.78032 s"
+        "tsp: found 1e-07 s, allowed: a period that makes up to 1000000 samples of 4.78032 s"
     )

@@ -19,7 +19,7 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
 from urmpipe_pipeline.sources.tables.numbers import RowFault
 from urmpipe_pipeline.sources.tables.opening import PATH, open_tables
-from urmpipe_pipeline.sources.targets.row_faults import Further, Rows, read_rows
+from urmpipe_pipeline.sources.targets.row_faults import ExtraColumn, Rows, read_rows
 from urmpipe_pipeline.sources.targets.sniff_targets import sniff_targets
 from urmpipe_pipeline.sources.targets.target_rotation import rotation_units, target_form, target_rotations
 from urmpipe_pipeline.sources.units.rotation import form_inference
@@ -34,11 +34,11 @@ class PoseTable:
     """The rows of a table, in SI.
 
     Attributes:
-        plan: What was read of which columns.
+        plan: The columns and their roles, units and clock.
         position: In [m], shape (n, 3); NaN in a row with a fault of its pose.
         rotation: Matrices [-], shape (n, 3, 3), NaN in a row with a fault; None if the table has positions
             only.
-        further: What stands beside the pose, by what it is: in [m] or [-], shape (n,).
+        further: The columns beside the pose by their meaning, in [m] or [-], shape (n,).
         clock: Times in integer [ns] on the table's clock, shape (n,); None without one.
         faults: Data row from 1, and all that is wrong with it.
         inferences: What was found out about the table.
@@ -71,20 +71,19 @@ class PoseTable:
 def read_pose_table(
     file: Path,
     options: ReadOptions,
-    further: Mapping[str, Further] | None = None,
+    further: Mapping[str, ExtraColumn] | None = None,
     naming: str = "name the columns in a header",
 ) -> PoseTable:
     """Return the rows of a table: x, y, z, where it has one the orientation, and further columns.
 
-    Lengths are in m and angles in rad where neither the header nor the options tell; rz, ry, rx mean
-    R = Rz Ry Rx. A further length whose own name tells no unit is in that of x, y, z.
+    Lengths are in m and angles in rad unless the header or the options give a unit; rz, ry, rx mean
+    R = Rz Ry Rx. A further length without a unit in its own name has the unit of x, y, z.
 
     Args:
         file: A text table, as a log may be.
-        options: What the user says where the file need not, or cannot, tell; those about joints are not
-            used.
-        further: The columns to look for beside the poses, by what they are.
-        naming: What helps where columns have no names.
+        options: How to read the file where it does not show it; those about joints are not used.
+        further: The columns to look for beside the poses, by their meaning.
+        naming: The remedy where columns have no names, for the error.
 
     Raises:
         LogError: If the file as a whole is wrong: no x, y, z, an unknown unit, no row, a clock that repeats
@@ -125,7 +124,9 @@ def _unused(plan: Plan) -> list[Column]:
     return [column for column in columns_of(plan.tables.layouts, plan.tables.titles) if column not in used]
 
 
-def _poses(plan: Plan, rows: Rows, form: RotationForm | None, further: Mapping[str, Further]) -> PoseTable:
+def _poses(
+    plan: Plan, rows: Rows, form: RotationForm | None, further: Mapping[str, ExtraColumn]
+) -> PoseTable:
     """Return the rows in SI, the pose of a row with a fault as NaN, and what was found out about units."""
     finder = UnitFinder(Tellers(plan.units, plan.tables.known, str(plan.tables.paths[plan.main])))
     columns = plan.roles.rotation
@@ -166,9 +167,9 @@ def _without_pose(plan: Plan, rows: Rows) -> list[int]:
 
 
 def _length_units(plan: Plan, finder: UnitFinder, values: FloatArray) -> tuple[list[Unit], list[LogWarning]]:
-    """Return the units of x, y, z, m where none is told, and a warning if no row can be in m then.
+    """Return the units of x, y, z, m where none is given, and a warning if no row can be in m then.
 
-    What reaches further than an arm in m is a target out of reach.
+    A point further away in m than any arm reaches is a target out of reach.
     """
     columns = plan.roles.position
     units = finder.positions(columns, np.zeros((1, 3)))
@@ -186,10 +187,10 @@ def _further(
     plan: Plan,
     finder: UnitFinder,
     values: FloatArray,
-    further: Mapping[str, Further],
+    further: Mapping[str, ExtraColumn],
     lengths: Sequence[Unit],
 ) -> tuple[dict[str, FloatArray], list[Inference]]:
-    """Return what stands beside the poses in SI, and the units that columns share with x, y, z."""
+    """Return the columns beside the poses in SI, and the units that they share with x, y, z."""
     found, said = {}, []
     for (name, column), cells in zip(plan.roles.further.items(), values.T, strict=True):
         factor = 1.0
@@ -212,9 +213,9 @@ def _refuse_unclear(plan: Plan, naming: str, *, named: bool, timed: bool) -> Non
 
     Args:
         plan: What is to be read.
-        naming: What helps where columns have no names.
+        naming: The remedy where columns have no names.
         named: Whether the user names the columns of the pose.
-        timed: Whether the user tells the time.
+        timed: Whether the user names the time.
 
     Raises:
         LogError: With what may be read instead.
@@ -233,7 +234,7 @@ def _refuse_unclear(plan: Plan, naming: str, *, named: bool, timed: bool) -> Non
 
 
 def _remedies(count: int, naming: str, *, timed: bool) -> Iterator[Hint]:
-    """Yield what tells so many columns without names: a header, the form of the orientation, the time."""
+    """Yield remedies for so many columns without names: a header, the form of the orientation, the time."""
     yield Hint("", does=naming)
     yield from (Hint("rotation", form, "says which") for form in FORMS if 3 + width(form) == count)
     if not timed and count - 1 in {3, *(3 + width(form) for form in FORMS)}:

@@ -34,14 +34,14 @@ ALLOWED = "a finite number"
 
 
 @dataclass(frozen=True, slots=True)
-class Further:
+class ExtraColumn:
     """A column beside the poses.
 
     Attributes:
         patterns: Of its name.
-        allowed: What a cell may hold, in words.
+        allowed: The values that a cell may hold, in words.
         fits: Returns which numbers, in the file's own unit and of shape (n,), a cell may hold.
-        empty: What an empty cell stands for, in SI.
+        empty: The value of an empty cell, in SI.
         length: Whether it holds lengths.
     """
 
@@ -73,15 +73,15 @@ class Rows:
     warnings: tuple[LogWarning, ...] = ()
 
 
-def read_rows(plan: Plan, further: Mapping[str, Further]) -> Rows:
+def read_rows(plan: Plan, further: Mapping[str, ExtraColumn]) -> Rows:
     """Return the rows that a plan asks for, all in one table, with a fault where a row cannot be used.
 
-    A fault is a row that is not written like the others, a cell that holds no finite number, or in a further
-    column none that fits, or a time that is missing. Times that repeat or run backwards are an error of the
-    file, as in a log: nothing tells which of two rows is wrong.
+    A fault is a row that is not written like the others, a cell of a pose without a finite number, a cell of
+    a further column with a wrong number, or a missing time. Times that repeat or run backwards are an error
+    of the file, as in a log: either of two rows may be the wrong one.
 
     Raises:
-        LogError: If there is no row, with what leaving out rows does not mend (the header again), or if the
+        LogError: If there is no row, if a fault remains without the wrong rows (the header again), or if the
             known times are no clock.
     """
     layout, clock = plan.tables.layouts[plan.main], plan.clocks[plan.main]
@@ -100,7 +100,7 @@ def read_rows(plan: Plan, further: Mapping[str, Further]) -> Rows:
 
 
 def _faults(
-    numbers: Numbers, roles: Roles, further: Mapping[str, Further], clock: Clock
+    numbers: Numbers, roles: Roles, further: Mapping[str, ExtraColumn], clock: Clock
 ) -> dict[int, list[RowFault]]:
     """Return what is wrong with rows, in their order: all of it."""
     faults = {row + 1: list(of_row) for row, of_row in numbers.unread.items()}

@@ -23,10 +23,10 @@ UNIT_NORM = 1e-3
 """The norm of a quaternion may differ from 1 by this, as printed digits do; then it is divided by it."""
 
 MOST_RAD = 2 * np.pi * 1.01
-"""Angles of which none is told in a unit and most are beyond a turn in [rad] are hardly in rad."""
+"""Angles without a given unit, most of them beyond a turn in [rad], are hardly in rad."""
 
 MAP = Hint("log_map", None, 'says which: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."')
-"""What helps where the names of columns do not tell an orientation."""
+"""The remedy where the names of columns show no orientation."""
 
 _OURS = frozenset(("rx", "ry", "rz"))
 _KUKA = frozenset("abc")
@@ -48,7 +48,8 @@ def target_form(
         named: Whether the user names the columns of the pose.
 
     Raises:
-        LogError: If only a part of an orientation is there, its form cannot be told, or it is told of none.
+        LogError: If only a part of an orientation is there, its form is not known, or a form is given for
+            positions.
     """
     found = roles.rotation
     if not found:
@@ -70,7 +71,7 @@ def target_form(
 def rotation_units(
     columns: Sequence[Column], form: RotationForm, values: FloatArray, told: Sequence[Unit | None]
 ) -> tuple[list[Unit], list[LogWarning]]:
-    """Return the unit of each column of an orientation, rad where none is told, and what was assumed.
+    """Return the unit of each column of an orientation, rad where none is given, and what was assumed.
 
     That angles are in rad is the form of targets, and no assumption, unless most of them are beyond a turn or
     they are called A, B, C as KUKA's, which are in degrees. Values are those of finite rows in the file's own
@@ -95,7 +96,7 @@ def target_rotations(
 ) -> tuple[FloatArray, dict[int, RowFault]]:
     """Return the rotation matrices [-], shape (n, 3, 3), and by index what is wrong with rows that hold none.
 
-    Values are in [rad] or [-], shape (n, columns); a row with NaN stays NaN and is not told of.
+    Values are in [rad] or [-], shape (n, columns); a row with NaN stays NaN and has no fault.
     """
     names = tuple(column.header for column in columns)
     faults = {row: RowFault(said, names) for row, said in _no_rotations(values, form)}
@@ -113,7 +114,7 @@ def _no_rotations(values: FloatArray, form: RotationForm) -> Iterator[tuple[int,
     elif form == "matrix":
         r = values.reshape(-1, 3, 3)
         off = np.abs(r @ r.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
-        with np.errstate(invalid="ignore"):  # rows with NaN, which are told of already
+        with np.errstate(invalid="ignore"):  # rows with NaN, which have faults already
             det = np.linalg.det(r)
         for row in np.flatnonzero((off > ORTHOGONAL) | (det < 0)).tolist():
             found = f"R R^T off I by {off[row]:.3g} and det R = {det[row]:.3g}"

@@ -11,14 +11,14 @@ from scipy.optimize import brentq
 
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.stretches import Arcs, Piece, stretches
+from urmpipe_models.planning.stretches import Arcs, Piece, speeds, stretches
 from urmpipe_models.planning.time_law import Phase, TimeLaw
 
-SHARE = math.sqrt(0.5)
+EQUAL_SHARE = math.sqrt(0.5)
 """Of a total acceleration: so much s'' and s'^2 / r each may have on an arc that begins or ends at rest."""
 
-SPARE = 1e-9
-"""So much of a way stays free where speeds meet: Ruckig finds no way that has to fit to the last bit."""
+SPARE_LENGTH = 1e-9
+"""Of a piece, this share stays free where speeds meet: Ruckig finds no motion that fits to the last bit."""
 
 
 def jerk_law(path: LineArcPath, velocity: float, acceleration: float, jerk: float, arcs: Arcs) -> TimeLaw:
@@ -36,7 +36,7 @@ def jerk_law(path: LineArcPath, velocity: float, acceleration: float, jerk: floa
         arcs: "tangential" or "total".
 
     Raises:
-        OptionError: If Ruckig is not installed.
+        OptionError: If Ruckig is not installed, or finds no motion.
 
     Source: [BerscheidKroger2021]_ (Ruckig), which plans each piece.
     """
@@ -44,7 +44,8 @@ def jerk_law(path: LineArcPath, velocity: float, acceleration: float, jerk: floa
     begin = 0.0
     for stretch in stretches(path, velocity, acceleration, arcs):
         pieces = [*_held(stretch, acceleration)]
-        for piece, (entry, leave) in zip(pieces, pairwise(_speeds(pieces, jerk)), strict=True):
+        met = speeds(pieces, lambda piece, speed: _reached(piece, speed, jerk))
+        for piece, (entry, leave) in zip(pieces, pairwise(met), strict=True):
             phases += _planned(piece, entry, leave, jerk, begin)
             begin += piece.length
     return TimeLaw(phases)
@@ -67,18 +68,8 @@ def _held(stretch: Sequence[Piece], acceleration: float) -> Iterator[_Piece]:
         elif lines and lines[0] < k < lines[-1]:
             yield _Piece(piece.length, 0.0, piece.fastest)
         else:
-            fastest = min(piece.fastest, math.sqrt(SHARE * acceleration * piece.radius))
-            yield _Piece(piece.length, SHARE * acceleration, fastest)
-
-
-def _speeds(pieces: Sequence[_Piece], jerk: float) -> list[float]:
-    """Return the speeds in [m/s] where pieces begin, and where the last one ends, 0 at both ends."""
-    speeds = [0.0, *(min(one.fastest, other.fastest) for one, other in pairwise(pieces)), 0.0]
-    for k in range(1, len(pieces)):
-        speeds[k] = min(speeds[k], _reached(pieces[k - 1], speeds[k - 1], jerk))
-    for k in range(len(pieces) - 1, 0, -1):
-        speeds[k] = min(speeds[k], _reached(pieces[k], speeds[k + 1], jerk))
-    return speeds
+            fastest = min(piece.fastest, math.sqrt(EQUAL_SHARE * acceleration * piece.radius))
+            yield _Piece(piece.length, EQUAL_SHARE * acceleration, fastest)
 
 
 def _reached(piece: _Piece, speed: float, jerk: float) -> float:
@@ -95,7 +86,7 @@ def _reached(piece: _Piece, speed: float, jerk: float) -> float:
         """Return how far in [m] the change to a speed in [m/s] leads beyond the piece."""
         change = end - speed
         duration = 2.0 * math.sqrt(change / jerk) if change < a * a / jerk else change / a + a / jerk
-        return 0.5 * (speed + end) * duration - (1.0 - SPARE) * piece.length
+        return 0.5 * (speed + end) * duration - (1.0 - SPARE_LENGTH) * piece.length
 
     return piece.fastest if beyond(piece.fastest) <= 0.0 else float(brentq(beyond, speed, piece.fastest))
 
@@ -115,8 +106,8 @@ def _planned(piece: _Piece, entry: float, leave: float, jerk: float, begin: floa
     given.max_velocity, given.max_acceleration = [piece.fastest], [piece.acceleration]
     given.max_jerk = [jerk]
     if Ruckig(1).calculate(given, found) not in (Result.Working, Result.Finished):
-        said = f"{piece.length:g} m from {entry:g} to {leave:g} m/s with a jerk of {jerk:g} m/s3"
-        raise OptionError(Finding(parameter="jerk", found=f"no motion over {said}", allowed="another jerk"))
+        motion = f"{piece.length:g} m from {entry:g} to {leave:g} m/s with a jerk of {jerk:g} m/s3"
+        raise OptionError(Finding(parameter="jerk", found=f"no motion over {motion}", allowed="another jerk"))
     profile = found.profiles[0][0]
     for duration, s, v, a, j in zip(profile.t, profile.p, profile.v, profile.a, profile.j, strict=False):
         if duration > 0.0:
