@@ -55,7 +55,8 @@ class _Limited(Protocol):
     """What has a largest speed in [m/s]."""
 
     @property
-    def fastest(self) -> float: ...
+    def fastest(self) -> float:
+        """The largest s' in [m/s]."""
 
 
 AnyPiece = TypeVar("AnyPiece", bound=_Limited)

@@ -99,7 +99,7 @@ class TimeLaw:
     def time_at(self, s: FloatArray) -> FloatArray:
         """Return when the motion is at arc lengths in [m], shape (n,), in [s], shape (n,); the first time.
 
-        Near a stop s tells the time no better than sqrt(2 e / a), e the rounding of s.
+        Near a stop the time is known to sqrt(2 e / a), with e the rounding of s.
         """
         begin = self._table[:, 1]
         k = np.clip(np.searchsorted(begin, s, side="left") - 1, 0, None)

@@ -78,7 +78,7 @@ class PlannedJoints:
 
     @property
     def most_used(self) -> MostUsed:
-        """The limit of which most is used; some sample has to be reached."""
+        """The most used limit; at least one sample has to be reached."""
         shares = np.stack((self.velocity_share, self.acceleration_share))
         kind, sample, joint = np.unravel_index(int(np.nanargmax(shares)), shares.shape)
         limit = ("largest rate", "largest acceleration")[int(kind)]

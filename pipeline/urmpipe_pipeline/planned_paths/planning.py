@@ -109,7 +109,7 @@ class _Samples:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Timed:
-    """How time runs along a path, by which law, what its speeds were multiplied by, what is in the way."""
+    """A law of time with its timing, the factor that its speeds were multiplied by, and the obstacles."""
 
     timing: Timing
     law: TimeLaw
@@ -178,7 +178,7 @@ def _sampled(path: LineArcPath, joints: PathJoints | None, law: TimeLaw, tsp: fl
 
 
 def _warnings(path: LineArcPath, joints: PathJoints | None, timed: _Timed) -> Iterator[LogWarning]:
-    """Yield what is open about the tool's turn, and where the joints' rates step: the law of limits rests."""
+    """Yield warnings about half turns and about steps of the joints' rates, where the law of limits rests."""
     yield from _half_turns(path)
     if timed.timing.law == "limits":
         return

@@ -29,7 +29,7 @@ ROW: Mapping[str, tuple[int, ...]] = {"position": (3,), "radius": (), "variant":
 def curve_faults(rows: PathRows) -> tuple[Finding, ...]:
     """Return why rows make no curve: too few, too far away, a radius that fits nowhere.
 
-    Of places that are not known, NaN, what is known is returned.
+    Rows of which some places are unknown (NaN) are checked as far as possible.
     """
     if len(rows) < FEWEST:
         few = Finding(found=counted(len(rows), "row"), allowed=f"{FEWEST} or more")
