@@ -82,7 +82,7 @@ def decisive_fact(plan: PlannedPath) -> Iterator[Fact]:
 
 
 def obstacle_words(one: Obstacle) -> str:
-    """Return what is in the way, with its time to 1 ms, segment, row, and joint unless the words name it."""
+    """Return an obstacle in words: its time to 1 ms, segment, row, and the joint unless the words name it."""
     joint = f", joint {one.joint}" if one.joint and one.joint not in one.words else ""
     return f"at t = {one.t:.3f} s (segment {one.segment + 1}, row {one.row}{joint}): {one.words}"
 

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
-from urmpipe_models.planning.rows import PROPER, VARIANTS, PathRows
+from urmpipe_models.planning.rows import PROPER, PathRows
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
-from urmpipe_pipeline.planned_paths.row_checks import curve_faults
+from urmpipe_pipeline.planned_paths.row_checks import are_radii, are_variants, curve_faults
 from urmpipe_pipeline.sources.clocks.clock_columns import time_columns
 from urmpipe_pipeline.sources.columns.columns import Column, listed
 from urmpipe_pipeline.sources.options import ReadOptions
@@ -54,7 +53,7 @@ class GivenPath:
     place: str = ""
 
     def finding(self, row: int, found: str, allowed: str) -> Finding:
-        """Return what is wrong with a row, from 1, at its line of the file."""
+        """Return a finding about a row, counted from 1, at its line of the file."""
         place = self.place or self.name
         return Finding(file=place, line=self.lines.get(row), row=row, found=found, allowed=allowed)
 
@@ -90,17 +89,9 @@ def _extra_columns() -> dict[str, ExtraColumn]:
     """Return the columns that a path may have beside its points."""
     names, radius, variant = vocabulary().path, "0 or more, or an empty cell", "1, 2 or an empty cell"
     return {
-        **{name: ExtraColumn(names[name], radius, _are_radii, empty=0.0, length=True) for name in MEANINGS},
-        "variant": ExtraColumn(names["variant"], variant, _are_variants, empty=PROPER, length=False),
+        **{name: ExtraColumn(names[name], radius, are_radii, empty=0.0, length=True) for name in MEANINGS},
+        "variant": ExtraColumn(names["variant"], variant, are_variants, empty=PROPER, length=False),
     }
-
-
-def _are_radii(values: FloatArray) -> BoolArray:
-    return np.asarray((values >= 0.0) & (values < np.inf))
-
-
-def _are_variants(values: FloatArray) -> BoolArray:
-    return np.isin(values, VARIANTS)
 
 
 def _rows(table: PoseTable) -> PathRows:
@@ -110,9 +101,9 @@ def _rows(table: PoseTable) -> PathRows:
     variant = table.further.get("variant", np.array(PROPER))
     return PathRows(
         position=table.position,
-        radius=np.where(_are_radii(radius), radius, np.nan),
+        radius=np.where(are_radii(radius), radius, np.nan),
         corner=name == "corner_r",
-        variant=np.where(_are_variants(variant), variant, PROPER),
+        variant=np.where(are_variants(variant), variant, PROPER),
         rotation=table.rotation,
     )
 

@@ -42,7 +42,7 @@ class PlannedJoints:
         q: Joint values in [rad] or [m], shape (n, joints); NaN where there is no solution.
         qd: Rates in [rad/s] or [m/s], shape (n, joints); exact, not by differences.
         qdd: Second derivatives in [rad/s2] or [m/s2], shape (n, joints); likewise.
-        oriented: Whether the tool is turned as the path says; else any orientation is accepted.
+        oriented: Whether the path gives the tool's orientation; else any orientation is accepted.
     """
 
     chain: Chain

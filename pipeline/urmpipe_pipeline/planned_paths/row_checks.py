@@ -26,6 +26,16 @@ ROW: Mapping[str, tuple[int, ...]] = {"position": (3,), "radius": (), "variant":
 """Shapes of one row of each array."""
 
 
+def are_radii(values: FloatArray) -> BoolArray:
+    """Return which values are radii in [m], shape (n,): finite, 0 or more."""
+    return np.asarray((values >= 0.0) & (values < np.inf))
+
+
+def are_variants(values: FloatArray | IntArray) -> BoolArray:
+    """Return which values are variants of an arc [-], shape (n,)."""
+    return np.isin(values, VARIANTS)
+
+
 def curve_faults(rows: PathRows) -> tuple[Finding, ...]:
     """Return why rows make no curve: too few, too far away, a radius that fits nowhere.
 
@@ -58,9 +68,8 @@ def checked_rows(rows: PathRows) -> PathRows:
     if not faults:
         rotation, reasons = _checked_poses(rows.position, rotation)
         faults += reasons
-        fits = (rows.radius >= 0.0) & (rows.radius < np.inf)
-        faults += _unfit(rows.radius, "radius", " m", fits, "finite, 0 or more")
-        faults += _unfit(rows.variant, "variant", "", np.isin(rows.variant, VARIANTS), "1 or 2")
+        faults += _unfit(rows.radius, "radius", " m", are_radii(rows.radius), "finite, 0 or more")
+        faults += _unfit(rows.variant, "variant", "", are_variants(rows.variant), "1 or 2")
     if faults:
         raise OptionError(*capped([replace(fault, parameter="path") for fault in faults], ""))
     made = replace(rows, rotation=rotation)

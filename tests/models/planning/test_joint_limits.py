@@ -268,7 +268,7 @@ def test_a_joint_that_comes_to_its_limit_makes_the_others_step() -> None:
 
 
 def test_the_contact_with_a_limit_is_found() -> None:
-    """Joints that rest at it, as the law of limits says, accelerate no more than they may, by differences."""
+    """The law of limits rests there: by differences no joint accelerates more than it may."""
     chain = load_robot("panda")
     joints = [replace(one, acceleration=10.0) for one in chain.joints]
     joints[2] = replace(joints[2], lower=-0.02, upper=0.02)
