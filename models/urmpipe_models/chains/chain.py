@@ -9,10 +9,12 @@ from functools import cached_property
 from html import escape
 from typing import Literal
 
+from urmpipe_models.chains.inertial import GRAVITY, Inertial
 from urmpipe_models.chains.parameters import Parameter, parameters_of, with_values
 from urmpipe_models.chains.visual import Visual
 from urmpipe_models.display import Shown, line_of, number_of
-from urmpipe_models.elementwise import Element
+from urmpipe_models.drives.joint_drives import JointDrive
+from urmpipe_models.elementwise import Element, Vector
 from urmpipe_models.errors import RobotError
 from urmpipe_models.names import not_among
 from urmpipe_models.transform import Transform
@@ -45,6 +47,7 @@ class Joint:
         upper: Largest value allowed, in [rad] or [m].
         velocity: Largest speed, in [rad/s] or [m/s].
         acceleration: Largest acceleration either way, in [rad/s2] or [m/s2].
+        effort: Largest torque or force either way, in [N.m] or [N].
         mimic: The joint it follows, if it has no coordinate of its own.
     """
 
@@ -56,6 +59,7 @@ class Joint:
     upper: float = math.inf
     velocity: float = math.inf
     acceleration: float = math.inf
+    effort: float = math.inf
     mimic: Mimic | None = None
 
     def faults(self) -> Iterator[str]:
@@ -65,9 +69,9 @@ class Joint:
             yield f"joint {self.name}: axis {list(self.axis)} has length {length:g}; allowed: 1"
         if not self.lower <= self.upper:
             yield f"joint {self.name}: lower limit {self.lower:g} above upper {self.upper:g}"
-        for key, value in (("velocity", self.velocity), ("acceleration", self.acceleration)):
-            if not value > 0.0:
-                yield f"joint {self.name}: {key} {value:g}; allowed: more than 0"
+        for key in ("velocity", "acceleration", "effort"):
+            if not getattr(self, key) > 0.0:
+                yield f"joint {self.name}: {key} {getattr(self, key):g}; allowed: more than 0"
 
 
 @dataclass(frozen=True, repr=False)
@@ -88,6 +92,11 @@ class Chain(Shown):
         description: One line for people.
         source: Where the numbers come from.
         visuals: What the arm looks like; none where the description does not tell.
+        inertials: The masses of the arm; none where the description does not tell.
+        gravity: Acceleration of gravity in the world's frame, in [m/s2]; `base` turns the arm under it.
+        left_out: Links of a URDF that the arm carries and that move by joints of their own: their masses
+            are not among the `inertials`.
+        drives: What drives or holds the joints; none where the description does not tell.
     """
 
     name: str
@@ -99,6 +108,10 @@ class Chain(Shown):
     description: str = ""
     source: str = ""
     visuals: tuple[Visual, ...] = ()
+    inertials: tuple[Inertial, ...] = ()
+    gravity: Vector = GRAVITY
+    left_out: tuple[str, ...] = ()
+    drives: tuple[JointDrive, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.start:
@@ -108,7 +121,7 @@ class Chain(Shown):
             raise RobotError(*faults)
 
     def _faults(self) -> Iterator[str]:
-        """Yield what is wrong with the joints, their names and the start."""
+        """Yield what is wrong with the joints, what hangs on them, and the start."""
         names = [joint.name for joint in self.joints]
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
@@ -122,13 +135,26 @@ class Chain(Shown):
                     f"joint {joint.name} mimics {joint.mimic.joint}, no moving joint of the chain;"
                     f" allowed: {', '.join(self.coordinates)}"
                 )
-        for visual in self.visuals:
-            yield from visual.faults()
-        carriers = {visual.joint for visual in self.visuals if visual.joint is not None}
-        for carrier in sorted(carriers - set(names)):
-            yield f"a visual hangs on {carrier}, no joint of the chain; allowed: {', '.join(names)}"
+        for kind, carried in (("a visual", self.visuals), ("an inertial", self.inertials)):
+            for one in carried:
+                yield from one.faults()
+            carriers = {one.joint for one in carried if one.joint is not None}
+            for carrier in sorted(carriers - set(names)):
+                yield f"{kind} hangs on {carrier}, no joint of the chain; allowed: {', '.join(names)}"
+        yield from self._drive_faults()
         if len(self.start) != len(self.coordinates):
             yield f"start has {len(self.start)} values; allowed: {len(self.coordinates)}, one a coordinate"
+
+    def _drive_faults(self) -> Iterator[str]:
+        """Yield what is wrong with the drives and the joints that they name."""
+        driven = [one.joint for one in self.drives]
+        for one in self.drives:
+            yield from one.faults()
+        for name in sorted(set(driven)):
+            if name not in self.coordinates:
+                yield f"drives.{name}: found, allowed: a moving joint: {', '.join(self.coordinates)}"
+            elif driven.count(name) > 1:
+                yield f"drives.{name}: found {driven.count(name)} times, allowed: once"
 
     @cached_property
     def moving(self) -> tuple[Joint, ...]:

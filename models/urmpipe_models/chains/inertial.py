@@ -1,0 +1,68 @@
+"""The masses of an arm: what its frames carry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from numbers import Real
+from typing import TypeAlias
+
+import numpy as np
+
+from urmpipe_models.elementwise import ZERO, Element, Vector
+
+GRAVITY: tuple[float, float, float] = (0.0, 0.0, -9.81)
+"""The acceleration of gravity in the world's frame, in [m/s2], where a robot file gives no other."""
+
+PRINTED_DIGITS = 5e-3
+"""Principal moments may miss the triangle inequality by this share: a thin rod in three printed digits."""
+
+ROUNDING = 1e-9
+"""A principal moment may be below 0 by this share of the largest: rounding."""
+
+_Six: TypeAlias = tuple[Element, Element, Element, Element, Element, Element]
+_SixNumbers: TypeAlias = tuple[float, float, float, float, float, float]
+_ThreeNumbers: TypeAlias = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Inertial:
+    """A mass that a frame of the arm carries; a frame may carry several.
+
+    Attributes:
+        joint: Name of the joint whose moving frame carries it; None for the base, which stands still.
+        mass: m in [kg].
+        centre: Its centre in the frame that carries it, in [m].
+        inertia: ixx, iyy, izz, ixy, ixz, iyz about the centre, along the axes of the frame, in [kg.m2];
+            the products are those of the inertia matrix, -integral of x y dm.
+        source: Where the numbers come from.
+    """
+
+    joint: str | None
+    mass: Element = field(metadata={"stored": float})
+    centre: Vector = field(default=ZERO, metadata={"stored": _ThreeNumbers})
+    inertia: _Six = field(default=(0.0,) * 6, metadata={"stored": _SixNumbers})
+    source: str = ""
+
+    @property
+    def place(self) -> str:
+        """The joint that carries it in words, for messages."""
+        return "the base" if self.joint is None else f"joint {self.joint}"
+
+    def faults(self) -> Iterator[str]:
+        """Yield why no body has this mass and inertia; of what is no number, as in a trace, nothing."""
+        if not all(isinstance(value, Real) for value in (self.mass, *self.inertia)):
+            return
+        mass, inertia = float(self.mass), [float(value) for value in self.inertia]
+        where = f"inertial on {self.place}"
+        if mass < 0.0:
+            yield f"{where}: mass {mass:g} kg; allowed: 0 or more"
+        if mass == 0.0 and any(inertia):
+            yield f"{where}: mass 0 with an inertia; allowed: a mass, or no inertia"
+        ixx, iyy, izz, ixy, ixz, iyz = inertia
+        low, middle, high = np.linalg.eigvalsh([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]).tolist()
+        moments = f"principal moments {low:.4g}, {middle:.4g}, {high:.4g} kg.m2"
+        if low < -ROUNDING * abs(high) or high < 0.0:
+            yield f"{where}: {moments}; allowed: 0 or more"
+        elif low + middle < (1.0 - PRINTED_DIGITS) * high:
+            yield f"{where}: {moments}; allowed: none above the sum of the other two"

@@ -1,0 +1,76 @@
+"""What holds or turns the joints of an arm: a drive under control, or a spring and a damper alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from urmpipe_models.drives.controller import Gains
+from urmpipe_models.drives.drive import Drive
+
+
+@dataclass(frozen=True, slots=True)
+class HeldJoint:
+    """A joint without a drive, held where it starts by a spring and a damper.
+
+    Attributes:
+        joint: Name of a coordinate.
+        stiffness: k in [N.m/rad], of a joint that slides in [N/m].
+        damping: l in [N.m.s/rad], of a joint that slides in [N.s/m].
+    """
+
+    joint: str
+    stiffness: float
+    damping: float
+
+    def faults(self) -> Iterator[str]:
+        """Yield which constants no spring and damper have."""
+        yield from _above_zero(self.joint, {"k": self.stiffness})
+        if not 0.0 <= self.damping < math.inf:
+            yield f"drives.{self.joint}.l: found {self.damping:g}, allowed: 0 or more"
+
+
+@dataclass(frozen=True, slots=True)
+class DrivenJoint:
+    """A joint with a flexible DC drive and a sampled controller.
+
+    Attributes:
+        joint: Name of a coordinate.
+        drive: The constants of motor, gear and shaft; of a joint that slides with m for rad.
+        period: Time between two samples of the controller in [s].
+        gains: What a sample adds to the voltage.
+        largest_voltage: u_max in [V].
+    """
+
+    joint: str
+    drive: Drive
+    period: float
+    gains: Gains
+    largest_voltage: float
+
+    def faults(self) -> Iterator[str]:
+        """Yield which constants no drive has; gains may have any sign (see `drive_controller`)."""
+        constants = dict(zip(DRIVE_KEYS, self.drive, strict=True))
+        yield from _above_zero(
+            self.joint, {**constants, "period": self.period, "u_max": self.largest_voltage}
+        )
+        for key, value in zip(GAIN_KEYS, self.gains, strict=True):
+            if not math.isfinite(value):
+                yield f"drives.{self.joint}.{key}: found {value:g}, allowed: a finite number"
+
+
+JointDrive: TypeAlias = HeldJoint | DrivenJoint
+
+DRIVE_KEYS = ("k", "l", "i_p", "C", "R", "L", "I1")
+"""The constants of `Drive`, as robot files and units name them."""
+
+GAIN_KEYS = ("Kphi", "Kw", "Keps")
+"""The gains, as robot files and units name them."""
+
+
+def _above_zero(joint: str, values: dict[str, float]) -> Iterator[str]:
+    for key, value in values.items():
+        if not 0.0 < value < math.inf:
+            yield f"drives.{joint}.{key}: found {value:g}, allowed: a finite number above 0"

@@ -1,0 +1,1 @@
+"""The motion of an arm's masses: forces from motion, motion from forces, energies."""
