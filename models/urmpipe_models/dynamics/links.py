@@ -130,7 +130,7 @@ def turned(frame: Transform, matrix: Symmetric) -> Symmetric:
 
 
 def about_origin(mass: Element, centre: Vector) -> Symmetric:
-    """Return m (c^2 1 - c c^T), what a mass in [kg] at c in [m] adds to an inertia about the origin [kg.m2]."""
+    """Return m (c^2 1 - c c^T) in [kg.m2], the inertia about the origin of a mass in [kg] at c in [m]."""
     x, y, z = centre
     mx, my, mz = scale(mass, centre)
     xx, yy, zz = times(mx, x), times(my, y), times(mz, z)

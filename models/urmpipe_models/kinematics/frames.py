@@ -15,6 +15,15 @@ def joint_values(chain: Chain, q: Sequence[Element]) -> list[Element]:
     return [_value(joint, of) for joint in chain.joints]
 
 
+def joint_rates(chain: Chain, rates: Sequence[Element]) -> list[Element]:
+    """Return the derivative of every joint's value: as `joint_values`, but a mimic's offset drops out."""
+    of = dict(zip(chain.coordinates, rates, strict=True))
+    return [
+        times(joint.mimic.multiplier, of[joint.mimic.joint]) if joint.mimic else of.get(joint.name, 0.0)
+        for joint in chain.joints
+    ]
+
+
 def frames(chain: Chain, q: Sequence[Element]) -> Iterator[Transform]:
     """Yield the base and the moving frame of every joint, in the world: what the links hang on.
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.elementwise import ZERO, Element, Vector, add, cross, scale, times
-from urmpipe_models.kinematics.frames import joint_values, moved
+from urmpipe_models.elementwise import ZERO, Element, Vector, add, cross, scale
+from urmpipe_models.kinematics.frames import joint_rates, joint_values, moved
 from urmpipe_models.transform import Transform
 
 
@@ -61,7 +61,7 @@ def each_motion(
         qd: Their rates, in [rad/s] or [m/s].
         qdd: Their second derivatives, in [rad/s2] or [m/s2].
     """
-    values, rates, second = joint_values(chain, q), _joint_rates(chain, qd), _joint_rates(chain, qdd)
+    values, rates, second = joint_values(chain, q), joint_rates(chain, qd), joint_rates(chain, qdd)
     body = Motion(chain.base, ZERO, ZERO, ZERO, ZERO)
     for k, joint in enumerate(chain.joints):
         at_joint = _carried(body, joint.origin)
@@ -70,15 +70,6 @@ def each_motion(
             yield replace(at_joint, pose=end)
         body = _driven(at_joint, joint, values[k], rates[k], second[k])
     yield _carried(body, chain.tip @ chain.tool)
-
-
-def _joint_rates(chain: Chain, rates: Sequence[Element]) -> list[Element]:
-    """Return the derivative of every joint's value: as `joint_values`, but a mimic's offset drops out."""
-    of = dict(zip(chain.coordinates, rates, strict=True))
-    return [
-        times(joint.mimic.multiplier, of[joint.mimic.joint]) if joint.mimic else of.get(joint.name, 0.0)
-        for joint in chain.joints
-    ]
 
 
 def _carried(state: Motion, origin: Transform) -> Motion:
