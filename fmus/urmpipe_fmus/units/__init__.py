@@ -23,6 +23,8 @@ _UNITS: dict[str, str] = {
     "dc_drive": "DC motor with gear and a flexible damped shaft",
     "inertia": "load of a drive: an inertia in a bearing with friction",
     "drive_controller": "sampled control of a drive's voltage",
+    "chain_dynamics": "motion of an arm with masses under the torques of its joints",
+    "driven_arm": "an arm with masses, a flexible drive and a sampled controller on each joint",
     "set_point": "set position, velocity and acceleration over time: step, ramp, trapezoid",
 }
 """What each unit does, in a line."""

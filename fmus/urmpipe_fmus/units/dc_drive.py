@@ -7,7 +7,14 @@ from collections.abc import Mapping
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, Parameter, State
-from urmpipe_models.drives.drive import Drive, current_rate, shaft_acceleration, shaft_torque
+from urmpipe_models.drives.drive import (
+    Drive,
+    current_rate,
+    lost_power,
+    shaft_acceleration,
+    shaft_torque,
+    stored_energy,
+)
 from urmpipe_models.elementwise import Element
 
 OPTIONS: Mapping[str, str] = {}
@@ -85,6 +92,7 @@ def _outputs() -> tuple[Output, ...]:
     return (
         Output(name="Mk", description="Torque of the shaft on the driven element", unit="N.m"),
         Output(name="alpha1", description="Acceleration of the gear's output shaft", unit="rad/s2"),
+        Output(name="energy_stored", description="Energy of rotor, winding and shaft", unit="J"),
     )
 
 
@@ -96,6 +104,8 @@ def _states() -> tuple[State, ...]:
             name="omega1", description="Rate of that shaft", unit="rad/s", display_unit="deg/s", output=True
         ),
         State(name="i_a", description="Current of the armature", unit="A", output=True),
+        State(name="energy_in", description="Work of the voltage", unit="J", output=True),
+        State(name="energy_lost", description="Heat of armature and shaft", unit="J", output=True),
     )
 
 
@@ -106,7 +116,11 @@ def _torque(v: Values) -> Element:
 
 def _computed(v: Values) -> Mapping[str, Element]:
     torque = _torque(v)
-    return {"Mk": torque, "alpha1": shaft_acceleration(_drive(v), v.i_a, torque)}
+    return {
+        "Mk": torque,
+        "alpha1": shaft_acceleration(_drive(v), v.i_a, torque),
+        "energy_stored": stored_energy(_drive(v), v.theta1, v.omega1, v.i_a, v.theta2),
+    }
 
 
 def _derivatives(v: Values) -> Mapping[str, Element]:
@@ -114,4 +128,6 @@ def _derivatives(v: Values) -> Mapping[str, Element]:
         "theta1": v.omega1,
         "omega1": shaft_acceleration(_drive(v), v.i_a, _torque(v)),
         "i_a": current_rate(_drive(v), v.u, v.omega1, v.i_a),
+        "energy_in": v.u * v.i_a,
+        "energy_lost": lost_power(_drive(v), v.omega1, v.i_a, v.omega2),
     }

@@ -9,7 +9,7 @@ import numpy as np
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Memory, Output, Parameter
-from urmpipe_models.drives.controller import Gains, next_voltage, sample_number
+from urmpipe_models.drives.controller import Gains, next_voltage, sample_number, voltage_at
 from urmpipe_models.drives.set_point import JointMotion
 from urmpipe_models.elementwise import Element
 
@@ -34,7 +34,10 @@ def drive_controller() -> Unit:
         description="Sampled control of a drive's voltage by errors of position, velocity, acceleration",
         variables=(*_parameters(), *_inputs("set", "Set"), *_inputs("real", "Real"), _VOLTAGE, *_memories()),
         outputs=lambda v: {"u": _voltage(v)},
-        update=lambda v: {"last": _voltage(v), "sample": np.maximum(v.sample, _now(v))},
+        update=lambda v: {
+            "last": _voltage(v),
+            "sample": np.maximum(v.sample, sample_number(v.time, v.period)),
+        },
         equations=(
             "u_n = u_n-1 + Kphi (set_theta - real_theta) + Kw (set_omega - real_omega)",
             "      + Keps (set_alpha - real_alpha), within -u_max .. u_max    (eq. 20, which prints a minus)",
@@ -77,11 +80,6 @@ def _memories() -> tuple[Memory, ...]:
     )
 
 
-def _now(v: Values) -> Element:
-    """Return the number of the sample instant that the communication point has reached."""
-    return sample_number(v.time, v.period)
-
-
 def _voltage(v: Values) -> Element:
     """Return the voltage from the communication point on: a new one at a sample, else the held one."""
     fresh = next_voltage(
@@ -91,4 +89,4 @@ def _voltage(v: Values) -> Element:
         JointMotion(v.real_theta, v.real_omega, v.real_alpha),
         v.u_max,
     )
-    return np.where(_now(v) > v.sample, fresh, v.last)
+    return voltage_at(v.time, v.period, v.sample, fresh, v.last)

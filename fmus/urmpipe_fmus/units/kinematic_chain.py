@@ -9,12 +9,12 @@ from typing import Any
 
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.units.chain_geometry import geometry_of
-from urmpipe_fmus.units.options import some_of, yes_or_no
+from urmpipe_fmus.units.coordinates import kinds_of, values_of
+from urmpipe_fmus.units.options import an_arm, some_of, yes_or_no
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, Variable
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.elementwise import Element
-from urmpipe_models.errors import UnitError, shown
+from urmpipe_models.errors import UnitError
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.kinematics.motion import Motion, each_motion
 from urmpipe_models.robots.robot_file import chain_from_dict, robot_toml
@@ -53,8 +53,7 @@ def kinematic_chain(
 
     Source: [UrmArm2021]_ eq. 1-14; v and a by the outward recursion (see `each_motion`).
     """
-    if not isinstance(robot, Chain):
-        raise UnitError(f"unit kinematic_chain: option robot: found {shown(robot)}, allowed: a robot (Chain)")
+    an_arm("kinematic_chain", robot)
     names = robot.point_names
     chosen = some_of("kinematic_chain", "points", names if points is None else points, names)
     sensed = some_of("kinematic_chain", "sensors", names[-1:] if sensors is None else sensors, names)
@@ -102,20 +101,11 @@ def from_robot_toml(robot: str, **options: Any) -> Unit:
 
 def _moved(arm: Chain, v: Values, rates: bool) -> tuple[Sequence[Transform], Sequence[Motion]]:
     """Return the poses of p1..pn, and their motions if the rates are known."""
-    q = _coordinates(arm, v, "phi", "s")
+    q = values_of(arm, v)
     if not rates:
         return forward(arm, q), ()
-    qd, qdd = _coordinates(arm, v, "phid", "sd"), _coordinates(arm, v, "phidd", "sdd")
-    motions = tuple(each_motion(arm, q, qd, qdd))
+    motions = tuple(each_motion(arm, q, values_of(arm, v, "d"), values_of(arm, v, "dd")))
     return [motion.pose for motion in motions], motions
-
-
-def _coordinates(arm: Chain, v: Values, turning: str, sliding: str) -> list[Element]:
-    """Return the joints' values in the arm's order from those that turn and those that slide."""
-    kinds = [joint.kind for joint in arm.moving]
-    angles = iter(getattr(v, turning) if "revolute" in kinds else ())
-    ways = iter(getattr(v, sliding) if "prismatic" in kinds else ())
-    return [next(ways if kind == "prismatic" else angles) for kind in kinds]
 
 
 def _sensed(number: str, pose: Transform, motion: Motion | None) -> dict[str, Any]:
@@ -129,29 +119,23 @@ def _sensed(number: str, pose: Transform, motion: Motion | None) -> dict[str, An
 
 def _inputs(robot: Chain, rates: bool) -> Iterator[Input]:
     """Yield the joints' angles and ways, and their rates."""
-    for name, kind, unit, seen_in, quantity in (
-        ("phi", "revolute", "rad", "deg", "Angles"),
-        ("s", "prismatic", "m", "mm", "Ways"),
-    ):
-        at = [k for k, joint in enumerate(robot.moving) if joint.kind == kind]
-        if not at:
-            continue
+    for kind in kinds_of(robot):
+        at = kind.of(robot)
         of = f"of the joints {', '.join(robot.coordinates[k] for k in at)}"
-        start = tuple(float(robot.start[k]) for k in at)
         yield Input(
-            name=name,
-            description=f"{quantity} {of}",
-            unit=unit,
-            display_unit=seen_in,
-            start=start,
+            name=kind.name,
+            description=f"{kind.word}s {of}",
+            unit=kind.unit,
+            display_unit=kind.display_unit,
+            start=tuple(float(robot.start[k]) for k in at),
             size=len(at),
         )
         for dots, rate in (("d", "/s"), ("dd", "/s2")) if rates else ():
             yield Input(
-                name=f"{name}{dots}",
+                name=f"{kind.name}{dots}",
                 description=f"{'Velocities' if dots == 'd' else 'Accelerations'} {of}",
-                unit=f"{unit}{rate}",
-                display_unit=f"{seen_in}{rate}",
+                unit=f"{kind.unit}{rate}",
+                display_unit=f"{kind.display_unit}{rate}",
                 size=len(at),
             )
 

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import UnitError, shown
+
+
+def an_arm(unit: str, value: Any) -> None:
+    """Check the option of a robot.
+
+    Raises:
+        UnitError: If it is none.
+    """
+    if not isinstance(value, Chain):
+        raise UnitError(f"unit {unit}: option robot: found {shown(value)}, allowed: a robot (Chain)")
 
 
 def whole_number(unit: str, option: str, value: Any) -> int:

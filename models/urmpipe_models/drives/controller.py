@@ -63,3 +63,16 @@ def next_voltage(
 def sample_number(time: Element, period: Element) -> Element:
     """Return the number of the last sample instant, n T, that is not after a time in [s]."""
     return np.floor(time / period + SAMPLE_SLACK)
+
+
+def voltage_at(time: Element, period: Element, sample: Element, fresh: Element, last: Element) -> Element:
+    """Return the voltage from a time on in [V]: a new one where a sample is due, else the held one.
+
+    Args:
+        time: In [s].
+        period: Between two samples, in [s].
+        sample: Number of the last sample that was taken.
+        fresh: What `next_voltage` gives now, in [V].
+        last: The voltage of the last sample in [V].
+    """
+    return np.where(sample_number(time, period) > sample, fresh, last)

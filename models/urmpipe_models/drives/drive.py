@@ -87,6 +87,36 @@ def current_rate(drive: Drive, voltage: Element, omega1: Element, current: Eleme
     return (voltage - induced - drive.resistance * current) / drive.inductance
 
 
+def stored_energy(
+    drive: Drive, theta1: Element, omega1: Element, current: Element, theta2: Element
+) -> Element:
+    """Return (I1 theta1'^2 + L i_a^2 + k (theta1 - theta2)^2) / 2, what a drive holds, in [J].
+
+    Args:
+        drive: The constants.
+        theta1: Angle of the gear's output shaft in [rad].
+        omega1: Its rate in [rad/s].
+        current: i_a in [A].
+        theta2: Angle of the driven element in [rad].
+    """
+    twist = theta1 - theta2
+    turning, winding = drive.inertia * omega1 * omega1, drive.inductance * current * current
+    return 0.5 * (turning + winding + drive.stiffness * twist * twist)
+
+
+def lost_power(drive: Drive, omega1: Element, current: Element, omega2: Element) -> Element:
+    """Return R i_a^2 + l (theta1' - theta2')^2, the heat of armature and shaft, in [W].
+
+    Args:
+        drive: The constants.
+        omega1: Rate of the gear's output shaft in [rad/s].
+        current: i_a in [A].
+        omega2: Rate of the driven element in [rad/s].
+    """
+    twisting = omega1 - omega2
+    return drive.resistance * current * current + drive.damping * twisting * twisting
+
+
 def load_acceleration(
     inertia: Element, damping: Element, omega: Element, torque: Element, external: Element
 ) -> Element:

@@ -1,0 +1,94 @@
+"""What of an arm's masses can be changed while it is simulated, and what acts on its tool."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+from urmpipe_fmus.units.dc_drive import SMALLEST
+from urmpipe_fmus.values import Values
+from urmpipe_fmus.variable import Input, Parameter
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.dynamics.wrench import Wrench
+
+
+class Masses(NamedTuple):
+    """The masses of an arm.
+
+    Attributes:
+        parameters: Tunable; they start at the masses of the robot's description.
+        chain_at: Returns the arm of some values of the parameters.
+    """
+
+    parameters: tuple[Parameter, ...]
+    chain_at: Callable[[Values], Chain]
+
+
+def masses_of(robot: Chain) -> Masses:
+    """Return the masses of an arm that move, their centres, and gravity as parameters.
+
+    Masses of the base, which stands still, and masses of 0 have no part in the motion and are left out.
+    """
+    moving = tuple(one for one in robot.inertials if one.joint is not None and one.mass)
+    arm = replace(robot, inertials=moving, visuals=())
+    centres = [f"centre{k}" for k in range(1, len(moving) + 1)]
+
+    def chain_at(v: Values) -> Chain:
+        """Return the arm of some masses."""
+        inertials = (
+            replace(one, mass=mass, centre=getattr(v, name))
+            for one, mass, name in zip(moving, v.masses, centres, strict=True)
+        )
+        return replace(arm, inertials=tuple(inertials), gravity=v.gravity)
+
+    masses = Parameter(
+        name="masses",
+        description="Masses on the joints " + ", ".join(str(one.joint) for one in moving),
+        unit="kg",
+        start=tuple(float(one.mass) for one in moving),
+        minimum=SMALLEST,
+        size=len(moving),
+    )
+    places = (
+        Parameter(
+            name=name,
+            description=f"Centre of mass {k} in the frame of joint {one.joint}: x, y, z",
+            unit="m",
+            display_unit="mm",
+            start=tuple(map(float, one.centre)),
+            size=3,
+        )
+        for k, (name, one) in enumerate(zip(centres, moving, strict=True), start=1)
+    )
+    gravity = Parameter(
+        name="gravity",
+        description="Acceleration of gravity in the world: x, y, z",
+        unit="m/s2",
+        start=tuple(map(float, robot.gravity)),
+        size=3,
+    )
+    return Masses((masses, *places, gravity), chain_at)
+
+
+def tool_inputs() -> tuple[Input, Input]:
+    """Return what acts on the tool centre point as inputs."""
+    return (
+        Input(
+            name="force",
+            description="Force on the tool centre point, along the axes of the world",
+            unit="N",
+            size=3,
+        ),
+        Input(
+            name="moment",
+            description="Moment on the tool centre point, along the axes of the world",
+            unit="N.m",
+            size=3,
+        ),
+    )
+
+
+def wrench_at(v: Values) -> Wrench:
+    """Return what acts on the tool centre point."""
+    return Wrench(v.force, v.moment)

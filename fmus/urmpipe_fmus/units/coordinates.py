@@ -1,0 +1,71 @@
+"""The coordinates of an arm as variables: those that turn and those that slide apart, as their units are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from urmpipe_fmus.values import Values
+from urmpipe_models.chains.chain import Chain, JointKind
+from urmpipe_models.elementwise import Element
+
+
+@dataclass(frozen=True, slots=True)
+class CoordinateKind:
+    """How the coordinates of a kind are named and measured.
+
+    Attributes:
+        kind: Of the joints.
+        name: Of the variable; with d its rate, with dd its second derivative.
+        word: One coordinate in words.
+        unit: Of a value.
+        display_unit: What people like to see.
+        effort: Name of the variable that drives them.
+        effort_unit: Its unit.
+    """
+
+    kind: JointKind
+    name: str
+    word: str
+    unit: str
+    display_unit: str
+    effort: str
+    effort_unit: str
+
+    def of(self, robot: Chain) -> list[int]:
+        """Return the indices of the coordinates of this kind."""
+        return [k for k, joint in enumerate(robot.moving) if joint.kind == self.kind]
+
+
+TURNING = CoordinateKind("revolute", "phi", "Angle", "rad", "deg", "tau", "N.m")
+SLIDING = CoordinateKind("prismatic", "s", "Way", "m", "mm", "f", "N")
+KINDS = (TURNING, SLIDING)
+
+
+def kinds_of(robot: Chain) -> list[CoordinateKind]:
+    """Return the kinds that an arm has."""
+    return [one for one in KINDS if one.of(robot)]
+
+
+def gathered(robot: Chain, v: Values, names: Mapping[CoordinateKind, str]) -> list[Element]:
+    """Return the elements of the variables of each kind in the arm's order.
+
+    Args:
+        robot: The arm.
+        v: The values of its unit.
+        names: The variable of each kind.
+    """
+    found: dict[int, Element] = {}
+    for one in kinds_of(robot):
+        found |= zip(one.of(robot), getattr(v, names[one]), strict=True)
+    return [found[k] for k in range(len(robot.coordinates))]
+
+
+def values_of(robot: Chain, v: Values, suffix: str = "") -> list[Element]:
+    """Return the coordinates in the arm's order; with suffix "d" their rates, "dd" their accelerations."""
+    return gathered(robot, v, {one: one.name + suffix for one in KINDS})
+
+
+def scattered(robot: Chain, elements: Sequence[Element], suffix: str = "") -> dict[str, tuple[Element, ...]]:
+    """Return elements in the arm's order by the variables of their kinds: the inverse of `values_of`."""
+    return {one.name + suffix: tuple(elements[k] for k in one.of(robot)) for one in kinds_of(robot)}

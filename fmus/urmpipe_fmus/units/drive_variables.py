@@ -1,0 +1,273 @@
+"""The drives of an arm as variables: arrays over its driven and over its held joints, by kind of joint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_fmus.units.coordinates import CoordinateKind, kinds_of
+from urmpipe_fmus.units.dc_drive import SMALLEST
+from urmpipe_fmus.units.drive_controller import NO_SAMPLE
+from urmpipe_fmus.values import Values
+from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.drives.controller import Gains, next_voltage, sample_number, voltage_at
+from urmpipe_models.drives.drive import Drive
+from urmpipe_models.drives.joint_drives import DRIVE_KEYS, GAIN_KEYS, DrivenJoint, HeldJoint
+from urmpipe_models.drives.set_point import JointMotion
+from urmpipe_models.dynamics.driven_arm import (
+    Actuator,
+    ArmState,
+    Motor,
+    MotorRates,
+    Rest,
+    Spring,
+    joint_torques,
+)
+from urmpipe_models.elementwise import Element
+
+_CONSTANTS = {
+    "k": ("Rigidity of the shaft", "{torque}/{way}"),
+    "l": ("Damping of the shaft", "{torque}.s/{way}"),
+    "i_p": ("Gear ratio: turns of the motor for one of the joint", "{ratio}"),
+    "C": ("Motor constant: torque for a current, voltage for a speed", "N.m/A"),
+    "R": ("Resistance of the armature", "Ohm"),
+    "L": ("Inductance of the armature", "H"),
+    "I1": ("Inertia of rotor and gear, reduced to the joint", "{inertia}"),
+    "Kphi": ("Voltage that a sample adds for an error of position", "V/{way}"),
+    "Kw": ("Voltage that a sample adds for an error of velocity", "V.s/{way}"),
+    "Keps": ("Voltage that a sample adds for an error of acceleration", "V.s2/{way}"),
+}
+"""The constants of drive and controller, by the names of robot files: description and unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveGroup:
+    """The drives of all joints of a kind: their variables have names that end in `suffix`.
+
+    Attributes:
+        kind: Of the joints.
+        robot: The arm.
+        driven: By index of the coordinate, each joint with a drive and what holds it at rest.
+        held: By index of the coordinate, each joint with a spring and what holds it at rest.
+    """
+
+    kind: CoordinateKind
+    robot: Chain
+    driven: Mapping[int, tuple[DrivenJoint, Rest]]
+    held: Mapping[int, tuple[HeldJoint, Rest]]
+
+    @property
+    def suffix(self) -> str:
+        """Nothing for joints that turn, "_s" for those that slide."""
+        return "" if self.kind.kind == "revolute" else "_s"
+
+    def parameters(self) -> Iterator[Parameter]:
+        """Yield the constants of the drives and the springs; the periods are fixed."""
+        joints = [one for one, _ in self.driven.values()]
+        gains = dict.fromkeys(GAIN_KEYS, -np.inf)
+        for place, key in enumerate((*DRIVE_KEYS, *GAIN_KEYS)) if joints else ():
+            description, unit = _CONSTANTS[key]
+            yield self._parameter(
+                key,
+                description,
+                self._unit(unit),
+                [float((*one.drive, *one.gains)[place]) for one in joints],
+                gains.get(key, SMALLEST),
+            )
+        if joints:
+            periods = [one.period for one in joints]
+            largest = [one.largest_voltage for one in joints]
+            yield self._parameter("period", "Time between two samples", "s", periods, 1e-6, tunable=False)
+            yield self._parameter("u_max", "Largest voltage", "V", largest, 0.0)
+        if self.held:
+            stiffness = [one.stiffness for one, _ in self.held.values()]
+            damping = [one.damping for one, _ in self.held.values()]
+            rest = [rest.rest for _, rest in self.held.values()]
+            k, l_unit = self._unit("{torque}/{way}"), self._unit("{torque}.s/{way}")
+            yield self._parameter("k_held", "Rigidity of the spring", k, stiffness, SMALLEST, held=True)
+            yield self._parameter("l_held", "Damping of the spring", l_unit, damping, 0.0, held=True)
+            where = "Where the spring gives no torque"
+            yield self._parameter("rest", where, self.kind.unit, rest, -np.inf, held=True)
+
+    def inputs(self) -> Iterator[Input]:
+        """Yield the set points."""
+        kind, starts = self.kind, tuple(float(self.robot.start[k]) for k in self.driven)
+        for dots, per, word in (("", "", "position"), ("d", "/s", "velocity"), ("dd", "/s2", "acceleration")):
+            if starts:
+                yield Input(
+                    name=f"set_{kind.name}{dots}",
+                    description=f"Set {word} {self._of(self.driven)}",
+                    unit=kind.unit + per,
+                    display_unit=kind.display_unit + per,
+                    start=0.0 if dots else starts,
+                    size=len(starts),
+                )
+
+    def computed(self) -> Iterator[Output]:
+        """Yield voltages and torques."""
+        if self.driven:
+            yield Output(
+                name=f"u{self.suffix}",
+                description=f"Voltages of the armatures {self._of(self.driven)}",
+                unit="V",
+                size=len(self.driven),
+            )
+        every = sorted((*self.driven, *self.held))
+        yield Output(
+            name=f"Mk{self.suffix}",
+            description=f"Torques of shafts and springs {self._of(every)}",
+            unit=self.kind.effort_unit,
+            size=len(every),
+        )
+
+    def states(self) -> Iterator[State]:
+        """Yield the states of the drives, which start where they hold the arm."""
+        rests = [one for _, one in self.driven.values()]
+        way, seen = self.kind.unit, self.kind.display_unit
+        for name, description, unit, display_unit, start in (
+            ("theta1", "Angles of the gears' output shafts", way, seen, [one.rest for one in rests]),
+            ("omega1", "Rates of these shafts", f"{way}/s", f"{seen}/s", [0.0 for _ in rests]),
+            ("i_a", "Currents of the armatures", "A", "", [one.current for one in rests]),
+        ):
+            if rests:
+                yield State(
+                    name=f"{name}{self.suffix}",
+                    description=f"{description} {self._of(self.driven)}",
+                    unit=unit,
+                    display_unit=display_unit,
+                    start=tuple(start),
+                    size=len(rests),
+                    output=True,
+                )
+
+    def memories(self) -> Iterator[Memory]:
+        """Yield what the controllers remember."""
+        rests = [one for _, one in self.driven.values()]
+        if rests:
+            yield Memory(
+                name=f"last{self.suffix}",
+                description="Voltages of the samples before",
+                unit="V",
+                start=tuple(one.voltage for one in rests),
+                size=len(rests),
+            )
+            yield Memory(
+                name=f"sample{self.suffix}",
+                description="Numbers of the last samples; before the first -2^53",
+                start=NO_SAMPLE,
+                size=len(rests),
+            )
+
+    def actuators(self, v: Values) -> dict[int, Actuator]:
+        """Return what gives each joint its torque, with the held voltage, by index of the coordinate."""
+        found: dict[int, Actuator] = {}
+        for j, k in enumerate(self.driven):
+            drive = Drive(*(self._read(v, key)[j] for key in DRIVE_KEYS))
+            angle, rate, current, voltage = (
+                self._read(v, name)[j] for name in ("theta1", "omega1", "i_a", "last")
+            )
+            found[k] = Motor(drive, angle, rate, current, voltage)
+        for j, k in enumerate(self.held):
+            stiffness, damping, rest = (self._read(v, key)[j] for key in ("k_held", "l_held", "rest"))
+            found[k] = Spring(stiffness, damping, rest)
+        return found
+
+    def voltages(
+        self, v: Values, q: Sequence[Element], qd: Sequence[Element], qdd: Sequence[Element]
+    ) -> list[Element]:
+        """Return the voltages from the communication point on."""
+        found = []
+        for j, k in enumerate(self.driven):
+            gains = Gains(*(self._read(v, key)[j] for key in GAIN_KEYS))
+            name = f"set_{self.kind.name}"
+            wanted = JointMotion(*(getattr(v, name + dots)[j] for dots in ("", "d", "dd")))
+            last, limit, period, sample = (
+                self._read(v, key)[j] for key in ("last", "u_max", "period", "sample")
+            )
+            fresh = next_voltage(last, gains, wanted, JointMotion(q[k], qd[k], qdd[k]), limit)
+            found.append(voltage_at(v.time, period, sample, fresh, last))
+        return found
+
+    def outputs(self, state: ArmState, voltages: Sequence[Element]) -> dict[str, tuple[Element, ...]]:
+        """Return voltages and torques."""
+        torques = joint_torques(state)
+        found = {f"Mk{self.suffix}": tuple(torques[k] for k in sorted((*self.driven, *self.held)))}
+        return found | ({f"u{self.suffix}": tuple(voltages)} if self.driven else {})
+
+    def derivatives(self, rates: Mapping[int, MotorRates]) -> dict[str, tuple[Element, ...]]:
+        """Return how the states of the drives change, of the rates by index of the coordinate."""
+        own = [rates[k] for k in self.driven]
+        names = ("theta1", "omega1", "i_a") if own else ()
+        return {f"{name}{self.suffix}": tuple(one[place] for one in own) for place, name in enumerate(names)}
+
+    def samples(self, v: Values, voltages: Sequence[Element]) -> dict[str, tuple[Element, ...]]:
+        """Return what the controllers remember from the communication point on."""
+        if not self.driven:
+            return {}
+        numbers = (
+            np.maximum(sample, sample_number(v.time, period))
+            for sample, period in zip(self._read(v, "sample"), self._read(v, "period"), strict=True)
+        )
+        return {f"last{self.suffix}": tuple(voltages), f"sample{self.suffix}": tuple(numbers)}
+
+    def _read(self, v: Values, name: str) -> tuple[Element, ...]:
+        found: tuple[Element, ...] = getattr(v, name + self.suffix)
+        return found
+
+    def _parameter(
+        self,
+        name: str,
+        description: str,
+        unit: str,
+        start: Sequence[float],
+        minimum: float,
+        *,
+        held: bool = False,
+        tunable: bool = True,
+    ) -> Parameter:
+        return Parameter(
+            name=f"{name}{self.suffix}",
+            description=f"{description} {self._of(self.held if held else self.driven)}",
+            unit=unit,
+            start=tuple(start),
+            minimum=minimum,
+            size=len(start),
+            tunable=tunable,
+        )
+
+    def _unit(self, form: str) -> str:
+        turns = self.kind.kind == "revolute"
+        return form.format(
+            torque=self.kind.effort_unit,
+            way=self.kind.unit,
+            ratio="" if turns else "rad/m",
+            inertia="kg.m2" if turns else "kg",
+        )
+
+    def _of(self, indices: Iterable[int]) -> str:
+        return f"of the joints {', '.join(self.robot.coordinates[k] for k in indices)}"
+
+
+def drive_groups(robot: Chain, rests: Sequence[Rest]) -> list[DriveGroup]:
+    """Return the drives and springs of an arm by kind of joint.
+
+    Args:
+        robot: The arm, with one of `drives` for every coordinate.
+        rests: What holds it at rest, in the order of its coordinates.
+    """
+    by_joint = {one.joint: one for one in robot.drives}
+    found = []
+    for kind in kinds_of(robot):
+        driven: dict[int, tuple[DrivenJoint, Rest]] = {}
+        held: dict[int, tuple[HeldJoint, Rest]] = {}
+        for k in kind.of(robot):
+            own = by_joint[robot.coordinates[k]]
+            if isinstance(own, DrivenJoint):
+                driven[k] = own, rests[k]
+            else:
+                held[k] = own, rests[k]
+        found.append(DriveGroup(kind, robot, driven, held))
+    return found

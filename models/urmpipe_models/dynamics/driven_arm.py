@@ -1,0 +1,233 @@
+"""An arm that is turned by flexible drives: all of it as one system of equations.
+
+The state is q and q' of the joints, and of each joint with a drive theta1, theta1' and the current. A joint
+without a drive is held by a spring and a damper.
+
+Source: [Iso9283]_ eq. 14-19.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple, TypeAlias
+
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.drives.drive import (
+    Drive,
+    current_rate,
+    driving_torque,
+    lost_power,
+    shaft_acceleration,
+    shaft_torque,
+    stored_energy,
+)
+from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint
+from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
+from urmpipe_models.dynamics.forward import check_motion, forward_dynamics
+from urmpipe_models.dynamics.inverse import inverse_dynamics
+from urmpipe_models.dynamics.wrench import Wrench, wrench_power
+from urmpipe_models.elementwise import Element
+from urmpipe_models.errors import RobotError
+
+
+class Spring(NamedTuple):
+    """What holds a joint without a drive.
+
+    Attributes:
+        stiffness: k in [N.m/rad] or [N/m].
+        damping: l in [N.m.s/rad] or [N.s/m].
+        rest: Where it gives no torque, in [rad] or [m].
+    """
+
+    stiffness: Element
+    damping: Element
+    rest: Element
+
+
+class Motor(NamedTuple):
+    """The drive of a joint and its state.
+
+    Attributes:
+        drive: The constants.
+        angle: theta1 of the gear's output shaft in [rad] or [m].
+        rate: theta1' in [rad/s] or [m/s].
+        current: i_a in [A].
+        voltage: U in [V].
+    """
+
+    drive: Drive
+    angle: Element
+    rate: Element
+    current: Element
+    voltage: Element
+
+
+Actuator: TypeAlias = Spring | Motor
+"""What gives a joint its torque."""
+
+
+class ArmState(NamedTuple):
+    """An arm and what turns it, at an instant.
+
+    Attributes:
+        q: One element per coordinate, in [rad] or [m].
+        qd: Their rates, in [rad/s] or [m/s].
+        actuators: One per coordinate.
+    """
+
+    q: Sequence[Element]
+    qd: Sequence[Element]
+    actuators: Sequence[Actuator]
+
+
+class MotorRates(NamedTuple):
+    """How the state of a drive changes: theta1' [rad/s], theta1'' [rad/s2], i_a' [A/s]; or with m for rad."""
+
+    angle: Element
+    rate: Element
+    current: Element
+
+
+class Energies(NamedTuple):
+    """What goes into an arm with drives, what it holds, and what becomes heat.
+
+    Attributes:
+        power_in: Of the voltages and of the wrench, in [W].
+        power_lost: Of armatures, shafts and dampers, in [W].
+        stored: Kinetic, potential, elastic and magnetic, in [J].
+    """
+
+    power_in: Element
+    power_lost: Element
+    stored: Element
+
+
+class Rest(NamedTuple):
+    """What holds a joint of an arm at rest against gravity.
+
+    Attributes:
+        rest: Where its spring gives no torque, in [rad] or [m]; of a drive theta1.
+        current: i_a in [A]; 0 without a drive.
+        voltage: U in [V]; 0 without a drive.
+    """
+
+    rest: float
+    current: float
+    voltage: float
+
+
+def joint_torques(state: ArmState) -> list[Element]:
+    """Return what shafts and springs give the joints, Mk of eq. 14 with a held joint's spring at rest.
+
+    Args:
+        state: The arm.
+
+    Returns:
+        One element per coordinate, in [N.m] or [N].
+    """
+    torques = []
+    for one, q, qd in zip(state.actuators, state.q, state.qd, strict=True):
+        if isinstance(one, Motor):
+            torques.append(shaft_torque(one.drive, one.angle, one.rate, q, qd))
+        else:
+            torques.append(one.stiffness * (one.rest - q) - one.damping * qd)
+    return torques
+
+
+def joint_accelerations(chain: Chain, state: ArmState, wrench: Wrench | None = None) -> list[Element]:
+    """Return q'' of eq. 19 in [rad/s2] or [m/s2], one element per coordinate.
+
+    Args:
+        chain: The arm, with masses.
+        state: The arm and what turns it.
+        wrench: What acts on the tool centre point from outside.
+    """
+    return forward_dynamics(chain, state.q, state.qd, joint_torques(state), wrench)
+
+
+def motor_rates(state: ArmState) -> dict[int, MotorRates]:
+    """Return how the drives change, eq. 15 and 18, by index of the coordinates that have any.
+
+    Args:
+        state: The arm and what turns it.
+    """
+    return {
+        k: MotorRates(
+            one.rate,
+            shaft_acceleration(one.drive, one.current, torque),
+            current_rate(one.drive, one.voltage, one.rate, one.current),
+        )
+        for k, (one, torque) in enumerate(zip(state.actuators, joint_torques(state), strict=True))
+        if isinstance(one, Motor)
+    }
+
+
+def energies(chain: Chain, state: ArmState, wrench: Wrench | None = None) -> Energies:
+    """Return the powers and the energy of an arm with its drives: stored' = power_in - power_lost.
+
+    Args:
+        chain: The arm, with masses.
+        state: The arm and what turns it.
+        wrench: What acts on the tool centre point from outside.
+    """
+    stored = kinetic_energy(chain, state.q, state.qd) + potential_energy(chain, state.q)
+    power_in = 0.0 if wrench is None else wrench_power(chain, state.q, state.qd, wrench)
+    power_lost = 0.0
+    for one, q, qd in zip(state.actuators, state.q, state.qd, strict=True):
+        if isinstance(one, Motor):
+            power_in = power_in + one.voltage * one.current
+            power_lost = power_lost + lost_power(one.drive, one.rate, one.current, qd)
+            stored = stored + stored_energy(one.drive, one.angle, one.rate, one.current, q)
+        else:
+            power_lost = power_lost + one.damping * qd * qd
+            stored = stored + 0.5 * one.stiffness * (one.rest - q) * (one.rest - q)
+    return Energies(power_in, power_lost, stored)
+
+
+def at_rest(chain: Chain) -> list[Rest]:
+    """Return what holds an arm at its start pose: shafts twisted by gravity, currents and voltages set.
+
+    theta1 = q + tau / k, i_a = tau / (i_p C), U = R i_a.
+
+    Args:
+        chain: The arm, with masses and a drive or a spring for each coordinate.
+
+    Raises:
+        RobotError: With every joint that has neither, whose voltage does not hold it, or that moves no mass.
+
+    Source: [Iso9283]_ eq. 14-19 with all derivatives 0.
+    """
+    by_joint = {one.joint: one for one in chain.drives}
+    faults = [
+        f"robot {chain.name}: key drives.{name}: not found, allowed: the drive of the joint,"
+        " or { k, l } of a spring that holds it"
+        for name in chain.coordinates
+        if name not in by_joint
+    ]
+    if faults:
+        raise RobotError(*faults)
+    check_motion(chain)
+    still = [0.0] * len(chain.coordinates)
+    torques = inverse_dynamics(chain, list(map(float, chain.start)), still, still)
+    found = [
+        _held(by_joint[name], float(q), float(torque))
+        for name, q, torque in zip(chain.coordinates, chain.start, torques, strict=True)
+    ]
+    for name, rest in zip(chain.coordinates, found, strict=True):
+        own = by_joint[name]
+        if isinstance(own, DrivenJoint) and abs(rest.voltage) > own.largest_voltage:
+            need = f"{abs(rest.voltage):.4g} V to hold the arm at its start"
+            faults.append(
+                f"robot {chain.name}: drives.{name}: needs {need}, allowed: u_max, {own.largest_voltage:g} V"
+            )
+    if faults:
+        raise RobotError(*faults)
+    return found
+
+
+def _held(one: HeldJoint | DrivenJoint, q: float, torque: float) -> Rest:
+    """Return what gives a joint a torque at rest."""
+    if isinstance(one, HeldJoint):
+        return Rest(q + torque / one.stiffness, 0.0, 0.0)
+    current = torque / driving_torque(one.drive, 1.0)
+    return Rest(q + torque / one.drive.stiffness, current, one.drive.resistance * current)
