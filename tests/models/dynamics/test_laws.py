@@ -1,0 +1,251 @@
+"""Laws of the equations of motion that hold for any arm: with slides, mimics, fixed frames, odd axes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from made_masses import body, with_masses
+from sliding_arm import sliding_arm
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
+from urmpipe_models.chains.inertial import Inertial
+from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
+from urmpipe_models.dynamics.forward import check_motion, factors, forward_dynamics, solved
+from urmpipe_models.dynamics.inverse import inverse_dynamics
+from urmpipe_models.dynamics.links import links_of
+from urmpipe_models.dynamics.mass_centres import mass_centres, mass_motions
+from urmpipe_models.dynamics.mass_matrix import mass_matrix
+from urmpipe_models.dynamics.over_log import energies_over_log, terms_over_log, torque_over_log
+from urmpipe_models.dynamics.terms import torque_terms
+from urmpipe_models.dynamics.wrench import Wrench, wrench_power
+from urmpipe_models.errors import RobotError
+from urmpipe_models.kinematics.motion import motions
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.transform import from_offset
+
+ROUNDED = 1e-11
+"""Sums of some thousand products, of values up to some hundred."""
+
+KINDS: tuple[JointKind, ...] = ("revolute", "prismatic", "fixed")
+
+
+def random_arm(seed: int) -> Chain:
+    """Two to five joints of any kind and axis, some of which follow another."""
+    rng = np.random.default_rng(seed)
+    joints: list[Joint] = []
+    for k in range(rng.integers(2, 6)):
+        axis = rng.normal(size=3)
+        x, y, z = (axis / np.linalg.norm(axis)).tolist() if rng.random() < 0.5 else np.eye(3)[k % 3].tolist()
+        kind = KINDS[rng.choice(3, p=[0.6, 0.25, 0.15])]
+        leaders = [one.name for one in joints if one.kind != "fixed" and one.mimic is None]
+        follows = leaders and kind != "fixed" and rng.random() < 0.3
+        mimic = Mimic(rng.choice(leaders), float(rng.normal()), 0.2) if follows else None
+        joints.append(Joint(f"j{k}", kind, from_offset(rng.normal(size=6)), (x, y, z), mimic=mimic))
+    if not any(one.kind != "fixed" for one in joints):
+        joints[0] = replace(joints[0], kind="revolute")
+    chain = Chain("random", tuple(joints), tip=from_offset(rng.normal(size=6)))
+    chain = replace(chain, gravity=tuple(rng.normal(size=3).tolist()))
+    return with_masses(chain.placed(from_offset(rng.normal(size=6))), seed)
+
+
+def random_state(chain: Chain, seed: int, count: int = 3) -> FloatArray:
+    """Some sets of numbers, one a coordinate: shape (count, coordinates)."""
+    return np.random.default_rng(seed + 1).normal(size=(count, len(chain.coordinates)))
+
+
+SEEDS = st.integers(0, 10**6)
+
+
+@settings(max_examples=50, deadline=None)
+@given(SEEDS)
+def test_the_power_of_the_torques_is_the_change_of_the_energy(seed: int) -> None:
+    """tau . q' = dT/dt + dU/dt + what the tool takes, by a complex step along the motion."""
+    chain = random_arm(seed)
+    q, qd, qdd = random_state(chain, seed)
+    wrench = Wrench((1.0, -2.0, 3.0), (0.5, 0.2, -0.4))
+    tau = inverse_dynamics(chain, q, qd, qdd, wrench)
+    step = 1e-20j  # of a complex step the difference is exact to rounding
+    moved, faster = q + step * qd, qd + step * qdd
+    change = np.imag(kinetic_energy(chain, moved, faster) + potential_energy(chain, moved)) / 1e-20
+    power = np.dot(tau, qd) + wrench_power(chain, q, qd, wrench)
+    assert power == pytest.approx(change, rel=ROUNDED, abs=ROUNDED * (1.0 + np.abs(tau) @ np.abs(qd)))
+
+
+@settings(max_examples=50, deadline=None)
+@given(SEEDS)
+def test_mass_matrix_terms_and_recursion_are_one_equation(seed: int) -> None:
+    chain = random_arm(seed)
+    q, qd, qdd = random_state(chain, seed)
+    wrench = Wrench((1.0, -2.0, 3.0), (0.5, 0.2, -0.4))
+    terms = torque_terms(chain, q, qd, qdd, wrench)
+    total = np.array(inverse_dynamics(chain, q, qd, qdd, wrench), dtype=float)
+    size = ROUNDED * (1.0 + np.abs(np.array(terms, dtype=float)).sum())
+    np.testing.assert_allclose(np.sum(terms, axis=0), total, rtol=0.0, atol=size)
+    M = np.array(mass_matrix(chain, q), dtype=float)
+    np.testing.assert_array_equal(M, M.T)
+    np.testing.assert_allclose(M @ qdd, np.array(terms.inertia, dtype=float), rtol=0.0, atol=size)
+    energy = kinetic_energy(chain, q, qd)
+    assert 0.5 * qd @ M @ qd == pytest.approx(energy, rel=ROUNDED)
+
+
+@settings(max_examples=50, deadline=None)
+@given(SEEDS)
+def test_centrifugal_is_what_squares_and_coriolis_what_products_of_rates_need(seed: int) -> None:
+    chain = random_arm(seed)
+    q, qd, _ = random_state(chain, seed)
+    still, count = np.zeros_like(q), len(q)
+
+    def of_rates(rates: FloatArray) -> FloatArray:
+        """What rates need without gravity."""
+        free = replace(chain, gravity=(0.0, 0.0, 0.0))
+        return np.array(inverse_dynamics(free, q, rates, still), dtype=float)
+
+    alone = [of_rates(np.where(np.arange(count) == k, qd, 0.0)) for k in range(count)]
+    terms = torque_terms(chain, q, qd, still)
+    size = ROUNDED * (1.0 + np.abs(alone).sum())
+    np.testing.assert_allclose(np.array(terms.centrifugal, float), np.sum(alone, axis=0), atol=size)
+    products = of_rates(qd) - np.sum(alone, axis=0)
+    np.testing.assert_allclose(np.array(terms.coriolis, float), products, atol=10.0 * size)
+
+
+@settings(max_examples=30, deadline=None)
+@given(SEEDS)
+def test_centres_move_as_points_of_the_chain_do(seed: int) -> None:
+    """A mass at the tool centre point, and omega, as the kinematics have them."""
+    chain = random_arm(seed)
+    q, qd, _ = random_state(chain, seed)
+    last = chain.joints[-1].name
+    tool = (chain.tip @ chain.tool).translation
+    carrying = replace(chain, inertials=(Inertial(last, 1.0, tool),))
+    *_, motion = motions(chain, q, qd, [0.0] * len(q))
+    (found,) = mass_motions(carrying, q, qd)
+    np.testing.assert_allclose(found.centre, motion.pose.translation, atol=ROUNDED)
+    np.testing.assert_allclose(found.velocity, motion.velocity, atol=ROUNDED)
+    assert np.linalg.norm(found.omega) == pytest.approx(np.linalg.norm(motion.omega), abs=ROUNDED)
+    (centre,) = mass_centres(carrying, q)
+    np.testing.assert_array_equal(centre, found.centre)
+
+
+@settings(max_examples=30, deadline=None)
+@given(SEEDS)
+def test_forward_dynamics_undo_the_inverse(seed: int) -> None:
+    chain = random_arm(seed)
+    try:
+        check_motion(chain)
+    except RobotError:  # slides along one line, with no mass between them
+        return
+    q, qd, tau = random_state(chain, seed)
+    wrench = Wrench((1.0, -2.0, 3.0), (0.5, 0.2, -0.4))
+    qdd = forward_dynamics(chain, q, qd, tau, wrench)
+    again = inverse_dynamics(chain, q, qd, qdd, wrench)
+    condition = np.linalg.cond(np.array(mass_matrix(chain, q), dtype=float))
+    np.testing.assert_allclose(again, tau, atol=1e-14 * condition * (1.0 + np.abs(qdd).max()))
+
+
+def test_the_base_turns_the_arm_under_gravity() -> None:
+    chain = with_masses(load_robot("ur5e"))
+    q, qd, qdd = random_state(chain, 3)
+    turned = chain.placed(from_offset((1.0, 2.0, 3.0, 0.4, -0.8, 1.2)))
+    back = from_offset((1.0, 2.0, 3.0, 0.4, -0.8, 1.2)).inverse()
+    pulled = replace(chain, gravity=back.rotate((0.0, 0.0, -9.81)), base=from_offset((0.0, 0.0, 0.0)))
+    here, there = (inverse_dynamics(one, q, qd, qdd) for one in (turned, replace(pulled)))
+    np.testing.assert_allclose(here, there, rtol=1e-12)  # the same arm seen from another frame
+
+
+def test_bodies_that_are_fixed_to_one_frame_are_one_body() -> None:
+    chain = load_robot("urm6")
+    rng = np.random.default_rng(4)
+    some = [body("phi3", rng), body("effector", rng), body("phi6", rng)]
+    links = links_of(replace(chain, inertials=tuple(some))).links
+    assert [link.mass for link in links] == [0.0, 0.0, some[0].mass, 0.0, 0.0, some[1].mass + some[2].mass]
+
+
+def test_long_logs_are_as_each_row() -> None:
+    chain = with_masses(load_robot("urm6"))
+    rng = np.random.default_rng(5)
+    q, qd, qdd = rng.normal(size=(3, 40_000, 6))  # more than two blocks
+    tau, terms = torque_over_log(chain, q, qd, qdd), terms_over_log(chain, q, qd, qdd)
+    np.testing.assert_allclose(sum(terms.values()), tau, atol=1e-11)
+    kinetic, potential = energies_over_log(chain, q, qd)
+    for k in (0, 20_000, 39_999):
+        np.testing.assert_array_equal(tau[k], inverse_dynamics(chain, q[k], qd[k], qdd[k]))
+        assert kinetic[k] == kinetic_energy(chain, q[k], qd[k])
+        assert potential[k] == potential_energy(chain, q[k])
+
+
+def test_energy_is_kept_over_ten_seconds() -> None:
+    """urm6 swings from its side without friction: 1e-8 of the energy it swings with."""
+    chain = with_masses(load_robot("urm6"))
+    start = np.concatenate((np.full(6, 0.5), np.linspace(-1.0, 1.0, 6)))
+
+    def rates(_t: float, x: FloatArray) -> FloatArray:
+        return np.concatenate((x[6:], forward_dynamics(chain, x[:6], x[6:], [0.0] * 6)))
+
+    found = solve_ivp(rates, (0.0, 10.0), start, "DOP853", rtol=1e-12, atol=1e-12)
+    kinetic, potential = energies_over_log(
+        chain, np.ascontiguousarray(found.y[:6].T), np.ascontiguousarray(found.y[6:].T)
+    )
+    total = kinetic + potential
+    assert np.ptp(kinetic) > 5.0  # it swings
+    assert np.abs(total - total[0]).max() <= 1e-8 * np.ptp(kinetic)
+
+
+@settings(max_examples=50, deadline=None)
+@given(SEEDS, st.integers(1, 7))
+def test_factors_solve_positive_definite_systems(seed: int, size: int) -> None:
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(size, size))
+    matrix, right = root @ root.T + 0.1 * np.eye(size), rng.normal(size=size)
+    lower, pivots = factors(matrix.tolist())
+    full = np.eye(size)
+    for i, row in enumerate(lower):
+        full[i, :i] = row
+    np.testing.assert_allclose(full @ np.diag(pivots) @ full.T, matrix, atol=1e-12)
+    found = solved(matrix.tolist(), right.tolist())
+    np.testing.assert_allclose(matrix @ found, right, atol=1e-13 * np.linalg.cond(matrix))
+
+
+NEEDS_MASS = "so that its motion cannot be solved; allowed: an inertial that only this joint moves"
+
+
+def test_joints_that_move_no_mass_are_named() -> None:
+    chain = Chain(
+        "bare",
+        (
+            Joint("turn", axis=(0.0, 0.0, 1.0)),
+            Joint("again", axis=(0.0, 0.0, 1.0)),
+            Joint("slide", "prismatic", axis=(1.0, 0.0, 0.0)),
+            Joint("spin", axis=(1.0, 0.0, 0.0)),
+        ),
+        inertials=(Inertial("slide", 1.0, (0.5, 0.0, 0.0)),),
+    )
+    with pytest.raises(RobotError) as error:
+        check_motion(chain)
+    assert str(error.value).splitlines() == [
+        f"robot bare: joint {name}: moves no mass of its own, {NEEDS_MASS}" for name in ("again", "spin")
+    ]
+    check_motion(with_masses(sliding_arm()))
+
+
+def test_an_arm_without_masses_says_which_key_is_missing() -> None:
+    chain = load_robot("urm6")
+    still = [0.0] * 6
+    for ask in (
+        lambda: inverse_dynamics(chain, still, still, still),
+        lambda: mass_matrix(chain, still),
+        lambda: forward_dynamics(chain, still, still, still),
+        lambda: torque_terms(chain, still, still, still),
+        lambda: kinetic_energy(chain, still, still),
+        lambda: check_motion(chain),
+    ):
+        with pytest.raises(RobotError) as error:
+            ask()
+        assert str(error.value) == (
+            "robot urm6: key inertials: found none, allowed: the masses of the arm (in a URDF <inertial>)"
+        )
