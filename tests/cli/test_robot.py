@@ -18,6 +18,7 @@ from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.robots.robot_file import chain_from_dict
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_models.robots.urdf_writer import write_urdf
+from urmpipe_pipeline.palette import MASS_COLOUR
 from urmpipe_pipeline.projections import FRONT, SIDEWAYS, Sketch, chain_spots, projected
 
 NAMES = list(robot_names())
@@ -76,6 +77,49 @@ def test_show_tells_what_limits_rates(urmpipe: Any, tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
+HEAVY = """
+kind = "joints"
+gravity = [0, 9.81, 0]
+left_out = ["finger"]
+joints = [{ name = "turn", effort = 150 }, { name = "slide", kind = "prismatic", effort = 20.5 }]
+inertials = [
+    { mass = 1.5 },
+    { joint = "turn", mass = 2, centre = [0, 0, 0.1], inertia = [2, 2, 3, 1, 0, 0], source = "CAD" },
+]
+drives.turn = { k = 2500, l = 5, i_p = 100, C = 0.05, R = 0.5, L = 0.001, I1 = 0.5, period = 0.005, \
+Kphi = 7.5, Kw = 0.75, Keps = 0.01, u_max = 48 }
+drives.slide = { k = 3000, l = 0 }
+""".replace("\\\n", "")
+
+
+def test_show_tells_masses_gravity_efforts_and_drives(urmpipe: Any, tmp_path: Path) -> None:
+    (tmp_path / "arm.toml").write_text(HEAVY, encoding="utf-8")
+    ran = urmpipe("robot", "show", "arm.toml")
+    assert (ran.code, ran.err) == (
+        0, "warning: the mass of finger is left out: this link moves by a joint of its own\n",
+    )  # fmt: skip
+    lines = [" ".join(line.split()) for line in ran.out.splitlines()]
+    assert "Gravity: 0, 9.81, 0 m/s²" in lines
+    assert "turn revolute 0, 0, 1 no limit no limit 150 N.m 0 deg" in lines
+    assert "slide prismatic 0, 0, 1 no limit no limit 20.5 N 0 m" in lines
+    first = lines.index("Masses; 3.5 kg in all")
+    assert lines[first + 2] == "Joint Mass [kg] Centre x, y, z [m] Principal moments [kg.m²] Source"
+    assert lines[first + 4] == "base 1.5 0, 0, 0 0, 0, 0"
+    assert lines[first + 5] == "turn 2 0, 0, 0.1 1, 3, 3 CAD"
+    assert "slide held k = 3000, l = 0" in lines
+    first = lines.index("Drives; constants in SI")
+    assert " ".join(lines[first + 4 : first + 6]) == (
+        "turn driven k = 2500, l = 5, i_p = 100, C = 0.05, R = 0.5, L = 0.001, I1 = 0.5, period = 0.005,"
+        " Kphi = 7.5, Kw = 0.75, Keps = 0.01, u_max = 48"
+    )
+    answer = json.loads(urmpipe("robot", "show", "arm.toml", "--json").out)
+    assert (answer["gravity"], answer["left_out"]) == ([0.0, 9.81, 0.0], ["finger"])
+    assert answer["inertials"][0] == {"mass": 1.5, "centre": [0.0] * 3, "inertia": [0.0] * 6}
+    assert answer["drives"]["slide"] == {"k": 3000.0, "l": 0.0}
+    light = urmpipe("robot", "show", "urm6").out
+    assert not any(word in light for word in ("Gravity", "Masses", "Effort", "Drives"))
+
+
 def test_show_as_json_is_the_chain_and_its_points(urmpipe: Any) -> None:
     ran = urmpipe("robot", "show", "ur5e", "--q", "0,0,0,0,0,0", "--tool", "0,0,0.1", "--json")
     answer = json.loads(ran.out)
@@ -116,6 +160,14 @@ def test_show_draws_a_picture_and_replaces_only_its_own(urmpipe: Any, tmp_path: 
         " export to replace\n"
     )
     assert picture.read_text(encoding="utf-8") == "mine"
+
+
+def test_a_picture_has_the_mass_centres(urmpipe: Any, tmp_path: Path) -> None:
+    for name, dots in (("ur10", True), ("urm6", False)):
+        assert urmpipe("robot", "show", name, "--picture", f"{name}.svg", "-q").code == 0
+        drawn = (tmp_path / f"{name}.svg").read_text(encoding="utf-8")
+        assert ("mass centres, as large as balls of one density: " in drawn) == dots
+        assert (MASS_COLOUR in drawn) == dots
 
 
 @pytest.mark.parametrize(

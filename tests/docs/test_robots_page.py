@@ -14,9 +14,12 @@ import pytest
 from pages import lay_files, snippets, text_of
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.chains.visual import Box, Cylinder
+from urmpipe_models.drives.joint_drives import HeldJoint
 from urmpipe_models.errors import RobotError
+from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.robot_file import read_robot_file
+from urmpipe_models.transform import rotation_y
 
 PAGE = text_of("docs/robots.md")
 EXAMPLES = {re.findall(r'name = "(.*?)"|$', one)[0]: one for one in snippets("docs/robots.md", "toml")}
@@ -30,6 +33,8 @@ base = {{ unheard = 1, steps = [{{ unheard = 1 }}, {{ along = "x", unheard = 1 }
 tool = {{ unheard = 1 }}
 tip = {{ unheard = 1 }}
 visuals = [{{ unheard = 1, origin = {{ unheard = 1 }} }}, {{ mesh = "a.stl", unheard = 1 }}]
+inertials = [{{ unheard = 1 }}]
+drives = {{ q1 = {{ unheard = 1 }} }}
 """
 """A key that is none in every table that a kind may have."""
 
@@ -74,7 +79,8 @@ def test_every_kind_is_on_the_page(read: Callable[[str], Chain]) -> None:
     with pytest.raises(RobotError, match="allowed: one of ") as caught:
         read('kind = "none"')
     assert str(caught.value).partition("one of ")[2].split(", ") == kinds()
-    assert [re.findall(r'kind = "(\w+)"', one)[0] for one in EXAMPLES.values()] == kinds()
+    shown = [re.findall(r'kind = "(\w+)"', one)[0] for one in EXAMPLES.values()]
+    assert shown == [*kinds(), "joints"]  # the last one is the arm with masses
 
 
 @pytest.mark.parametrize("kind", kinds())
@@ -90,6 +96,7 @@ def test_the_keys_of_a_kind_are_those_that_are_read(read: Callable[[str], Chain]
     assert known(caught.value, "base.steps[1].") == keys_of(every, "key of `steps`") - {"about"}
     shapes = known(caught.value, "visuals[0].") | known(caught.value, "visuals[1].")
     assert shapes == keys_of(visuals, "key of `visuals`")
+    assert known(caught.value, "inertials[0].") == keys_of(section("Masses"), "key of `inertials`")
     limits = keys_of(every, "key of `limits`") if "limits" in keys_of(own, "key") else set()
     assert known(caught.value, "limits.") == limits
     assert known(caught.value, "joints[0].") == keys_of(own, "key of `joints`")
@@ -149,14 +156,23 @@ EXPECTED: dict[str, dict[str, Any]] = {
         "velocity": [2, 2, 0.5],
         "tool": (0, 0, 0.15),
     },
+    "parallelogram-arm": {
+        "coordinates": ("theta1", "theta2", "theta3", "theta4"),
+        "start": (0, 0, 0, 0),
+        "lower": [-math.inf, -40 * TURN, -40 * TURN, 0],
+        "upper": [math.inf, 60 * TURN, 60 * TURN, 0],
+        "velocity": [math.inf] * 4,
+        "effort": [700, 900, 900, math.inf],
+        "tool": (0, 0, 0),
+    },
 }
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_is_the_arm_that_it_says(read: Callable[[str], Chain], name: str) -> None:
-    chain, expected = read(EXAMPLES[name]), {"acceleration": math.inf} | EXPECTED[name]
+    chain, expected = read(EXAMPLES[name]), {"acceleration": math.inf, "effort": math.inf} | EXPECTED[name]
     assert (chain.name, chain.coordinates) == (name or "arm", expected["coordinates"])
-    for key in ("lower", "upper", "velocity", "acceleration"):
+    for key in ("lower", "upper", "velocity", "acceleration", "effort"):
         np.testing.assert_allclose([getattr(one, key) for one in chain.moving], expected[key], rtol=1e-15)
     np.testing.assert_allclose(chain.start, expected["start"], rtol=1e-15)
     assert chain.tool.translation == expected["tool"]
@@ -172,6 +188,23 @@ def test_a_finger_follows_the_other_and_shapes_are_in_the_units_of_the_file(
     shapes = [visual.shape for visual in chain.visuals]
     assert shapes == [Box((0.2, 0.2, 0.02)), Cylinder(0.03, 0.3)]
     assert chain.visuals[1].origin.translation == (0.0, 0.0, 0.15)
+
+
+def test_the_parallelogram_turns_forearm_and_counterweight_by_the_angle_to_the_ground(
+    read: Callable[[str], Chain],
+) -> None:
+    chain = read(EXAMPLES["parallelogram-arm"])
+    assert [one.source for one in chain.inertials] == [
+        "column", "counterweight", "upper arm", "forearm", "wrist",
+    ]  # fmt: skip
+    assert chain.drives == (HeldJoint("theta4", 2500.0, 20.0),)
+    q = (0.0, 0.3, 0.2, 0.0)
+    crank, uncrank, upper, undone, forearm, level = forward(chain, q)[1:7]
+    turned = (rotation_y(angle).rotation for angle in (0.2, 0.0, 0.3, 0.0, 0.2, 0.0))
+    for pose, rotation in zip((crank, uncrank, upper, undone, forearm, level), turned, strict=True):
+        np.testing.assert_allclose(pose.rotation, rotation, rtol=0.0, atol=1e-15)  # rounding
+    end = (math.sin(0.3) + 1.1 * math.cos(0.2) + 0.2, 0.0, 0.8 + math.cos(0.3) - 1.1 * math.sin(0.2))
+    np.testing.assert_allclose(forward(chain, q)[-1].translation, end, rtol=0.0, atol=1e-15)
 
 
 def test_the_urdf_of_the_page_is_an_arm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
 from urmpipe_models.chains.dh import DHRow
+from urmpipe_models.chains.inertial import Inertial
+from urmpipe_models.drives.controller import Gains
+from urmpipe_models.drives.drive import Drive
+from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint, JointDrive
 from urmpipe_models.transform import Transform, from_offset
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
@@ -54,7 +60,8 @@ def drawn_joint(draw: DrawFn, name: str, leaders: list[str]) -> Joint:
     if leaders and bool(draw(one_in_four)):
         mimic = Mimic(draw(st.sampled_from(leaders)), draw(lengths), draw(lengths))
     lower, upper = draw(limits)
-    return Joint(name, kind, draw(frames), draw(axes), lower, upper, draw(rates), draw(rates), mimic)
+    most = draw(rates), draw(rates), draw(rates)
+    return Joint(name, kind, draw(frames), draw(axes), lower, upper, *most, mimic)
 
 
 @st.composite
@@ -73,6 +80,43 @@ def random_chains(draw: DrawFn) -> Chain:
     return Chain(name, tuple(chosen), tip, base, tool, start, description, source)
 
 
+points = st.tuples(st.floats(0.01, 5.0), lengths, lengths, lengths)
+above_zero = st.floats(1e-6, 1e4)
+
+
+@st.composite
+def inertials(draw: DrawFn, joint: str | None) -> Inertial:
+    """The mass and inertia of three points about the origin, at a centre of its own."""
+    masses, xs, ys, zs = np.array([draw(points) for _ in range(3)]).T
+    xx, yy, zz, xy, xz, yz = (
+        float((masses * a * b).sum()) for a, b in ((xs, xs), (ys, ys), (zs, zs), (xs, ys), (xs, zs), (ys, zs))
+    )
+    inertia = (yy + zz, xx + zz, xx + yy, -xy, -xz, -yz)
+    centre = draw(lengths), draw(lengths), draw(lengths)
+    return Inertial(joint, float(masses.sum()), centre, inertia, draw(texts))
+
+
+@st.composite
+def drives(draw: DrawFn, joint: str) -> JointDrive:
+    """A joint that is held, or one with a drive and a controller."""
+    if draw(st.booleans()):
+        return HeldJoint(joint, draw(above_zero), draw(above_zero))
+    drive, gains = Drive(*(draw(above_zero) for _ in range(7))), Gains(*(draw(lengths) for _ in range(3)))
+    return DrivenJoint(joint, drive, draw(above_zero), gains, draw(above_zero))
+
+
+@st.composite
+def random_heavy_chains(draw: DrawFn) -> Chain:
+    """A random chain with up to two masses on its base and each of its joints, and some drives."""
+    chain = draw(random_chains())
+    carriers = [None, *(joint.name for joint in chain.joints)]
+    masses = [draw(inertials(one)) for one in carriers for _ in range(draw(st.integers(0, 2)))]
+    driven = [draw(drives(one)) for one in chain.coordinates if draw(st.booleans())]
+    left_out = tuple(draw(st.lists(texts, max_size=2)))
+    gravity = draw(lengths), draw(lengths), draw(lengths)
+    return replace(chain, inertials=tuple(masses), gravity=gravity, left_out=left_out, drives=tuple(driven))
+
+
 dh_row = st.builds(DHRow, theta=angles, d=lengths, a=lengths, alpha=angles, kind=kinds)
 random_dh_rows = st.lists(dh_row, min_size=1, max_size=7)
 """One to seven rows of DH parameters, prismatic joints among them."""
@@ -81,6 +125,11 @@ random_dh_rows = st.lists(dh_row, min_size=1, max_size=7)
 @pytest.fixture(scope="session")
 def chains() -> SearchStrategy[Chain]:
     return random_chains()
+
+
+@pytest.fixture(scope="session")
+def heavy_chains() -> SearchStrategy[Chain]:
+    return random_heavy_chains()
 
 
 @pytest.fixture(scope="session")

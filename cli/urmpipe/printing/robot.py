@@ -12,9 +12,12 @@ from numpy.typing import NDArray
 
 from urmpipe.printing.terminal import new_console, new_table
 from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.inertial import GRAVITY
 from urmpipe_models.chains.parameters import Parameter, parts_of
+from urmpipe_models.drives.joint_drives import HeldJoint
 from urmpipe_models.inverse.closed.closed_form import closed_form, method_words
 from urmpipe_models.kinematics.forward import forward, points_over_log
+from urmpipe_models.robots.robot_drives import drive_to_dict
 from urmpipe_models.robots.robot_file import chain_to_dict
 from urmpipe_models.transform import Transform, euler_zyx, rpy_of
 
@@ -102,14 +105,20 @@ def print_robots(robots: Sequence[Chain]) -> None:
 
 
 def print_chain(posed: PosedChain) -> None:
-    """Print an arm's parameters and joints, and where its points are."""
+    """Print an arm's parameters, joints, masses and drives, and where its points are."""
     console, chain = new_console(), posed.chain
     console.print(posed.title, soft_wrap=True)
     if chain.source:
         console.print(f"Source: {chain.source}", soft_wrap=True)
     console.print(f"Inverse: {method_words(posed.inverse)}", soft_wrap=True)
+    if chain.gravity != GRAVITY:
+        console.print(f"Gravity: {_figures(chain.gravity)} m/s²", soft_wrap=True)
     console.print(_parameters(chain))
     console.print(_joints(posed))
+    if chain.inertials:
+        console.print(_masses(chain))
+    if chain.drives:
+        console.print(_drives(chain))
     console.print(_points(posed))
 
 
@@ -134,13 +143,45 @@ def _value(one: Parameter) -> str:
     return f"{_figure(one.value)} m" if one.kind == "along" else f"{_figure(math.degrees(one.value))} deg"
 
 
+COLUMNS = {"velocity": "Speed", "acceleration": "Acceleration", "effort": "Effort"}
+"""The limits of a joint that have a column of their own; all but the speed only where one is known."""
+
+PER = {"velocity": "s", "acceleration": "s²"}
+"""What a rate of a joint is counted by."""
+
+
 def _joints(posed: PosedChain) -> Table:
-    known = any(math.isfinite(joint.acceleration) for joint in posed.chain.joints)
-    rates = ("Speed", "Acceleration")[: 1 + known]
-    table = new_table("Joint", "Kind", "Axis", "Limits", *rates, "q", title="Joints")
+    joints = posed.chain.joints
+    shown = [
+        key for key in COLUMNS if key == "velocity" or any(math.isfinite(getattr(one, key)) for one in joints)
+    ]
+    columns = (COLUMNS[key] for key in shown)
+    table = new_table("Joint", "Kind", "Axis", "Limits", *columns, "q", title="Joints")
     values = dict(zip(posed.chain.coordinates, posed.q, strict=True))
-    for joint in posed.chain.joints:
-        table.add_row(joint.name, _kind(joint), *_motion(joint, values, len(rates)))
+    for joint in joints:
+        table.add_row(joint.name, _kind(joint), *_motion(joint, values, shown))
+    return table
+
+
+def _masses(chain: Chain) -> Table:
+    total = sum(float(one.mass) for one in chain.inertials)
+    table = new_table(
+        "Joint", "Mass [kg]", "Centre x, y, z [m]", "Principal moments [kg.m²]", "Source",
+        title=f"Masses; {_figure(total)} kg in all",
+    )  # fmt: skip
+    for one in chain.inertials:
+        ixx, iyy, izz, ixy, ixz, iyz = one.inertia
+        moments = np.linalg.eigvalsh([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) + 0.0
+        principal = ", ".join(f"{moment:.4g}" for moment in moments)
+        table.add_row(one.joint or "base", _figure(one.mass), _figures(one.centre), principal, one.source)
+    return table
+
+
+def _drives(chain: Chain) -> Table:
+    table = new_table("Joint", "Kind", "Constants", title="Drives; constants in SI")
+    for one in chain.drives:
+        constants = ", ".join(f"{key} = {value:.6g}" for key, value in drive_to_dict(one).items())
+        table.add_row(one.joint, "held" if isinstance(one, HeldJoint) else "driven", constants)
     return table
 
 
@@ -158,17 +199,23 @@ def _kind(joint: Joint) -> str:
     return f"{joint.kind}, {_figure(joint.mimic.multiplier)} x {joint.mimic.joint}"
 
 
-def _motion(joint: Joint, values: dict[str, float], rates: int) -> tuple[str, ...]:
-    """Return axis, limits, speed, with two rates acceleration, and coordinate of a moving joint."""
+def _motion(joint: Joint, values: dict[str, float], rates: Sequence[str]) -> tuple[str, ...]:
+    """Return axis, limits, the largest of some rates and efforts, and coordinate of a moving joint."""
     if joint.kind == "fixed":
         return ()
     unit, factor = ("m", 1.0) if joint.kind == "prismatic" else ("deg", 180.0 / math.pi)
     value = f"{_figure(values[joint.name] * factor)} {unit}" if joint.name in values else ""
-    largest = (
-        f"{_figure(most * factor)} {unit}/{per}" if math.isfinite(most) else "no limit"
-        for most, per in ((joint.velocity, "s"), (joint.acceleration, "s²"))[:rates]
-    )
+    largest = (_largest(joint, key, unit, factor) for key in rates)
     return _figures(joint.axis), _limits(joint, unit, factor), *largest, value
+
+
+def _largest(joint: Joint, key: str, unit: str, factor: float) -> str:
+    most = getattr(joint, key)
+    if not math.isfinite(most):
+        return "no limit"
+    if key == "effort":
+        return f"{_figure(most)} {'N' if joint.kind == 'prismatic' else 'N.m'}"
+    return f"{_figure(most * factor)} {unit}/{PER[key]}"
 
 
 def _limits(joint: Joint, unit: str, factor: float) -> str:

@@ -29,6 +29,7 @@ class DHRow:
         upper: Largest coordinate allowed, in [rad] or [m].
         velocity: Largest speed, in [rad/s] or [m/s].
         acceleration: Largest acceleration either way, in [rad/s2] or [m/s2].
+        effort: Largest torque or force either way, in [N.m] or [N].
     """
 
     theta: Element = 0.0
@@ -41,6 +42,7 @@ class DHRow:
     upper: float = math.inf
     velocity: float = math.inf
     acceleration: float = math.inf
+    effort: float = math.inf
 
 
 def dh_chain(
@@ -154,6 +156,7 @@ def _joints(rows: Sequence[DHRow], origins: Sequence[Transform]) -> tuple[Joint,
             upper=row.upper,
             velocity=row.velocity,
             acceleration=row.acceleration,
+            effort=row.effort,
         )
         for name, row, origin in zip(_names(rows), rows, origins, strict=True)
     )

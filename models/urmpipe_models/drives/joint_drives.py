@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeAlias
 
 from urmpipe_models.drives.controller import Gains
@@ -45,10 +45,15 @@ class DrivenJoint:
     """
 
     joint: str
-    drive: Drive
+    drive: Drive = field(metadata={"stored": tuple[float, ...]})
     period: float
-    gains: Gains
+    gains: Gains = field(metadata={"stored": tuple[float, ...]})
     largest_voltage: float
+
+    def __post_init__(self) -> None:
+        """Make drive and gains of the plain numbers that a recording gives."""
+        object.__setattr__(self, "drive", Drive(*self.drive))
+        object.__setattr__(self, "gains", Gains(*self.gains))
 
     def faults(self) -> Iterator[str]:
         """Yield which constants no drive has; gains may have any sign (see `drive_controller`)."""

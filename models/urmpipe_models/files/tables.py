@@ -135,6 +135,13 @@ class Table:
             value = {}
         return Table(value, self.faults, self._file, f"{self.place}{key}.")
 
+    def named_tables(self, key: str) -> dict[str, Table]:
+        """Return the tables in the table under a key, by their names; none where it is missing."""
+        outer = self.table(key)
+        named = {name: outer.table(name) for name in outer._data}
+        outer.close()
+        return named
+
     def tables(self, key: str) -> list[Table]:
         """Return the tables of a list; the key is required."""
         value = self._get(key)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,9 +15,9 @@ from urmpipe_models.chains.dh import DHRow, dh_chain, modified_dh_chain
 from urmpipe_models.chains.urm import urm_chain
 from urmpipe_models.errors import Finding, RobotError
 from urmpipe_models.files.tables import Table
-from urmpipe_models.files.toml_text import parse_toml, toml_lines
+from urmpipe_models.files.toml_text import parse_toml, toml_lines, toml_text
+from urmpipe_models.robots.carried import carried_to_dict, own_faults, read_carried
 from urmpipe_models.robots.robot_frames import Units, frame_to_dict, read_frame
-from urmpipe_models.robots.robot_visuals import read_visual, visual_to_dict
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_models.robots.written import EXPORT_MARK
 
@@ -29,12 +29,13 @@ Build: TypeAlias = Callable[[str], Chain]
 
 
 class _Limits(NamedTuple):
-    """Limits of a joint in [rad] or [m], its largest speed and acceleration in these a second or s2."""
+    """Limits of a joint in [rad] or [m], its rates in these a second or s2, its effort in [N.m] or [N]."""
 
     lower: float = -math.inf
     upper: float = math.inf
     velocity: float = math.inf
     acceleration: float = math.inf
+    effort: float = math.inf
 
 
 def read_robot_file(path: str | Path) -> Chain:
@@ -45,18 +46,23 @@ def read_robot_file(path: str | Path) -> Chain:
     tables `[base]` and `[tool]` with `translation` and `rpy` (or `rotation`, three rows). By kind:
 
     - urm: `lengths`, `tilts`, `directions`; `[limits]` with `lower`, `upper`, `velocity`, `acceleration`,
-      each one number or one a moving joint.
+      `effort`, each one number or one a moving joint.
     - dh, modified_dh: `[[joints]]` with `name`, `kind` (fixed: a frame without a coordinate), `theta`, `d`,
       `a`, `alpha`; `[limits]`.
     - articulated6r: `lengths` l0..l4 (see `articulated_6r`); `[limits]`.
     - joints: `[[joints]]` with `name`, `kind`, `origin`, `axis`, `lower`, `upper`, `velocity`,
-      `acceleration`, `mimic`; `[tip]`. A mimic has `joint`, `offset` and `multiplier`, the last in rad and
-      m always.
+      `acceleration`, `effort`, `mimic`; `[tip]`. A mimic has `joint`, `offset` and `multiplier`, the last in
+      rad and m always.
     - urdf: `file` (relative to this one), `base_link`, `tip_link`.
 
     What the arm looks like (instead of what a URDF says): `[[visuals]]` with `joint` (none: the base),
     `origin`, `colour` (r, g, b, opacity) and one of `box` (x, y, z), `cylinder` and `capsule` (radius,
     length), `sphere` (radius), `mesh` (a file, relative to this one) with `scale`.
+
+    What it weighs (instead of what a URDF says): `[[inertials]]` with `joint` (none: the base), `mass`,
+    `centre`, `inertia` and `source`; `gravity`; `left_out`. What drives its joints: `[drives.JOINT]` with `k`
+    and `l` of a joint that is held, or all keys of a drive. Masses, inertias, gravity, efforts and drives are
+    SI whatever the units of the file.
 
     Args:
         path: The file.
@@ -84,7 +90,7 @@ def chain_to_dict(chain: Chain) -> dict[str, Any]:
         "tip": frame_to_dict(chain.tip),
         "tool": frame_to_dict(chain.tool),
         "joints": [_joint_to_dict(joint) for joint in chain.joints],
-        **({"visuals": [visual_to_dict(visual) for visual in chain.visuals]} if chain.visuals else {}),
+        **carried_to_dict(chain),
     }
 
 
@@ -107,13 +113,16 @@ def robot_toml(chain: Chain) -> str:
     frames = {key: _shortest(data.pop(key)) for key in ("base", "tip", "tool")}
     for joint in data["joints"]:
         joint["origin"] = _shortest(joint["origin"])
-    lists = {key: data.pop(key, []) for key in ("joints", "visuals")}
+    lists = {key: data.pop(key, []) for key in ("joints", "visuals", "inertials")}
+    drives = data.pop("drives", {})
     lines = [f"# {EXPORT_MARK}: lengths in m, angles in rad", *toml_lines(data)]
     for key, frame in frames.items():
         lines += ["", f"[{key}]", *toml_lines(frame)]
     for key, items in lists.items():
         for item in items:
             lines += ["", f"[[{key}]]", *toml_lines(item)]
+    for joint, drive in drives.items():
+        lines += ["", f"[drives.{toml_text(joint)}]", *toml_lines(drive)]
     return "\n".join(lines) + "\n"
 
 
@@ -146,23 +155,31 @@ def _read(
     start = table.numbers("start", None, ())
     base, tool = (read_frame(table.table(key), units) if table.has(key) else None for key in ("base", "tool"))
     build = _READERS[kind](table, units, folder)
-    given = table.tables("visuals") if table.has("visuals") else []
-    visuals = tuple(read_visual(row, units) for row in given)
+    carried = read_carried(table, units)
     table.close()
     if faults:
         raise RobotError(*faults)
     try:
         chain = build(name)
+    except RobotError as error:
+        further = (Finding(f"robot {name}: {fault}") for fault in own_faults(carried))
+        raise RobotError(*_in_file(file, (*error.findings, *further))) from error
+    try:
         return replace(
             chain.placed(base, tool),
             name=name or chain.name,
             start=_start(chain, start, units) or chain.start,
             description=description or chain.description,
             source=source or chain.source,
-            visuals=visuals or chain.visuals,
+            **carried,
         )
     except RobotError as error:
-        raise RobotError(*(replace(fault, file=fault.file or file) for fault in error.findings)) from error
+        raise RobotError(*_in_file(file, error.findings)) from error
+
+
+def _in_file(file: str | None, findings: Iterable[Finding]) -> Iterator[Finding]:
+    """Yield findings as those of a file, unless they name one."""
+    return (replace(one, file=one.file or file) for one in findings)
 
 
 def _unsaid_units(data: Mapping[str, Any], chain: Chain) -> Iterator[str]:
@@ -267,7 +284,7 @@ def _joint(table: Table, units: Units) -> Joint:
         read_frame(table.table("origin"), units),
         cast("tuple[float, float, float]", table.numbers("axis", 3, (0.0, 0.0, 1.0))),
         **{
-            key: units.of_joint(kind, table.number(key, default, infinite=True))
+            key: _limit(key, kind, table.number(key, default, infinite=True), units)
             for key, default in _Limits._field_defaults.items()
         },
         mimic=_mimic(table.table("mimic"), kind, units) if table.has("mimic") else None,
@@ -289,12 +306,17 @@ def _mimic(table: Table, kind: str, units: Units) -> Mimic:
 
 def _limits(table: Table, kinds: Sequence[JointKind], units: Units) -> list[_Limits]:
     """Return the limits of every joint, in SI."""
-    given = [table.spread(key, len(kinds), default) for key, default in _Limits._field_defaults.items()]
+    given = {key: table.spread(key, len(kinds), default) for key, default in _Limits._field_defaults.items()}
     table.close()
     return [
-        _Limits(*(units.of_joint(kind, value) for value in values))
-        for kind, *values in zip(kinds, *given, strict=True)
+        _Limits(**{key: _limit(key, kind, values[k], units) for key, values in given.items()})
+        for k, kind in enumerate(kinds)
     ]
+
+
+def _limit(key: str, kind: str, value: float, units: Units) -> float:
+    """Return a limit of a joint in SI, which an effort is already."""
+    return value if key == "effort" else units.of_joint(kind, value)
 
 
 def _start(chain: Chain, values: tuple[float, ...], units: Units) -> tuple[float, ...]:
@@ -305,13 +327,16 @@ def _start(chain: Chain, values: tuple[float, ...], units: Units) -> tuple[float
 
 
 def _joint_to_dict(joint: Joint) -> dict[str, Any]:
-    """Return a joint as a JSON object."""
+    """Return a joint as a JSON object; an effort that is not known is left out."""
+    limits = {key: _finite_or_none(getattr(joint, key)) for key in _Limits._fields}
+    if limits["effort"] is None:
+        del limits["effort"]
     return {
         "name": joint.name,
         "kind": joint.kind,
         "origin": frame_to_dict(joint.origin),
         "axis": [float(value) for value in joint.axis],
-        **{key: _finite_or_none(getattr(joint, key)) for key in _Limits._fields},
+        **limits,
         "mimic": joint.mimic and _mimic_to_dict(joint.mimic),
     }
 

@@ -11,12 +11,15 @@ from urmpipe_models.chains.visual import Visual
 from urmpipe_models.errors import RobotError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_models.names import did_you_mean
+from urmpipe_models.robots.urdf_inertials import chain_masses
 from urmpipe_models.robots.urdf_tree import (
     BASE_JOINT,
     KINDS,
+    MASS_JOINT,
     OTHER_TYPES,
     TIP_JOINT,
     TOOL_JOINT,
+    Carrier,
     Edge,
     UrdfTree,
     read_tree,
@@ -30,7 +33,8 @@ def read_urdf(path: str | Path, *, base_link: str | None = None, tip_link: str |
 
     Every joint between the two is kept, the fixed ones as frames that may carry a sensor. Only the
     three fixed joints that `write_urdf` adds for base, tip and tool become these again. What the links
-    between the two look like is kept, too; mesh files are looked up but not opened.
+    between the two look like is kept, too; mesh files are looked up but not opened. Masses are those of the
+    links between the two, and of all that is fixed to them.
 
     Args:
         path: The file.
@@ -49,13 +53,22 @@ def read_urdf(path: str | Path, *, base_link: str | None = None, tip_link: str |
         _take(joints, TOOL_JOINT, -1),
         _take(joints, TIP_JOINT, -1),
     )
-    visuals = tuple(_visuals(tree, edges, joints, base))
+    carriers = list(_carriers(edges, joints, base))
+    visuals = [visual for carrier in carriers for visual in _visuals(tree, carrier)]
+    inertials, left_out = chain_masses(tree, carriers)
     if tree.faults:
         raise RobotError(*tree.faults)
-    located = tuple(visual.located(Path(path).parent) for visual in visuals)
     try:
         return Chain(
-            tree.name, tuple(joints), tip=tip, base=base, tool=tool, source=Path(path).name, visuals=located
+            tree.name,
+            tuple(joints),
+            tip=tip,
+            base=base,
+            tool=tool,
+            source=Path(path).name,
+            visuals=tuple(visual.located(Path(path).parent) for visual in visuals),
+            inertials=inertials,
+            left_out=left_out,
         )
     except RobotError as error:
         raise RobotError(*(replace(fault, file=tree.file) for fault in error.findings)) from error
@@ -97,14 +110,11 @@ def _root(tree: UrdfTree) -> str | None:
 
 def _ways(tree: UrdfTree, root: str) -> dict[str, list[Edge]]:
     """Return the joints from the root to every link that follows it."""
-    below: dict[str, list[Edge]] = {}
-    for edge in tree.edges.values():
-        below.setdefault(edge.parent, []).append(edge)
     ways: dict[str, list[Edge]] = {root: []}
     waiting = [root]
     while waiting:
         link = waiting.pop()
-        for edge in below.get(link, []):
+        for edge in tree.below(link):
             ways[edge.child] = [*ways[link], edge]
             waiting.append(edge.child)
     return ways
@@ -112,8 +122,9 @@ def _ways(tree: UrdfTree, root: str) -> dict[str, list[Edge]]:
 
 def _default_tip(tree: UrdfTree, ways: dict[str, list[Edge]]) -> str | None:
     """Return the end with the most moving joints before it; nothing, and a fault noted, if in doubt."""
-    parents = {edge.parent for edge in tree.edges.values()}
-    moving = {link: sum(map(_moves, way)) for link, way in ways.items() if link not in parents}
+    masses = {edge.child for edge in tree.edges.values() if edge.joint.name.startswith(MASS_JOINT)}
+    parents = {edge.parent for edge in tree.edges.values() if edge.child not in masses}
+    moving = {link: sum(map(_moves, way)) for link, way in ways.items() if link not in parents | masses}
     most = [link for link, count in moving.items() if count == max(moving.values())]
     if len(most) > 1:
         found = f"{len(most)} ends with {moving[most[0]]} moving joints"
@@ -195,27 +206,27 @@ def _take(joints: list[Joint], name: str, index: int) -> Transform:
     return Transform()
 
 
-def _visuals(
-    tree: UrdfTree, edges: Sequence[Edge], joints: Sequence[Joint], base: Transform
-) -> Iterator[Visual]:
-    """Yield what the links of the chain show, each on the joint of the chain that carries it.
+def _carriers(edges: Sequence[Edge], joints: Sequence[Joint], base: Transform) -> Iterator[Carrier]:
+    """Yield the links of the chain, each with the joint of the chain that carries it.
 
     Links that hang on a joint which became base, tip or tool are carried by the joint before it.
     """
     if not edges:
         return
     kept = {joint.name for joint in joints}
-    carrier, frame = None, base.inverse()
-    yield from _on(frame, link_visuals(tree, edges[0].parent, carrier))
+    carrier = Carrier(edges[0].parent, None, base.inverse(), moves=False)
+    yield carrier
     for edge in edges:
-        name = edge.joint.name
-        carrier, frame = (name, Transform()) if name in kept else (carrier, frame @ edge.joint.origin)
-        yield from _on(frame, link_visuals(tree, edge.child, carrier))
+        name, moves = edge.joint.name, carrier.moves or edge.joint.kind != "fixed"
+        on = (name, Transform()) if name in kept else (carrier.joint, carrier.frame @ edge.joint.origin)
+        carrier = Carrier(edge.child, *on, moves)
+        yield carrier
 
 
-def _on(frame: Transform, visuals: Iterable[Visual]) -> Iterator[Visual]:
-    """Yield shapes that are given in a frame in the frame that carries it."""
-    return (replace(visual, origin=frame @ visual.origin) for visual in visuals)
+def _visuals(tree: UrdfTree, carrier: Carrier) -> Iterator[Visual]:
+    """Yield what a link of the chain shows, in the frame that carries it."""
+    shapes = link_visuals(tree, carrier.link, carrier.joint)
+    return (replace(visual, origin=carrier.frame @ visual.origin) for visual in shapes)
 
 
 def _listed(names: Iterable[str]) -> str:

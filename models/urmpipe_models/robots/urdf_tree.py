@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from urmpipe_models.chains.chain import Joint, JointKind, Mimic
 from urmpipe_models.errors import Finding, RobotError, shown
@@ -28,6 +28,9 @@ UNLIMITED = 1.7976931348623157e308
 
 BASE_JOINT, TIP_JOINT, TOOL_JOINT = "urmpipe_base", "urmpipe_tip", "urmpipe_tool"
 """Names of the fixed joints that stand for a chain's base, tip and tool."""
+
+MASS_JOINT = "urmpipe_mass"
+"""What the names of the fixed joints begin with that hold a further mass of a link."""
 
 STAND_IN = "urmpipe"
 """Name of the material of the shapes that `write_urdf` gives an arm that has none."""
@@ -52,6 +55,22 @@ class Edge:
     parent: str
     child: str
     line: int
+
+
+class Carrier(NamedTuple):
+    """A link that a chain carries.
+
+    Attributes:
+        link: Its name.
+        joint: Name of the joint of the chain whose moving frame carries it; None for the base.
+        frame: The link in that frame.
+        moves: Whether a joint before it moves.
+    """
+
+    link: str
+    joint: str | None
+    frame: Transform
+    moves: bool
 
 
 @dataclass(slots=True)
@@ -79,6 +98,10 @@ class UrdfTree:
     def fault(self, message: str, line: int | None = None, hints: tuple[Hint, ...] = ()) -> None:
         """Note that something is wrong."""
         self.faults.append(Finding(message, self.file, line=line, hints=hints))
+
+    def below(self, link: str) -> list[Edge]:
+        """Return the joints that sit on a link, in the order of the file."""
+        return [edge for edge in self.edges.values() if edge.parent == link]
 
 
 def read_tree(path: Path) -> UrdfTree:
@@ -133,7 +156,7 @@ def _add_joint(tree: UrdfTree, node: Node) -> None:
         tree.fault(f"joint {name}: found type {shown(type_)}; allowed: {', '.join(KINDS)}", node.line)
     parent, child = (_link_of(tree, node, name, end) for end in ("parent", "child"))
     kind = KINDS.get(type_, "fixed")
-    lower, upper, velocity, acceleration = _limits(tree, node, name, type_)
+    lower, upper, velocity, acceleration, effort = _limits(tree, node, name, type_)
     joint = Joint(
         name,
         kind,
@@ -143,6 +166,7 @@ def _add_joint(tree: UrdfTree, node: Node) -> None:
         upper=upper,
         velocity=velocity,
         acceleration=acceleration,
+        effort=effort,
         mimic=None if kind == "fixed" else _mimic(tree, node, name),
     )
     tree.edges[name] = Edge(joint, type_, parent, child, node.line)
@@ -194,23 +218,25 @@ def _axis(tree: UrdfTree, node: Node, joint: str) -> tuple[float, float, float]:
     return x / length, y / length, z / length
 
 
-def _limits(tree: UrdfTree, node: Node, joint: str, type_: str) -> tuple[float, float, float, float]:
-    """Return lower, upper, velocity and acceleration; what the file leaves out is not limited."""
+def _limits(tree: UrdfTree, node: Node, joint: str, type_: str) -> tuple[float, float, float, float, float]:
+    """Return lower, upper, velocity, acceleration and effort; what the file leaves out is not limited."""
     limit = node.first("limit")
     if limit is None or type_ == "fixed":
-        return -math.inf, math.inf, math.inf, math.inf
+        return -math.inf, math.inf, math.inf, math.inf, math.inf
     place = f"joint {joint}: limit"
-    velocity, acceleration = (_rate(tree, limit, place, key) for key in ("velocity", "acceleration"))
+    velocity, acceleration, effort = (
+        _largest(tree, limit, place, key) for key in ("velocity", "acceleration", "effort")
+    )
     if type_ == "continuous" or not limit.attributes.keys() & {"lower", "upper"}:
-        return -math.inf, math.inf, velocity, acceleration
+        return -math.inf, math.inf, velocity, acceleration, effort
     (lower,), (upper,) = (numbers_of(tree, limit, place, end, (0.0,)) for end in ("lower", "upper"))
     if lower > upper:
         tree.fault(f"{place}: lower {lower:g} above upper {upper:g}", limit.line)
-    return lower, upper, velocity, acceleration
+    return lower, upper, velocity, acceleration, effort
 
 
-def _rate(tree: UrdfTree, limit: Node, place: str, attribute: str) -> float:
-    """Return the largest speed or acceleration; 0 is no limit."""
+def _largest(tree: UrdfTree, limit: Node, place: str, attribute: str) -> float:
+    """Return the largest speed, acceleration or effort; 0 is no limit."""
     (value,) = numbers_of(tree, limit, place, attribute, (math.inf,))
     if value < 0.0:
         tree.fault(f"{place} {attribute}: found {value:g}; allowed: 0 (not known) or more", limit.line)

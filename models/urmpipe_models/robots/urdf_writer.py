@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.inertial import Inertial
 from urmpipe_models.chains.visual import Box, Mesh, Shape, Sphere, Visual
 from urmpipe_models.elementwise import ZERO, Vector
 from urmpipe_models.errors import RobotError
-from urmpipe_models.robots.urdf_tree import BASE_JOINT, STAND_IN, TIP_JOINT, TOOL_JOINT, UNLIMITED
+from urmpipe_models.robots.urdf_inertials import MOMENTS
+from urmpipe_models.robots.urdf_tree import (
+    BASE_JOINT,
+    MASS_JOINT,
+    STAND_IN,
+    TIP_JOINT,
+    TOOL_JOINT,
+    UNLIMITED,
+)
 from urmpipe_models.robots.written import EXPORT_MARK, replace_text
 from urmpipe_models.transform import rpy_of
 
@@ -24,7 +33,7 @@ def write_urdf(chain: Chain, path: str | Path) -> None:
 
     Raises:
         OutputError: If the file cannot be written.
-        RobotError: If a joint has one of the three names that stand for base, tip and tool.
+        RobotError: If a joint has a name that stands for base, tip, tool or a mass.
     """
     replace_text(Path(path), urdf_text(chain))
 
@@ -38,15 +47,17 @@ def urdf_text(chain: Chain) -> str:
     k + 1 if that joint does not slide; the last one is the origin of tool0. A revolute joint without
     limits is `continuous`; elsewhere the largest double stands for infinity. Limits of acceleration make it
     URDF 1.2, which has them. An arm without visuals gets a cylinder a link, which `read_urdf` leaves out
-    again.
+    again. A link has one mass; further ones of a joint are links of their own, fixed to it by joints whose
+    names begin with `urmpipe_mass`. URDF has no gravity, no drives and no sources of masses.
 
     Raises:
-        RobotError: If a joint has one of these three names.
+        RobotError: If a joint has one of these names.
     """
-    taken = {BASE_JOINT, TIP_JOINT, TOOL_JOINT} & {joint.name for joint in chain.joints}
+    names = [joint.name for joint in chain.joints]
+    taken = [one for one in names if one in {BASE_JOINT, TIP_JOINT, TOOL_JOINT} or one.startswith(MASS_JOINT)]
     if taken:
         raise RobotError(
-            f"robot {chain.name}: joint name {', '.join(sorted(taken))} stands for base, tip or tool"
+            f"robot {chain.name}: joint name {', '.join(taken)} stands for base, tip, tool or a mass"
         )
     frames = [
         Joint(BASE_JOINT, "fixed", chain.base),
@@ -55,10 +66,12 @@ def urdf_text(chain: Chain) -> str:
         Joint(TOOL_JOINT, "fixed", chain.tool),
     ]
     links = ["world", "base_link", *(f"link{k}" for k in range(1, len(chain.joints) + 1)), "tip", "tool0"]
-    carried: dict[str, list[str]] = {link: [] for link in links}
-    of_joint = dict(zip([None, *(joint.name for joint in chain.joints)], links[1:-2], strict=True))
-    for visual in chain.visuals:
-        carried[of_joint[visual.joint]] += _visual_lines(visual)
+    on = dict(zip(links[1:-2], [None, *names], strict=True))
+    shown = {
+        link: [line for one in chain.visuals if one.joint == joint for line in _visual_lines(one)]
+        for link, joint in on.items()
+    }
+    masses = {link: [one for one in chain.inertials if one.joint == joint] for link, joint in on.items()}
     radius = sum(math.hypot(*joint.origin.translation) for joint in frames[1:]) / SLENDERNESS
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
@@ -71,8 +84,13 @@ def urdf_text(chain: Chain) -> str:
         frames, [*frames[1:], None], links[:-1], links[1:], strict=True
     ):
         end = following.origin.translation if following else ZERO
-        lines += _link_lines(child, carried[child] if chain.visuals else _stand_in_lines(end, radius))
+        looks = shown.get(child, []) if chain.visuals else _stand_in_lines(end, radius)
+        lines += _link_lines(child, [*looks, *_inertial_lines(masses.get(child, [])[:1])])
         lines += _joint_lines(joint, parent, child)
+        for k, one in enumerate(masses.get(child, [])[1:], start=2):
+            lines += _link_lines(f"{child}_mass{k}", _inertial_lines([one]))
+            holds = Joint(f"{MASS_JOINT}_{child}_{k}", "fixed")
+            lines += _joint_lines(holds, child, f"{child}_mass{k}")
     return "\n".join([*lines, "</robot>"]) + "\n"
 
 
@@ -85,9 +103,29 @@ def _version(chain: Chain) -> str:
     return ' version="1.2"' if limited else ""
 
 
-def _link_lines(name: str, visuals: Sequence[str]) -> list[str]:
-    """Return a link with the lines of its visuals."""
-    return [f'  <link name="{name}">', *visuals, "  </link>"] if visuals else [f'  <link name="{name}"/>']
+def _link_lines(name: str, inside: Sequence[str]) -> list[str]:
+    """Return a link with the lines of its visuals and its mass."""
+    return [f'  <link name="{name}">', *inside, "  </link>"] if inside else [f'  <link name="{name}"/>']
+
+
+def _inertial_lines(inertials: Sequence[Inertial]) -> list[str]:
+    """Return the mass of a link, of at most one inertial."""
+    return [
+        line
+        for one in inertials
+        for line in (
+            "    <inertial>",
+            f'      <origin xyz="{_numbers(one.centre)}"/>',
+            f'      <mass value="{float(one.mass)!r}"/>',
+            f"      <inertia {_attributes(dict(zip(MOMENTS, one.inertia, strict=True)))}/>",
+            "    </inertial>",
+        )
+    ]
+
+
+def _attributes(values: Mapping[str, float]) -> str:
+    """Return numbers as attributes, all digits of them."""
+    return " ".join(f'{key}="{float(value)!r}"' for key, value in values.items())
 
 
 def _stand_in_lines(end: Vector, radius: float) -> list[str]:
@@ -143,10 +181,11 @@ def _joint_lines(joint: Joint, parent: str, child: str) -> list[str]:
         f'    <origin xyz="{xyz}" rpy="{rpy}"/>',
     ]
     if joint.kind != "fixed":
-        limits = {"lower": joint.lower, "upper": joint.upper, "effort": math.inf, "velocity": joint.velocity}
+        limits = {"lower": joint.lower, "upper": joint.upper, "effort": joint.effort}
+        limits["velocity"] = joint.velocity
         if math.isfinite(joint.acceleration):
             limits["acceleration"] = joint.acceleration
-        given = " ".join(f'{key}="{_finite(value)!r}"' for key, value in limits.items())
+        given = _attributes({key: _finite(value) for key, value in limits.items()})
         lines += [f'    <axis xyz="{_numbers(joint.axis)}"/>', f"    <limit {given}/>"]
     if joint.mimic is not None:
         leader, multiplier, offset = joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset

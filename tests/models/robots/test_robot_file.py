@@ -235,9 +235,10 @@ def test_everything_wrong_is_said_at_once(robot: Any) -> None:
         "arm.toml: key limits.velocity: found 'fast', allowed: a number, or 0 numbers, one a joint",
         "arm.toml: key limits.acceleration: found [nan], allowed: a number, or 0 numbers, one a joint",
         "arm.toml: key limits.uper: unknown (did you mean upper?); allowed: lower, upper, velocity,"
-        " acceleration",
+        " acceleration, effort",
         "arm.toml: key nmae: unknown (did you mean name?); allowed: kind, length_unit, angle_unit, name,"
-        " description, source, start, base, tool, lengths, tilts, directions, limits, visuals",
+        " description, source, start, base, tool, lengths, tilts, directions, limits, visuals,"
+        " inertials, drives, left_out, gravity",
     ]
 
 

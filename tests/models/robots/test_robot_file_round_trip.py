@@ -26,7 +26,7 @@ def bits(chain: Chain) -> bytes:
     for frame in (chain.base, chain.tip, chain.tool, *(joint.origin for joint in chain.joints)):
         numbers += [*frame.translation, *(entry for row in frame.rotation for entry in row)]
     for joint in chain.joints:
-        numbers += [*joint.axis, joint.lower, joint.upper, joint.velocity, joint.acceleration]
+        numbers += [*joint.axis, joint.lower, joint.upper, joint.velocity, joint.acceleration, joint.effort]
         if joint.mimic is not None:
             numbers += [joint.mimic.multiplier, joint.mimic.offset]
     return np.array(numbers, dtype=float).tobytes()
@@ -114,6 +114,7 @@ def test_a_negative_zero_and_odd_texts_come_back() -> None:
 def test_a_dictionary_from_before_limits_of_acceleration_has_none() -> None:
     data = chain_to_dict(load_robot("ur5e"))
     for joint in data["joints"]:
+        assert "effort" not in joint  # one from before efforts and one without them are the same
         del joint["acceleration"]
     assert chain_from_dict(data) == load_robot("ur5e")
 

@@ -22,7 +22,7 @@ ARM = """<robot name="arm">
     <limit lower="-1" upper="2" effort="5" velocity="0.5" acceleration="3"/>
   </joint>
   <joint name="j2" type="continuous">
-    <parent link="a"/> <child link="b"/> <limit lower="0" upper="0" effort="5" velocity="0" acceleration="0"/>
+    <parent link="a"/> <child link="b"/> <limit lower="0" upper="0" effort="0" velocity="0" acceleration="0"/>
   </joint>
   <joint name="j3" type="prismatic">
     <parent link="b"/> <child link="c"/> <axis xyz="0 1 0"/> <mimic joint="j2" multiplier="0.5" offset="0.1"/>
@@ -54,8 +54,8 @@ def test_every_kind_of_joint_is_read(urdf: Any) -> None:
     assert urdf(ARM) == Chain(
         "arm",
         (
-            Joint("j1", "revolute", translation(0.0, 0.0, 0.3), (0.0, 0.0, 1.0), -1.0, 2.0, 0.5, 3.0),
-            Joint("j2", "revolute", axis=(1.0, 0.0, 0.0)),  # URDF's default axis; a rate of 0 is not known
+            Joint("j1", "revolute", translation(0.0, 0.0, 0.3), (0.0, 0.0, 1.0), -1.0, 2.0, 0.5, 3.0, 5.0),
+            Joint("j2", "revolute", axis=(1.0, 0.0, 0.0)),  # URDF's default axis; a limit of 0 is not known
             Joint("j3", "prismatic", axis=(0.0, 1.0, 0.0), mimic=Mimic("j2", 0.5, 0.1)),
             Joint("sensor", "fixed", translation(0.1, 0.0, 0.0)),
         ),
@@ -130,7 +130,8 @@ def test_everything_wrong_is_said_at_once_with_its_line(urdf: Any) -> None:
         joint("j1", "r", "a", "spinning"),
         joint("j1", "a", "b"),
         joint("j2", "a", "b", inside='<origin xyz="0 abc 0" rpy="1 2"/><axis xyz="0 0 0"/>'),
-        joint("j3", "a", "b", "revolute", '<limit lower="2" upper="1" velocity="-1" acceleration="-2"/>'),
+        joint("j3", "a", "b", "revolute", '<limit lower="2" upper="1" velocity="-1" '
+              'effort="-3" acceleration="-2"/>'),
         joint("j4", "a", "cc", inside='<mimic joint="ghost" multiplier="nan"/>'),
         '<joint name="j5" type="fixed"><child link="c"/></joint>',
         '<joint type="fixed"/>',
@@ -145,6 +146,7 @@ def test_everything_wrong_is_said_at_once_with_its_line(urdf: Any) -> None:
         "arm.urdf:10: joint j2: axis is zero; allowed: a direction",
         "arm.urdf:11: joint j3: limit velocity: found -1; allowed: 0 (not known) or more",
         "arm.urdf:11: joint j3: limit acceleration: found -2; allowed: 0 (not known) or more",
+        "arm.urdf:11: joint j3: limit effort: found -3; allowed: 0 (not known) or more",
         "arm.urdf:11: joint j3: limit: lower 2 above upper 1",
         "arm.urdf:12: joint j4: child 'cc'; allowed: a link of the file (did you mean c?)",
         "arm.urdf:12: joint j4: mimic multiplier: found 'nan', expected a number",

@@ -141,8 +141,11 @@ def test_names_are_escaped(tmp_path: Path) -> None:
 
 def test_reserved_joint_names_are_refused(tmp_path: Path) -> None:
     with pytest.raises(RobotError) as caught:
-        write_urdf(Chain("odd", (Joint("urmpipe_tip"),)), tmp_path / "odd.urdf")
-    assert str(caught.value) == "robot odd: joint name urmpipe_tip stands for base, tip or tool"
+        chain = Chain("odd", (Joint("urmpipe_tip"), Joint("urmpipe_mass_link1_2"), Joint("tip")))
+        write_urdf(chain, tmp_path / "odd.urdf")
+    assert str(caught.value) == (
+        "robot odd: joint name urmpipe_tip, urmpipe_mass_link1_2 stands for base, tip, tool or a mass"
+    )
     assert not list(tmp_path.iterdir())
 
 

@@ -1,0 +1,79 @@
+"""Masses of a chain: what no body can have is refused."""
+
+from __future__ import annotations
+
+import pytest
+
+from asserting import refusal
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.inertial import GRAVITY, Inertial
+from urmpipe_models.drives.controller import Gains
+from urmpipe_models.drives.drive import Drive
+from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint
+from urmpipe_models.errors import RobotError
+
+BALL = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
+
+
+def test_a_mass_alone_is_a_point_at_the_origin_of_its_frame() -> None:
+    point = Inertial("j", 2.0)
+    assert (point.centre, point.inertia, point.source) == ((0.0, 0.0, 0.0), (0.0,) * 6, "")
+    assert (point.place, Inertial(None, 2.0).place) == ("joint j", "the base")
+    assert Chain("arm", (Joint("j"),), inertials=(point,)).gravity == GRAVITY == (0.0, 0.0, -9.81)
+
+
+@pytest.mark.parametrize(
+    ("mass", "inertia", "fault"),
+    [
+        (-1.0, (0.0,) * 6, "inertial on joint j: mass -1 kg; allowed: 0 or more"),
+        (0.0, BALL, "inertial on joint j: mass 0 with an inertia; allowed: a mass, or no inertia"),
+        (
+            1.0,
+            (-0.1, 0.1, 0.1, 0.0, 0.0, 0.0),
+            "inertial on joint j: principal moments -0.1, 0.1, 0.1 kg.m2; allowed: 0 or more",
+        ),
+        (
+            1.0,
+            (0.1, 0.1, 0.3, 0.0, 0.0, 0.0),
+            "inertial on joint j: principal moments 0.1, 0.1, 0.3 kg.m2; allowed: none above the sum of the"
+            " other two",
+        ),
+    ],
+)
+def test_masses_that_no_body_has_are_refused(
+    mass: float, inertia: tuple[float, float, float, float, float, float], fault: str
+) -> None:
+    assert list(Inertial("j", mass, inertia=inertia).faults()) == [fault]
+
+
+def test_printed_digits_may_miss_the_sum_and_rounding_may_go_below_zero() -> None:
+    plate = (0.2, 0.2, 0.2, 0.1, 0.0, 0.0)  # 0.1, 0.2, 0.3
+    assert list(Inertial("j", 1.0, inertia=plate).faults()) == []
+    rod = (3.01e-3, 3.00e-3, 1e-9, 0.0, 0.0, 0.0)
+    assert list(Inertial("j", 1.0, inertia=rod).faults()) == []
+    thin = (0.3, 0.3, -1e-11, 0.0, 0.0, 0.0)
+    assert list(Inertial("j", 1.0, inertia=thin).faults()) == []
+
+
+def test_a_chain_says_all_that_is_wrong_with_masses_and_drives_at_once() -> None:
+    drive = Drive(2500.0, 5.0, 100.0, 0.0, 0.5, 0.001, 0.5)
+    inertials = (Inertial("j", -1.0), Inertial("k", 1.0), Inertial(None, 0.0, inertia=BALL))
+    drives = (
+        HeldJoint("j", 0.0, -1.0),
+        DrivenJoint("j", drive, 0.005, Gains(1.0, float("nan"), 0.0), 48.0),
+        HeldJoint("frame", 1.0, 0.0),
+    )
+    joints = (Joint("j", effort=-2.0), Joint("frame", "fixed"))
+    said = refusal(RobotError, Chain, "arm", joints, inertials=inertials, drives=drives)
+    assert said.splitlines() == [
+        "robot arm: joint j: effort -2; allowed: more than 0",
+        "robot arm: inertial on joint j: mass -1 kg; allowed: 0 or more",
+        "robot arm: inertial on the base: mass 0 with an inertia; allowed: a mass, or no inertia",
+        "robot arm: an inertial hangs on k, no joint of the chain; allowed: j, frame",
+        "robot arm: drives.j.k: found 0, allowed: a finite number above 0",
+        "robot arm: drives.j.l: found -1, allowed: 0 or more",
+        "robot arm: drives.j.C: found 0, allowed: a finite number above 0",
+        "robot arm: drives.j.Kw: found nan, allowed: a finite number",
+        "robot arm: drives.frame: found, allowed: a moving joint: j",
+        "robot arm: drives.j: found 2 times, allowed: once",
+    ]
