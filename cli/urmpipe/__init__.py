@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from urmpipe.api.build_fmu import build_fmu as build_fmu
     from urmpipe.api.compare import compare as compare
     from urmpipe.api.diagnose import diagnose as diagnose
+    from urmpipe.api.equations import Equations as Equations
+    from urmpipe.api.equations import equations as equations
     from urmpipe.api.export import export as export
     from urmpipe.api.ik import ik as ik
     from urmpipe.api.ingest import ingest as ingest
@@ -79,6 +81,7 @@ _HOME = {
     "CosimulationError": "urmpipe_models.errors",
     "Deviation": "urmpipe_pipeline.comparison.deviation",
     "Diagnosis": "urmpipe_pipeline.diagnosis.result",
+    "Equations": "urmpipe.api.equations",
     "Exported": "urmpipe_pipeline.tables",
     "FmuError": "urmpipe_models.errors",
     "SolvedTargets": "urmpipe_pipeline.solved_targets.result",
@@ -108,6 +111,7 @@ _HOME = {
     "build_fmu": "urmpipe.api.build_fmu",
     "compare": "urmpipe.api.compare",
     "diagnose": "urmpipe.api.diagnose",
+    "equations": "urmpipe.api.equations",
     "export": "urmpipe.api.export",
     "ik": "urmpipe.api.ik",
     "ingest": "urmpipe.api.ingest",

@@ -148,6 +148,7 @@ KINDS = {
     "duration": SECONDS,
     "every": FLAG,
     "figures": PATH,
+    "form": _one_of("text", "c"),
     "formats": Kind(
         _one_or_many(lambda one: isinstance(one, str) and one in ("svg", "png")), "svg, png or a list of both"
     ),
@@ -183,6 +184,7 @@ KINDS = {
     "targets": Kind(lambda value: _is_text(value) or not isinstance(value, str), "a file, or an array"),
     "tcp": _one_of("fk", "recorded"),
     "tip_link": LINK,
+    "term": _one_of("all", "inertia", "centrifugal", "coriolis", "gravity", "tool"),
     "to": _one_of("csv", "parquet", "mat", "tum"),
     "told": Kind(callable, "a function of a text, such as print"),
     "tolerance": KIND_OF_TOLERANCE,

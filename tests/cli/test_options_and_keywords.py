@@ -18,6 +18,7 @@ from urmpipe.commands.ik import ik
 from urmpipe.commands.ingest import ingest
 from urmpipe.commands.plan import plan
 from urmpipe.commands.report import report
+from urmpipe.commands.robot import robot
 from urmpipe.commands.simulate import simulate
 from urmpipe.commands.view import view
 from urmpipe_models.spelling import option_of
@@ -26,6 +27,7 @@ COMMANDS: dict[str, tuple[click.Command, Callable[..., Any]]] = {
     "build": (fmu.commands["build"], urmpipe.build_fmu),
     "compare": (compare, urmpipe.compare),
     "diagnose": (diagnose, urmpipe.diagnose),
+    "equations": (robot.commands["equations"], urmpipe.equations),
     "export": (export, urmpipe.export),
     "ik": (ik, urmpipe.ik),
     "ingest": (ingest, urmpipe.ingest),
@@ -39,6 +41,7 @@ OPERANDS = {
     "build": {"unit"},
     "compare": {"reference", "logs"},
     "diagnose": {"reference", "log"},
+    "equations": {"robot"},
     "export": {"result"},
     "ik": {"targets"},
     "ingest": {"log"},

@@ -1,4 +1,4 @@
-"""`urmpipe robot list|show|export`."""
+"""`urmpipe robot list|show|export|equations`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import click
 
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import placing_options
-from urmpipe.options.types import ROBOT, JointValuesType
+from urmpipe.options.types import ROBOT, JointValuesType, OneOf
 from urmpipe.usage import Group
 
 if TYPE_CHECKING:
@@ -63,7 +63,8 @@ def show(
 ) -> int:
     """Print the parameters of a robot and where its points are; --picture draws it from two sides.
 
-    The points p1..pn are the ends of its segments, the last one the tool centre point.
+    The points p1..pn are the ends of its segments, the last one the tool centre point. The picture has the
+    centres of its masses, too.
 
     \b
     Examples:
@@ -76,7 +77,15 @@ def show(
     from urmpipe.printing.robot import chain_at, print_chain
     from urmpipe_models.errors import Finding, OptionError
     from urmpipe_models.robots.written import EXPORT_MARK, write_export
-    from urmpipe_pipeline.projections import FRONT, SIDEWAYS, Sketch, chain_spots, projected
+    from urmpipe_pipeline.masses import mass_notices
+    from urmpipe_pipeline.projections import (
+        FRONT,
+        SIDEWAYS,
+        Sketch,
+        chain_masses,
+        chain_spots,
+        projected,
+    )
     from urmpipe_pipeline.solved_targets.solution_warnings import start_warnings
 
     chain = _placed(name, placing)
@@ -84,10 +93,11 @@ def show(
     if len(q) != len(chain.coordinates):
         allowed = f"{len(chain.coordinates)}, one for each of {', '.join(chain.coordinates)}"
         raise OptionError(Finding(parameter="q", found=f"{len(q)} values", allowed=allowed))
-    terminal.warn(list(start_warnings(chain, np.array(q), "q")))
+    terminal.warn([*start_warnings(chain, np.array(q), "q"), *mass_notices(chain)])
     posed = chain_at(chain, q)
     if picture is not None:
-        sketch = Sketch([posed.skeleton], spots=chain_spots(posed.skeleton))
+        masses = chain_masses(chain, np.array(q))
+        sketch = Sketch([posed.skeleton], spots=chain_spots(posed.skeleton), masses=masses)
         write_export(picture, projected(sketch, (SIDEWAYS, FRONT), posed.title, EXPORT_MARK), Path(name))
     terminal.answer(posed.to_dict, lambda: print_chain(posed))
     return 0
@@ -125,6 +135,51 @@ def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -
     write_export(target, writers[target.suffix.lower()](chain), Path(name))
     made = {"schema": 1, "robot": chain.name, "file": target}
     terminal.answer(lambda: made, lambda: say(f"Robot: {target}"))
+    return 0
+
+
+@robot.command(short_help="Write the equations of motion of a robot as formulas.")
+@click.argument("name", metavar="NAME|FILE", type=ROBOT)
+@output_option("FILE", "Write them into a file [default: print them].")
+@click.option(
+    "--form", type=OneOf(["text", "c"]), default="text", show_default=True, help="Text, or functions in C99."
+)
+@click.option(
+    "--term",
+    type=OneOf(["all", "inertia", "centrifugal", "coriolis", "gravity", "tool"]),
+    default="all",
+    show_default=True,
+    help="One term alone.",
+)
+@placing_options
+@output_options
+def equations(name: str, terminal: Terminal, **options: Any) -> int:
+    """Write the equations of motion of a robot with masses and up to 4 coordinates as formulas.
+
+    Lagrange's equations of the second kind, term by term, with the additions and multiplications that they
+    take before and after reduction. Needs SymPy: pip install "urmpipe[planning]". The file replaces only
+    another export of a robot.
+
+    \b
+    Examples:
+      urmpipe robot equations my-arm.urdf
+      urmpipe robot equations my-arm.urdf --term gravity
+      urmpipe robot equations my-arm.urdf --form c -o my_arm.c
+    """
+    import urmpipe
+    from urmpipe.printing.terminal import say
+
+    with terminal.working(f"Deriving {name}"):
+        result = urmpipe.equations(name, **options)
+
+    def text() -> None:
+        """Print the formulas, or where they are."""
+        if result.output is None:
+            click.echo(result.text, nl=False)
+        else:
+            say(f"Equations: {result.output}  ({result.reduced}; before reduction {result.operations})")
+
+    terminal.answer(result.to_dict, text)
     return 0
 
 

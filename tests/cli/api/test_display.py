@@ -13,6 +13,8 @@ import pytest
 import urmpipe
 from diagnoses import diagnosis_of
 from urmpipe_datasets import LOGS
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.inertial import Inertial
 from urmpipe_models.display import Shown
 from urmpipe_pipeline.comparison.change import Absent, BaselineComparison
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
@@ -21,6 +23,11 @@ OTHERS = {
     "LogMap", "LogReading", "PathRows", "ReadOptions", "Reading", "TableReading", "Targets", "Transform",
 }  # fmt: skip
 """Public classes that are no results: what they hold is what they show."""
+
+
+def pendulum() -> Chain:
+    """An arm of one joint with a mass."""
+    return Chain("rod", (Joint("turn"),), inertials=(Inertial("turn", 1.0, (0.5, 0.0, 0.0)),))
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +47,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     made = [
         run, run.log, comparison, comparison.runs[0], diagnosis_of(comparison.runs[0]),
         urmpipe.load_robot("urm6"), urmpipe.ik([[0.4, 0.1, 0.4]], "ur5e"), simulation,
+        urmpipe.equations(pendulum()),
         urmpipe.build_fmu("dc_drive", backend="python", output=folder),
         urmpipe.plan("cube:wall,a=0.2,r=0.02,x=0.5,y=0,z=0.3", "ur5e"),
         urmpipe.export(run, folder / "log.csv"), urmpipe.report([run], folder / "report.html"),

@@ -11,9 +11,11 @@ import pandas as pd
 import pytest
 
 import urmpipe
+from urmpipe.api.equations import FormName
 from urmpipe.kinds import KINDS, kind_of
 from urmpipe.systems.units import Backend
 from urmpipe_models.inverse.solve import METHODS
+from urmpipe_models.lagrange.equations import TERMS
 from urmpipe_models.planning.stretches import ARCS
 from urmpipe_pipeline.comparison.compare import Tcp
 from urmpipe_pipeline.comparison.trajectory import AlignMode
@@ -76,6 +78,7 @@ def given(function: str, run: urmpipe.Run, folder: Path) -> dict[str, Any]:
         "log": "log.csv", "logs": "log.csv", "reference": "path.csv", "targets": [[0.3, 0.1, 0.4]],
         "results": run, "result": run, "run": run, "recordings": "run.rrd", "output": folder / "out",
         "system": "one-drive", "unit": "kinematic_chain", "name_or_path": "urm6", "path": "lab.toml",
+        "robot": "ur5e",
     }  # fmt: skip
     parameters = signature(FUNCTIONS[function]).parameters
     if function == "plan":
@@ -116,10 +119,12 @@ def test_each_kind_is_of_a_keyword() -> None:
         ("arcs", ARCS),
         ("backend", get_args(Backend)),
         ("derivative", get_args(Method)),
+        ("form", get_args(FormName)),
         ("law", LAWS),
         ("method", METHODS),
         ("rows", get_args(Rows)),
         ("tcp", get_args(Tcp)),
+        ("term", ("all", *TERMS)),
         ("to", get_args(Format)),
     ],
 )

@@ -1,0 +1,122 @@
+"""`urmpipe.equations`: the equations of motion of an arm as formulas."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+from urmpipe.arm_placing import Frame, Robot, place_robot
+from urmpipe.keyword_checks import PathLike, public
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.lagrange.c_code import c_code
+from urmpipe_models.lagrange.equations import TERMS, TermName
+from urmpipe_models.lagrange.open_form import Cost, open_form
+from urmpipe_models.lagrange.operations import Operations, summed
+from urmpipe_models.lagrange.text import equations_text
+from urmpipe_models.robots.written import write_export
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FormName = Literal["text", "c"]
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Equations(Shown):
+    """The equations of motion of an arm.
+
+    Attributes:
+        robot: The arm.
+        text: The formulas, as text or C.
+        terms: What each term of each coordinate costs: `joint`, `term`, `operations` and `reduced`, each with
+            its `additions` and `multiplications`.
+        output: The file that was written, if any.
+    """
+
+    robot: Chain
+    text: str
+    terms: tuple[Cost, ...]
+    output: Path | None = None
+
+    @property
+    def operations(self) -> Operations:
+        """What all of it costs as expanded sums."""
+        return summed(one.operations for one in self.terms)
+
+    @property
+    def reduced(self) -> Operations:
+        """What all of it costs as C computes it."""
+        return summed(one.reduced for one in self.terms)
+
+    def _headline(self) -> str:
+        """Return the arm, its coordinates, and what the formulas cost."""
+        return line_of(
+            self.robot.name, number_of(len(self.robot.coordinates), "coordinate"), str(self.reduced)
+        )
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return one row a coordinate and term: names, and operations before and after reduction."""
+        import pandas as pd
+
+        columns = ("joint", "term", "additions", "multiplications")
+        reduced = ("reduced_additions", "reduced_multiplications")
+        rows = [(one.joint, one.term, *one.operations, *one.reduced) for one in self.terms]
+        return pd.DataFrame(rows, columns=[*columns, *reduced])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the object that `urmpipe robot equations --json` prints."""
+        terms = [
+            {
+                "joint": one.joint, "term": one.term,
+                "operations": one.operations._asdict(), "reduced": one.reduced._asdict(),
+            }
+            for one in self.terms
+        ]  # fmt: skip
+        return {
+            "schema": 1,
+            "robot": self.robot.name,
+            "coordinates": list(self.robot.coordinates),
+            "terms": terms,
+            "output": None if self.output is None else str(self.output),
+        }
+
+
+@public
+def equations(
+    robot: Robot,
+    *,
+    base: Frame | None = None,
+    tool: Frame | None = None,
+    base_link: str | None = None,
+    tip_link: str | None = None,
+    form: FormName = "text",
+    term: TermName | Literal["all"] = "all",
+    output: PathLike | None = None,
+) -> Equations:
+    """Derive the equations of motion of an arm of up to 4 coordinates as formulas. See docs/dynamics.md.
+
+    Args:
+        robot: The arm, with masses.
+        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
+        tool: The tool centre point in the frame of the arm's tip, likewise.
+        base_link: Link of a URDF where the arm begins; default: its root.
+        tip_link: Link of a URDF where the arm ends; default: its end.
+        form: text: a line a term; c: functions in C99.
+        term: inertia, centrifugal, coriolis, gravity or tool alone; default: all of them.
+        output: A file to write; it replaces only another export of a robot.
+
+    Raises:
+        UrmpipeError: With what is wrong with the arm, such as no masses or too many coordinates; if SymPy
+            (extra `planning`) is not installed; if the output may not be written.
+
+    Source: [Iso9283]_ eq. 8-13, section 4.
+    """
+    chain = cast(Chain, place_robot(robot, base, tool, base_link=base_link, tip_link=tip_link))
+    found = open_form(chain, TERMS if term == "all" else (term,))
+    text = c_code(found) if form == "c" else equations_text(found)
+    target = None if output is None else Path(output)
+    if target is not None:
+        write_export(target, text, Path(chain.name if isinstance(robot, Chain) else robot))
+    return Equations(chain, text, found.costs, target)

@@ -1,0 +1,143 @@
+"""Random arms with masses, and open forms as functions of numbers."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import re
+import subprocess
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
+from urmpipe_models.chains.inertial import Inertial
+from urmpipe_models.lagrange.c_code import ARGUMENTS, c_name
+from urmpipe_models.transform import Transform, from_xyz_rpy
+
+Motion = tuple[FloatArray, FloatArray, FloatArray]
+"""q, q', q'' of each coordinate."""
+
+
+def random_arm(rng: np.random.Generator, coordinates: int) -> Chain:
+    """Return an arm of any geometry: joints that turn or slide, fixed ones, mimics, parallel axes."""
+    joints, inertials = list[Joint](), [_inertial(rng, None)]
+    for k in range(coordinates):
+        kind: JointKind = "prismatic" if rng.random() < 0.3 else "revolute"
+        joints.append(Joint(f"q{k + 1}", kind, *_frame(rng)))
+        joints.append(Joint(f"f{k + 1}", "fixed", *_frame(rng)))
+        if rng.random() < 0.5:
+            mimic = Mimic(f"q{k + 1}", float(rng.choice([-1.0, 0.5, 2.0])), float(rng.normal()))
+            joints.append(
+                Joint(
+                    f"m{k + 1}", "revolute" if rng.random() < 0.7 else "prismatic", *_frame(rng), mimic=mimic
+                )
+            )
+    inertials += [_inertial(rng, one.name) for one in joints]
+    frames = [_frame(rng)[0] for _ in range(3)]
+    gravity = tuple(rng.normal(0.0, 9.0, 3).tolist())
+    return Chain(
+        "any", tuple(joints), base=frames[0], tip=frames[1], tool=frames[2],
+        inertials=tuple(inertials), gravity=gravity,
+    )  # fmt: skip
+
+
+def random_motion(rng: np.random.Generator, chain: Chain) -> Motion:
+    q, qd, qdd = rng.normal(0.0, 1.5, (3, len(chain.coordinates)))
+    return q, qd, qdd
+
+
+def _frame(rng: np.random.Generator) -> tuple[Transform, tuple[float, float, float]]:
+    """Return a frame and an axis: along one of its own axes or not, its neighbours' or not."""
+    quarters = (rng.integers(0, 4, 3) * math.pi / 2).tolist()
+    turn = rng.uniform(-3.0, 3.0, 3).tolist() if rng.random() < 0.4 else quarters
+    axis = (
+        rng.normal(0.0, 1.0, 3)
+        if rng.random() < 0.2
+        else np.eye(3)[rng.integers(3)] * rng.choice([-1.0, 1.0])
+    )
+    x, y, z = (axis / np.linalg.norm(axis)).tolist()
+    return from_xyz_rpy(rng.uniform(-0.5, 0.5, 3).tolist(), turn, "random"), (x, y, z)
+
+
+def _inertial(rng: np.random.Generator, joint: str | None) -> Inertial:
+    """Return a body of a few points, so that a body may have its inertia."""
+    points = rng.normal(0.0, 0.2, (5, 3))
+    points -= points.mean(axis=0)
+    matrix = sum(0.3 * (p @ p * np.eye(3) - np.outer(p, p)) for p in points)
+    ixx, iyy, izz, ixy, ixz, iyz = (
+        float(matrix[i, k]) for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    )
+    centre = tuple(rng.normal(0.0, 0.3, 3).tolist())
+    return Inertial(joint, 1.5, centre, (ixx, iyy, izz, ixy, ixz, iyz))
+
+
+def compiled(code: str, folder: Path) -> ctypes.CDLL:
+    """Return what a file of C99 is compiled to, without any warning."""
+    source = folder / "equations.c"
+    source.write_text(code, encoding="utf-8")
+    library = source.with_suffix(".so")
+    flags = [
+        "-std=c99",
+        "-O1",
+        "-Wall",
+        "-Wextra",
+        "-Wno-unused-parameter",
+        "-Werror",
+        "-pedantic",
+        "-shared",
+        "-fPIC",
+    ]
+    done = subprocess.run(
+        ["cc", *flags, str(source), "-o", str(library), "-lm"], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    return ctypes.CDLL(str(library))
+
+
+def c_terms(
+    library: ctypes.CDLL, chain: Chain, motion: Motion, wrench: Sequence[float]
+) -> dict[str, FloatArray]:
+    """Return each term of each coordinate, and the sum as `torque`, as compiled C computes them."""
+    given = dict(zip(("q", "qd", "qdd"), motion, strict=True)) | {"force": np.asarray(wrench)}
+    arguments: dict[str, tuple[str, ...]] = {
+        **{str(term): names for term, names in ARGUMENTS.items()},
+        "torque": tuple(given),
+    }
+    pointer = ctypes.POINTER(ctypes.c_double)
+    found = {}
+    for term, names in arguments.items():
+        tau = np.full(len(chain.coordinates), np.nan)
+        arrays = [*(np.ascontiguousarray(given[name]) for name in names), tau]
+        getattr(library, f"{c_name(chain.name)}_{term}")(*(one.ctypes.data_as(pointer) for one in arrays))
+        found[term] = tau
+    return found
+
+
+def text_terms(text: str) -> Callable[[Motion, Sequence[float]], dict[str, FloatArray]]:
+    """Return a function that computes each term of each coordinate as a text says it."""
+    coordinates = re.findall(r"^tau_(\w+) = ", text, re.MULTILINE)
+    angles = re.findall(r"^# (c\w+) = (cos\(.*\)), (s\w+) = (sin\(.*\))$", text, re.MULTILINE)
+    lines = re.findall(r"^  (\w+) = (.*)$", text, re.MULTILINE)
+    in_python = [(term, re.sub(r"''", "_dd", one)) for term, one in lines]
+    code = [(term, re.sub(r"'", "_d", one).replace("^", "**")) for term, one in in_python]
+
+    def terms(motion: Motion, wrench: Sequence[float]) -> dict[str, FloatArray]:
+        """Return the terms."""
+        names: dict[str, Any] = {"cos": math.cos, "sin": math.sin}
+        for mark, values in zip(("", "_d", "_dd"), motion, strict=True):
+            names |= {
+                f"{name}{mark}": value for name, value in zip(coordinates, values.tolist(), strict=True)
+            }
+        names |= dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), wrench, strict=True))
+        for cosine, c, sine, s in angles:
+            names |= {cosine: eval(c, names), sine: eval(s, names)}
+        found: dict[str, list[float]] = {}
+        for term, formula in code:
+            found.setdefault(term, []).append(eval(formula, names))
+        return {term: np.array(values) for term, values in found.items()}
+
+    return terms
