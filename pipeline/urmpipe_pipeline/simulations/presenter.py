@@ -26,9 +26,10 @@ from urmpipe_pipeline.presentation.section import (
     Section,
     Value,
 )
-from urmpipe_pipeline.simulations.figures import path_figure, signal_figures
+from urmpipe_pipeline.simulations.energy import EnergyBalance
+from urmpipe_pipeline.simulations.figures import energy_figure, path_figure, signal_figures
 from urmpipe_pipeline.simulations.scene import simulation_scene
-from urmpipe_pipeline.simulations.signal_groups import Group, answers_of, groups_of
+from urmpipe_pipeline.simulations.signal_groups import ANSWERS, Group, answers_of, groups_of
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.simulations.tables import (
     blocks_table,
@@ -38,6 +39,8 @@ from urmpipe_pipeline.simulations.tables import (
     settings_table,
     signals_table,
 )
+
+ENERGY = "Energy balance"
 
 
 def present(simulation: Simulation) -> Presentation:
@@ -141,19 +144,35 @@ def _facts(simulation: Simulation) -> Iterator[Fact]:
     if count > 1 and (period := simulation.duration / (count - 1)) > 1.5 * simulation.step:
         yield Fact("Sample every", Value(period, "s"))
     yield Fact("Blocks", Value(len(simulation.blocks)), brief=False)
+    if simulation.energy is not None:
+        yield _energy_fact(simulation, simulation.energy)
     yield recording_fact(simulation.recording)
 
 
+def _energy_fact(simulation: Simulation, balance: EnergyBalance) -> Fact:
+    """Return the largest residual of the energy balance; without a value nothing is shown."""
+    worst = balance.worst
+    if worst is None:
+        return Fact(ENERGY, None)
+    residual = abs(float(balance.residual[worst]))
+    blocks = text.counted(len({one.block for one in simulation.signals if one.is_energy}), "block")
+    at, share = text.seconds(float(simulation.t[worst])), text.percent(balance.share(residual))
+    words = f"largest residual {residual:.4g} J at t = {at} s, {share} of the largest energy"
+    return Fact(ENERGY, f"{blocks}, {words}")
+
+
 def _sections(simulation: Simulation) -> Iterator[Section]:
-    """Yield set points and answers, then what each block did; blocks that are judged rank first."""
-    answers = answers_of(simulation)
-    groups = groupby([*answers, *groups_of(simulation)], lambda one: one.block)
-    by_block = [(block, list(some)) for block, some in groups]
+    """Yield set points and answers, the energy balance, then each block; judged blocks rank first."""
+    answers, balance = answers_of(simulation), simulation.energy
+    by_block = [(block, list(some)) for block, some in groupby(groups_of(simulation), lambda one: one.block)]
     worst = simulation.judged_worst
-    opened = by_block[0 if answers else -1][0] if by_block else ""
+    opened = worst.block if worst else by_block[-1][0] if by_block and not answers else ANSWERS
+    if answers:
+        yield _section(simulation, ANSWERS, answers, None, opened=opened == ANSWERS)
+    if balance is not None:
+        yield Section(ENERGY, figures=partial(energy_figure, simulation, balance), rank=1)
     judged = {one.block: one for one in simulation.verdicts}
     by_block += [(block, []) for block in judged if block not in dict(by_block)]
-    opened = worst.block if worst else opened
     for block, own in by_block:
         yield _section(simulation, block, own, judged.get(block), opened=block == opened)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
@@ -14,7 +14,7 @@ MOST = len(JOINT_COLOURS)
 """Lines in a plot, so that each has a colour of its own; only an array that has more gets more."""
 
 NAMED = 3
-"""Variables that the title of a plot names; of more, the first and the last."""
+"""Names in the title of a plot; of more, the first and the last."""
 
 FAMILY = 3
 """So many blocks of one kind with the same variables are plotted together, variable by variable."""
@@ -49,8 +49,7 @@ class Group:
     @property
     def variables(self) -> str:
         """What is plotted: "theta1, theta2", or "Mk ... i" of many."""
-        names = list(dict.fromkeys(one.variable for one in self.signals))
-        return ", ".join(names) if len(names) <= NAMED else f"{names[0]} ... {names[-1]}"
+        return shortened([array_name(one.variable) for one in self.signals])
 
     @property
     def names(self) -> tuple[tuple[str, ...], ...]:
@@ -84,7 +83,7 @@ class Group:
 
 
 def groups_of(simulation: Simulation) -> list[Group]:
-    """Return the groups of all signals, by block in the order in which the blocks first stand."""
+    """Return the groups of all signals but energies, by block in the order of their first signals."""
     families = _families(simulation)
     found: list[Group] = []
     for block in dict.fromkeys(one.block for one in simulation.signals):
@@ -96,15 +95,18 @@ def groups_of(simulation: Simulation) -> list[Group]:
     return found
 
 
+def _plotted(simulation: Simulation, blocks: Collection[str]) -> list[Signal]:
+    """Return the signals of some blocks; energies stand in the balance of all blocks."""
+    return [one for one in simulation.signals if one.block in blocks and not one.is_energy]
+
+
 def _families(simulation: Simulation) -> list[list[str]]:
     """Return the names of blocks of one kind that recorded the same variables; none that is judged."""
     judged = {one.block for one in simulation.verdicts}
     kinds: dict[object, list[str]] = {}
     for block in simulation.blocks:
         own = tuple(
-            (one.variable, one.unit, one.columns.shape[1])
-            for one in simulation.signals
-            if one.block == block.name
+            (one.variable, one.unit, one.columns.shape[1]) for one in _plotted(simulation, [block.name])
         )
         if own and block.name not in judged:
             kinds.setdefault((block.kind, block.source, own), []).append(block.name)
@@ -114,7 +116,7 @@ def _families(simulation: Simulation) -> list[list[str]]:
 def _groups_of_family(simulation: Simulation, family: list[str]) -> Iterator[Group]:
     """Yield the signals of several blocks, variable by variable."""
     label = f"{family[0]} ... {family[-1]}"
-    members = [one for one in simulation.signals if one.block in family]
+    members = _plotted(simulation, family)
     for variable in dict.fromkeys(one.variable for one in members):
         some = [one for one in members if one.variable == variable]
         yield from (Group(label, some[0].unit, packed, None, True) for packed in _packed(some))
@@ -123,7 +125,7 @@ def _groups_of_family(simulation: Simulation, family: list[str]) -> Iterator[Gro
 def _groups_of_block(simulation: Simulation, block: str) -> Iterator[Group]:
     """Yield what is judged first, then the other signals by unit."""
     verdict = next((one for one in simulation.verdicts if one.block == block), None)
-    own = [one for one in simulation.signals if one.block == block]
+    own = _plotted(simulation, [block])
     judged = [one for one in own if verdict is not None and one.variable in verdict.variables]
     if judged:
         yield Group(block, judged[0].unit, tuple(judged), verdict)
@@ -150,20 +152,42 @@ def _packed(signals: list[Signal]) -> Iterator[tuple[Signal, ...]]:
 def answers_of(simulation: Simulation) -> list[Group]:
     """Return the groups of what controllers are to hold and what they measure, one a quantity and unit.
 
-    A block whose inputs set_NAME and real_NAME are both connected to recorded signals is such a controller.
+    A block with an input set_NAME that is recorded, or connected to a recorded signal, is such a controller.
+    It measures its input real_NAME; without one, its own output NAME.
     """
     signals = {one.name: one for one in simulation.signals}
+    sources = {**{name: name for name in signals}, **simulation.connections}
     pairs: dict[tuple[str, str], list[tuple[Signal, Signal]]] = {}
-    for name, source in simulation.connections.items():
+    for name, source in sources.items():
         block, _, variable = name.rpartition(".")
         if not variable.startswith(SET):
             continue
         quantity = variable.removeprefix(SET)
-        measured = simulation.connections.get(f"{block}.{REAL}{quantity}", "")
-        wanted, real = signals.get(source), signals.get(measured)
+        measured = sources.get(f"{block}.{REAL}{quantity}", f"{block}.{quantity}")
+        wanted, real = _recorded(signals, source), _recorded(signals, measured)
         if wanted is not None and real is not None and wanted.unit == real.unit:
-            pairs.setdefault((quantity, real.unit), []).append((wanted, real))
+            pairs.setdefault((array_name(quantity), real.unit), []).append((wanted, real))
     return [_answers(unit, some) for (_, unit), some in pairs.items()]
+
+
+def shortened(names: Sequence[str]) -> str:
+    """Return some names for a title, each once: "theta1, theta2", or "Mk ... i" of many."""
+    own = list(dict.fromkeys(names))
+    return ", ".join(own) if len(own) <= NAMED else f"{own[0]} ... {own[-1]}"
+
+
+def array_name(variable: str) -> str:
+    """Return the name of the array that a scalar is an element of: phi of phi[1]; else its own."""
+    return variable.partition("[")[0]
+
+
+def _recorded(signals: Mapping[str, Signal], name: str) -> Signal | None:
+    """Return the signal, or the element of an array, of a name in the system; None if there is none."""
+    whole = signals.get(array_name(name))
+    if name in signals or whole is None or name not in whole.names:
+        return signals.get(name)
+    i = whole.names.index(name)
+    return replace(whole, variable=whole.variables[i], values=whole.columns[:, i])
 
 
 def _answers(unit: str, pairs: list[tuple[Signal, Signal]]) -> Group:

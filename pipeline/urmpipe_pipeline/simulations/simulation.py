@@ -23,6 +23,7 @@ from urmpipe_pipeline.joint_log import LogWarning, seconds
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.results import SCHEMA
+from urmpipe_pipeline.simulations.energy import ENERGIES, EnergyBalance, energy_balance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,6 +86,11 @@ class Signal:
     def names(self) -> tuple[str, ...]:
         """Names of its scalars in the system: `chain.phi[1]`, ..."""
         return tuple(f"{self.block}.{variable}" for variable in self.variables)
+
+    @property
+    def is_energy(self) -> bool:
+        """Whether it is a part of the energy balance."""
+        return self.unit == "J" and self.variable in ENERGIES
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,6 +245,11 @@ class Simulation(Result):
         """The worst verdict: one that failed, of these what uses up most or lacks a value; None without."""
         return max(self.verdicts, key=_severity, default=None)
 
+    @property
+    def energy(self) -> EnergyBalance | None:
+        """The energy balance of all blocks that have energies; None without one."""
+        return energy_balance((one.variable, one.columns) for one in self.signals if one.is_energy)
+
     def signal(self, name: str) -> Signal:
         """Return the signal `block.variable`.
 
@@ -267,7 +278,7 @@ class Simulation(Result):
 
     def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the object that `urmpipe simulate --json` prints."""
-        t = self.t
+        t, energy = self.t, self.energy
         return {
             "schema": SCHEMA,
             "name": self.name,
@@ -279,6 +290,7 @@ class Simulation(Result):
                 for one in self.blocks
             ],
             "signals": [scalar for one in self.signals for scalar in _scalars(one, t)],
+            "energy": energy.to_dict() if energy else None,
             "failed": self.failed,
             "verdict": self.verdict,
             "assumptions": list(self.assumptions),

@@ -62,3 +62,31 @@ def test_one_set_point_of_two_controllers_is_drawn_once(controlled: Simulation) 
 )
 def test_what_is_no_pair_is_no_answer(controlled: Simulation, connections: Mapping[str, str]) -> None:
     assert answers_of(replace(controlled, connections=connections)) == []
+
+
+def test_elements_of_arrays_are_answers_a_plot_a_quantity(controlled: Simulation) -> None:
+    q = np.arange(6.0).reshape(3, 2)
+    arm = Signal("arm", "phi", q, "rad", "deg")
+    connections = {f"c{i}.set_theta": f"set_point{i}.theta" for i in (1, 2)}
+    connections |= {f"c{i}.real_theta": f"arm.phi[{i}]" for i in (1, 2)}
+    signals = (*controlled.signals, arm)
+    (theta,) = answers_of(replace(controlled, signals=signals, connections=connections))
+    assert [one.name for one in theta.signals[2:]] == ["arm.phi[1]", "arm.phi[2]"]
+    np.testing.assert_array_equal(theta.signals[3].values, q[:, 1])
+    assert (theta.variables, theta.signals[3].display_unit) == ("theta, phi", "deg")
+
+
+@pytest.mark.parametrize("connected", [True, False])
+def test_without_a_measuring_input_the_answer_is_the_output_of_that_name(
+    controlled: Simulation, connected: bool
+) -> None:
+    """A block that is controlled inside has it so; its set point may come from a log."""
+    arm = Signal("arm", "phi", np.zeros((3, 2)), "rad")
+    logged = Signal("arm", "set_phi", np.ones((3, 2)), "rad")
+    connections = {f"arm.set_phi[{i}]": f"set_point{i}.theta" for i in (1, 2)} if connected else {}
+    signals = (*controlled.signals, arm, *(() if connected else (logged,)))
+    (phi,) = answers_of(replace(controlled, signals=signals, connections=connections))
+    wanted = ["set_point1.theta", "set_point2.theta"] if connected else ["arm.set_phi"]
+    real = ["arm.phi[1]", "arm.phi[2]"] if connected else ["arm.phi"]
+    assert [one.name for one in phi.signals] == [*wanted, *real]
+    assert phi.wanted == len(wanted)

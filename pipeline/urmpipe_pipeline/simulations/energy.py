@@ -1,0 +1,71 @@
+"""The energy balance of blocks: what went in, what was lost, what is stored, and what is left over."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+
+ENERGIES = ("energy_in", "energy_lost", "energy_stored")
+"""Variables in [J] of which a balance is made, whatever block has them."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EnergyBalance:
+    """Energies of some blocks together, counted from the first sample.
+
+    Attributes:
+        supplied: Work done on the blocks from outside in [J], shape (n,).
+        lost: Heat and damping in [J], shape (n,).
+        stored: Change of the stored energy in [J], shape (n,).
+    """
+
+    supplied: FloatArray
+    lost: FloatArray
+    stored: FloatArray
+
+    @property
+    def residual(self) -> FloatArray:
+        """What is left over in [J], shape (n,): supplied - lost - stored."""
+        with np.errstate(invalid="ignore"):
+            return self.supplied - self.lost - self.stored
+
+    @property
+    def worst(self) -> int | None:
+        """The sample of the largest absolute residual; None where it never has a value."""
+        size = np.abs(self.residual)
+        known = np.flatnonzero(np.isfinite(size))
+        return int(known[np.argmax(size[known])]) if len(known) else None
+
+    def share(self, residual: float) -> float:
+        """Return a residual in [J] as a share of the largest of the three energies; 0 where all are 0."""
+        sizes = np.abs([self.supplied, self.lost, self.stored])
+        largest = float(np.max(sizes, where=np.isfinite(sizes), initial=0.0))
+        return abs(residual) / largest if largest > 0.0 else 0.0
+
+    def to_dict(self) -> dict[str, float | None]:
+        """Return the energies and the residual at the last sample in [J]; None where there is no value."""
+        named = {"in": self.supplied, "lost": self.lost, "stored": self.stored, "residual": self.residual}
+        ends = {key: float(values[-1]) if len(values) else np.nan for key, values in named.items()}
+        return {key: value if np.isfinite(value) else None for key, value in ends.items()}
+
+
+def energy_balance(signals: Iterable[tuple[str, FloatArray]]) -> EnergyBalance | None:
+    """Return the balance of signals that are `ENERGIES`, each summed over all blocks; None without any.
+
+    Args:
+        signals: Names of variables with their values in [J], each shape (n, k). One of `ENERGIES` that no
+            block has counts as 0.
+    """
+    sums: dict[str, FloatArray] = {}
+    for variable, values in signals:
+        with np.errstate(invalid="ignore"):
+            change = (values - values[:1]).sum(axis=1)
+            sums[variable] = sums.get(variable, 0.0) + change
+    if not sums:
+        return None
+    none = np.zeros(len(next(iter(sums.values()))))
+    return EnergyBalance(*(sums.get(variable, none) for variable in ENERGIES))

@@ -1,0 +1,99 @@
+"""The energy balance: what goes in is lost or stored, and what is left over is shown."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from asserting import there
+from presented import facts, figures
+from urmpipe_pipeline.results import present
+from urmpipe_pipeline.simulations.energy import energy_balance
+from urmpipe_pipeline.simulations.signal_groups import groups_of
+from urmpipe_pipeline.simulations.simulation import Signal, Simulation
+
+MakeSimulation = Callable[..., Simulation]
+
+
+@pytest.fixture
+def swinging(make_simulation: MakeSimulation) -> Simulation:
+    """Two blocks of which one starts with 5 J; 0.5 J are left over at the second sample, 0 at the end."""
+    return replace(
+        make_simulation(3),
+        signals=(
+            Signal("a", "energy_in", np.array([0.0, 4.0, 8.0]), "J"),
+            Signal("a", "x", np.zeros(3), "m"),
+            Signal("a", "energy_stored", np.array([5.0, 6.5, 9.0]), "J"),
+            Signal("b", "energy_in", np.array([[0.0, 0.0], [1.0, -1.0], [1.0, 1.0]]), "J"),
+            Signal("b", "energy_lost", np.array([1.0, 3.0, 7.0]), "J"),
+        ),
+        verdicts=(),
+    )
+
+
+def test_energies_of_all_blocks_count_from_the_first_sample(swinging: Simulation) -> None:
+    balance = there(swinging.energy)
+    np.testing.assert_array_equal(balance.supplied, [0.0, 4.0, 10.0])
+    np.testing.assert_array_equal(balance.lost, [0.0, 2.0, 6.0])
+    np.testing.assert_array_equal(balance.stored, [0.0, 1.5, 4.0])
+    np.testing.assert_array_equal(balance.residual, [0.0, 0.5, 0.0])
+    assert (balance.worst, balance.share(-0.5)) == (1, 0.05)
+    assert swinging.to_dict()["energy"] == {"in": 10.0, "lost": 6.0, "stored": 4.0, "residual": 0.0}
+
+
+def test_the_balance_stands_before_the_blocks_and_only_there(swinging: Simulation) -> None:
+    body = present(swinging).body
+    assert [one.title for one in body.sections] == ["Energy balance", "a"]
+    assert [one.variables for one in groups_of(swinging)] == ["x"]
+    (figure,) = figures(body.sections[0])
+    energies, residual = (view.panels[0] for view in figure.views)
+    np.testing.assert_array_equal(energies.lines[0].values, [[0, 0, 0], [4, 2, 1.5], [10, 6, 4]])
+    np.testing.assert_array_equal(residual.lines[0].values, [0.0, 0.5, 0.0])
+    assert (energies.unit, residual.unit, residual.peaks) == ("J", "J", (1,))
+    assert figure.caption.startswith("Sums over a, b since the first sample.")
+    fact = facts(body)["Energy balance"]
+    assert fact == "2 blocks, largest residual 0.5 J at t = 0.005 s, 5.0 % of the largest energy"
+
+
+def test_set_points_stand_before_the_balance(swinging: Simulation) -> None:
+    answers = Signal("c", "set_x", np.zeros(3), "m"), Signal("c", "x", np.zeros(3), "m")
+    shown = present(replace(swinging, signals=(*swinging.signals, *answers)))
+    titles = [one.title for one in shown.body.sections]
+    assert titles == ["Set point and answer", "Energy balance", "a", "c"]
+    assert [one.title for one in shown.body.sections if one.opened] == ["Set point and answer"]
+
+
+@pytest.mark.parametrize(("variable", "unit"), [("energy_in", "W"), ("energy", "J"), ("energy_in[1]", "J")])
+def test_other_signals_are_no_part_of_it(make_simulation: MakeSimulation, variable: str, unit: str) -> None:
+    simulation = replace(make_simulation(3), signals=(Signal("a", variable, np.zeros(3), unit),), verdicts=())
+    assert (simulation.energy, simulation.to_dict()["energy"]) == (None, None)
+    shown = present(simulation).body
+    assert [one.title for one in shown.sections] == ["a"]
+    assert "Energy balance" not in facts(shown)
+
+
+@pytest.mark.parametrize(
+    ("values", "worst", "end"),
+    [
+        (np.empty(0), None, None),
+        (np.full(3, np.nan), None, None),
+        (np.array([0.0, np.inf, 2.0]), 2, 2.0),
+        (np.array([0.0, 3.0, np.nan]), 1, None),
+        (np.zeros(3), 0, 0.0),
+    ],
+)
+def test_values_that_are_not_finite_are_left_out(
+    make_simulation: MakeSimulation, values: NDArray[np.float64], worst: int | None, end: float | None
+) -> None:
+    balance = there(energy_balance([("energy_in", values[:, np.newaxis])]))
+    assert (balance.worst, balance.to_dict()["residual"]) == (worst, end)
+    assert balance.share(0.0) == 0.0
+    simulation = make_simulation(len(values))
+    simulation = replace(simulation, signals=(Signal("a", "energy_in", values, "J"),), verdicts=(), arms=())
+    shown = present(simulation).body
+    assert (facts(shown)["Energy balance"] is None) == (worst is None)
+    assert len(figures(shown.sections[0])) == (len(values) > 0)
