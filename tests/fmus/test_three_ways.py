@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fmu_run import FmuRun
+from made_masses import with_drives, with_masses
 from random_units import PATIENT, random_columns, random_starts, random_units
 from sliding_arm import sliding_arm
 from urmpipe_fmus.build import build_fmu
@@ -62,6 +63,13 @@ UNITS: dict[str, tuple[str, dict[str, Any]]] = {
     "a load": ("inertia", {}),
     "a controller": ("drive_controller", {}),
     "a set point": ("set_point", {}),
+    "a URM arm with masses": ("chain_dynamics", {"robot": with_masses(load_robot("urm6"))}),
+    "sliding joints with masses": ("chain_dynamics", {"robot": with_masses(sliding_arm())}),
+    "a URM arm with drives": ("driven_arm", {"robot": with_drives(with_masses(load_robot("urm6")))}),
+    "driven and held sliding joints": (
+        "driven_arm",
+        {"robot": with_drives(with_masses(sliding_arm()), held=["wrist"])},
+    ),
 }
 
 
@@ -73,6 +81,12 @@ def test_every_unit_that_is_shipped_is_here() -> None:
 def unit_of(what: str) -> Unit:
     name, options = UNITS[what]
     return make_unit(name, **options)
+
+
+def times_of(unit: Unit) -> FloatArray:
+    """Communication points in [s]; few of an arm with masses, which takes Python some ms an internal step."""
+    count = 9 if unit.name in ("chain_dynamics", "driven_arm") else 41
+    return 0.005 * np.arange(count, dtype=np.float64)
 
 
 def near(rng: np.random.Generator, variable: Variable) -> Any:
@@ -147,7 +161,7 @@ def assert_fmu_gives(unit: Unit, path: Path, case: tuple[Any, Any], t: FloatArra
 
 @pytest.mark.parametrize("what", UNITS)
 def test_a_run_gives_what_steps_give(what: str) -> None:
-    unit, t = unit_of(what), np.linspace(0.0, 0.2, 41, dtype=np.float64)
+    unit, t = unit_of(what), times_of(unit_of(what))
     for seed in range(3):
         start, columns = random_case(unit, seed, len(t))
         assert_same(stepped(unit, t, columns, start), shown(unit, run(unit, t, columns, start)))
@@ -157,7 +171,7 @@ def test_a_run_gives_what_steps_give(what: str) -> None:
 @pytest.mark.parametrize("backend", [pytest.param("native", marks=needs_native), "python"])
 @pytest.mark.parametrize("what", UNITS)
 def test_an_fmu_gives_what_a_run_gives(what: str, backend: Backend) -> None:
-    unit, t = unit_of(what), np.linspace(0.0, 0.2, 41, dtype=np.float64)
+    unit, t = unit_of(what), times_of(unit_of(what))
     path = cached_fmu(unit, backend)
     for seed in range(3):
         assert_fmu_gives(unit, path, random_case(unit, seed, len(t)), t)
@@ -167,21 +181,22 @@ def test_an_fmu_gives_what_a_run_gives(what: str, backend: Backend) -> None:
 @pytest.mark.parametrize("backend", [pytest.param("native", marks=needs_native), "python"])
 @pytest.mark.parametrize("what", UNITS)
 def test_an_fmu_goes_on_bit_by_bit_from_a_saved_state(what: str, backend: Backend) -> None:
-    unit, t = unit_of(what), np.linspace(0.0, 0.2, 41, dtype=np.float64)
+    unit, t = unit_of(what), times_of(unit_of(what))
     start, columns = random_case(unit, 0, len(t))
+    half = len(t) // 2
     before, after = (
-        {name: rows[part] for name, rows in columns.items()} for part in (slice(20), slice(20, 41))
+        {name: rows[part] for name, rows in columns.items()} for part in (slice(half), slice(half, None))
     )
     with FmuRun(cached_fmu(unit, backend), unit, start) as fmu:
-        fmu.over(t[:20], before)
+        fmu.over(t[:half], before)
         state = fmu.fmu.getFMUstate()
         kept = fmu.fmu.serializeFMUstate(state)
-        first = fmu.over(t[19:40], after)
+        first = fmu.over(t[half - 1 : -1], after)
         fmu.fmu.setFMUstate(state)
-        again = fmu.over(t[19:40], after)
-        fmu.over(t[:20] + 0.4, before)  # somewhere else
+        again = fmu.over(t[half - 1 : -1], after)
+        fmu.over(t[:half] + 0.4, before)  # somewhere else
         fmu.fmu.setFMUstate(fmu.fmu.deSerializeFMUstate(kept))
-        last = fmu.over(t[19:40], after)
+        last = fmu.over(t[half - 1 : -1], after)
     np.testing.assert_array_equal(again, first)
     np.testing.assert_array_equal(last, first)
     assert (np.ptp(first, axis=0) > 0.0).any()

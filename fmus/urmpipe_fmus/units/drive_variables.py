@@ -64,6 +64,11 @@ class DriveGroup:
         """Nothing for joints that turn, "_s" for those that slide."""
         return "" if self.kind.kind == "revolute" else "_s"
 
+    @property
+    def _limit(self) -> str:
+        """Name of the limit of the voltage, u of which it is: u_max, u_s_max."""
+        return f"u{self.suffix}_max"
+
     def parameters(self) -> Iterator[Parameter]:
         """Yield the constants of the drives and the springs; the periods are fixed."""
         joints = [one for one, _ in self.driven.values()]
@@ -81,7 +86,7 @@ class DriveGroup:
             periods = [one.period for one in joints]
             largest = [one.largest_voltage for one in joints]
             yield self._parameter("period", "Time between two samples", "s", periods, 1e-6, tunable=False)
-            yield self._parameter("u_max", "Largest voltage", "V", largest, 0.0)
+            yield self._parameter(self._limit, "Largest voltage", "V", largest, 0.0, plain=True)
         if self.held:
             stiffness = [one.stiffness for one, _ in self.held.values()]
             damping = [one.damping for one, _ in self.held.values()]
@@ -184,9 +189,8 @@ class DriveGroup:
             gains = Gains(*(self._read(v, key)[j] for key in GAIN_KEYS))
             name = f"set_{self.kind.name}"
             wanted = JointMotion(*(getattr(v, name + dots)[j] for dots in ("", "d", "dd")))
-            last, limit, period, sample = (
-                self._read(v, key)[j] for key in ("last", "u_max", "period", "sample")
-            )
+            last, period, sample = (self._read(v, key)[j] for key in ("last", "period", "sample"))
+            limit = getattr(v, self._limit)[j]
             fresh = next_voltage(last, gains, wanted, JointMotion(q[k], qd[k], qdd[k]), limit)
             found.append(voltage_at(v.time, period, sample, fresh, last))
         return found
@@ -227,9 +231,10 @@ class DriveGroup:
         *,
         held: bool = False,
         tunable: bool = True,
+        plain: bool = False,
     ) -> Parameter:
         return Parameter(
-            name=f"{name}{self.suffix}",
+            name=name if plain else name + self.suffix,
             description=f"{description} {self._of(self.held if held else self.driven)}",
             unit=unit,
             start=tuple(start),

@@ -21,17 +21,19 @@ def inertia() -> Unit:
     return Unit(
         name="inertia",
         description="Inertia that turns about a fixed axis in a bearing with viscous friction",
-        variables=(*_parameters(), *_inputs(), _ACCELERATION, *_states()),
-        outputs=lambda v: {"alpha": _acceleration(v)},
-        derivatives=lambda v: {"theta": v.omega, "omega": _acceleration(v)},
+        variables=(*_parameters(), *_inputs(), *_outputs(), *_states()),
+        outputs=lambda v: {"alpha": _acceleration(v), "energy_stored": 0.5 * v.J * v.omega * v.omega},
+        derivatives=lambda v: {
+            "theta": v.omega,
+            "omega": _acceleration(v),
+            "energy_in": v.tau_ext * v.omega,
+            "energy_lost": v.d * v.omega * v.omega,
+        },
         internal_step=5e-4,
         equations=("J alpha = tau + tau_ext - d omega, alpha = omega', omega = theta'",),
         source="Simulative investigation of robot's accuracy and running speed (2005), eq. 19",
         recipe=Recipe(__name__, "inertia"),
     )
-
-
-_ACCELERATION = Output(name="alpha", description="Acceleration", unit="rad/s2")
 
 
 def _parameters() -> tuple[Parameter, ...]:
@@ -48,10 +50,19 @@ def _inputs() -> tuple[Input, ...]:
     )
 
 
+def _outputs() -> tuple[Output, ...]:
+    return (
+        Output(name="alpha", description="Acceleration", unit="rad/s2"),
+        Output(name="energy_stored", description="Kinetic energy", unit="J"),
+    )
+
+
 def _states() -> tuple[State, ...]:
     return (
         State(name="theta", description="Angle", unit="rad", display_unit="deg", output=True),
         State(name="omega", description="Rate", unit="rad/s", display_unit="deg/s", output=True),
+        State(name="energy_in", description="Work of the torque from outside", unit="J", output=True),
+        State(name="energy_lost", description="Heat of the bearing", unit="J", output=True),
     )
 
 

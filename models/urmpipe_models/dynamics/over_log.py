@@ -32,13 +32,16 @@ def torque_over_log(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray
 
 
 def terms_over_log(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> dict[str, FloatArray]:
-    """Return the terms of `torque_over_log` by name (see `TorqueTerms`), each of its shape.
+    """Return the terms of `torque_over_log` by name (see `TorqueTerms`), in [N.m] or [N].
 
     Args:
         chain: The arm, with masses.
         q: Joint values in [rad] or [m], shape (n, joints).
         qd: Their rates in [rad/s] or [m/s], shape (n, joints).
         qdd: Their second derivatives in [rad/s2] or [m/s2], shape (n, joints).
+
+    Returns:
+        inertia, centrifugal, coriolis, gravity and tool, in [N.m] or [N], shape (n, joints) each.
     """
     names, joints = TorqueTerms._fields, q.shape[1]
     flat = _over(

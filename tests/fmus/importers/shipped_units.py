@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from made_masses import with_drives, with_masses
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_names
@@ -39,6 +40,8 @@ def shipped_unit(name: str) -> Unit:
         options = {"robot": load_robot("urm6"), "rates": True}
     elif name == "log_source":
         options = {"table": swinging_joints(400), "columns": [("q", "rad", 6)], "interpolate": True}
+    elif name in ("chain_dynamics", "driven_arm"):
+        options = {"robot": with_drives(with_masses(load_robot("urm6")))}
     elif name == "repolarizer":
         options = {"joints": 6}
     return make_unit(name, **options)
