@@ -21,10 +21,10 @@ PAGES = {
     "ingest": "[logs.md](logs.md), [recording-logs.md](recording-logs.md)",
     "compare": "[compare.md](compare.md), [ci.md](ci.md)",
     "diagnose": "[diagnose.md](diagnose.md)",
-    "robot": "[robots.md](robots.md)",
+    "robot": "[robots.md](robots.md), [dynamics.md](dynamics.md)",
     "ik": "[ik.md](ik.md), [targets.md](targets.md)",
     "fmu": "[fmu.md](fmu.md), [units.md](units.md)",
-    "simulate": "[simulate.md](simulate.md), [drives.md](drives.md)",
+    "simulate": "[simulate.md](simulate.md), [drives.md](drives.md), [dynamics.md](dynamics.md)",
 }
 """Pages that explain what a command does."""
 

@@ -50,6 +50,9 @@ DEVIATION_COLOUR = "#fe046c"
 MENDED_COLOUR = _COLOURS["green"]
 """A log as it would be without the causes of its deviation."""
 
+MASS_COLOUR = "#ffe14d"
+"""Centres of masses in space; yellow."""
+
 VALUE_SCALE = ((0.0, "#8fc1e3"), (0.35, "#e69f00"), (0.7, "#d55e00"), (1.0, "#6b0f00"))
 """Small to large: darker all the way, blue to red, legible on white and to the colour-blind."""
 

@@ -10,8 +10,11 @@ from html import escape
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.dynamics.over_log import mass_centres_over_log
+from urmpipe_pipeline.palette import INK_COLOUR, MASS_COLOUR
 from urmpipe_pipeline.presentation.parts import spot_at
-from urmpipe_pipeline.presentation.scene import Spot
+from urmpipe_pipeline.presentation.scene import Spot, ball_sizes
 
 SIZE = 420
 """Longest extent of what is drawn, in pixels."""
@@ -27,6 +30,12 @@ APART_PX = 50
 
 NEAR_PX = 10
 """Spots nearer than this in a view have one name, in pixels."""
+
+MASS_PX = 16
+"""Radius of the dot of the largest mass, in pixels; the others are as large as balls of one density."""
+
+LEGEND_PX, LEGEND_WIDE = 28, 520
+"""Height and least width of a picture for the line below it that says what these dots are, in pixels."""
 
 HALO = 'stroke="white" stroke-width="4" paint-order="stroke"'
 """Keeps a label readable over a line."""
@@ -56,6 +65,14 @@ FRONT = View("from the front", 1, 2, 1, 0)
 ABOVE = View("from above", 0, 1, 0, 1)
 
 
+@dataclass(frozen=True, slots=True)
+class Mass:
+    """A mass of an arm: where its centre is in [m], and how much it is in [kg]."""
+
+    position: tuple[float, float, float]
+    mass: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Sketch:
     """What is drawn, from the back to the front.
@@ -64,17 +81,19 @@ class Sketch:
         arms: The base and the points p1..pn of each arm in [m], shape (n + 1, 3).
         path: Where a point goes in [m], shape (m, 3).
         spots: Places with a word.
+        masses: Masses of the arms.
     """
 
     arms: Sequence[FloatArray]
     path: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     spots: Sequence[Spot] = ()
+    masses: Sequence[Mass] = ()
 
     @property
     def extent(self) -> tuple[FloatArray, FloatArray]:
         """Its least and its largest coordinates in [m], shape (3,) each."""
-        spots = np.array([spot.position for spot in self.spots]).reshape(-1, 3)
-        every = np.concatenate([*self.arms, self.path, spots])
+        places = [*(one.position for one in self.spots), *(one.position for one in self.masses)]
+        every = np.concatenate([*self.arms, self.path, np.array(places).reshape(-1, 3)])
         every = every[np.isfinite(every).all(axis=1)]
         return every.min(axis=0), every.max(axis=0)
 
@@ -117,7 +136,8 @@ def projected(sketch: Sketch, views: Sequence[View], title: str, mark: str = "")
         mark: A comment at its start, by which a file of ours is known.
     """
     frames = _frames(sketch, views)
-    width, height = np.max([one.corner + one.size for one in frames], axis=0) + np.array([20.0, SCALE_PX])
+    width, bottom = np.max([one.corner + one.size for one in frames], axis=0) + np.array([20.0, SCALE_PX])
+    width, height = (max(width, LEGEND_WIDE), bottom + LEGEND_PX) if sketch.masses else (width, bottom)
     size = f'width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.0f} {height:.0f}"'
     return "\n".join(
         (
@@ -127,6 +147,7 @@ def projected(sketch: Sketch, views: Sequence[View], title: str, mark: str = "")
             '<rect width="100%" height="100%" fill="white"/>',
             f'<text x="{SCALE_PX}" y="24" font-size="17">{escape(title)}</text>',
             *(line for one in frames for line in (*_scales(one), *_drawn(sketch, one))),
+            *_legend(sketch, bottom),
             "</svg>\n",
         )
     )
@@ -187,11 +208,29 @@ def _drawn(sketch: Sketch, frame: _Frame) -> Iterator[str]:
         yield _polyline(frame.placed(arm), style)
     if len(sketch.path):
         yield _polyline(frame.placed(sketch.path), 'stroke="#d55e00" stroke-width="2"')
+    centres = frame.placed(np.array([one.position for one in sketch.masses]).reshape(-1, 3))
+    for place, size in zip(centres, ball_sizes([one.mass for one in sketch.masses]), strict=True):
+        yield _mass(place, MASS_PX * size)
     placed = frame.placed(np.array([spot.position for spot in sketch.spots]).reshape(-1, 3))
     for spot, (x, y) in zip(sketch.spots, placed.tolist(), strict=True):
         yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{5 if alone else 3}" fill="{spot.colour}"/>'
     for (x, y), words in _names(placed, [spot.words for spot in sketch.spots]):
         yield f'<text x="{x + 8:.1f}" y="{y - 6:.1f}" {HALO}>{escape(words)}</text>'
+
+
+def _mass(place: FloatArray, radius: float) -> str:
+    """Return the dot of a mass at a place in pixels, shape (2,), with its radius in pixels."""
+    style = f'fill="{MASS_COLOUR}" fill-opacity="0.85" stroke="{INK_COLOUR}"'
+    return f'<circle cx="{place[0]:.1f}" cy="{place[1]:.1f}" r="{radius:.1f}" {style}/>'
+
+
+def _legend(sketch: Sketch, top: float) -> Iterator[str]:
+    """Yield what the dots of masses are, below the views, whose end is given in pixels from the top."""
+    if sketch.masses:
+        masses = [one.mass for one in sketch.masses]
+        words = f"mass centres, as large as balls of one density: {min(masses):.3g} to {max(masses):.3g} kg"
+        yield _mass(np.array([SCALE_PX + 8.0, top + 8.0]), 8.0)
+        yield f'<text x="{SCALE_PX + 24}" y="{top + 12:.1f}">{words}</text>'
 
 
 def _names(placed: FloatArray, words: Sequence[str]) -> Iterator[tuple[tuple[float, float], str]]:
@@ -232,3 +271,12 @@ def chain_spots(skeleton: FloatArray) -> list[Spot]:
     """Return the names of the points of an arm: its skeleton in [m], shape (n + 1, 3)."""
     names = [("base", "#222"), *((f"p{k}", "#d55e00") for k in range(1, len(skeleton)))]
     return [Spot(spot_at(point), *name) for point, name in zip(skeleton, names, strict=True)]
+
+
+def chain_masses(chain: Chain, q: FloatArray) -> list[Mass]:
+    """Return the masses of an arm, if it has some, at joint values in [rad] or [m], shape (joints,)."""
+    if not chain.inertials:
+        return []
+    centres = mass_centres_over_log(chain, q[np.newaxis])[0]
+    masses = [float(one.mass) for one in chain.inertials]
+    return [Mass(spot_at(place), mass) for place, mass in zip(centres, masses, strict=True) if mass > 0.0]

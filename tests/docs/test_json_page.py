@@ -84,14 +84,15 @@ def test_each_key_of_a_diagnosis_is_named() -> None:
 def test_each_key_of_a_simulation_is_named() -> None:
     t_ns, block = np.arange(2), SimulatedBlock("meter", "unit", "delta_meter", "")
     simulation = Simulation(
-        name="system", description="", t_ns=t_ns, step=0.005, signals=(Signal("meter", "norm", np.zeros(2)),),
+        name="system", description="", t_ns=t_ns, step=0.005,
+        signals=(Signal("meter", "energy_in", np.zeros(2), "J"),),
         system_svg="", system_text="", blocks=(block,), failed=None, warnings=(LogWarning("gap", "a gap"),),
         provenance=provenance("simulate", {}, ()),
         verdicts=tuple(filter(None, [delta_verdict("meter", t_ns, np.zeros((2, 3)), {"axis": 1.0})])),
     )  # fmt: skip
     found = keys(simulation.to_dict())
     assert found - NAMED == set()
-    assert {"t_min", "quantity", "content", "message"} <= found
+    assert {"t_min", "quantity", "content", "message", "residual"} <= found
 
 
 CALLS = {
@@ -105,6 +106,7 @@ CALLS = {
     "ingest ingest": "ingest log.csv --robot urm6 -o log.rrd",
     "plan plan": "plan cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1 --robot irb60",
     "report report": "report log.rrd",
+    "robot equations": "robot equations rod.toml",
     "robot export": "robot export urm6 -o urm6.toml",
     "robot list": "robot list",
     "robot show": "robot show urm6",
@@ -120,6 +122,8 @@ def test_each_key_of_each_command_is_named(
     for name, source in (("log", "matlab"), ("path", "path")):
         head = (LOGS / f"{source}.csv").read_text(encoding="utf-8").splitlines()[:31]
         (tmp_path / f"{name}.csv").write_text("\n".join(head) + "\n", encoding="utf-8")
+    rod = 'kind = "joints"\njoints = [{ name = "a" }]\ninertials = [{ joint = "a", mass = 1 }]\n'
+    (tmp_path / "rod.toml").write_text(rod, encoding="utf-8")
     for call in sorted(CALLS.values(), key=lambda one: not one.startswith(("ingest", "fmu build"))):
         assert run([*shlex.split(call), "--json"]) == 0, call
         assert keys(json.loads(capsys.readouterr().out)) - NAMED == set(), call

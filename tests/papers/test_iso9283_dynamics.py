@@ -69,7 +69,7 @@ def arm() -> Chain:
 
 def test_eq_8_to_11_give_places_and_velocities_of_the_mass_centres() -> None:
     T, D = np.eye(4), np.zeros((4, 4))
-    for k, (row, motion) in enumerate(zip(ROWS, mass_motions(arm(), Q, QD), strict=True)):
+    for k, (row, motion) in enumerate(zip(ROWS, mass_motions(arm(), list(Q), list(QD)), strict=True)):
         A = element_matrix(row, Q[k])
         derivative = np.zeros((4, 4))
         derivative[0, 1], derivative[1, 0] = -QD[k], QD[k]  # Q_i, eq. 11
@@ -82,7 +82,7 @@ def test_eq_8_to_11_give_places_and_velocities_of_the_mass_centres() -> None:
 
 def test_eq_12_gives_the_angular_velocity_in_the_axes_of_the_element() -> None:
     omega = np.zeros(3)
-    for k, (row, motion) in enumerate(zip(ROWS, mass_motions(arm(), Q, QD), strict=True)):
+    for k, (row, motion) in enumerate(zip(ROWS, mass_motions(arm(), list(Q), list(QD)), strict=True)):
         B = element_matrix(row, Q[k])[:3, :3]
         omega = (omega + [0.0, 0.0, QD[k]]) @ B  # eq. 12: a row vector
         rest = element_matrix(row, 0.0)[:3, :3]
@@ -91,9 +91,9 @@ def test_eq_12_gives_the_angular_velocity_in_the_axes_of_the_element() -> None:
 
 def test_eq_13_is_lagrange_of_these_energies_term_by_term() -> None:
     """M_i = D1 theta'' + D2 theta'^2 + D_(1+k) theta'_(j-1) theta'_k + g E + J^T F, by differences of M and U."""
-    chain, still = arm(), np.zeros(4)
+    chain, still = arm(), [0.0] * 4
     wrench = Wrench((3.0, -1.0, 2.0), (0.2, 0.4, -0.3))
-    terms = torque_terms(chain, Q, QD, QDD, wrench)
+    terms = torque_terms(chain, list(Q), list(QD), list(QDD), wrench)
     step = 1e-6
     slopes = np.array([(M_at(chain, Q + e) - M_at(chain, Q - e)) / (2 * step) for e in step * np.eye(4)])
     # Christoffel symbols: of the pair j, k in row i
@@ -108,15 +108,15 @@ def test_eq_13_is_lagrange_of_these_energies_term_by_term() -> None:
         for e in step * np.eye(4)
     ]
     np.testing.assert_allclose(np.array(terms.gravity, dtype=float), heights, atol=near)
-    J = np.array(jacobian(chain, Q), dtype=float).T
+    J = np.array(jacobian(chain, list(Q)), dtype=np.float64).T
     outside = np.array([*wrench.force, *wrench.moment])
     np.testing.assert_allclose(terms.tool, -J.T @ outside, atol=1e-12)  # F of eq. 13 is what the arm exerts
-    total = inverse_dynamics(chain, Q, QD, QDD, wrench)
+    total = inverse_dynamics(chain, list(Q), list(QD), list(QDD), wrench)
     np.testing.assert_allclose(np.sum(terms, axis=0), np.array(total, dtype=float), atol=1e-12)
     twice = QD @ M_at(chain, Q) @ QD
-    np.testing.assert_allclose(2.0 * kinetic_energy(chain, Q, QD), twice, rtol=1e-13)
-    assert not np.any(torque_terms(chain, Q, still, still).coriolis)
+    np.testing.assert_allclose(2.0 * kinetic_energy(chain, list(Q), list(QD)), twice, rtol=1e-13)
+    assert not np.any(torque_terms(chain, list(Q), still, still).coriolis)
 
 
 def M_at(chain: Chain, q: FloatArray) -> FloatArray:  # noqa: N802 - the paper's letter
-    return np.array(mass_matrix(chain, q), dtype=float)
+    return np.array(mass_matrix(chain, list(q)), dtype=np.float64)

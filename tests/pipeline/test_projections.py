@@ -12,8 +12,22 @@ from hypothesis import strategies as st
 
 from asserting import there
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.inertial import Inertial
+from urmpipe_pipeline.palette import MASS_COLOUR
 from urmpipe_pipeline.presentation.scene import Spot
-from urmpipe_pipeline.projections import ABOVE, FRONT, SIDEWAYS, Sketch, View, projected
+from urmpipe_pipeline.projections import (
+    ABOVE,
+    FRONT,
+    LEGEND_WIDE,
+    MASS_PX,
+    SIDEWAYS,
+    Mass,
+    Sketch,
+    View,
+    chain_masses,
+    projected,
+)
 
 VIEWS = (SIDEWAYS, FRONT, ABOVE)
 SVG = "{http://www.w3.org/2000/svg}"
@@ -111,3 +125,33 @@ def test_a_path_breaks_no_drawing_where_it_is_not_known() -> None:
 def test_what_stands_in_one_point_is_drawn() -> None:
     (line,) = points(drawn(Sketch([np.zeros((2, 3))]), (FRONT,)))
     assert np.isfinite(line).all()
+
+
+def test_masses_are_dots_as_large_as_balls_of_one_density() -> None:
+    masses = [Mass((0.0, 0.0, 0.4), 0.5), Mass((0.2, 0.0, 1.0), 4.0)]
+    svg = drawn(Sketch([ARM], masses=masses), (SIDEWAYS, FRONT))
+    dots = [one for one in svg.findall(f"{SVG}circle") if one.get("fill") == MASS_COLOUR]
+    *placed, legend = dots
+    assert [number(one, "r") for one in placed] == [MASS_PX / 2, MASS_PX] * 2  # 8 times the mass
+    assert number(placed[0], "cx") < number(placed[1], "cx")
+    words = [one.text for one in svg.findall(f"{SVG}text")][-1]
+    assert words == "mass centres, as large as balls of one density: 0.5 to 4 kg"
+    bottom = max(box[3] for box in frames(svg))
+    assert bottom < number(legend, "cy") < number(svg, "height")
+
+
+def test_the_line_about_masses_fits_below_a_slim_arm() -> None:
+    upright = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    svg = drawn(Sketch([upright], masses=[Mass((0.0, 0.0, 0.5), 1.0)]), (SIDEWAYS,))
+    assert number(svg, "width") == LEGEND_WIDE
+    assert number(drawn(Sketch([upright]), (SIDEWAYS,)), "width") < LEGEND_WIDE
+
+
+def test_the_masses_of_a_chain_stand_where_its_joints_take_them() -> None:
+    joint = Joint("q1", axis=(0.0, 0.0, 1.0))
+    heavy, none = Inertial("q1", 2.0, (0.5, 0.0, 0.1)), Inertial("q1", 0.0)
+    chain = Chain("arm", (joint,), inertials=(heavy, none))
+    (mass,) = chain_masses(chain, np.array([np.pi / 2]))
+    np.testing.assert_allclose(mass.position, (0.0, 0.5, 0.1), atol=1e-15)
+    assert mass.mass == 2.0
+    assert chain_masses(Chain("bare", (joint,)), np.zeros(1)) == []

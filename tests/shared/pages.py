@@ -87,6 +87,7 @@ def lay_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "my_unit.py").write_bytes((DOCS / "examples" / "low_pass.py").read_bytes())
     (folder / "arm.urdf").write_text("\n".join(snippets("docs/robots.md", "xml")), encoding="utf-8")
     (folder / "my-arm.toml").write_text(snippets("docs/robots.md", "toml")[0], encoding="utf-8")
+    (folder / "planar.toml").write_text(snippets("docs/dynamics.md", "toml")[0], encoding="utf-8")
     system = next(one for one in snippets("docs/simulate.md", "toml") if one.startswith("[system]"))
     (folder / "my-system.toml").write_text(system, encoding="utf-8")
 

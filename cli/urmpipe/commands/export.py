@@ -37,10 +37,10 @@ if TYPE_CHECKING:
 def export(recording: Path, output: Path | None, terminal: Terminal, **options: Any) -> int:
     """Write what a recording holds, for other tools.
 
-    --rows grid is what urmpipe made of a log: t, the repolarized joints, their rates, and the motion of the
-    tool centre point, in SI. --rows file is what the log said: its columns under their own names, in their
-    own units, with its own clock; nothing is repolarized or resampled. Columns that ingest did not use are
-    not in a recording.
+    --rows grid is what urmpipe made of a log: t, the repolarized joints, their rates, their torques where
+    the robot has masses, and the motion of the tool centre point, in SI. --rows file is what the log said:
+    its columns under their own names, in their own units, with its own clock; nothing is repolarized or
+    resampled. Columns that ingest did not use are not in a recording.
 
     A comparison leaves as its deviations; as TUM, reference and actual become two trajectories for evo. A
     simulation leaves as its signals, each under BLOCK.VARIABLE with its unit; as TUM, the tip of each arm. A

@@ -43,6 +43,8 @@ class Line:
         steps: True for what changes only from one row to the next.
         points: True for rows that nothing joins.
         t_ns: Time of each row in [ns], shape (n,), where it is not the panel's.
+        stacked: True for the parts of a sum: a page stacks them as areas, those above 0 and those below 0;
+            the viewer, which has no areas, draws lines.
     """
 
     values: FloatArray | Computed
@@ -52,6 +54,7 @@ class Line:
     steps: bool = False
     points: bool = False
     t_ns: IntArray | None = None
+    stacked: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

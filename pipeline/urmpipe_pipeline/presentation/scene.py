@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
+import numpy as np
 from numpy import bool_
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.elementwise import Element
 
 BoolArray: TypeAlias = NDArray[bool_]
 
@@ -45,6 +48,7 @@ class Arm:
         vanishes: True if nothing is drawn where there is no pose; else the last pose stays.
         kept: Rows that are drawn in any case.
         marks: Words at its points; not of a ghost.
+        masses: Whether the centres of its masses are drawn, as large as balls of one density; not of a ghost.
     """
 
     chain: Chain
@@ -56,6 +60,7 @@ class Arm:
     vanishes: bool = False
     kept: tuple[int, ...] = ()
     marks: tuple[ArmMark, ...] = ()
+    masses: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -183,3 +188,9 @@ class Scene:
     spots: tuple[Spot, ...] = ()
     targets: Targets | None = None
     arrows: Arrows | None = None
+
+
+def ball_sizes(masses: Sequence[Element]) -> FloatArray:
+    """Return the radii of balls of one density with some masses in [kg], the largest 1, shape (n,)."""
+    sizes = np.cbrt(np.array(masses, dtype=np.float64))
+    return np.asarray(sizes / (sizes.max(initial=0.0) or 1.0))

@@ -36,6 +36,9 @@ CLOCK = "t_ns"
 STORED = "stored"
 """Key of a field's metadata: False of what is not stored; the type that is stored where the hint is wider."""
 
+PATH = "path"
+"""Key of a field's metadata: where its array stands instead of below the field's name."""
+
 MANY = 64
 """A longer list of plain values or of flat records stands as columns."""
 
@@ -262,9 +265,9 @@ def _record(cls: Any) -> Form:
     """Return the form of a dataclass: its fields by their names."""
 
     def to_json(value: Any, at: Out) -> Any:
-        clock = getattr(value, CLOCK, None)
+        clock, paths = getattr(value, CLOCK, None), paths_of(cls)
         parts = parts_of(cls).items()
-        return {name: part.write(getattr(value, name), at.below(name, clock)) for name, part in parts}
+        return {name: part.write(getattr(value, name), at.below(paths[name], clock)) for name, part in parts}
 
     def from_json(tree: Any, at: In) -> Any:
         known = ((name, part) for name, part in parts_of(cls).items() if name in tree)
@@ -355,3 +358,9 @@ def parts_of(cls: type) -> dict[str, Form]:
     """Return the forms of the fields of a dataclass that are stored."""
     hints = get_type_hints(cls)
     return {one.name: form_of(one.metadata.get(STORED, hints[one.name])) for one in stored(cls)}
+
+
+@cache
+def paths_of(cls: type) -> dict[str, str]:
+    """Return where the fields of a dataclass stand below it, by their names."""
+    return {one.name: one.metadata.get(PATH, one.name) for one in stored(cls)}

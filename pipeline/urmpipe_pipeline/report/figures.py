@@ -109,6 +109,8 @@ def _spec(figure: Figure, panels: Sequence[Panel], span: Span) -> Spec:
     places = ((at / 1e9 if timed else at + 1, words) for at, words in figure.instants.items())
     through = [instant(at, words, span.start, span.end) for at, words in places]
     found = spec.stacked(drawn, axis(span.start, span.end), through)
+    if any(one.stacked for panel in panels for one in panel.lines):  # the parts of all sums are too many
+        found["layout"]["hoversubplots"] = "overlaying"
     if through and names.first:
         found["layout"]["legend"] |= {"y": LEGEND_Y}
     return found

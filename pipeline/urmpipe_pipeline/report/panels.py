@@ -10,7 +10,9 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline import text
+from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.joint_log import seconds
+from urmpipe_pipeline.palette import rgb
 from urmpipe_pipeline.presentation.figure import Line, Mark, Over, Panel, Shape
 from urmpipe_pipeline.report import spec
 from urmpipe_pipeline.report.spec import MUTED, Spec, typed
@@ -37,6 +39,9 @@ DOTS = 1500
 
 MARKED = 1000
 """Marks of a panel at most: a browser draws no more of them with ease."""
+
+AREA = 0.6
+"""Opacity of the parts of a sum."""
 
 DEPTH = 1000.0
 """So far below the least of the lines' largest values a logarithmic axis reaches."""
@@ -89,6 +94,10 @@ class Names:
     def entry(self, name: str, number: int) -> Spec:
         """Return whether a line in a panel has its entry there, and what else the entry switches."""
         return {"legendgroup": name, "showlegend": self.first[name] == number} if name in self.first else {}
+
+    def extra(self, name: str, panel: str) -> str:
+        """Return how the pointer tells a line from those of its name in panels of other titles."""
+        return f"<extra>{label(panel)} {label(name)}</extra>" if name in self.often else ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,7 +162,8 @@ def drawn_panel(panel: Panel, number: int, names: Names, span: Span) -> spec.Pan
     if panel.over is not None:
         return spec.Panel(title, list(_clouds(curves, panel.over, panel.peaks, unit)), (), panel.share, look)
     traces = [
-        *_lines(panel, curves, number, names, unit),
+        *_areas(panel, [one for one in curves if one.line.stacked], number, names, unit),
+        *_lines(panel, [one for one in curves if not one.line.stacked], number, names, unit),
         *_peaks(panel, curves),
         *_marks(panel, factor, names, number),
     ]
@@ -183,9 +193,43 @@ def _lines(panel: Panel, curves: Sequence[_Curve], number: int, names: Names, un
             more |= {"mode": "markers", "marker": {"color": one.colour, "size": 7}, "cliponaxis": False}
         points = points_for(one.t_ns)
         trace = line(one.x, one.values, one.name, one.colour, unit, points=points, keep=panel.peaks, **more)
-        if one.name in names.often:
-            trace["hovertemplate"] += f"<extra>{label(panel.title)} {label(one.name)}</extra>"
+        trace["hovertemplate"] += names.extra(one.name, panel.title)
         yield trace
+
+
+def _areas(panel: Panel, curves: Sequence[_Curve], number: int, names: Names, unit: str) -> Iterator[Spec]:
+    """Yield the parts of a sum as areas from 0 upwards and from 0 downwards, at the same rows in all.
+
+    What the pointer tells is the part, not the height of the stack.
+    """
+    if not curves:
+        return
+    values = np.column_stack([one.values for one in curves])
+    kept = decimate(values, points_for(curves[0].t_ns), curves[0].x)
+    for one, column in zip(curves, values[kept].T, strict=True):
+        digits = pointer_digits(unit, column)
+        area: Spec = {
+            "type": "scatter",
+            "mode": "lines",
+            "name": label(one.name),
+            "x": typed(one.x[kept], "f8"),
+            "line": {"width": 0, "simplify": False},
+            "fillcolor": f"rgba{(*rgb(one.colour), AREA)}",
+            "showlegend": False,
+            **names.entry(one.name, number),
+        }
+        hover = f"%{{customdata:{told(column, digits)}}} {label(unit)}".rstrip()
+        yield area | {
+            "y": typed(np.fmax(column, 0.0)),
+            "stackgroup": f"up {number}",
+            "customdata": typed(column, precision(column, digits)),
+            "hovertemplate": hover + names.extra(one.name, panel.title),
+        }
+        below = np.fmin(column, 0.0)
+        if below.any():
+            yield area | {
+                "y": typed(below), "stackgroup": f"down {number}", "hoverinfo": "skip", "showlegend": False,
+            }  # fmt: skip
 
 
 def _peaks(panel: Panel, curves: Sequence[_Curve]) -> Iterator[Spec]:

@@ -65,7 +65,7 @@ def provenance_of(name: str, made: Provenance) -> dict[str, Any]:
 
 
 def grid_table(run: Run) -> ExportTable:
-    """Return the run on its grid in SI, each name with its unit: t, q, q', q'', and the tool centre point.
+    """Return the run on its grid in SI, each name with its unit: t, q, q', q'', torques, tool centre point.
 
     Of single poses the row stands for t, and there is nothing per second: no motion joins them.
     """
@@ -79,6 +79,8 @@ def grid_table(run: Run) -> ExportTable:
     for prefix, order, values in orders[: 3 if moves else 1]:
         names = [prefix + name for name in joints]
         columns += columns_of(names, [unit + order for unit in units], values)
+    if run.tau is not None:
+        columns += columns_of([f"tau_{name}" for name in joints], run.torque_units, run.tau)
     if run.tcp is not None:
         points = (
             ("p", "m", run.tcp.position), ("v", "m/s", run.tcp.velocity), ("a", "m/s2", run.tcp.acceleration),
@@ -96,9 +98,10 @@ def grid_table(run: Run) -> ExportTable:
 
 
 def _grid_fields(run: Run) -> dict[str, Any]:
-    """Return the fields of a run on its grid, in SI: t, q, qd, qdd, p, v, a, euler_zyx, p_recorded.
+    """Return the fields of a run on its grid, in SI: t, q, qd, qdd, tau, p, v, a, euler_zyx, p_recorded.
 
-    What a run does not have is empty: the point without kinematics, times and derivatives of single poses.
+    What a run does not have is empty: the point without kinematics, torques without masses, times and
+    derivatives of single poses.
     """
     units = run.joint_units
     tcp = run.tcp
@@ -112,6 +115,7 @@ def _grid_fields(run: Run) -> dict[str, Any]:
         "q": run.q,
         "qd": run.qd if moves else nothing,
         "qdd": run.qdd if moves else nothing,
+        "tau": nothing if run.tau is None else run.tau,
         "p": nothing if tcp is None else tcp.position,
         "v": tcp.velocity if tcp is not None and moves else nothing,
         "a": tcp.acceleration if tcp is not None and moves else nothing,
@@ -120,8 +124,8 @@ def _grid_fields(run: Run) -> dict[str, Any]:
         "joints": [encodable(name) for name in run.log.joints],
         "units": {
             "t": "s", "clock_ns": "ns", "q": list(units), "qd": [f"{unit}/s" for unit in units],
-            "qdd": [f"{unit}/s2" for unit in units], "p": "m", "v": "m/s", "a": "m/s2",
-            "euler_zyx": "rad", "p_recorded": "m",
+            "qdd": [f"{unit}/s2" for unit in units], "tau": run.torque_units, "p": "m", "v": "m/s",
+            "a": "m/s2", "euler_zyx": "rad", "p_recorded": "m",
         },
     }  # fmt: skip
 

@@ -18,6 +18,7 @@ from urmpipe_pipeline.presentation.figure import Computed, Figure, Line, Mark, P
 from urmpipe_pipeline.presentation.parts import within_words
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.torque_figures import torque_figures
 
 EULER = {"rz": AXIS_COLOURS["z"], "ry": AXIS_COLOURS["y"], "rx": AXIS_COLOURS["x"]}
 """The Euler angles in the colours of their axes."""
@@ -30,11 +31,12 @@ JOINTS_SHARE = 3.4
 
 
 def run_figures(run: Run) -> Iterator[Figure]:
-    """Yield the plots of a log that stands alone: joints, speed, motion."""
+    """Yield the plots of a log that stands alone: joints, speed, motion, torques where they are known."""
     yield from joints_figure(run)
     if run.timed and run.tcp is not None:
         yield speed_figure(run.name, run.t_ns, _lengths(run.tcp.velocity))
     yield from motion_figure(run)
+    yield from torque_figures(run)
 
 
 def times_of(run: Run) -> IntArray | None:

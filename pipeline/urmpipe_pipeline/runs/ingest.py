@@ -16,6 +16,7 @@ from urmpipe_models.kinematics.forward import PointLog, point_over_log
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.choices import check_choice
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.masses import mass_notices
 from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import Provenance, provenance
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
@@ -25,6 +26,7 @@ from urmpipe_pipeline.runs.plausibility import beyond_limits, implausible
 from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded
 from urmpipe_pipeline.runs.results import RowJoints, Run
 from urmpipe_pipeline.runs.robot_inference import infer_robot
+from urmpipe_pipeline.runs.torques import beyond_efforts, torques
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.sources.clocks.clock import unused_for_poses, unused_period
 from urmpipe_pipeline.sources.read import read_numbers
@@ -124,11 +126,14 @@ def run_of(
     method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
     qd, qdd = _rates(log, grid, q, method, grid.steps(found.broken), warnings)
     tcp, noticed = kinematics(robot, q, qd, qdd)
+    tau = torques(robot, q, qd, qdd)
+    if timed:
+        noticed += beyond_efforts(log.joints, robot, grid.t_ns, tau, grid.source_ns)
     recorded = None if log.tcp_position is None else grid.resample(log.tcp_position)
     return Run(
         name=name or log.name, log=log, robot=robot, tsp=grid.tsp, t_ns=grid.t_ns, q=q, qd=qd, qdd=qdd,
         tcp=tcp, tcp_recorded=recorded, audit=found.entries, warnings=(*warnings, *noticed), provenance=made,
-        rows=None if grid.own else RowJoints(grid.source_ns, found.q),
+        rows=None if grid.own else RowJoints(grid.source_ns, found.q), tau=tau,
     )  # fmt: skip
 
 
@@ -196,7 +201,7 @@ def kinematics(
         allowed = f"{len(robot.coordinates)}, as robot {robot.name} has"
         raise LogError(f"found {q.shape[1]} joints, allowed: {allowed}")
     tcp = point_over_log(robot, q, qd, qdd)
-    notices = missing_visuals(robot)
+    notices = [*missing_visuals(robot), *mass_notices(robot)]
     if not tcp.singular.any():
         return tcp, notices
     count, first = int(tcp.singular.sum()), int(np.argmax(tcp.singular))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from urmpipe_pipeline.presentation.parts import (
 from urmpipe_pipeline.presentation.section import Advice, Cell, Event, Fact, Level, Table, Value
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.torques import joint_torques
 
 AUDIT_NOTES: dict[AuditKind, str] = {
     "in-between": "in-between: a linear resampling left this sample on a wrap, Step off the line of its"
@@ -102,6 +104,24 @@ def inference_table(run: Run, *, brief: bool = False) -> Table:
     table = table_of(f"What was inferred ({len(rows)})", heads, rows, brief=brief, folded=True)
     *others, last = table.columns
     return replace(table, columns=(*others, replace(last, brief=False)))
+
+
+def torque_table(run: Run) -> Iterator[Table]:
+    """Yield the largest torque of each joint and its limit; nothing where torques are not known."""
+    if run.tau is None:
+        return
+    found = cache(lambda: joint_torques(run.log.joints, run.robot, run.t_ns, run.tau))
+    heads: Heads[int] = {
+        "joint": ("Joint", lambda j: run.log.joints[j]),
+        "max": ("Largest torque", lambda j: Value(float(f"{found()[j].max:.4g}"), found()[j].unit)),
+        "t_max": ("At t", lambda j: Value(found()[j].t_max, "s")),
+        "rms": ("RMS", lambda j: Value(float(f"{found()[j].rms:.4g}"), found()[j].unit)),
+        "effort": ("Effort limit", lambda j: Value(found()[j].effort, found()[j].unit, given=True)),
+        "effort_share": ("Used", lambda j: Value(found()[j].effort_share, "%", limit=1.0)),
+        "share_out": ("Time beyond", lambda j: Value(found()[j].share_out, "%")),
+    }
+    note = "The torque that the motion takes, by inverse dynamics, without friction and load at the tool."
+    yield Table("Joint torques", columns_of(range(len(run.log.joints)), heads), note)
 
 
 def file_tables(run: Run) -> Iterator[Table]:

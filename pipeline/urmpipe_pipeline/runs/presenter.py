@@ -17,10 +17,11 @@ from urmpipe_pipeline.runs.parts import (
     inference_table,
     log_events,
     log_facts,
+    torque_table,
 )
 from urmpipe_pipeline.runs.playback_figures import playback_figures
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.runs.scene import path_figure, run_scene
+from urmpipe_pipeline.runs.scene import mass_drawing, path_figure, run_scene
 
 
 def present(run: Run) -> Presentation:
@@ -30,7 +31,11 @@ def present(run: Run) -> Presentation:
         f"Log {run.name}",
         None,
         log_facts(run),
-        (inference_table(run, brief=True), *([audit_table(run, brief=True)] if run.audit else [])),
+        (
+            inference_table(run, brief=True),
+            *([audit_table(run, brief=True)] if run.audit else []),
+            *torque_table(run),
+        ),
         partial(run_figures, run),
         partial(_page, run),
         events=partial(log_events, run),
@@ -80,4 +85,5 @@ def _page(run: Run) -> Iterator[Block]:
     """Yield what only a page shows of a log."""
     yield from playback_figures(run)
     yield from path_figure(run)
+    yield from mass_drawing(run)
     yield from file_tables(run)

@@ -20,6 +20,7 @@ from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.runs.grid import RESAMPLED, interpolate
+from urmpipe_pipeline.runs.torques import joint_torques
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -60,6 +61,8 @@ class Run(Result):
         provenance: How to repeat it.
         recording: Where it was written.
         rows: The joints on the file's rows where the grid has other samples; else None.
+        tau: Torques of the joints in [N.m] or [N], shape (g, joints), NaN where a rate is; None of a robot
+            without masses and of still poses.
     """
 
     name: str
@@ -77,6 +80,7 @@ class Run(Result):
     provenance: Provenance
     recording: Path | None = field(default=None, metadata={"stored": False})
     rows: RowJoints | None = None
+    tau: FloatArray | None = field(default=None, metadata={"path": "joints/torque"})
 
     @property
     def resampled(self) -> bool:
@@ -146,6 +150,11 @@ class Run(Result):
             return ["rad" if joint.kind == "revolute" else "m" for joint in self.robot.moving]
         return list(self.log.joint_units)
 
+    @property
+    def torque_units(self) -> list[str]:
+        """The SI unit of the torque of each joint, N.m, or N of one that slides."""
+        return ["N.m" if unit == "rad" else "N" for unit in self.joint_units]
+
     def as_run(self) -> Run:
         """Return this run: what results that have a run return of it."""
         return self
@@ -160,7 +169,7 @@ class Run(Result):
         return line_of(self.name, arm, f"{rows} in {self.duration:g} s", grid)
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row a grid sample: t [s], the joints, their rates, and the TCP where there is one.
+        """Return one row a grid sample: t [s], the joints, their rates and torques, and the TCP, where known.
 
         Of still poses the number of the row stands for t, from 1, and there is nothing per second.
         """
@@ -170,6 +179,8 @@ class Run(Result):
         kinds = 3 if self.timed else 1
         for prefix, values in (("", self.q), ("d_", self.qd), ("dd_", self.qdd))[:kinds]:
             columns |= {f"{prefix}{name}": values[:, i] for i, name in enumerate(self.log.joints)}
+        if self.tau is not None:
+            columns |= {f"tau_{name}": self.tau[:, i] for i, name in enumerate(self.log.joints)}
         if self.tcp is not None:
             for name, values in (
                 ("p", self.tcp.position), ("v", self.tcp.velocity), ("a", self.tcp.acceleration),
@@ -196,6 +207,9 @@ class Run(Result):
             "inferences": [one.to_dict(voice) for one in self.log.inferences],
             "repolarizations": [entry.to_dict() for entry in self.repolarizations],
             "audit": [entry.to_dict() for entry in self.audit],
+            "torques": [
+                one.to_dict() for one in joint_torques(self.log.joints, self.robot, self.t_ns, self.tau)
+            ],
             "warnings": [one.to_dict(voice) for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }

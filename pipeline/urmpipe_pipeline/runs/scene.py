@@ -6,10 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, run_colour
-from urmpipe_pipeline.presentation.figure import SpaceFigure
+from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
 from urmpipe_pipeline.presentation.parts import ends, within_words
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene
+from urmpipe_pipeline.projections import FRONT, SIDEWAYS, Sketch, chain_masses, chain_spots, projected
 from urmpipe_pipeline.runs.figures import times_of
 from urmpipe_pipeline.runs.results import Run
 
@@ -18,9 +20,11 @@ def run_scene(run: Run) -> Scene | None:
     """Return the arm of a log, where it was and where it recorded itself; None without a position."""
     arms: tuple[Arm, ...] = ()
     if run.robot is not None and run.tcp is not None:
-        arms = (Arm(run.robot, run.q, times_of(run), run_colour(0)),)
+        masses = bool(run.robot.inertials)
+        arms = (Arm(run.robot, run.q, times_of(run), run_colour(0), masses=masses),)
     paths = tuple(_paths(run))
-    return Scene("Arm and paths [m]", arms, paths) if arms or paths else None
+    title = "Arm, its mass centres (yellow) and paths [m]" if arms and arms[0].masses else "Arm and paths [m]"
+    return Scene(title, arms, paths) if arms or paths else None
 
 
 def path_figure(run: Run) -> Iterator[SpaceFigure]:
@@ -43,6 +47,23 @@ def path_figure(run: Run) -> Iterator[SpaceFigure]:
         tuple(paths),
         ends(known) if timed else (),
     )
+
+
+def mass_drawing(run: Run) -> Iterator[Drawing]:
+    """Yield the arm at its first pose in two projections, with its mass centres; nothing without masses."""
+    if run.robot is None or not run.robot.inertials or run.tcp is None:
+        return
+    there = np.flatnonzero(np.isfinite(run.q).all(axis=1))
+    if not len(there):
+        return
+    q, name = np.asarray(run.q)[there[0]], run.robot.name
+    (skeleton,) = points_over_log(run.robot, q[np.newaxis])
+    masses = chain_masses(run.robot, q)
+    sketch = Sketch([skeleton], spots=chain_spots(skeleton), masses=masses)
+    alt = f"{name} from the side and from the front, with the centres of"
+    alt += f" its {len(masses)} masses, {sum(one.mass for one in masses):.4g} kg in all."
+    svg = projected(sketch, (SIDEWAYS, FRONT), f"{name} at the start of {run.name}")
+    yield Drawing("Mass centres", alt, svg)
 
 
 def _paths(run: Run) -> Iterator[Path]:

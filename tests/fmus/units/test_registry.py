@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from asserting import refusal
+from made_masses import with_drives, with_masses
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_help, unit_name, unit_names, unit_options
@@ -16,6 +17,7 @@ from urmpipe_fmus.variable import Output
 from urmpipe_models.errors import UnitError
 from urmpipe_models.robots.catalogue import load_robot
 
+ARM = with_drives(with_masses(load_robot("urm4")))
 TABLE = Table(np.array([0, 5_000_000]), np.array([[0.5, 1.0], [0.25, 2.0]]))
 
 
@@ -24,6 +26,8 @@ def test_the_options_told_are_the_arguments_taken_and_a_unit_has_its_own_name() 
         "kinematic_chain": {"robot": load_robot("urm4")},
         "repolarizer": {"joints": 4},
         "log_source": {"table": TABLE, "columns": [["q", "rad", 2]]},
+        "chain_dynamics": {"robot": ARM},
+        "driven_arm": {"robot": ARM},
     }
     for name in unit_names():
         module = importlib.import_module(f"urmpipe_fmus.units.{name}")
@@ -43,6 +47,8 @@ def remade(unit: Unit) -> Unit:
 def test_a_unit_made_again_by_its_recipe_is_the_same_bit_by_bit(robot: str) -> None:
     for unit in (
         make_unit("kinematic_chain", robot=load_robot(robot), points=["p6", "p2"], rates=True),
+        make_unit("chain_dynamics", robot=with_masses(load_robot(robot))),
+        make_unit("driven_arm", robot=with_drives(with_masses(load_robot(robot)))),
         make_unit("repolarizer", joints=3),
         make_unit("delta_meter"),
         make_unit("log_source", table=TABLE, columns=[["q", "rad"], ["d", "m", None, "a way"]]),

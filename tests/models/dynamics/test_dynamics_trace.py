@@ -12,7 +12,6 @@ import pytest
 
 from made_masses import DRIVE, with_drives, with_masses
 from sliding_arm import sliding_arm
-from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.drives.controller import voltage_at
 from urmpipe_models.drives.drive import Drive
@@ -105,7 +104,9 @@ def test_masses_centres_inertias_and_gravity_trace_as_parameters() -> None:
 def test_a_driven_arm_traces_with_its_drives_as_parameters() -> None:
     chain = with_drives(with_masses(load_robot("urm6")))
 
-    def state_of(q: FloatArray, qd: FloatArray, motors: FloatArray, constants: FloatArray) -> ArmState:
+    def state_of(
+        q: Sequence[Any], qd: Sequence[Any], motors: Sequence[Any], constants: Sequence[Any]
+    ) -> ArmState:
         drives = [Drive(*(c * given for c, given in zip(constants, DRIVE, strict=True))) for _ in range(5)]
         rows = [motors[4 * k : 4 * k + 4] for k in range(5)]
         given = [Motor(drive, *row) for drive, row in zip(drives, rows, strict=True)]

@@ -46,12 +46,12 @@ def random_arm(seed: int) -> Chain:
         leaders = [one.name for one in joints if one.kind != "fixed" and one.mimic is None]
         follows = leaders and kind != "fixed" and rng.random() < 0.3
         mimic = Mimic(rng.choice(leaders), float(rng.normal()), 0.2) if follows else None
-        joints.append(Joint(f"j{k}", kind, from_offset(rng.normal(size=6)), (x, y, z), mimic=mimic))
+        joints.append(Joint(f"j{k}", kind, from_offset(rng.normal(size=6).tolist()), (x, y, z), mimic=mimic))
     if not any(one.kind != "fixed" for one in joints):
         joints[0] = replace(joints[0], kind="revolute")
-    chain = Chain("random", tuple(joints), tip=from_offset(rng.normal(size=6)))
+    chain = Chain("random", tuple(joints), tip=from_offset(rng.normal(size=6).tolist()))
     chain = replace(chain, gravity=tuple(rng.normal(size=3).tolist()))
-    return with_masses(chain.placed(from_offset(rng.normal(size=6))), seed)
+    return with_masses(chain.placed(from_offset(rng.normal(size=6).tolist())), seed)
 
 
 def random_state(chain: Chain, seed: int, count: int = 3) -> FloatArray:
@@ -104,7 +104,7 @@ def test_centrifugal_is_what_squares_and_coriolis_what_products_of_rates_need(se
     def of_rates(rates: FloatArray) -> FloatArray:
         """What rates need without gravity."""
         free = replace(chain, gravity=(0.0, 0.0, 0.0))
-        return np.array(inverse_dynamics(free, q, rates, still), dtype=float)
+        return np.array(inverse_dynamics(free, q, list(rates), still), dtype=np.float64)
 
     alone = [of_rates(np.where(np.arange(count) == k, qd, 0.0)) for k in range(count)]
     terms = torque_terms(chain, q, qd, still)
@@ -185,7 +185,7 @@ def test_energy_is_kept_over_ten_seconds() -> None:
     start = np.concatenate((np.full(6, 0.5), np.linspace(-1.0, 1.0, 6)))
 
     def rates(_t: float, x: FloatArray) -> FloatArray:
-        return np.concatenate((x[6:], forward_dynamics(chain, x[:6], x[6:], [0.0] * 6)))
+        return np.concatenate((x[6:], forward_dynamics(chain, list(x[:6]), list(x[6:]), [0.0] * 6)))
 
     found = solve_ivp(rates, (0.0, 10.0), start, "DOP853", rtol=1e-12, atol=1e-12)
     kinetic, potential = energies_over_log(

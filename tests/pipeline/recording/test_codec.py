@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 from same_results import assert_same
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray, TextArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.drives.controller import Gains
+from urmpipe_models.drives.drive import Drive
+from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.robots.robot_file import robot_toml
@@ -77,6 +80,12 @@ class Toy:
     lone: FloatArray
     labels: NDArray[np.str_]
     recording: Path | None = field(default=None, metadata={"stored": False})
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    t_ns: IntArray
+    values: FloatArray = field(metadata={"path": "deep/values"})
 
 
 TEXT = st.text(st.characters(exclude_categories=[]), max_size=8)
@@ -188,6 +197,13 @@ def test_an_array_stands_at_the_path_of_its_field_on_the_nearest_times() -> None
     assert plotted == {f"/parts/{name}/values" for name in ("matlab", "a_b_c", "matlab-2")}
 
 
+def test_a_field_may_say_where_its_array_stands() -> None:
+    one = Placed(np.arange(3), np.ones((3, 2)))
+    assert [column.at for column in encode(one).columns] == ["/t_ns", "/deep/values"]
+    assert encode(one).columns[1].t_ns is one.t_ns
+    assert_same(round_trip(one), one)
+
+
 def test_an_array_in_two_places_is_kept_once() -> None:
     both = np.zeros((3, 3))
     toy = small_toy(poses=both, lone=both)
@@ -215,6 +231,21 @@ def test_an_arm_comes_back_with_every_bit(name: str) -> None:
     assert back.parameters == chain.parameters
     q = [0.1 * k + 0.37 for k in range(len(chain.coordinates))]
     assert forward(back, q) == forward(chain, q)
+
+
+def test_masses_gravity_and_drives_come_back() -> None:
+    arm = load_robot("ur3")
+    drive = DrivenJoint(
+        arm.coordinates[0],
+        Drive(2500.0, 5.0, 100.0, 0.05, 0.5, 0.001, 0.5),
+        0.005,
+        Gains(7.5, 0.75, 0.01),
+        48.0,
+    )
+    held = HeldJoint(arm.coordinates[1], 3000.0, 0.0)
+    heavy = replace(arm, gravity=(0.0, 9.81, 0.0), left_out=("finger",), drives=(drive, held))
+    back = round_trip(heavy)
+    assert (back, back.drives[0].drive.ratio, back.inertials[0].mass) == (heavy, 100.0, 2.0)
 
 
 def test_an_arm_stored_without_its_parameters_has_those_of_its_frames() -> None:

@@ -15,9 +15,12 @@ from recorded import columns, entities, static, times_of, views
 from toys import STEP_NS, eye_of, recorded, shown, toy
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.inertial import Inertial
 from urmpipe_models.chains.visual import Sphere, Visual
+from urmpipe_models.dynamics.over_log import mass_centres_over_log
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_models.orientation import quaternions
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import JOINT_COLOURS, REFERENCE_COLOUR, run_colour
@@ -26,7 +29,7 @@ from urmpipe_pipeline.presentation.scene import Scene, Spot
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW, FILLED, WIDE
 from urmpipe_pipeline.recording.views.geometry import drawn_arm, drawn_path, extent
-from urmpipe_pipeline.recording.views.shapes import bodies_over_log, lacks_shapes
+from urmpipe_pipeline.recording.views.shapes import SEEN_THROUGH, bodies_over_log, lacks_shapes
 from urmpipe_pipeline.recording.views.tracks import DASHES, LEAST_DASH, MOST, POSE_PERIOD
 from urmpipe_pipeline.results import present, read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
@@ -260,3 +263,39 @@ def test_what_is_fixed_to_a_link_counts_as_the_link() -> None:
     assert bare(None, "mount", "b")
     assert not bare("a", "b")
     assert not bare("plate", "b")
+
+
+# --- masses ----------------------------------------------------------------------------------------
+
+
+def test_mass_centres_are_dots_as_large_as_balls_that_move_with_the_arm(
+    make_run: MakeRun, tmp_path: Path
+) -> None:
+    chain = load_robot("ur10")
+    run = make_run(rows=200, robot=chain)
+    path = write_recording(run, tmp_path / "run.rrd")
+    drawn = np.searchsorted(run.t_ns, times_of(path, f"{SCENE}/robot/masses"))
+    assert len(drawn) > 20
+    centres = mass_centres_over_log(chain, run.q[drawn])
+    moved = column(path, "robot/masses", "Points3D:positions")
+    np.testing.assert_allclose(moved, centres, rtol=0, atol=1e-6)  # single precision
+    radii = np.array(static(path, f"{SCENE}/robot/masses", "Points3D:radii"))
+    masses = np.array([one.mass for one in chain.inertials], float)
+    np.testing.assert_allclose((radii / radii.max()) ** 3, masses / masses.max(), rtol=1e-5)
+    words = static(path, f"{SCENE}/robot/masses", "Points3D:labels")
+    assert words[0] == f"{masses[0]:.4g} kg at {chain.inertials[0].joint or 'the base'}"
+
+
+def test_an_arm_without_masses_has_no_dots(make_run: MakeRun, tmp_path: Path) -> None:
+    path = write_recording(make_run(rows=20), tmp_path / "run.rrd")
+    assert below(path, "robot") == {"joints", "links"}
+
+
+def test_links_are_seen_through_where_masses_are_in_them(
+    make_run: MakeRun, shapes: Path, tmp_path: Path
+) -> None:
+    robot = read_urdf(shapes)
+    robot = replace(robot, inertials=(Inertial(robot.coordinates[0], 1.0),))
+    path = write_recording(make_run(rows=20, robot=robot), tmp_path / "run.rrd")
+    (box,) = column(path, "robot/base/visual\\ 1", "Boxes3D:colors").tolist()
+    assert box == [0x66666600 + round(255 * SEEN_THROUGH)]

@@ -416,3 +416,33 @@ def test_places_on_a_line_are_larger_than_poses_that_nothing_joins() -> None:
     both = drawn_space(SpaceFigure("S", "C.", "A.", (Path("way", PLACES, T_NS, RED), some)))
     assert trace(both, "stops")["marker"]["size"] >= trace(both, "way")["line"]["width"]
     assert alone["marker"]["size"] < trace(both, "stops")["marker"]["size"]
+
+
+def test_parts_of_a_sum_are_stacked_on_both_sides_of_0() -> None:
+    parts = np.column_stack((np.sin(T), 1.5 + np.cos(3.0 * T), np.sin(2.0 * T)))
+    total = parts.sum(axis=1)
+    lines = (
+        Line(parts, ("a", "b", "c"), (RED, BLUE, RED), stacked=True),
+        Line(total, ("sum",), (BLUE,)),
+    )
+    made = drawn(figure(Panel("τ", "N.m", lines, T_NS)))
+    *areas, line = made.spec["data"]
+    sides = [(one["name"], one["stackgroup"], one["showlegend"]) for one in areas]
+    assert sides == [
+        ("a", "up 0", True), ("a", "down 0", False), ("b", "up 0", True), ("c", "up 0", True),
+        ("c", "down 0", False),
+    ]  # fmt: skip
+    kept = numbers(areas[0]["x"])
+    rows = np.rint(kept / 0.005).astype(np.int64)
+    assert len(kept) < COUNT
+    for one in areas:  # plotly.js stacks what stands at the same time
+        np.testing.assert_array_equal(numbers(one["x"]), kept)
+    stack = sum(numbers(one["y"]) for one in areas)
+    np.testing.assert_allclose(stack, total[rows], rtol=0, atol=1e-6)  # single precision
+    told = numbers(areas[0]["customdata"])
+    np.testing.assert_allclose(told, parts[rows, 0], rtol=0, atol=1e-7)
+    assert all(numbers(one["y"]).min() >= 0.0 for one in areas if one["stackgroup"] == "up 0")
+    assert all(numbers(one["y"]).max() <= 0.0 for one in areas if one["stackgroup"] == "down 0")
+    assert line["name"] == "sum"
+    assert made.spec["layout"]["hoversubplots"] == "overlaying"  # the pointer tells one sum
+    go.Figure(made.spec)

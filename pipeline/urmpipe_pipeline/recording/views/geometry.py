@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.dynamics.over_log import mass_centres_over_log
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_models.orientation import matrices
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, rgb
@@ -67,6 +68,8 @@ class DrawnArm:
         colours: One a point: a joint's own, or the reference's where nothing moves.
         bodies: Its links as they look; none where that is not known.
         marks: Words at its points.
+        masses: The centres of its masses in each pose in [m], shape (m, inertials, 3); none where they are
+            not drawn.
     """
 
     chain: Chain
@@ -75,6 +78,7 @@ class DrawnArm:
     colours: tuple[str, ...]
     bodies: tuple[Body, ...]
     marks: tuple[ArmMark, ...] = ()
+    masses: FloatArray = field(default_factory=lambda: np.empty((0, 0, 3)))
 
     def place(self, mark: ArmMark) -> FloatArray:
         """Return where a mark is in each pose in [m], shape (m, 3)."""
@@ -162,7 +166,9 @@ def drawn_arm(arm: Arm) -> DrawnArm | None:
     poses = q[moving.rows]
     colours = _point_colours(arm.chain, arm.colour)
     skeleton = points_over_log(arm.chain, poses)
-    return DrawnArm(arm.chain, moving, skeleton, colours, bodies_over_log(arm.chain, poses), arm.marks)
+    masses = mass_centres_over_log(arm.chain, poses) if arm.masses else np.empty((len(poses), 0, 3))
+    bodies = bodies_over_log(arm.chain, poses)
+    return DrawnArm(arm.chain, moving, skeleton, colours, bodies, arm.marks, masses)
 
 
 def drawn_ghosts(arms: Sequence[Arm]) -> tuple[DrawnGhost, ...]:

@@ -11,12 +11,13 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
+    MASS_COLOUR,
     NEUTRAL_COLOUR,
     REFERENCE_COLOUR,
     rgb,
     value_colours,
 )
-from urmpipe_pipeline.presentation.scene import ArmMark, Arrows, Scene, Spot
+from urmpipe_pipeline.presentation.scene import ArmMark, Arrows, Scene, Spot, ball_sizes
 from urmpipe_pipeline.recording.sending import ROOT, keys, shown_path, times_at
 from urmpipe_pipeline.recording.views.camera import EYE, eye_distance, seen
 from urmpipe_pipeline.recording.views.geometry import (
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
     from rerun import ComponentColumnList, LineStrips3D, Points3D, RecordingStream
     from rerun.blueprint import Spatial3DView
 
-LINK, JOINT, POINT, SPOT, AXIS, MARK = 0.012, 0.022, 0.018, 0.024, 0.005, 0.034
+LINK, JOINT, POINT, SPOT, AXIS, MARK, MASS = 0.012, 0.022, 0.018, 0.024, 0.005, 0.034, 0.04
 ASKED, DONE = 0.0065, 0.0035
 FRAME_LENGTH, FRAME, TARGET, MISSED = 0.09, 0.004, 0.012, 0.02
 """Sizes in the 3D view, as shares of the radius of everything in it."""
@@ -122,7 +123,7 @@ def _draw_arm(stream: RecordingStream, arm: DrawnArm, size: float) -> None:
 
     moving, entity = arm.moving, shown_path("scene", "robot", "joints")
     for body in arm.bodies:
-        draw_body(stream, body, times_at(moving.t_ns, moving.rows))
+        draw_body(stream, body, times_at(moving.t_ns, moving.rows), seen_through=arm.masses.size > 0)
         if len(moving.gone):
             hide_body(stream, body, times_at(moving.t_ns, moving.gone), len(moving.gone))
     skeleton = arm.skeleton.astype(np.float32)
@@ -133,8 +134,24 @@ def _draw_arm(stream: RecordingStream, arm: DrawnArm, size: float) -> None:
     columns = rr.Points3D.columns(positions=skeleton.reshape(-1, 3))
     _send(stream, entity, moving, columns, skeleton.shape[1])
     _send_gone(stream, entity, moving, rr.Points3D.columns(positions=[]))
+    if arm.masses.size:
+        _draw_masses(stream, arm, size)
     for number, mark in enumerate(arm.marks):
         _draw_mark(stream, arm, mark, shown_path("scene", "robot", "mark", str(number)), size)
+
+
+def _draw_masses(stream: RecordingStream, arm: DrawnArm, size: float) -> None:
+    """Draw the centres of an arm's masses, their names where they are selected."""
+    import rerun as rr
+
+    entity, moving = shown_path("scene", "robot", "masses"), arm.moving
+    labels = [encodable(f"{one.mass:.4g} kg at {one.joint or 'the base'}") for one in arm.chain.inertials]
+    radii = (MASS * size * ball_sizes([one.mass for one in arm.chain.inertials])).tolist()
+    style = rr.Points3D.from_fields(colors=[rgb(MASS_COLOUR)], radii=radii, labels=labels, show_labels=False)
+    stream.log(entity, style, static=True)
+    columns = rr.Points3D.columns(positions=arm.masses.astype(np.float32).reshape(-1, 3))
+    _send(stream, entity, moving, columns, arm.masses.shape[1])
+    _send_gone(stream, entity, moving, rr.Points3D.columns(positions=[]))
 
 
 def _draw_mark(stream: RecordingStream, arm: DrawnArm, mark: ArmMark, entity: str, size: float) -> None:

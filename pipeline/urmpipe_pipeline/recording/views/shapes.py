@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,12 @@ from urmpipe_pipeline.recording.sending import keys, shown_path
 
 if TYPE_CHECKING:
     from rerun import AsComponents, RecordingStream, TimeColumn
+
+SEEN_THROUGH = 0.4
+"""Opacity of the links where something inside them is drawn."""
+
+WHITE: Colour = (1.0, 1.0, 1.0, 1.0)
+"""Leaves a mesh the colours of its file."""
 
 UNSEEN = 1e-9
 """Scale of a shape that is hidden; zero would be none that the viewer can invert."""
@@ -72,8 +78,10 @@ def lacks_shapes(robot: Chain, bodies: Sequence[Body]) -> bool:
     return not set(range(1, int(moving[-1]) + 1)) <= shown
 
 
-def draw_body(stream: RecordingStream, body: Body, times: list[TimeColumn]) -> None:
-    """Send a link: its frame at the times given, its shapes once.
+def draw_body(
+    stream: RecordingStream, body: Body, times: list[TimeColumn], *, seen_through: bool = False
+) -> None:
+    """Send a link: its frame at the times given, its shapes once, seen through where something is inside.
 
     Translation and quaternion both stand in every row: Rerun takes a row as the whole transform.
     """
@@ -88,10 +96,16 @@ def draw_body(stream: RecordingStream, body: Body, times: list[TimeColumn]) -> N
         columns = rr.Transform3D.columns(translation=position, quaternion=rotation)
         stream.send_columns(shown_path(*place), times, columns)
     for number, visual in enumerate(body.visuals, start=1):
-        if (shape := _shape(visual)) is not None:
+        if (shape := _shape(_seen_through(visual) if seen_through else visual)) is not None:
             entity = shown_path(*place, f"visual {number}")
             stream.log(entity, _placed(visual), static=True)
             stream.log(entity, shape, static=True)
+
+
+def _seen_through(visual: Visual) -> Visual:
+    """Return a shape so that what is inside it can be seen."""
+    red, green, blue, opacity = visual.colour or WHITE
+    return replace(visual, colour=(red, green, blue, SEEN_THROUGH * opacity))
 
 
 def hide_body(stream: RecordingStream, body: Body, times: list[TimeColumn], count: int) -> None:

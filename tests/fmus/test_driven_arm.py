@@ -1,0 +1,344 @@
+"""An arm with drives: one function against other integrators, against its blocks, and at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import root
+
+from asserting import refusal
+from fmu_run import FmuRun
+from made_masses import DRIVE, driven, with_drives, with_masses
+from urmpipe_fmus.cache import cached_fmu
+from urmpipe_fmus.cosim import Block, Recorded, System, load_system, prepare, simulate
+from urmpipe_fmus.instance import Instance
+from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.units import make_unit
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.inertial import Inertial
+from urmpipe_models.drives.controller import Gains
+from urmpipe_models.drives.drive import Drive
+from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint
+from urmpipe_models.drives.set_point import trapezoid
+from urmpipe_models.dynamics.driven_arm import (
+    ArmState,
+    Motor,
+    at_rest,
+    energies,
+    joint_accelerations,
+    motor_rates,
+)
+from urmpipe_models.dynamics.inverse import inverse_dynamics
+from urmpipe_models.errors import UrmpipeError
+from urmpipe_models.kinematics.forward import jacobian
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.transform import translation
+
+PERIOD = 5e-3
+
+needs_native = pytest.mark.skipif(bool(native_missing(())), reason=f"runs native FMUs: {native_missing(())}")
+
+
+@cache
+def urm6() -> Chain:
+    """urm6 with masses that are made up, a drive on each joint."""
+    return with_drives(with_masses(load_robot("urm6")))
+
+
+def put(instance: Instance, **values: Any) -> None:
+    """Set variables by name."""
+    names = [one for one in instance.unit.variables if one.name in values]
+    for one in names:
+        flat = np.ravel(np.broadcast_to(values[one.name], (one.width,))).tolist()
+        instance.set([instance.reference(name) for name in one.names], flat)
+
+
+def read(instance: Instance, *names: str) -> FloatArray:
+    """Return variables by name, one after the other."""
+    every = [
+        scalar
+        for name in names
+        for one in instance.unit.variables
+        if one.name == name
+        for scalar in one.names
+    ]
+    return np.array(instance.get([instance.reference(name) for name in every]), dtype=np.float64)
+
+
+class OneSystem:
+    """The model functions with DOP853, a controller's period at a time."""
+
+    def __init__(self, chain: Chain) -> None:
+        self.chain, self.n = chain, len(chain.coordinates)
+        self.drives = [one for one in chain.drives if isinstance(one, DrivenJoint)]
+        rest = at_rest(chain)
+        motors = [[one.rest for one in rest], [0.0] * self.n, [one.current for one in rest]]
+        self.voltages = [one.voltage for one in rest]
+        self.x = np.concatenate((chain.start, np.zeros(self.n), *motors, [0.0, 0.0]))
+
+    def state(self, x: FloatArray) -> ArmState:
+        q, qd, theta1, omega1, current = x[:-2].reshape(5, self.n)
+        motors = zip(self.drives, theta1, omega1, current, self.voltages, strict=True)
+        return ArmState(list(q), list(qd), [Motor(one.drive, *rest) for one, *rest in motors])
+
+    def rates(self, _t: float, x: FloatArray) -> FloatArray:
+        state = self.state(x)
+        motors = np.array([*motor_rates(state).values()]).T
+        flows = energies(self.chain, state)
+        heat = [flows.power_in, flows.power_lost]
+        return np.concatenate((state.qd, joint_accelerations(self.chain, state), *motors, heat))
+
+    def sample(self, wanted: FloatArray) -> None:
+        """Take the sample of eq. 20: wanted are positions, velocities and accelerations, shape (3, n)."""
+        state = self.state(self.x)
+        real = np.array([state.q, state.qd, joint_accelerations(self.chain, state)])
+        for k, one in enumerate(self.drives):
+            added = float(np.dot(one.gains, (wanted - real)[:, k]))
+            self.voltages[k] = float(np.clip(self.voltages[k] + added, -48.0, 48.0))
+
+    def go(self, duration: float) -> None:
+        span = (0.0, duration)
+        self.x = solve_ivp(self.rates, span, self.x, "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+
+    def stored(self) -> float:
+        return float(energies(self.chain, self.state(self.x)).stored)
+
+
+def moves(chain: Chain, targets: FloatArray) -> Callable[[float], FloatArray]:
+    """Return set points over time: moves of all joints from 0.01 s on, shape (3, joints)."""
+
+    def wanted(t: float) -> FloatArray:
+        pairs = zip(chain.start, targets, strict=True)
+        return np.array([trapezoid(t, 0.01, a, b, 2.0, 20.0) for a, b in pairs], dtype=float).T
+
+    return wanted
+
+
+TARGETS = np.array([0.5, 2.7, 0.6, 2.6, 0.4, 2.8])
+
+
+@pytest.mark.slow
+def test_the_unit_is_what_dop853_makes_of_the_equations_and_no_energy_is_lost() -> None:
+    chain, wanted = urm6(), moves(urm6(), TARGETS)
+    whole, unit = OneSystem(chain), Instance(make_unit("driven_arm", robot=chain))
+    put(unit, internal_step=2.5e-4)
+    before = whole.stored()
+    for n in range(12):
+        whole.sample(wanted(n * PERIOD))
+        whole.go(PERIOD)
+        set_points = dict(zip(("set_phi", "set_phid", "set_phidd"), wanted(n * PERIOD), strict=True))
+        put(unit, **set_points)
+        unit.do_step(n * PERIOD, PERIOD)
+    np.testing.assert_allclose(whole.voltages, read(unit, "last"), atol=1e-7)
+    # RK4 in 0.25 ms: (h / 2 ms)^4 of the armature's time, of values that change by some 1
+    np.testing.assert_allclose(read(unit, "phi", "theta1"), whole.x[[*range(6), *range(12, 18)]], atol=1e-7)
+    assert np.abs(whole.x[:6] - chain.start).max() > 0.01  # it moves
+    work, lost = whole.x[-2:]
+    change = whole.stored() - before
+    assert work > 0.5
+    assert abs(work - change - lost) <= 1e-8 * work
+    stored, given, heat = read(unit, "energy_stored", "energy_in", "energy_lost")
+    assert abs(given - (stored - before) - heat) <= 1e-6 * given
+
+
+def test_it_starts_in_equilibrium_with_shafts_twisted_and_currents_and_voltages_set() -> None:
+    chain = urm6()
+    unit = Instance(make_unit("driven_arm", robot=chain))
+    still = [0.0] * 6
+    torques = np.array(inverse_dynamics(chain, chain.start, still, still), dtype=float)
+    assert np.abs(torques).max() > 2.0  # gravity pulls
+    np.testing.assert_allclose(read(unit, "theta1") - read(unit, "phi"), torques / 2500.0, atol=1e-15)
+    np.testing.assert_allclose(read(unit, "i_a"), torques / 5.0, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(read(unit, "u"), 0.5 * torques / 5.0, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(read(unit, "Mk"), torques, rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(read(unit, "phidd"), 0.0, atol=1e-10)
+
+
+@needs_native
+def test_an_arm_at_rest_stays_for_ten_seconds() -> None:
+    for chain in (urm6(), with_drives(with_masses(load_robot("urm6")), held=["phi2", "phi4"])):
+        unit = make_unit("driven_arm", robot=chain)
+        with FmuRun(cached_fmu(unit, "native"), unit, {}) as fmu:
+            found = fmu.over(PERIOD * np.arange(2001, dtype=np.float64), {})
+        names = [name for one in unit.variables if one.causality == "output" for name in one.names]
+        columns = [k for k, name in enumerate(names) if name.startswith("phi[")]
+        assert len(columns) == 6
+        assert np.abs(found[:, columns] - chain.start).max() <= 1e-9
+
+
+def test_a_held_pendulum_swings_with_the_root_of_k_over_j() -> None:
+    m, r, k = 2.0, 0.5, 800.0
+    chain = Chain(
+        "pendulum",
+        (Joint("q", axis=(0.0, -1.0, 0.0)),),
+        tip=translation(r, 0.0, 0.0),
+        inertials=(Inertial("q", m, (r, 0.0, 0.0)),),
+        drives=(HeldJoint("q", k, 0.0),),
+        gravity=(0.0, 0.0, 0.0),
+    )
+    unit = Instance(make_unit("driven_arm", robot=chain))
+    put(unit, phi=1e-6)
+    rate = np.sqrt(k / (m * r**2))
+    for n in range(20):
+        unit.do_step(n * PERIOD, PERIOD)
+    # RK4 in 0.5 ms at 40 rad/s: (0.02)^5 / 120 a step, 200 steps
+    assert read(unit, "phi")[0] == pytest.approx(1e-6 * np.cos(rate * 0.1), abs=1e-14)
+
+
+def test_a_force_on_the_tool_bends_the_springs_by_the_jacobian() -> None:
+    chain = with_drives(with_masses(load_robot("urm6")), held=load_robot("urm6").coordinates)
+    rest, still = np.array([one.rest for one in at_rest(chain)]), [0.0] * 6
+    outside = np.array([5.0, -3.0, 8.0, 0.4, 0.0, -0.2])
+
+    def missing(q: FloatArray) -> FloatArray:
+        """What springs give less than weight and force need."""
+        weight = np.array(inverse_dynamics(chain, list(q), still, still), dtype=np.float64)
+        pushed = np.array(jacobian(chain, list(q)), dtype=np.float64) @ outside
+        return np.asarray(weight - pushed - 2500.0 * (rest - q))
+
+    q = root(missing, chain.start, tol=1e-14).x
+    assert np.abs(q - chain.start).max() > 5e-4
+    unit = Instance(make_unit("driven_arm", robot=chain))
+    put(unit, phi=q, force=outside[:3], moment=outside[3:])
+    # torques of some N.m are in balance to 1e-13, and M^-1 reaches 20
+    np.testing.assert_allclose(read(unit, "phidd"), 0.0, atol=1e-10)
+
+
+def test_robots_without_drives_or_with_too_little_voltage_are_refused() -> None:
+    bare = with_masses(load_robot("urm4"))
+    some = replace(bare, drives=(driven("phi1"), HeldJoint("phi3", 9.0, 0.0)))
+    assert refused("driven_arm", some) == [
+        f"robot urm4: key drives.{name}: not found, allowed: the drive of the joint,"
+        " or { k, l } of a spring that holds it"
+        for name in ("phi2", "phi4")
+    ]
+    weak = tuple(
+        DrivenJoint(one, DRIVE._replace(resistance=1e3), 5e-3, Gains(7.5, 0.75, 0.01), 48.0)
+        for one in load_robot("urm6").coordinates
+    )
+    needed = [abs(one.current) * 1e3 for one in at_rest(urm6())]
+    assert max(needed) > 48.0 > min(needed)
+    assert refused("driven_arm", replace(urm6(), drives=weak)) == [
+        f"robot urm6: drives.phi{k}: needs {volts:.4g} V to hold the arm at its start, allowed: u_max, 48 V"
+        for k, volts in enumerate(needed, start=1)
+        if volts > 48.0
+    ]
+    for unit in ("chain_dynamics", "driven_arm"):
+        assert refused(unit, replace(urm6(), inertials=())) == [
+            "robot urm6: key inertials: found none, allowed: the masses of the arm (in a URDF <inertial>)"
+        ]
+        assert refused(unit, "urm6") == [f"unit {unit}: option robot: found 'urm6', allowed: a robot (Chain)"]
+
+
+def refused(unit: str, robot: Any) -> list[str]:
+    return refusal(UrmpipeError, make_unit, unit, robot=robot).splitlines()
+
+
+# The system driven-arm
+
+
+SMALL = Drive(50.0, 0.1, 100.0, 0.01, 2.0, 2e-3, 5e-3)
+"""The drive of a wrist, as the system has it."""
+
+
+def ur3() -> Chain:
+    """The arm of the system: its start pose and its drives in the robot."""
+    arm = next(block for block in load_system("driven-arm").blocks if block.name == "arm")
+    names = load_robot("ur3").coordinates
+    wrist = [DrivenJoint(name, SMALL, 5e-3, Gains(1.5, 0.15, 2e-3), 48.0) for name in names[3:]]
+    drives = (*map(driven, names[:3]), *wrist)
+    start = arm.start["phi"]
+    assert isinstance(start, (list, tuple))
+    return replace(load_robot("ur3"), start=tuple(map(float, start)), drives=drives)
+
+
+def system() -> System:
+    return load_system("driven-arm")
+
+
+def test_the_system_starts_where_the_unit_does() -> None:
+    unit = make_unit("driven_arm", robot=ur3())
+    starts = {
+        name: one
+        for variable in unit.variables
+        for name, one in zip(variable.names, variable.starts, strict=True)
+    }
+    blocks = {block.name: block.start for block in system().blocks}
+    assert max(abs(starts[f"i_a[{k}]"]) for k in range(1, 7)) > 1.0
+    for k in range(1, 7):
+        drive, controller = blocks[f"drive{k}"], blocks[f"controller{k}"]
+        assert drive["theta1"] == pytest.approx(starts[f"theta1[{k}]"], rel=0, abs=1e-12)
+        assert drive["i_a"] == pytest.approx(starts[f"i_a[{k}]"], rel=0, abs=1e-12)
+        assert controller["last"] == pytest.approx(starts[f"last[{k}]"], rel=0, abs=1e-12)
+        for key in ("k", "l", "i_p", "C", "R", "L", "I1"):
+            expected = starts[f"{key}[{k}]"]
+            assert drive.get(key, dc_drive_starts()[key]) == expected
+
+
+def dc_drive_starts() -> dict[str, float]:
+    return {one.name: one.starts[0] for one in make_unit("dc_drive").parameters}
+
+
+def make(block: Block) -> Unit:
+    options = dict(block.options)
+    if "robot" in options:
+        options["robot"] = load_robot(options["robot"])
+    return make_unit(block.unit, **options)
+
+
+def run_system(step: float, duration: float) -> Recorded:
+    return simulate(prepare(replace(system(), step=step, duration=duration, record_every=1), make))
+
+
+def as_one_function(duration: float) -> FloatArray:
+    """Return the joints at the controllers' samples, of the unit `driven_arm`."""
+    unit = make_unit("driven_arm", robot=ur3())
+    t = PERIOD * np.arange(round(duration / PERIOD) + 1, dtype=np.float64)
+    points = [block.start for block in system().blocks if block.name.startswith("set_point")]
+    columns = {name: np.empty((len(t), 6)) for name in ("set_phi", "set_phid", "set_phidd")}
+    for k, point in enumerate(points):
+        wanted = trapezoid(t, 0.1, point["initial"], point["target"], 2.0, 10.0)
+        for name, values in zip(columns, wanted, strict=True):
+            columns[name][:, k] = values
+    names = [name for one in unit.variables if one.causality == "output" for name in one.names]
+    with FmuRun(cached_fmu(unit, "native"), unit, {"internal_step": 1e-4}) as fmu:
+        found = fmu.over(t, columns)
+    return found[:, [names.index(f"phi[{k}]") for k in range(1, 7)]]
+
+
+@pytest.mark.slow
+@needs_native
+def test_the_blocks_near_the_unit_with_the_first_order_of_the_communication_step() -> None:
+    duration = 0.6
+    expected = as_one_function(duration)
+    errors = []
+    for parts in (5, 10, 20, 40):
+        recorded = run_system(PERIOD / parts, duration)
+        assert recorded.failed is None
+        found = np.column_stack([recorded.column("arm", f"phi[{k}]") for k in range(1, 7)])
+        errors.append(float(np.abs(found[::parts] - expected).max()))
+    assert np.abs(expected - expected[0]).max() > 0.3  # rad: it moves
+    # values held over a step are off by its length: the first order, in the limit of small steps
+    assert -np.diff(np.log2(errors)) == pytest.approx(1.0, abs=0.1), errors
+    assert errors[1] < 2e-3  # rad, with the system's own step
+
+
+@pytest.mark.slow
+@needs_native
+def test_at_5_ms_the_blocks_are_unstable_and_at_2_5_ms_they_are_not() -> None:
+    """What docs/dynamics.md names: at 5 ms it leaves its set points by more than a turn, or ends."""
+    coarse = run_system(PERIOD, 2.0)
+    assert coarse.failed is not None or np.abs(coarse.column("arm", "phi[6]")).max() > 2.0 * np.pi
+    fine = run_system(PERIOD / 2, 2.0)
+    assert fine.failed is None
+    for k in range(1, 7):
+        late = fine.column("arm", f"phi[{k}]")[-1] - fine.column(f"set_point{k}", "theta")[-1]
+        assert abs(late) < 1e-3

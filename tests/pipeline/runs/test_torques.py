@@ -1,0 +1,361 @@
+"""The torques of a log: Pinocchio's, in every table, with a warning beyond the effort of a joint."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio
+import pytest
+
+from arm_motion import clock
+from asserting import there
+from exported import export_result
+from made_plans import SMALL, planned
+from panda_log import PANDA, motion, panda, panda_csv
+from presented import cells, figures, scene_of
+from recorded import rows_of
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.inertial import Inertial
+from urmpipe_models.dynamics.over_log import energies_over_log, torque_over_log
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.json_values import json_ready
+from urmpipe_pipeline.presentation.figure import Drawing, Figure
+from urmpipe_pipeline.results import present, read_recording, write_recording
+from urmpipe_pipeline.runs.ingest import ingest_log
+from urmpipe_pipeline.runs.other_robot import on_robot
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.tables import ExportOptions
+
+SAME = 1e-10
+"""Of the largest torque: two ways to compute the same; found are 1e-13."""
+
+
+def rnea(q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+    """Pinocchio's torques of the Panda without its fingers, a row a sample."""
+    model = pinocchio.buildModelFromUrdf(str(PANDA))
+    fingers = [k for k, name in enumerate(model.names) if "finger" in name]
+    for one in fingers:
+        model.inertias[one] = pinocchio.Inertia.Zero()
+    model = pinocchio.buildReducedModel(model, fingers, pinocchio.neutral(model))
+    data = model.createData()
+    return np.array([pinocchio.rnea(model, data, *row).copy() for row in zip(q, qd, qdd, strict=True)])
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """A log of the Panda whose second joint needs more than its effort."""
+    robot = panda()
+    return ingest_log([panda_csv(tmp_path_factory.mktemp("log"), robot.coordinates, 2.2)], robot=robot)
+
+
+def slider(mass: float = 2.0, effort: float = np.inf) -> Chain:
+    """A mass that slides up and down."""
+    joint = Joint("q1", kind="prismatic", effort=effort)
+    return Chain("slider", (joint,), inertials=(Inertial("q1", mass),))
+
+
+def sliding(folder: Path, z: FloatArray, dt: float = 0.01) -> Path:
+    """Write a log of a joint that slides to some places in [m], shape (n,)."""
+    rows = [f"{k * dt:.6f},{value!r}" for k, value in enumerate(z.tolist())]
+    path = folder / "slide.csv"
+    path.write_text("\n".join(["t [s],q1 [m]", *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+def test_the_torques_of_a_log_are_those_of_pinocchio(run: Run) -> None:
+    expected = rnea(run.q, run.qd, run.qdd)
+    np.testing.assert_allclose(there(run.tau), expected, rtol=0, atol=SAME * np.abs(expected).max())
+
+
+def test_the_torques_of_the_log_are_near_those_of_the_motion_it_samples(run: Run) -> None:
+    """Central differences are off by T^2 omega^2 / 12 of the acceleration: below 0.1 % at these paces."""
+    expected = rnea(*motion(run.t, 2.2))
+    inner = slice(1, -1)  # the ends are one-sided
+    error = np.abs(there(run.tau)[inner] - expected[inner]).max()
+    assert error < 2e-3 * np.abs(expected).max()
+
+
+def test_a_coarse_log_is_smoothed_before(tmp_path: Path) -> None:
+    robot = panda()
+    path = panda_csv(tmp_path, robot.coordinates, 0.3, form="%+.3e")
+    expected = rnea(*motion(clock(801, 0.005), 0.3))
+    smooth, rough = (ingest_log([path], robot=robot, derivative=way) for way in (None, "central"))
+    worst = [float(np.abs(there(one.tau) - expected)[50:-50].max()) for one in (smooth, rough)]
+    assert worst[0] < 0.3  # of 43 N.m; four digits of the angles
+    assert worst[1] > 30.0
+
+
+def test_recorded_rates_and_accelerations_are_taken(tmp_path: Path) -> None:
+    robot, t = panda(), clock(401, 0.005)
+    names = [f"{prefix}{name}" for prefix in ("", "d_", "dd_") for name in robot.coordinates]
+    units = [unit for unit in ("rad", "rad/s", "rad/s2") for _ in robot.coordinates]
+    header = ",".join(["t [s]", *(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))])
+    table = np.column_stack((t, *motion(t)))
+    path = tmp_path / "recorded.csv"
+    np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.15g")
+    run = ingest_log([path], robot=robot)
+    expected = rnea(*motion(t))
+    # 15 digits are written of each value.
+    np.testing.assert_allclose(there(run.tau), expected, rtol=0, atol=1e-9)
+
+
+def test_the_table_has_a_column_a_joint_behind_the_accelerations(run: Run) -> None:
+    names = there(run.robot).coordinates
+    frame = run.to_frame()
+    columns = list(frame.columns)
+    first = columns.index(f"dd_{names[-1]}") + 1
+    assert columns[first : first + 8] == [*(f"tau_{name}" for name in names), "px"]
+    np.testing.assert_array_equal(frame[[f"tau_{name}" for name in names]].to_numpy(), run.tau)
+
+
+def test_a_csv_has_every_double_and_the_unit(run: Run, tmp_path: Path) -> None:
+    import pandas as pd
+
+    export_result(run, tmp_path / "a.csv", ExportOptions("csv", None))
+    frame = pd.read_csv(tmp_path / "a.csv")
+    names = [f"tau_{name} [N.m]" for name in there(run.robot).coordinates]
+    np.testing.assert_array_equal(frame[names].to_numpy(), run.tau)
+
+
+def test_a_mat_has_the_torques_with_their_units(run: Run, tmp_path: Path) -> None:
+    from scipy.io import loadmat
+
+    export_result(run, tmp_path / "a.mat", ExportOptions("mat", None))
+    fields = loadmat(tmp_path / "a.mat", simplify_cells=True)["run"]
+    np.testing.assert_array_equal(fields["tau"], run.tau)
+    assert fields["units"]["tau"].tolist() == ["N.m"] * 7
+
+
+def test_an_exported_log_is_read_with_the_same_joints(run: Run, tmp_path: Path) -> None:
+    export_result(run, tmp_path / "a.csv", ExportOptions("csv", None))
+    robot = replace(there(run.robot), name="q")
+    again = ingest_log([tmp_path / "a.csv"], robot=robot)
+    np.testing.assert_array_equal(again.q, run.q)
+    np.testing.assert_array_equal(again.tau, run.tau)
+
+
+def test_a_recording_has_the_torques_row_by_row(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "a.rrd"
+    write_recording(run, path)
+    rows = rows_of(path, "/joints/torque", "Scalars:scalars")
+    assert list(rows) == run.t_ns.tolist()
+    np.testing.assert_array_equal(list(rows.values()), run.tau)
+    back = read_recording(path)
+    assert isinstance(back, Run)
+    np.testing.assert_array_equal(back.tau, run.tau)
+
+
+def test_json_has_the_largest_torque_of_each_joint(run: Run) -> None:
+    torques, tau = run.to_dict()["torques"], there(run.tau)
+    assert [one["joint"] for one in torques] == list(there(run.robot).coordinates)
+    for one, column, joint in zip(torques, tau.T, there(run.robot).moving, strict=True):
+        size = np.abs(column)
+        assert (one["max"], one["t_max"]) == (size.max(), run.t[np.argmax(size)])
+        assert one["rms"] == np.sqrt(np.mean(size**2))
+        assert (one["effort"], one["unit"]) == (joint.effort, "N.m")
+        assert one["effort_share"] == size.max() / joint.effort
+        assert one["share_out"] == np.mean(size > joint.effort)
+    json.dumps(json_ready(torques), allow_nan=False)
+
+
+def test_a_torque_beyond_the_effort_is_said(run: Run) -> None:
+    tau, limit = there(run.tau)[:, 1], there(run.robot).moving[1].effort
+    beyond = np.flatnonzero(np.abs(tau) > limit)
+    worst = int(np.argmax(np.abs(tau)))
+    (warning,) = (one for one in run.warnings if one.kind == "effort-limit")
+    assert 10 < len(beyond) < 100
+    assert warning.row == beyond[0] + 1
+    assert warning.message == (
+        f"panda_joint2 needs more than its effort of 87 N.m in {len(beyond)} of 801 samples"
+        f" ({100 * len(beyond) / 801:.1f} %), at worst {np.abs(tau[worst]):.4g} N.m in row {worst + 1}:"
+        " check masses, clock and noise of the log"
+    )
+
+
+def test_several_joints_beyond_their_efforts_are_one_warning(run: Run) -> None:
+    robot = there(run.robot)
+    weak = replace(robot, joints=tuple(replace(one, effort=40.0) for one in robot.joints))
+    (warning,) = (one for one in on_robot(run, weak).warnings if one.kind == "effort-limit")
+    counts = np.count_nonzero(np.abs(there(run.tau)) > 40.0, axis=0).tolist()
+    assert warning.row == np.flatnonzero((np.abs(there(run.tau)) > 40.0).any(axis=1))[0] + 1
+    others = [f"panda_joint{j + 1} ({counts[j]} samples)" for j in (0, 2, 3) if counts[j]]
+    assert warning.message.startswith("panda_joint2 needs more than its effort of 40 N.m in ")
+    assert f"; also {' and '.join([', '.join(others[:-1]), others[-1]])}: check masses" in warning.message
+
+
+def test_the_row_is_that_of_the_file_on_another_grid(tmp_path: Path) -> None:
+    t = clock(500, 0.01)
+    z = 0.1 * np.sin(2.0 * np.pi * t**2 / 5.0)
+    path = sliding(tmp_path, z)
+    run = ingest_log([path], robot=slider(effort=25.0), tsp=0.02)
+    (warning,) = (one for one in run.warnings if one.kind == "effort-limit")
+    first = np.flatnonzero(np.abs(there(run.tau)[:, 0]) > 25.0)[0]
+    assert warning.row == 2 * first + 1
+    assert " N in " in warning.message
+
+
+def test_a_sliding_mass_takes_m_times_a_plus_g(tmp_path: Path) -> None:
+    t = clock(300, 0.01)
+    run = ingest_log([sliding(tmp_path, 0.5 * 3.0 * t**2)], robot=slider(2.0))
+    assert run.torque_units == ["N"]
+    # Second differences of 15 digits: 1e-16 / 1e-4.
+    np.testing.assert_allclose(there(run.tau), 2.0 * (3.0 + 9.81), rtol=0, atol=1e-9)
+    assert run.to_dict()["torques"][0]["effort"] is None
+    assert [one for one in run.warnings if one.kind == "effort-limit"] == []
+
+
+def test_rows_without_a_rate_have_no_torque(tmp_path: Path) -> None:
+    z = 0.1 * np.sin(clock(300, 0.05))
+    path = sliding(tmp_path, z)
+    lines = path.read_text(encoding="utf-8").splitlines()
+    lines[101] = lines[101].split(",")[0] + ","
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    run = ingest_log([path], robot=slider())
+    tau = there(run.tau)[:, 0]
+    np.testing.assert_array_equal(np.isnan(tau), np.isnan(run.qdd[:, 0]))
+    assert 0 < np.isnan(tau).sum() < 10
+    assert run.to_dict()["torques"][0]["max"] == np.nanmax(np.abs(tau))
+
+
+def test_nothing_is_said_of_rows_whose_pace_is_not_known(tmp_path: Path) -> None:
+    path = tmp_path / "slide.csv"
+    values = 0.1 * np.sin(np.arange(200.0))
+    path.write_text("\n".join(["q1 [m]", *map(repr, values.tolist())]) + "\n", encoding="utf-8")
+    run = ingest_log([path], robot=slider(effort=25.0))
+    if run.timed:
+        assert np.nanmax(np.abs(there(run.tau))) > 25.0
+    assert [one for one in run.warnings if one.kind == "effort-limit"] == []
+
+
+def test_still_poses_have_no_torques(tmp_path: Path) -> None:
+    run = ingest_log(
+        [sliding(tmp_path, np.linspace(0.0, 1.0, 20))], robot=slider(), read=ReadOptions(poses=True)
+    )
+    assert run.tau is None
+    assert run.to_dict()["torques"] == []
+    shown = present(run)
+    assert [one for one in figures(shown.body) if "orque" in one.title] == []
+    assert [one.title for one in shown.body.blocks() if isinstance(one, Drawing)] == ["Mass centres"]
+
+
+def test_a_robot_without_masses_gives_what_it_gave(run: Run) -> None:
+    bare = on_robot(run, replace(there(run.robot), inertials=(), left_out=()))
+    assert bare.tau is None
+    assert [name for name in bare.to_frame().columns if name.startswith("tau_")] == []
+    assert bare.to_dict()["torques"] == []
+    assert [one for one in bare.warnings if one.kind in ("effort-limit", "mass-left-out")] == []
+    shown = present(bare)
+    assert [one.title for one in figures(shown.body)] == [
+        "Joints", "Speed of the tool centre point", "Motion",
+    ]  # fmt: skip
+    assert scene_of(shown).title == "Arm and paths [m]"
+    assert [one for one in shown.body.blocks() if isinstance(one, Drawing)] == []
+
+
+def test_another_robot_gets_its_own_torques(run: Run) -> None:
+    robot = there(run.robot)
+    double = on_robot(run, replace(robot, inertials=2 * robot.inertials))
+    np.testing.assert_allclose(there(double.tau), 2.0 * there(run.tau), rtol=0, atol=1e-10)
+    again = on_robot(double, robot)
+    np.testing.assert_array_equal(again.tau, run.tau)
+    assert {one.kind for one in again.warnings} == {one.kind for one in run.warnings}
+
+
+def test_a_plan_has_the_torques_of_its_exact_rates() -> None:
+    plan = planned(load_robot("ur10"), SMALL)
+    joints, run = there(plan.joints), plan.as_run()
+    expected = torque_over_log(joints.chain, joints.q, joints.qd, joints.qdd)
+    np.testing.assert_array_equal(run.tau, expected)
+    assert np.isfinite(expected).all()
+
+
+# --- what is shown ---------------------------------------------------------------------------------
+
+
+def figure(run: Run, title: str) -> Figure:
+    return next(one for one in figures(present(run).body) if one.title == title)
+
+
+def test_torques_are_plotted_together_and_joint_by_joint_with_their_limits(run: Run) -> None:
+    shown = figure(run, "Joint torques")
+    together, *each = (view.panels[0] for view in shown.views)
+    assert together.lines[0].values is run.tau
+    assert (together.title, together.unit, together.limit) == ("τ", "N.m", None)
+    for j, (panel, joint) in enumerate(zip(each, there(run.robot).moving, strict=True)):
+        np.testing.assert_array_equal(panel.lines[0].values[:], there(run.tau)[:, j])
+        assert (panel.title, panel.limit) == (f"τ{j + 1}", joint.effort)
+    assert "panda_joint2" in shown.views[2].name
+    alt = shown.alt if isinstance(shown.alt, str) else shown.alt()
+    assert "panda_joint7 0.8" in alt and "of its limit)" in alt
+
+
+def test_the_terms_add_up_to_the_torque(run: Run) -> None:
+    views = figure(run, "Terms of the torques").views
+    assert len(views) == 7
+    for j, view in enumerate(views):
+        parts, total = view.panels[0].lines
+        assert (parts.stacked, total.stacked) == (True, False)
+        assert parts.names == ("gravity", "inertia", "centrifugal", "Coriolis")
+        np.testing.assert_array_equal(total.values[:], there(run.tau)[:, j])
+        # The terms are summed in another order.
+        np.testing.assert_allclose(parts.values[:].sum(axis=1), there(run.tau)[:, j], rtol=0, atol=1e-11)
+
+
+def test_the_gravity_term_is_what_an_arm_at_rest_holds(run: Run) -> None:
+    still = np.zeros_like(run.q)
+    held = rnea(run.q, still, still)
+    for j, view in enumerate(figure(run, "Terms of the torques").views):
+        np.testing.assert_allclose(view.panels[0].lines[0].values[:][:, 0], held[:, j], rtol=0, atol=1e-10)
+
+
+def test_the_energies_are_plotted(run: Run) -> None:
+    (view,) = figure(run, "Energy").views
+    kinetic, potential, total = view.panels[0].lines[0].values[:].T
+    expected = energies_over_log(there(run.robot), run.q, run.qd)
+    np.testing.assert_array_equal((kinetic, potential), expected)
+    np.testing.assert_array_equal(total, kinetic + potential)
+    # Power: what the joints give is what the energy gains; rates are by differences, as the gain is.
+    power = np.sum(there(run.tau) * run.qd, axis=1)
+    gain = np.gradient(total, run.tsp)
+    assert np.abs(power - gain)[2:-2].max() < 0.01 * np.abs(gain).max()
+
+
+def test_no_term_is_computed_before_it_is_shown(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> Any:
+        raise AssertionError("computed")
+
+    for name in ("terms_over_log", "energies_over_log"):
+        monkeypatch.setattr(f"urmpipe_pipeline.runs.torque_figures.{name}", refused)
+    assert len(figures(present(run).body)) == 6
+
+
+def test_the_table_has_each_joint_with_its_limit(run: Run) -> None:
+    table = next(one for one in present(run).body.tables if one.title == "Joint torques")
+    found, told = cells(table), run.to_dict()["torques"]
+    assert found["joint"] == list(run.log.joints)
+    for key in ("t_max", "effort", "effort_share", "share_out"):
+        assert found[key] == [one[key] for one in told]
+    assert found["max"] == [float(f"{one['max']:.4g}") for one in told]
+
+
+def test_the_scene_has_the_mass_centres(run: Run) -> None:
+    scene = scene_of(present(run))
+    assert scene.title == "Arm, its mass centres (yellow) and paths [m]"
+    assert [one.masses for one in scene.arms] == [True]
+
+
+def test_a_page_draws_the_arm_with_its_mass_centres(run: Run) -> None:
+    (drawing,) = (one for one in present(run).body.blocks() if isinstance(one, Drawing))
+    heavy = [one for one in there(run.robot).inertials if float(one.mass) > 0.0]
+    total = sum(float(one.mass) for one in heavy)
+    assert drawing.alt == (
+        "panda from the side and from the front, with the centres of"
+        f" its {len(heavy)} masses, {total:.4g} kg in all."
+    )
+    assert drawing.svg.count("<circle") == 2 * (len(heavy) + 11) + 1  # base, p1..p10; one in the legend
