@@ -92,7 +92,7 @@ FRAMES = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0
         ("igest x", f"found 'igest' (did you mean ingest?), allowed: {COMMAND_NAMES}"),
         ("show urm6", f"found 'show' (did you mean robot show?), allowed: {COMMAND_NAMES}"),
         ("robots list", f"found 'robots' (did you mean robot?), allowed: {COMMAND_NAMES}"),
-        ("robot lst", "found 'lst' (did you mean list?), allowed: export, list, show"),
+        ("robot lst", "found 'lst' (did you mean list?), allowed: equations, export, list, show"),
         ("ingest", "found no LOG..., allowed: urmpipe ingest [OPTIONS] LOG..."),
         ("ingest x --robt a", "--robt: no such option (did you mean --robot?); see urmpipe ingest --help"),
         ("ingest x --tsp", "--tsp: found no value, allowed: --tsp SECONDS"),

@@ -224,8 +224,8 @@ def test_quiet_says_nothing(urmpipe: RunCommand) -> None:
 
 def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunCommand) -> None:
     listed = json.loads(urmpipe("simulate", "--list", "--json").out)["systems"]
-    assert [one["name"] for one in listed] == ["log-to-delta", "one-drive", "six-drives"]
-    assert listed[0]["arguments"]["log"] == "coppeliasim.csv"
+    assert [one["name"] for one in listed] == ["driven-arm", "log-to-delta", "one-drive", "six-drives"]
+    assert listed[1]["arguments"]["log"] == "coppeliasim.csv"
     assert "log=coppeliasim.csv" in urmpipe("simulate", "--list").out
 
 
@@ -233,7 +233,7 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
     ("arguments", "said"),
     [
         ((), "error: found neither a system nor --list, allowed: one of both"),
-        (("nosuch",), "system: found 'nosuch', allowed: a TOML file, or one of log-to-delta"),
+        (("nosuch",), "system: found 'nosuch', allowed: a TOML file, or one of driven-arm, log-to-delta"),
         (("log-to-delta", "--set", "lgo=1"), "argument lgo: found 'lgo' (did you mean log?), allowed: log"),
         (("log-to-delta", "--set", "log"), "found 'log', allowed: NAME=VALUE, each name once"),
         (

@@ -84,13 +84,13 @@ def test_eq_12_gives_the_angular_velocity_in_the_axes_of_the_element() -> None:
     omega = np.zeros(3)
     for k, (row, motion) in enumerate(zip(ROWS, mass_motions(arm(), list(Q), list(QD)), strict=True)):
         B = element_matrix(row, Q[k])[:3, :3]
-        omega = (omega + [0.0, 0.0, QD[k]]) @ B  # eq. 12: a row vector
+        omega = (omega + np.array([0.0, 0.0, QD[k]])) @ B  # eq. 12: a row vector
         rest = element_matrix(row, 0.0)[:3, :3]
         np.testing.assert_allclose(omega, rest.T @ np.array(motion.omega, dtype=float), atol=ROUNDED)
 
 
 def test_eq_13_is_lagrange_of_these_energies_term_by_term() -> None:
-    """M_i = D1 theta'' + D2 theta'^2 + D_(1+k) theta'_(j-1) theta'_k + g E + J^T F, by differences of M and U."""
+    """M_i = D1 theta'' + D2 theta'^2 + D_(1+k) theta'_(j-1) theta'_k + g E + J^T F, by slopes of M and U."""
     chain, still = arm(), [0.0] * 4
     wrench = Wrench((3.0, -1.0, 2.0), (0.2, 0.4, -0.3))
     terms = torque_terms(chain, list(Q), list(QD), list(QDD), wrench)

@@ -46,7 +46,8 @@ def assert_traced(function: Callable[..., Any], sizes: Sequence[int], seed: int 
     """Hold a trace against the function in some random states."""
     casadi.GlobalOptions.setNumpyMode(-1)
     symbols = [casadi.SX.sym("x", size) for size in sizes]
-    traced = casadi.Function("f", symbols, [casadi.vertcat(*flat(function(*(x.elements() for x in symbols))))])
+    results = flat(function(*(x.elements() for x in symbols)))
+    traced = casadi.Function("f", symbols, [casadi.vertcat(*results)])
     rng = np.random.default_rng(seed)
     for _ in range(20):
         values = [rng.normal(size=size) for size in sizes]
@@ -93,7 +94,7 @@ def test_masses_centres_inertias_and_gravity_trace_as_parameters() -> None:
         return [inverse_dynamics(arm, q, q, q), mass_matrix(arm, q), kinetic_energy(arm, q, q)]
 
     def of_bodies(q: Any, spread: Any, centres: Any, gravity: Any) -> list[Any]:
-        """What numbers drawn from spread make: bodies that there are, as their inertias are those of boxes."""
+        """What numbers drawn from spread make: bodies that there are, their inertias those of boxes."""
         masses = [1.0 + spread[k] * spread[k] for k in range(count)]
         inertias = [entry for mass in masses for entry in (mass, mass, mass, 0.1, 0.1, 0.1)]
         return torques(q, masses, centres, inertias, gravity)
