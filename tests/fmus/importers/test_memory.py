@@ -45,7 +45,7 @@ def cycle():
     slave.terminate()
     slave.fmi2FreeInstance(slave.component)
 
-for _ in range(200):
+for _ in range(2000):  # the heap of a large unit takes some hundred to find its form
     cycle()
 before = resident()
 for _ in range(5000):

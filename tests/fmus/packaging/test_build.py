@@ -15,6 +15,7 @@ from fmpy.validation import validate_fmu
 
 from asserting import there
 from loaded_fmu import Loaded
+from made_masses import with_drives, with_masses
 from urmpipe_fmus.archive import content_guid
 from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.native import native_missing, this_platform
@@ -117,6 +118,8 @@ def test_a_failed_build_leaves_the_file_that_was_there(make: Make, tmp_path: Pat
 OPTIONS: dict[str, dict[str, Any]] = {
     "kinematic_chain": {"robot": load_robot("urm6")},
     "repolarizer": {"joints": 6},
+    "chain_dynamics": {"robot": with_drives(with_masses(load_robot("urm6")))},
+    "driven_arm": {"robot": with_drives(with_masses(load_robot("urm6")))},
 }
 
 
