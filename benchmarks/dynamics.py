@@ -11,28 +11,24 @@ import argparse
 import statistics
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pinocchio
 from bare_fmu import opened
-from pairs import Bound, machine, timed, write_results
+from pairs import Bound, in_turn, machine, timed, write_results
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "shared"))
 
 from made_masses import with_drives, with_masses
-
 from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.units import make_unit
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.dynamics.inverse import inverse_dynamics
 from urmpipe_models.dynamics.over_log import terms_over_log, torque_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_writer import urdf_text
-from urmpipe_models.row_blocks import row_blocks
 
 STATES = 1_000_000
 SIMULATED = 10.0
@@ -59,27 +55,6 @@ def states() -> tuple[FloatArray, FloatArray, FloatArray]:
     return q, qd, qdd
 
 
-def one_thread(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-    """Return the torques as `torque_over_log` does, block after block in one thread."""
-    found = np.empty((6, len(q)))
-    for block in row_blocks(len(q)):
-        columns = (list(np.ascontiguousarray(one[block].T)) for one in (q, qd, qdd))
-        for k, element in enumerate(inverse_dynamics(chain, *columns)):
-            found[k, block] = element
-    return found.T
-
-
-def in_turn(jobs: Mapping[str, Callable[[], object]], count: int) -> dict[str, list[float]]:
-    """Return how long jobs take in [s], run in turn, after one round that does not count."""
-    taken: dict[str, list[float]] = {name: [] for name in jobs}
-    for number in range(count + 1):
-        for name, job in jobs.items():
-            found = timed(job)
-            if number:
-                taken[name].append(found)
-    return taken
-
-
 def inverse_part(count: int) -> tuple[list[str], list[Bound]]:
     """Measure the inverse dynamics of many states."""
     chain, given = arm(), states()
@@ -89,7 +64,7 @@ def inverse_part(count: int) -> tuple[list[str], list[Bound]]:
     tau = np.zeros((6, STATES), order="F")
     theirs = partial(pinocchio.rneaInParallel, 1, pool, *columns, tau)
     jobs = {
-        "urmpipe, one thread": partial(one_thread, chain, *given),
+        "urmpipe, one thread": partial(torque_over_log, chain, *given, threads=1),
         "Pinocchio rneaInParallel, one thread": theirs,
         "urmpipe, `torque_over_log`": partial(torque_over_log, chain, *given),
         "urmpipe, `terms_over_log`": partial(terms_over_log, chain, *given),
@@ -103,7 +78,8 @@ def inverse_part(count: int) -> tuple[list[str], list[Bound]]:
     lines += ["", f"Largest difference of the two: {difference:.1e} N.m."]
     own, other = (taken[name] for name in list(jobs)[:2])
     ahead = statistics.median(b / a for a, b in zip(own, other, strict=True))
-    return lines, [Bound("Pinocchio's time over urmpipe's, one thread each, median of rounds", ahead, least=1.0)]
+    held = "Pinocchio's time over urmpipe's, one thread each, median of rounds"
+    return lines, [Bound(held, ahead, least=1.0)]
 
 
 def driven_part(count: int) -> tuple[list[str], list[Bound]]:

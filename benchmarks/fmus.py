@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from bare_fmu import FloatArray, opened, run_bare
-from pairs import Bound, machine, measure, median, rounds, timed, write_results
+from pairs import Bound, in_turn, machine, measure, median, rounds, timed, write_results
 from pairs import table as process_table
 
 from urmpipe.systems.blocks import Blocks
@@ -50,17 +50,6 @@ def sample_joints() -> FloatArray:
 def chain_unit() -> Unit:
     """Return the chain of the paper's arm, as it is shipped."""
     return make_unit("kinematic_chain", robot=load_robot("urm6"))
-
-
-def in_turn(jobs: Mapping[str, Callable[[], object]], count: int) -> dict[str, list[float]]:
-    """Return how long jobs take in [s], run in turn, after one round that does not count."""
-    taken: dict[str, list[float]] = {name: [] for name in jobs}
-    for number in range(count + 1):
-        for name, job in jobs.items():
-            found = timed(job)
-            if number:
-                taken[name].append(found)
-    return taken
 
 
 def ratio(taken: Sequence[float], base: Sequence[float]) -> float:

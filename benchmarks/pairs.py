@@ -56,6 +56,17 @@ def timed(job: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
+def in_turn(jobs: Mapping[str, Callable[[], object]], count: int) -> dict[str, list[float]]:
+    """Return how long jobs take in [s], run in turn, after one round that does not count."""
+    taken: dict[str, list[float]] = {name: [] for name in jobs}
+    for number in range(count + 1):
+        for name, job in jobs.items():
+            found = timed(job)
+            if number:
+                taken[name].append(found)
+    return taken
+
+
 def measure(command: Sequence[str]) -> Usage:
     """Run a command to its end; a failing one stops the benchmark."""
     start = time.perf_counter()

@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any
 
-from urmpipe_fmus.unit import Recipe, Unit
+from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units.chain_masses import masses_of, tool_inputs, wrench_at
-from urmpipe_fmus.units.coordinates import KINDS, gathered, kinds_of, scattered, values_of
+from urmpipe_fmus.units.coordinates import (
+    KINDS,
+    acceleration_outputs,
+    arm_recipe,
+    gathered,
+    kinds_of,
+    motion_states,
+    of_joints,
+    scattered,
+    values_of,
+)
 from urmpipe_fmus.units.options import an_arm
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, State, Variable
@@ -18,7 +27,7 @@ from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
 from urmpipe_models.dynamics.forward import check_motion, forward_dynamics
 from urmpipe_models.dynamics.wrench import wrench_power
 from urmpipe_models.elementwise import Element
-from urmpipe_models.robots.robot_file import chain_from_dict, robot_toml
+from urmpipe_models.robots.robot_file import chain_from_dict
 
 OPTIONS: Mapping[str, str] = {
     "robot": "a robot with masses: a name of the catalogue, a .toml or a .urdf file",
@@ -84,54 +93,9 @@ def chain_dynamics(robot: Chain) -> Unit:
     )
 
 
-def arm_recipe(module: str, robot: Chain) -> Recipe:
-    """Return how to make a unit of an arm again: by the arm as text, without its looks, which name files."""
-    return Recipe(module, "from_robot_toml", {"robot": robot_toml(replace(robot, visuals=()))})
-
-
 def from_robot_toml(robot: str) -> Unit:
     """Return `chain_dynamics` of the arm that a text of `robot_toml` describes, bit by bit."""
     return chain_dynamics(chain_from_dict(tomllib.loads(robot)))
-
-
-def of_joints(robot: Chain, indices: list[int]) -> str:
-    """Return which joints a variable is of, from the base outwards."""
-    return f"of the joints {', '.join(robot.coordinates[k] for k in indices)}"
-
-
-def motion_states(robot: Chain) -> Iterator[State]:
-    """Yield the coordinates and their rates; they start at the start pose at rest."""
-    for kind in kinds_of(robot):
-        at = kind.of(robot)
-        yield State(
-            name=kind.name,
-            description=f"{kind.word}s {of_joints(robot, at)}",
-            unit=kind.unit,
-            display_unit=kind.display_unit,
-            start=tuple(float(robot.start[k]) for k in at),
-            size=len(at),
-            output=True,
-        )
-        yield State(
-            name=f"{kind.name}d",
-            description=f"Velocities {of_joints(robot, at)}",
-            unit=f"{kind.unit}/s",
-            display_unit=f"{kind.display_unit}/s",
-            size=len(at),
-            output=True,
-        )
-
-
-def acceleration_outputs(robot: Chain) -> Iterator[Output]:
-    """Yield the accelerations of the coordinates."""
-    for kind in kinds_of(robot):
-        at = kind.of(robot)
-        yield Output(
-            name=f"{kind.name}dd",
-            description=f"Accelerations {of_joints(robot, at)}",
-            unit=f"{kind.unit}/s2",
-            size=len(at),
-        )
 
 
 def _inputs(robot: Chain) -> Iterator[Input]:

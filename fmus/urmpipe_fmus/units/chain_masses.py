@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
-from urmpipe_fmus.units.dc_drive import SMALLEST
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Parameter
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.drives.joint_drives import SMALLEST
 from urmpipe_models.dynamics.wrench import Wrench
 
 

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
+from urmpipe_fmus.unit import Recipe
 from urmpipe_fmus.values import Values
+from urmpipe_fmus.variable import Output, State
 from urmpipe_models.chains.chain import Chain, JointKind
 from urmpipe_models.elementwise import Element
+from urmpipe_models.robots.robot_file import robot_toml
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,3 +73,48 @@ def values_of(robot: Chain, v: Values, suffix: str = "") -> list[Element]:
 def scattered(robot: Chain, elements: Sequence[Element], suffix: str = "") -> dict[str, tuple[Element, ...]]:
     """Return elements in the arm's order by the variables of their kinds: the inverse of `values_of`."""
     return {one.name + suffix: tuple(elements[k] for k in one.of(robot)) for one in kinds_of(robot)}
+
+
+def of_joints(robot: Chain, indices: Iterable[int]) -> str:
+    """Return which joints a variable is of, from the base outwards."""
+    return f"of the joints {', '.join(robot.coordinates[k] for k in indices)}"
+
+
+def motion_states(robot: Chain) -> Iterator[State]:
+    """Yield the coordinates and their rates; they start at the start pose at rest."""
+    for kind in kinds_of(robot):
+        at = kind.of(robot)
+        yield State(
+            name=kind.name,
+            description=f"{kind.word}s {of_joints(robot, at)}",
+            unit=kind.unit,
+            display_unit=kind.display_unit,
+            start=tuple(float(robot.start[k]) for k in at),
+            size=len(at),
+            output=True,
+        )
+        yield State(
+            name=f"{kind.name}d",
+            description=f"Velocities {of_joints(robot, at)}",
+            unit=f"{kind.unit}/s",
+            display_unit=f"{kind.display_unit}/s",
+            size=len(at),
+            output=True,
+        )
+
+
+def acceleration_outputs(robot: Chain) -> Iterator[Output]:
+    """Yield the accelerations of the coordinates."""
+    for kind in kinds_of(robot):
+        at = kind.of(robot)
+        yield Output(
+            name=f"{kind.name}dd",
+            description=f"Accelerations {of_joints(robot, at)}",
+            unit=f"{kind.unit}/s2",
+            size=len(at),
+        )
+
+
+def arm_recipe(module: str, robot: Chain, **options: Any) -> Recipe:
+    """Return how to make a unit of an arm again: by the arm as text, without its looks, which name files."""
+    return Recipe(module, "from_robot_toml", {"robot": robot_toml(replace(robot, visuals=())), **options})

@@ -15,12 +15,10 @@ from urmpipe_models.drives.drive import (
     shaft_torque,
     stored_energy,
 )
+from urmpipe_models.drives.joint_drives import SMALLEST
 from urmpipe_models.elementwise import Element
 
 OPTIONS: Mapping[str, str] = {}
-
-SMALLEST = 1e-9
-"""Stands for above 0: FMI's min is a value that is allowed."""
 
 
 def dc_drive() -> Unit:

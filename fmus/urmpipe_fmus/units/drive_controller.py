@@ -10,6 +10,7 @@ from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Memory, Output, Parameter
 from urmpipe_models.drives.controller import Gains, next_voltage, sample_number, voltage_at
+from urmpipe_models.drives.joint_drives import SHORTEST_PERIOD
 from urmpipe_models.drives.set_point import JointMotion
 from urmpipe_models.elementwise import Element
 
@@ -55,7 +56,9 @@ _VOLTAGE = Output(name="u", description="Voltage for the drive's armature", unit
 def _parameters() -> tuple[Parameter, ...]:
     period, gain = "Time between two samples", "Voltage that a sample adds for an error of"
     return (
-        Parameter(name="period", description=period, unit="s", start=5e-3, minimum=1e-6, tunable=False),
+        Parameter(
+            name="period", description=period, unit="s", start=5e-3, minimum=SHORTEST_PERIOD, tunable=False
+        ),
         Parameter(name="Kphi", description=f"{gain} position (assumed)", unit="V/rad", start=7.5),
         Parameter(name="Kw", description=f"{gain} velocity (assumed)", unit="V.s/rad", start=0.75),
         Parameter(name="Keps", description=f"{gain} acceleration (assumed)", unit="V.s2/rad", start=0.01),

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_fmus.units.coordinates import CoordinateKind, kinds_of
-from urmpipe_fmus.units.dc_drive import SMALLEST
+from urmpipe_fmus.units.coordinates import CoordinateKind, kinds_of, of_joints
 from urmpipe_fmus.units.drive_controller import NO_SAMPLE
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.drives.controller import Gains, next_voltage, sample_number, voltage_at
 from urmpipe_models.drives.drive import Drive
-from urmpipe_models.drives.joint_drives import DRIVE_KEYS, GAIN_KEYS, DrivenJoint, HeldJoint
+from urmpipe_models.drives.joint_drives import (
+    DRIVE_KEYS,
+    GAIN_KEYS,
+    SHORTEST_PERIOD,
+    SMALLEST,
+    DrivenJoint,
+    HeldJoint,
+)
 from urmpipe_models.drives.set_point import JointMotion
 from urmpipe_models.dynamics.driven_arm import (
     Actuator,
@@ -66,36 +72,31 @@ class DriveGroup:
 
     @property
     def _limit(self) -> str:
-        """Name of the limit of the voltage, u of which it is: u_max, u_s_max."""
+        """Name of the voltage limit: u_max, u_s_max."""
         return f"u{self.suffix}_max"
 
     def parameters(self) -> Iterator[Parameter]:
         """Yield the constants of the drives and the springs; the periods are fixed."""
         joints = [one for one, _ in self.driven.values()]
-        gains = dict.fromkeys(GAIN_KEYS, -np.inf)
-        for place, key in enumerate((*DRIVE_KEYS, *GAIN_KEYS)) if joints else ():
-            description, unit = _CONSTANTS[key]
-            yield self._parameter(
-                key,
-                description,
-                self._unit(unit),
-                [float((*one.drive, *one.gains)[place]) for one in joints],
-                gains.get(key, SMALLEST),
-            )
         if joints:
-            periods = [one.period for one in joints]
-            largest = [one.largest_voltage for one in joints]
-            yield self._parameter("period", "Time between two samples", "s", periods, 1e-6, tunable=False)
-            yield self._parameter(self._limit, "Largest voltage", "V", largest, 0.0, plain=True)
+            constants = zip(*((*one.drive, *one.gains) for one in joints), strict=True)
+            for key, values in zip((*DRIVE_KEYS, *GAIN_KEYS), constants, strict=True):
+                description, unit = _CONSTANTS[key]
+                least = -np.inf if key in GAIN_KEYS else SMALLEST
+                yield self._parameter(key, description, self._unit(unit), values, least)
+            periods, largest = zip(*((one.period, one.largest_voltage) for one in joints), strict=True)
+            period = self._parameter("period", "Time between two samples", "s", periods, SHORTEST_PERIOD)
+            yield replace(period, tunable=False)
+            yield replace(self._parameter("u_max", "Largest voltage", "V", largest, 0.0), name=self._limit)
         if self.held:
-            stiffness = [one.stiffness for one, _ in self.held.values()]
-            damping = [one.damping for one, _ in self.held.values()]
-            rest = [rest.rest for _, rest in self.held.values()]
-            k, l_unit = self._unit("{torque}/{way}"), self._unit("{torque}.s/{way}")
-            yield self._parameter("k_held", "Rigidity of the spring", k, stiffness, SMALLEST, held=True)
-            yield self._parameter("l_held", "Damping of the spring", l_unit, damping, 0.0, held=True)
-            where = "Where the spring gives no torque"
-            yield self._parameter("rest", where, self.kind.unit, rest, -np.inf, held=True)
+            springs = ((one.stiffness, one.damping, rest.rest) for one, rest in self.held.values())
+            k, l_held, rest = zip(*springs, strict=True)
+            for name, description, unit, values, least in (
+                ("k_held", "Rigidity of the spring", self._unit("{torque}/{way}"), k, SMALLEST),
+                ("l_held", "Damping of the spring", self._unit("{torque}.s/{way}"), l_held, 0.0),
+                ("rest", "Where the spring gives no torque", self.kind.unit, rest, -np.inf),
+            ):
+                yield self._parameter(name, description, unit, values, least, self.held)
 
     def inputs(self) -> Iterator[Input]:
         """Yield the set points."""
@@ -228,19 +229,16 @@ class DriveGroup:
         unit: str,
         start: Sequence[float],
         minimum: float,
-        *,
-        held: bool = False,
-        tunable: bool = True,
-        plain: bool = False,
+        joints: Iterable[int] | None = None,
     ) -> Parameter:
+        """Return a tunable parameter of some joints, of the driven ones by default."""
         return Parameter(
-            name=name if plain else name + self.suffix,
-            description=f"{description} {self._of(self.held if held else self.driven)}",
+            name=name + self.suffix,
+            description=f"{description} {self._of(self.driven if joints is None else joints)}",
             unit=unit,
-            start=tuple(start),
+            start=tuple(map(float, start)),
             minimum=minimum,
             size=len(start),
-            tunable=tunable,
         )
 
     def _unit(self, form: str) -> str:
@@ -253,7 +251,7 @@ class DriveGroup:
         )
 
     def _of(self, indices: Iterable[int]) -> str:
-        return f"of the joints {', '.join(self.robot.coordinates[k] for k in indices)}"
+        return of_joints(self.robot, indices)
 
 
 def drive_groups(robot: Chain, rests: Sequence[Rest]) -> list[DriveGroup]:

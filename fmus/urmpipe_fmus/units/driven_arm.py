@@ -8,13 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.units.chain_dynamics import (
+from urmpipe_fmus.units.chain_masses import Masses, masses_of, tool_inputs, wrench_at
+from urmpipe_fmus.units.coordinates import (
     acceleration_outputs,
     arm_recipe,
     motion_states,
+    scattered,
+    values_of,
 )
-from urmpipe_fmus.units.chain_masses import Masses, masses_of, tool_inputs, wrench_at
-from urmpipe_fmus.units.coordinates import scattered, values_of
 from urmpipe_fmus.units.drive_variables import DriveGroup, drive_groups
 from urmpipe_fmus.units.options import an_arm
 from urmpipe_fmus.values import Values
@@ -99,12 +100,14 @@ class _Model:
         yield from (*tool_inputs(), *acceleration_outputs(self.robot))
         for group in self.groups:
             yield from group.computed()
-        yield Output(name="energy_stored", description="Energy of arm, rotors, windings, shafts", unit="J")
+        yield Output(name="energy_stored", description="Energy of arm, drives, shafts and springs", unit="J")
         yield from motion_states(self.robot)
         for group in self.groups:
             yield from (*group.states(), *group.memories())
         yield State(name="energy_in", description="Work of voltages and tool force", unit="J", output=True)
-        yield State(name="energy_lost", description="Heat of armatures and shafts", unit="J", output=True)
+        yield State(
+            name="energy_lost", description="Heat of armatures, shafts and dampers", unit="J", output=True
+        )
 
     def outputs(self, v: Values) -> Mapping[str, Any]:
         """Return accelerations, voltages, torques of shafts and springs, and the energy."""

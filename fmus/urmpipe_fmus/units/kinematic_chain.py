@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
-from urmpipe_fmus.unit import Recipe, Unit
+from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units.chain_geometry import geometry_of
-from urmpipe_fmus.units.coordinates import kinds_of, values_of
+from urmpipe_fmus.units.coordinates import arm_recipe, kinds_of, of_joints, values_of
 from urmpipe_fmus.units.options import an_arm, some_of, yes_or_no
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, Variable
@@ -17,7 +16,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import UnitError
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.kinematics.motion import Motion, each_motion
-from urmpipe_models.robots.robot_file import chain_from_dict, robot_toml
+from urmpipe_models.robots.robot_file import chain_from_dict
 from urmpipe_models.transform import Transform, euler_zyx
 
 OPTIONS: Mapping[str, str] = {
@@ -84,14 +83,8 @@ def kinematic_chain(
         outputs=outputs,
         equations=_equations(rates),
         source="UrmArm2021, eq. 1-14, with atan2 in eq. 10 and 13",
-        recipe=_recipe(robot, points=list(chosen), sensors=list(sensed), rates=rates),
+        recipe=arm_recipe(__name__, robot, points=list(chosen), sensors=list(sensed), rates=rates),
     )
-
-
-def _recipe(robot: Chain, **options: Any) -> Recipe:
-    """Return how to make the unit again: by the arm as text, without its looks, which name files."""
-    described = replace(robot, visuals=())
-    return Recipe(__name__, "from_robot_toml", {"robot": robot_toml(described), **options})
 
 
 def from_robot_toml(robot: str, **options: Any) -> Unit:
@@ -121,7 +114,7 @@ def _inputs(robot: Chain, rates: bool) -> Iterator[Input]:
     """Yield the joints' angles and ways, and their rates."""
     for kind in kinds_of(robot):
         at = kind.of(robot)
-        of = f"of the joints {', '.join(robot.coordinates[k] for k in at)}"
+        of = of_joints(robot, at)
         yield Input(
             name=kind.name,
             description=f"{kind.word}s {of}",

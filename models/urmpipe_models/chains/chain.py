@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
+from numbers import Real
 from typing import Literal
 
 from urmpipe_models.chains.inertial import GRAVITY, Inertial
@@ -63,10 +64,12 @@ class Joint:
     mimic: Mimic | None = None
 
     def faults(self) -> Iterator[str]:
-        """Yield what is wrong with its axis and its limits."""
+        """Yield what is wrong with its axis, its limits and its kind."""
         length = math.hypot(*self.axis)
         if abs(length - 1.0) > AXIS_TOLERANCE:
             yield f"joint {self.name}: axis {list(self.axis)} has length {length:g}; allowed: 1"
+        if self.kind == "fixed" and self.mimic is not None:
+            yield f"joint {self.name}: is fixed and mimics {self.mimic.joint}; allowed: one of both"
         if not self.lower <= self.upper:
             yield f"joint {self.name}: lower limit {self.lower:g} above upper {self.upper:g}"
         for key in ("velocity", "acceleration", "effort"):
@@ -141,6 +144,8 @@ class Chain(Shown):
             carriers = {one.joint for one in carried if one.joint is not None}
             for carrier in sorted(carriers - set(names)):
                 yield f"{kind} hangs on {carrier}, no joint of the chain; allowed: {', '.join(names)}"
+        if not all(math.isfinite(one) for one in self.gravity if isinstance(one, Real)):
+            yield f"gravity {[*self.gravity]}; allowed: finite numbers"
         yield from self._drive_faults()
         if len(self.start) != len(self.coordinates):
             yield f"start has {len(self.start)} values; allowed: {len(self.coordinates)}, one a coordinate"

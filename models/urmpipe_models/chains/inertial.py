@@ -49,18 +49,33 @@ class Inertial:
         """The joint that carries it in words, for messages."""
         return "the base" if self.joint is None else f"joint {self.joint}"
 
+    @property
+    def matrix(self) -> tuple[Vector, Vector, Vector]:
+        """The rows of the inertia matrix about the centre, in [kg.m2]."""
+        ixx, iyy, izz, ixy, ixz, iyz = self.inertia
+        return (ixx, ixy, ixz), (ixy, iyy, iyz), (ixz, iyz, izz)
+
+    @property
+    def principal_moments(self) -> tuple[float, float, float]:
+        """The moments of inertia about the principal axes through the centre, the least first, in [kg.m2]."""
+        low, middle, high = np.linalg.eigvalsh(np.array(self.matrix, dtype=np.float64)).tolist()
+        return low, middle, high
+
     def faults(self) -> Iterator[str]:
         """Yield why no body has this mass and inertia; of what is no number, as in a trace, nothing."""
-        if not all(isinstance(value, Real) for value in (self.mass, *self.inertia)):
+        values = (self.mass, *self.centre, *self.inertia)
+        if not all(isinstance(value, Real) for value in values):
             return
-        mass, inertia = float(self.mass), [float(value) for value in self.inertia]
         where = f"inertial on {self.place}"
+        if not np.isfinite(np.array(values, dtype=np.float64)).all():
+            yield f"{where}: found a number that is not finite in {[*map(float, values)]}; allowed: finite"
+            return
+        mass = float(self.mass)
         if mass < 0.0:
             yield f"{where}: mass {mass:g} kg; allowed: 0 or more"
-        if mass == 0.0 and any(inertia):
+        if mass == 0.0 and any(self.inertia):
             yield f"{where}: mass 0 with an inertia; allowed: a mass, or no inertia"
-        ixx, iyy, izz, ixy, ixz, iyz = inertia
-        low, middle, high = np.linalg.eigvalsh([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]).tolist()
+        low, middle, high = self.principal_moments
         moments = f"principal moments {low:.4g}, {middle:.4g}, {high:.4g} kg.m2"
         if low < -ROUNDING * abs(high) or high < 0.0:
             yield f"{where}: {moments}; allowed: 0 or more"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -27,9 +27,8 @@ class HeldJoint:
 
     def faults(self) -> Iterator[str]:
         """Yield which constants no spring and damper have."""
-        yield from _above_zero(self.joint, {"k": self.stiffness})
-        if not 0.0 <= self.damping < math.inf:
-            yield f"drives.{self.joint}.l: found {self.damping:g}, allowed: 0 or more"
+        yield from _at_least(SMALLEST, self.joint, {"k": self.stiffness})
+        yield from _at_least(0.0, self.joint, {"l": self.damping})
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,10 +56,9 @@ class DrivenJoint:
 
     def faults(self) -> Iterator[str]:
         """Yield which constants no drive has; gains may have any sign (see `drive_controller`)."""
-        constants = dict(zip(DRIVE_KEYS, self.drive, strict=True))
-        yield from _above_zero(
-            self.joint, {**constants, "period": self.period, "u_max": self.largest_voltage}
-        )
+        yield from _at_least(SMALLEST, self.joint, dict(zip(DRIVE_KEYS, self.drive, strict=True)))
+        yield from _at_least(SHORTEST_PERIOD, self.joint, {"period": self.period})
+        yield from _at_least(0.0, self.joint, {"u_max": self.largest_voltage})
         for key, value in zip(GAIN_KEYS, self.gains, strict=True):
             if not math.isfinite(value):
                 yield f"drives.{self.joint}.{key}: found {value:g}, allowed: a finite number"
@@ -75,7 +73,15 @@ GAIN_KEYS = ("Kphi", "Kw", "Keps")
 """The gains, as robot files and units name them."""
 
 
-def _above_zero(joint: str, values: dict[str, float]) -> Iterator[str]:
+SMALLEST = 1e-9
+"""The least value of a constant that is above 0, in its unit; FMI's min is a value that is allowed."""
+
+SHORTEST_PERIOD = 1e-6
+"""The least time between two samples of a controller in [s]."""
+
+
+def _at_least(least: float, joint: str, values: Mapping[str, float]) -> Iterator[str]:
+    """Yield which constants are not finite, or below the least value."""
     for key, value in values.items():
-        if not 0.0 < value < math.inf:
-            yield f"drives.{joint}.{key}: found {value:g}, allowed: a finite number above 0"
+        if not least <= value < math.inf:
+            yield f"drives.{joint}.{key}: found {value:g}, allowed: a finite number, {least:g} or more"

@@ -27,7 +27,7 @@ from urmpipe_models.dynamics.forward import check_motion, forward_dynamics
 from urmpipe_models.dynamics.inverse import inverse_dynamics
 from urmpipe_models.dynamics.wrench import Wrench, wrench_power
 from urmpipe_models.elementwise import Element
-from urmpipe_models.errors import RobotError
+from urmpipe_models.errors import Finding, RobotError
 
 
 class Spring(NamedTuple):
@@ -199,30 +199,32 @@ def at_rest(chain: Chain) -> list[Rest]:
     """
     by_joint = {one.joint: one for one in chain.drives}
     faults = [
-        f"robot {chain.name}: key drives.{name}: not found, allowed: the drive of the joint,"
-        " or { k, l } of a spring that holds it"
+        Finding(
+            f"robot {chain.name}: key drives.{name}: not found, allowed: the drive of the joint,"
+            " or { k, l } of a spring that holds it"
+        )
         for name in chain.coordinates
         if name not in by_joint
     ]
+    try:
+        check_motion(chain)
+    except RobotError as error:
+        faults += error.findings
     if faults:
         raise RobotError(*faults)
-    check_motion(chain)
     still = [0.0] * len(chain.coordinates)
     torques = inverse_dynamics(chain, list(map(float, chain.start)), still, still)
-    found = [
-        _held(by_joint[name], float(q), float(torque))
-        for name, q, torque in zip(chain.coordinates, chain.start, torques, strict=True)
+    drives = [by_joint[name] for name in chain.coordinates]
+    rests = [_held(*each) for each in zip(drives, map(float, chain.start), map(float, torques), strict=True)]
+    weak = [
+        f"robot {chain.name}: drives.{own.joint}: needs {abs(rest.voltage):.4g} V to hold the arm at its"
+        f" start, allowed: u_max, {own.largest_voltage:g} V"
+        for own, rest in zip(drives, rests, strict=True)
+        if isinstance(own, DrivenJoint) and abs(rest.voltage) > own.largest_voltage
     ]
-    for name, rest in zip(chain.coordinates, found, strict=True):
-        own = by_joint[name]
-        if isinstance(own, DrivenJoint) and abs(rest.voltage) > own.largest_voltage:
-            need = f"{abs(rest.voltage):.4g} V to hold the arm at its start"
-            faults.append(
-                f"robot {chain.name}: drives.{name}: needs {need}, allowed: u_max, {own.largest_voltage:g} V"
-            )
-    if faults:
-        raise RobotError(*faults)
-    return found
+    if weak:
+        raise RobotError(*weak)
+    return rests
 
 
 def _held(one: HeldJoint | DrivenJoint, q: float, torque: float) -> Rest:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from urmpipe_models.chains.chain import Chain, Joint
@@ -16,6 +16,10 @@ Symmetric: TypeAlias = tuple[Vector, Vector, Vector]
 """The rows of a symmetric matrix."""
 
 
+_Placed: TypeAlias = tuple[Transform, Inertial]
+"""A mass, and the frame that carries it in the moving frame of a joint."""
+
+
 @dataclass(frozen=True, slots=True)
 class Link:
     """A moving joint and the body that it carries.
@@ -23,7 +27,7 @@ class Link:
     Attributes:
         joint: The joint, one that moves; its origin counts from the moving frame of the link before it.
         coordinate: Index of the coordinate that it follows.
-        multiplier: Its value a unit of that coordinate: 1, of a mimic what the robot file tells.
+        multiplier: Change of its value per unit of the coordinate: 1, of a mimic its multiplier.
         mass: m of all that is fixed to its moving frame, in [kg].
         moment: h, the sum of mass times centre in that frame, in [kg.m].
         inertia: I about the origin of that frame, in [kg.m2].
@@ -76,49 +80,37 @@ def links_of(chain: Chain) -> Links:
         RobotError: If it has no masses.
     """
     check_masses(chain)
-    found: list[Link] = []
-    frame, bodies = Transform(), list[tuple[Transform, Inertial]]()  # the base: nothing of it moves
     index = {name: k for k, name in enumerate(chain.coordinates)}
     carried: dict[str | None, list[Inertial]] = {}
     for one in chain.inertials:
         carried.setdefault(one.joint, []).append(one)
-    pending: tuple[Joint, int, float] | None = None
+    moving: list[tuple[Joint, list[_Placed]]] = []
+    frame = Transform()  # of what follows in the moving frame before it
     for joint in chain.joints:
         frame = frame @ joint.origin
         if joint.kind != "fixed":
-            if pending:
-                found.append(Link(*pending, *_body(bodies)))
-            leader, multiplier = (
-                (joint.name, 1.0) if joint.mimic is None else (joint.mimic.joint, joint.mimic.multiplier)
-            )
-            pending = _moved_to(joint, frame), index[leader], float(multiplier)
-            frame, bodies = Transform(), []
-        bodies += [(frame, one) for one in carried.get(joint.name, ())]
-    if pending:
-        found.append(Link(*pending, *_body(bodies)))
-    return Links(tuple(found), frame @ chain.tip @ chain.tool)
+            moving.append((replace(joint, origin=frame), []))
+            frame = Transform()
+        if moving:  # what stands before the first of them does not move
+            moving[-1][1].extend((frame, one) for one in carried.get(joint.name, ()))
+    links = (
+        Link(joint, index[joint.name], 1.0, *_body(bodies))
+        if joint.mimic is None
+        else Link(joint, index[joint.mimic.joint], joint.mimic.multiplier, *_body(bodies))
+        for joint, bodies in moving
+    )
+    return Links(tuple(links), frame @ chain.tip @ chain.tool)
 
 
-def _moved_to(joint: Joint, origin: Transform) -> Joint:
-    """Return a joint with another origin."""
-    return Joint(joint.name, joint.kind, origin, joint.axis, mimic=joint.mimic)
-
-
-def _body(bodies: Sequence[tuple[Transform, Inertial]]) -> tuple[Element, Vector, Symmetric]:
+def _body(bodies: Sequence[_Placed]) -> tuple[Element, Vector, Symmetric]:
     """Return mass, moment and inertia about the origin of bodies, each in a frame of its own."""
     mass: Element = 0.0
     moment, inertia = ZERO, (ZERO, ZERO, ZERO)
     for frame, one in bodies:
         centre = frame.point(one.centre)
         mass, moment = plus(mass, one.mass), add(moment, scale(one.mass, centre))
-        inertia = summed(inertia, turned(frame, matrix_of(one)), about_origin(one.mass, centre))
+        inertia = summed(inertia, turned(frame, one.matrix), about_origin(one.mass, centre))
     return mass, moment, inertia
-
-
-def matrix_of(one: Inertial) -> Symmetric:
-    """Return the inertia about the centre of mass, in the axes of the frame that carries it [kg.m2]."""
-    ixx, iyy, izz, ixy, ixz, iyz = one.inertia
-    return (ixx, ixy, ixz), (ixy, iyy, iyz), (ixz, iyz, izz)
 
 
 def turned(frame: Transform, matrix: Symmetric) -> Symmetric:

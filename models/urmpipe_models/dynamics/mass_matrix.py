@@ -26,9 +26,10 @@ def mass_matrix(chain: Chain, q: Sequence[Element]) -> list[list[Element]]:
     Raises:
         RobotError: If the arm has no masses.
 
-    Source: [Iso9283]_ eq. 13, D_1.
+    Source: [Iso9283]_ eq. 13, D_1, by the composite bodies of [Walker1982]_.
     """
-    links, count = moving_links(chain, q), len(chain.coordinates)
+    links, _ = moving_links(chain, q)
+    count = len(chain.coordinates)
     matrix: list[list[Element]] = [[0.0] * count for _ in range(count)]
     beyond = Body()
     for j in reversed(range(len(links))):

@@ -13,10 +13,12 @@ from urmpipe_models.dynamics.inverse import inverse_dynamics
 from urmpipe_models.dynamics.mass_centres import mass_centres
 from urmpipe_models.dynamics.terms import TorqueTerms, torque_terms
 from urmpipe_models.elementwise import Element
-from urmpipe_models.row_blocks import row_blocks, side_by_side
+from urmpipe_models.row_blocks import THREADS, row_blocks, side_by_side
 
 
-def torque_over_log(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+def torque_over_log(
+    chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray, threads: int = THREADS
+) -> FloatArray:
     """Return the torques of the joints over a log, in [N.m] or [N], shape (n, joints).
 
     Args:
@@ -24,11 +26,14 @@ def torque_over_log(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray
         q: Joint values in [rad] or [m], shape (n, joints).
         qd: Their rates in [rad/s] or [m/s], shape (n, joints).
         qdd: Their second derivatives in [rad/s2] or [m/s2], shape (n, joints).
+        threads: Blocks of rows worked on at a time.
 
     Raises:
         RobotError: If the arm has no masses.
     """
-    return _over(lambda *columns: inverse_dynamics(chain, *columns), q.shape[1], q, qd, qdd).T
+    return _over(
+        lambda *columns: inverse_dynamics(chain, *columns), q.shape[1], q, qd, qdd, threads=threads
+    ).T
 
 
 def terms_over_log(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> dict[str, FloatArray]:
@@ -77,7 +82,9 @@ def mass_centres_over_log(chain: Chain, q: FloatArray) -> FloatArray:
     return flat.T.reshape(len(q), count, 3)
 
 
-def _over(work: Callable[..., Sequence[Element]], count: int, *rows: FloatArray) -> FloatArray:
+def _over(
+    work: Callable[..., Sequence[Element]], count: int, *rows: FloatArray, threads: int = THREADS
+) -> FloatArray:
     """Return what work makes of the columns of some arrays of shape (n, joints), shape (count, n)."""
     found = np.empty((count, len(rows[0])))
 
@@ -87,5 +94,5 @@ def _over(work: Callable[..., Sequence[Element]], count: int, *rows: FloatArray)
         for k, element in enumerate(work(*columns)):
             found[k, block] = element
 
-    side_by_side(fill, row_blocks(len(rows[0])))
+    side_by_side(fill, row_blocks(len(rows[0])), threads)
     return found

@@ -109,8 +109,8 @@ class MovingLink:
         return plus(dot(self.axis, force.moment), dot(self.slide, force.force))
 
 
-def moving_links(chain: Chain, q: Sequence[Element]) -> tuple[MovingLink, ...]:
-    """Return the moving joints and bodies of an arm, from the base outwards.
+def moving_links(chain: Chain, q: Sequence[Element]) -> tuple[list[MovingLink], Vector]:
+    """Return the moving joints and bodies of an arm from the base outwards, and the tool centre point [m].
 
     Args:
         chain: The arm, with masses.
@@ -128,13 +128,17 @@ def moving_links(chain: Chain, q: Sequence[Element]) -> tuple[MovingLink, ...]:
         axis, slide = (along, cross(pose.translation, along)) if turns else (ZERO, along)
         body = _placed(pose, link.mass, link.moment, _second_moments(link.inertia))
         found.append(MovingLink(link.coordinate, axis, slide, pose, body))
-    return tuple(found)
+    return found, pose.point(arm.tool.translation)
 
 
 def inertial_force(body: Body, field: Field) -> Force:
     """Return the force and moment that give a body accelerations G r + b in [m/s2].
 
     See the formulas of this module.
+
+    Args:
+        body: The body.
+        field: G in [1/s2] and b in [m/s2].
     """
     b, (hx, hy, hz) = field.offset, body.moment
     turn = Transform(field.gradient)

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.dynamics.links import links_of
 from urmpipe_models.dynamics.screws import Field, Force, MovingLink, inertial_force, moving_links
 from urmpipe_models.dynamics.wrench import Wrench
-from urmpipe_models.elementwise import Element, add, cross, plus, scale
+from urmpipe_models.elementwise import Element, Vector, add, cross, plus, scale
 
 
 class TorqueTerms(NamedTuple):
@@ -55,7 +54,7 @@ def torque_terms(
 
     Source: [Iso9283]_ eq. 13: D_1, D_2, D_(1+k), E and J^T F, the last with the sign of a force from outside.
     """
-    links = moving_links(chain, q)
+    links, place = moving_links(chain, q)
     inertia, centrifugal, coriolis = Field(), Field(), Field()
     rates = [Field() for _ in chain.coordinates]
     weight = Field(offset=scale(-1.0, chain.gravity))
@@ -72,7 +71,7 @@ def torque_terms(
         forces.append(tuple(inertial_force(link.body, field) for field in fields))
     tool = [Force()] * len(links)
     if wrench is not None:
-        tool[-1] = _tool_force(chain, links[-1], wrench)
+        tool[-1] = _against(wrench, place)
     terms = [*zip(*forces, strict=True), tool]
     return TorqueTerms(*(_torques(links, each, len(chain.coordinates)) for each in terms))
 
@@ -87,8 +86,7 @@ def _torques(links: Sequence[MovingLink], forces: Sequence[Force], count: int) -
     return torques
 
 
-def _tool_force(chain: Chain, last: MovingLink, wrench: Wrench) -> Force:
-    """Return what the last link needs against what acts on the tool."""
-    place = (last.frame @ links_of(chain).tool).translation
+def _against(wrench: Wrench, place: Vector) -> Force:
+    """Return what the last link needs against what acts on the tool at its place."""
     moment = add(wrench.moment, cross(place, wrench.force))
     return Force(scale(-1.0, wrench.force), scale(-1.0, moment))

@@ -122,7 +122,8 @@ def _ways(tree: UrdfTree, root: str) -> dict[str, list[Edge]]:
 
 def _default_tip(tree: UrdfTree, ways: dict[str, list[Edge]]) -> str | None:
     """Return the end with the most moving joints before it; nothing, and a fault noted, if in doubt."""
-    masses = {edge.child for edge in tree.edges.values() if edge.joint.name.startswith(MASS_JOINT)}
+    fixed = [edge for edge in tree.edges.values() if edge.type == "fixed"]
+    masses = {edge.child for edge in fixed if edge.joint.name.startswith(MASS_JOINT)}
     parents = {edge.parent for edge in tree.edges.values() if edge.child not in masses}
     moving = {link: sum(map(_moves, way)) for link, way in ways.items() if link not in parents | masses}
     most = [link for link, count in moving.items() if count == max(moving.values())]

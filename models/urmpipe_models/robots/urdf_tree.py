@@ -29,7 +29,7 @@ UNLIMITED = 1.7976931348623157e308
 BASE_JOINT, TIP_JOINT, TOOL_JOINT = "urmpipe_base", "urmpipe_tip", "urmpipe_tool"
 """Names of the fixed joints that stand for a chain's base, tip and tool."""
 
-MASS_JOINT = "urmpipe_mass"
+MASS_JOINT = "urmpipe_mass_"
 """What the names of the fixed joints begin with that hold a further mass of a link."""
 
 STAND_IN = "urmpipe"

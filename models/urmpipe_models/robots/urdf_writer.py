@@ -48,7 +48,7 @@ def urdf_text(chain: Chain) -> str:
     limits is `continuous`; elsewhere the largest double stands for infinity. Limits of acceleration make it
     URDF 1.2, which has them. An arm without visuals gets a cylinder a link, which `read_urdf` leaves out
     again. A link has one mass; further ones of a joint are links of their own, fixed to it by joints whose
-    names begin with `urmpipe_mass`. URDF has no gravity, no drives and no sources of masses.
+    names begin with `urmpipe_mass_`. URDF has no gravity, no drives and no sources of masses.
 
     Raises:
         RobotError: If a joint has one of these names.
@@ -89,7 +89,7 @@ def urdf_text(chain: Chain) -> str:
         lines += _joint_lines(joint, parent, child)
         for k, one in enumerate(masses.get(child, [])[1:], start=2):
             lines += _link_lines(f"{child}_mass{k}", _inertial_lines([one]))
-            holds = Joint(f"{MASS_JOINT}_{child}_{k}", "fixed")
+            holds = Joint(f"{MASS_JOINT}{child}_{k}", "fixed")
             lines += _joint_lines(holds, child, f"{child}_mass{k}")
     return "\n".join([*lines, "</robot>"]) + "\n"
 

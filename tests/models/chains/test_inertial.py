@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from asserting import refusal
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.chains.inertial import GRAVITY, Inertial
 from urmpipe_models.drives.controller import Gains
 from urmpipe_models.drives.drive import Drive
@@ -70,10 +70,28 @@ def test_a_chain_says_all_that_is_wrong_with_masses_and_drives_at_once() -> None
         "robot arm: inertial on joint j: mass -1 kg; allowed: 0 or more",
         "robot arm: inertial on the base: mass 0 with an inertia; allowed: a mass, or no inertia",
         "robot arm: an inertial hangs on k, no joint of the chain; allowed: j, frame",
-        "robot arm: drives.j.k: found 0, allowed: a finite number above 0",
-        "robot arm: drives.j.l: found -1, allowed: 0 or more",
-        "robot arm: drives.j.C: found 0, allowed: a finite number above 0",
+        "robot arm: drives.j.k: found 0, allowed: a finite number, 1e-09 or more",
+        "robot arm: drives.j.l: found -1, allowed: a finite number, 0 or more",
+        "robot arm: drives.j.C: found 0, allowed: a finite number, 1e-09 or more",
         "robot arm: drives.j.Kw: found nan, allowed: a finite number",
         "robot arm: drives.frame: found, allowed: a moving joint: j",
         "robot arm: drives.j: found 2 times, allowed: once",
+    ]
+
+
+def test_numbers_that_are_not_finite_and_fixed_mimics_are_refused() -> None:
+    nan, inf = float("nan"), float("inf")
+    with pytest.raises(RobotError) as error:
+        Chain(
+            "arm",
+            (Joint("j"), Joint("held", "fixed", mimic=Mimic("j"))),
+            gravity=(0.0, nan, -9.81),
+            inertials=(Inertial("j", inf), Inertial(None, 1.0, (0.0, 0.0, nan), (1.0,) * 6)),
+        )
+    odd, zeros, ones = "found a number that is not finite in", ", ".join(["0.0"] * 9), ", ".join(["1.0"] * 6)
+    assert str(error.value).splitlines() == [
+        "robot arm: joint held: is fixed and mimics j; allowed: one of both",
+        f"robot arm: inertial on joint j: {odd} [inf, {zeros}]; allowed: finite",
+        f"robot arm: inertial on the base: {odd} [1.0, 0.0, 0.0, nan, {ones}]; allowed: finite",
+        "robot arm: gravity [0.0, nan, -9.81]; allowed: finite numbers",
     ]
