@@ -81,13 +81,13 @@ def of_readme() -> list[str]:
     with tempfile.TemporaryDirectory() as folder:
         demo = Path(folder) / "demo"
         urmpipe = [sys.executable, "-m", "urmpipe"]
-        drives = Path(folder) / "six-drives.rrd"
+        drives = Path(folder) / "driven-arm.rrd"
         subprocess.run([*urmpipe, "demo", "-q", "-o", str(demo)], check=True)
-        subprocess.run([*urmpipe, "simulate", "six-drives", "-q", "-o", str(drives)], check=True)
+        subprocess.run([*urmpipe, "simulate", "driven-arm", "-q", "-o", str(drives)], check=True)
         return [
             *of_recording(demo / "demo.rrd", HERE / "recording.png", None),
             *of_page(demo / "report.html", HERE / "report.png", 1280),
-            *of_recording(drives, HERE / "six-drives.png", 1.0),
+            *of_recording(drives, HERE / "driven-arm.png", 0.5),
             *of_branches(Path(folder), HERE / "ik.png"),
         ]
 

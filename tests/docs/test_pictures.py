@@ -15,10 +15,10 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 DRIVERS = sorted(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))
 
 SIZES = {
+    "driven-arm.png": (1920, 1080),
     "ik.png": (1920, 1080),
     "recording.png": (1920, 1080),
     "report.png": (1280, 1000),
-    "six-drives.png": (1920, 1080),
 }
 """Width and height in [px]."""
 

@@ -3,35 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.elementwise import ZERO, Vector
 from urmpipe_models.lagrange.angles import Step, Turn, steps
-from urmpipe_models.lagrange.variables import Polynomial, Variables, total
+from urmpipe_models.lagrange.variables import Polynomial, Variables, scalar_product, total
 from urmpipe_models.transform import Transform
-
-Matrix: TypeAlias = Any
-"""A `DomainMatrix` of SymPy over polynomials."""
 
 Triple: TypeAlias = list[Polynomial]
 """x, y, z."""
+
+Matrix: TypeAlias = list[Triple]
+"""The rows of a rotation."""
 
 
 class Body(NamedTuple):
     """What a joint moves.
 
     Attributes:
-        name: The joint.
-        frame: T, the homogeneous transform from the joint's moving frame to the base, shape (4, 4).
+        step: The joint.
+        rotation: From the joint's moving frame to the base.
+        place: The origin of that frame, in the base [m].
         spin: The angular velocity in the axes of the moving frame, in [rad/s].
-        base_spin: The same in the axes of the base.
     """
 
-    name: str
-    frame: Matrix
+    step: Step
+    rotation: Matrix
+    place: Triple
     spin: Triple
-    base_spin: Triple
 
 
 def bodies(chain: Chain, variables: Variables) -> Iterator[Body]:
@@ -42,107 +42,85 @@ def bodies(chain: Chain, variables: Variables) -> Iterator[Body]:
 
     Source: [Iso9283]_ eq. 8 and 12.
     """
-    zero = variables.constant(0.0)
-    frame = matrix(Transform(), variables)
-    place, spin, base_spin = [zero] * 3, [zero] * 3, [zero] * 3
+    begin, origin = matrix(Transform().rotation, variables), column(ZERO, variables)  # where a turn begins
+    spin = place = column(ZERO, variables)  # in the axes of that frame
     for step in steps(chain):
-        origin = _column(step.joint.origin.translation, variables)
-        place = _sum(place, apply(_rotation(step.before, variables), origin))
+        shift = column(step.joint.origin.translation, variables)
+        place = shifted(place, _rotation(step.before, variables), shift, variables)
         if step.begins:
-            spin, base_spin = _spins(step.at, frame, spin, base_spin, variables)
-            frame, place = frame * _homogeneous(_rotation(step.at, variables), place, variables), [zero] * 3
-        place = _sum(place, _slide(step, variables))
-        local = _homogeneous(_rotation(step.after, variables), place, variables)
-        own, seen = _spins(step.after, frame, spin, base_spin, variables)
-        yield Body(step.joint.name, frame * local, own, seen)
+            spin = _spin(step.at, spin, variables)
+            origin = shifted(origin, begin, place, variables)
+            begin, place = _product(begin, _rotation(step.at, variables), variables), column(ZERO, variables)
+        rotation = _rotation(step.after, variables)
+        if step.joint.kind == "prismatic":
+            value = variables.value(step.value, step.offset)
+            slide = [variables.constant(x) * value for x in step.joint.axis]
+            place = shifted(place, rotation, slide, variables)
+        yield Body(
+            step,
+            _product(begin, rotation, variables),
+            shifted(origin, begin, place, variables),
+            _spin(step.after, spin, variables),
+        )
 
 
-def matrix(frame: Transform, variables: Variables) -> Matrix:
-    """Return a constant transform as a homogeneous matrix, shape (4, 4)."""
-    rotation = [[variables.constant(x) for x in row] for row in frame.rotation]
-    return _homogeneous(_dense(rotation, variables), _column(frame.translation, variables), variables)
+def column(of: Vector, variables: Variables) -> Triple:
+    """Return a constant vector."""
+    return [variables.constant(x) for x in of]
 
 
-def point(frame: Matrix, place: Vector, variables: Variables) -> Triple:
-    """Return where a point in [m] of a frame is, in the base [m]."""
-    return apply(frame, [*_column(place, variables), variables.constant(1.0)])[:3]
+def matrix(of: Sequence[Vector], variables: Variables) -> Matrix:
+    """Return a constant matrix."""
+    return [column(row, variables) for row in of]
 
 
-def apply(of: Matrix, vector: Sequence[Polynomial]) -> list[Polynomial]:
+def apply(of: Matrix, vector: Sequence[Polynomial], variables: Variables) -> Triple:
     """Return a matrix times a column."""
-    return [sum(a * b for a, b in zip(row, vector, strict=True)) for row in of.to_list()]
+    return [scalar_product(row, vector, variables) for row in of]
+
+
+def shifted(place: Triple, rotation: Matrix, shift: Triple, variables: Variables) -> Triple:
+    """Return a place and what follows it in turned axes."""
+    return [total(one, variables) for one in zip(place, apply(rotation, shift, variables), strict=True)]
 
 
 def velocity(place: Triple, variables: Variables) -> Triple:
     """Return dr/dt = sum_j (dr/dq_j) q_j', in [m/s]. Source: [Iso9283]_ eq. 9-11, by differentiation."""
     return [
-        total((variables.derivative(x, j) * rate for j, rate in enumerate(variables.rates)), variables)
+        total(
+            (part * rate for j, rate in enumerate(variables.rates) for part in variables.derivative(x, j)),
+            variables,
+        )
         for x in place
     ]
 
 
-def _spins(
-    turn: Turn, frame: Matrix, spin: Triple, base_spin: Triple, variables: Variables
-) -> tuple[Triple, Triple]:
-    """Return the angular velocity behind a turn, in the axes of what is turned and in those of the base."""
-    own = [variables.constant(x) * variables.rate(turn.angle) for x in turn.axis]
-    zero = variables.constant(0.0)
-    behind = apply(_rotation(turn, variables).transpose(), _sum(spin, own))
-    return behind, _sum(base_spin, apply(frame, [*own, zero])[:3])
+def _product(a: Matrix, b: Matrix, variables: Variables) -> Matrix:
+    """Return the product of two matrices."""
+    return [[scalar_product(row, one, variables) for one in zip(*b, strict=True)] for row in a]
+
+
+def _spin(turn: Turn, before: Triple, variables: Variables) -> Triple:
+    """Return the angular velocity behind a turn, in the axes of what it turns."""
+    rate = variables.rate(turn.angle)
+    added = [
+        total((x, variables.constant(a) * rate), variables) for x, a in zip(before, turn.axis, strict=True)
+    ]
+    return [scalar_product(one, added, variables) for one in zip(*_rotation(turn, variables), strict=True)]
 
 
 def _rotation(turn: Turn, variables: Variables) -> Matrix:
-    """Return Rot(axis, angle) inner, shape (3, 3): c 1 + s [a]x + (1 - c) a a^T of a unit vector a."""
+    """Return Rot(axis, angle) inner: c 1 + s [a]x + (1 - c) a a^T of a unit vector a, times a constant."""
     c, s = variables.cosine_sine(turn.angle)
     x, y, z = turn.axis
     across = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
     rows = [
-        [_entry(c, s, i == k, across[i][k], turn.axis[i] * turn.axis[k], variables) for k in range(3)]
+        [
+            c * variables.constant(float(i == k) - turn.axis[i] * turn.axis[k])
+            + s * variables.constant(across[i][k])
+            + variables.constant(turn.axis[i] * turn.axis[k])
+            for k in range(3)
+        ]
         for i in range(3)
     ]
-    inner = [[variables.constant(value) for value in row] for row in turn.inner.rotation]
-    return _dense(rows, variables) * _dense(inner, variables)
-
-
-def _entry(
-    c: Polynomial, s: Polynomial, diagonal: bool, across: float, square: float, variables: Variables
-) -> Polynomial:
-    """Return c d + s across + (1 - c) square, an entry of a rotation matrix."""
-    return (
-        c * variables.constant(float(diagonal) - square)
-        + s * variables.constant(across)
-        + variables.constant(square)
-    )
-
-
-def _slide(step: Step, variables: Variables) -> Triple:
-    """Return how far a joint slides, in the frame where its turn begins [m]."""
-    if step.joint.kind != "prismatic":
-        return _column(ZERO, variables)
-    value = variables.value(step.value, step.offset)
-    along = apply(_rotation(step.after, variables), _column(step.joint.axis, variables))
-    return [value * x for x in along]
-
-
-def _homogeneous(rotation: Matrix, place: Sequence[Polynomial], variables: Variables) -> Matrix:
-    """Return a rotation and a translation as one matrix, shape (4, 4)."""
-    rows = [[*row, x] for row, x in zip(rotation.to_list(), place, strict=True)]
-    last = [variables.constant(x) for x in (0.0, 0.0, 0.0, 1.0)]
-    return _dense([*rows, last], variables)
-
-
-def _dense(rows: list[list[Polynomial]], variables: Variables) -> Matrix:
-    """Return rows of polynomials as a matrix."""
-    from sympy.polys.matrices import DomainMatrix
-
-    return DomainMatrix(rows, (len(rows), len(rows[0])), variables.ring.to_domain())
-
-
-def _column(of: Vector, variables: Variables) -> Triple:
-    """Return a constant vector."""
-    return [variables.constant(x) for x in of]
-
-
-def _sum(a: Triple, b: Triple) -> Triple:
-    """Return the sum of two vectors."""
-    return [x + y for x, y in zip(a, b, strict=True)]
+    return _product(rows, matrix(turn.inner.rotation, variables), variables)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.chains.inertial import Inertial
+from urmpipe_models.elementwise import Vector
 from urmpipe_models.lagrange.angles import rounded
-from urmpipe_models.lagrange.bodies import Body, Triple, apply, bodies, matrix, point, velocity
-from urmpipe_models.lagrange.variables import Polynomial, Variables, total
+from urmpipe_models.lagrange.bodies import Body, Triple, apply, bodies, column, matrix, shifted, velocity
+from urmpipe_models.lagrange.variables import Polynomial, Variables, scalar_product, total
 from urmpipe_models.transform import Transform
 
 
@@ -38,37 +40,40 @@ def energies(chain: Chain, variables: Variables) -> Energies:
     Source: [Iso9283]_ eq. 8-12.
     """
     world = rounded(Transform(chain.base.columns))  # from the world's axes to the base's
-    found = {one.name: one for one in bodies(chain, variables)}
+    found = {one.step.joint.name: one for one in bodies(chain, variables)}
     carried = [(found[one.joint], one) for one in chain.inertials if one.joint is not None]
-    kinetic = total((_kinetic(body, one, variables) for body, one in carried), variables)
-    gravity = [variables.constant(-x) for x in world.rotate(chain.gravity)]
-    potential = total(
-        (
-            variables.constant(one.mass) * _dot(gravity, point(body.frame, one.centre, variables))
-            for body, one in carried
-        ),
-        variables,
-    )
-    last = found[chain.joints[-1].name]
-    tool = point(last.frame, (chain.tip @ chain.tool).translation, variables)
-    turn = matrix(world, variables)
-    force, moment = (
-        apply(turn, [*part, variables.constant(0.0)])[:3]
-        for part in (variables.wrench[:3], variables.wrench[3:])
-    )
-    return Energies(kinetic, potential, _dot(force, velocity(tool, variables)) + _dot(moment, last.base_spin))
+    gravity = world.rotate(chain.gravity)
+    kinetic = total((_kinetic(*pair, variables) for pair in carried), variables, of_masses=True)
+    potential = total((_potential(*pair, gravity, variables) for pair in carried), variables, of_masses=True)
+    tool = _point(found[chain.joints[-1].name], (chain.tip @ chain.tool).translation, variables)
+    turn = matrix(world.rotation, variables)
+    force, moment = (apply(turn, part, variables) for part in (variables.wrench[:3], variables.wrench[3:]))
+    moved = [*velocity(tool, variables), *_turning([*found.values()], variables)]
+    return Energies(kinetic, potential, scalar_product([*force, *moment], moved, variables))
 
 
 def _kinetic(body: Body, one: Inertial, variables: Variables) -> Polynomial:
     """Return 1/2 m v^2 + 1/2 omega^T I omega of a mass, in [J]."""
-    speed = velocity(point(body.frame, one.centre, variables), variables)
-    ixx, iyy, izz, ixy, ixz, iyz = one.inertia
-    rows = ((ixx, ixy, ixz), (ixy, iyy, iyz), (ixz, iyz, izz))
-    turned = [_dot([variables.constant(x) for x in row], body.spin) for row in rows]
-    half = variables.constant(0.5)
-    return half * variables.constant(one.mass) * _dot(speed, speed) + half * _dot(body.spin, turned)
+    speed = velocity(_point(body, one.centre, variables), variables)
+    turned = apply(matrix(one.matrix, variables), body.spin, variables)
+    momenta = [*(variables.constant(one.mass) * x for x in speed), *turned]
+    return variables.constant(0.5) * scalar_product(momenta, [*speed, *body.spin], variables)
 
 
-def _dot(a: Triple, b: Triple) -> Polynomial:
-    """Return the scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+def _potential(body: Body, one: Inertial, gravity: Vector, variables: Variables) -> Polynomial:
+    """Return -m g^T r of a mass, in [J]."""
+    weight = [variables.constant(-one.mass * x) for x in gravity]
+    return scalar_product(weight, _point(body, one.centre, variables), variables)
+
+
+def _point(body: Body, place: Vector, variables: Variables) -> Triple:
+    """Return where a point in [m] of a body is, in the base [m]."""
+    return shifted(body.place, body.rotation, column(place, variables), variables)
+
+
+def _turning(found: Sequence[Body], variables: Variables) -> Triple:
+    """Return the angular velocity of the last body, along the base: each joint's rate on its axis."""
+    turning = [(rotation, step) for step, rotation, *_ in found if step.joint.kind == "revolute"]
+    axes = [apply(rotation, column(step.joint.axis, variables), variables) for rotation, step in turning]
+    rates = [variables.rate(step.value) for _, step in turning]
+    return [scalar_product([axis[k] for axis in axes], rates, variables) for k in range(3)]

@@ -82,10 +82,8 @@ def open_form(chain: Chain, terms: Sequence[TermName] = TERMS) -> OpenForm:
         allowed = f"up to {MOST} in the open form"
         raise RobotError(Finding(about=f"robot {chain.name}", found=f"{count} coordinates", allowed=allowed))
     variables = variables_of(chain)
-    found = energies(chain, variables)
-    short = found._replace(kinetic=simplified(found.kinetic, variables))
-    expanded, reduced = equations(found, variables), equations(short, variables)
-    formulas = {term: [_numbers(simplified(one[term], variables)) for one in reduced] for term in terms}
+    expanded = equations(energies(chain, variables), variables)
+    formulas = {term: [_numbers(simplified(one[term], variables)) for one in expanded] for term in terms}
     programs = {term: program(formulas[term], c_symbols(variables)) for term in terms}
     after = {term: programs[term].operations() for term in terms}
     costs = tuple(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from urmpipe_models.lagrange.equations import cleaned, largest, motion
 from urmpipe_models.lagrange.variables import Polynomial, Variables, difference, oriented, total
 
 
@@ -18,7 +17,7 @@ class Identity(NamedTuple):
 
 
 def simplified(of: Polynomial, variables: Variables) -> Polynomial:
-    """Return a polynomial with shorter factors of each product of rates, accelerations and wrench.
+    """Return a polynomial with a shorter factor of each product of rates, accelerations and wrench.
 
     Of each angle s^2 = 1 - c^2 and c^2 = 1 - s^2, of angles a and b about the same axis
     cos b cos a + sin b sin a = cos(b - a) and sin b cos a - cos b sin a = sin(b - a): each is put in where it
@@ -29,33 +28,28 @@ def simplified(of: Polynomial, variables: Variables) -> Polynomial:
         variables: Its variables.
     """
     known = [*_differences(variables), *_squares(variables)]
-    parts = variables.by_motion(of).items()
-    return total((_shortest(part, known) * motion(key, variables) for key, part in parts), variables)
+    return total((_shortest(part, known, variables) for part in variables.by_motion(of).values()), variables)
 
 
-def _shortest(of: Polynomial, known: Sequence[Identity]) -> Polynomial:
+def _shortest(of: Polynomial, known: Sequence[Identity], variables: Variables) -> Polynomial:
     """Return the shortest polynomial that was found."""
-    scale, before = largest(of), len(of) + 1
+    before = len(of) + 1
     while len(of) < before:
         before = len(of)
         for identity in known:
-            of = min(of, cleaned(_replaced(of, identity), scale), key=len)
+            of = min(of, total(_replaced(of, identity), variables), key=len)
     return of
 
 
-def _replaced(of: Polynomial, identity: Identity) -> Polynomial:
-    """Return a polynomial with what is equal in place of a product."""
+def _replaced(of: Polynomial, identity: Identity) -> Iterator[Polynomial]:
+    """Yield the parts of a polynomial with what is equal in place of a product."""
     i, j, equal = identity
-    found = of.copy()
     for key, coefficient in of.items():
         times = key[i] // 2 if i == j else min(key[i], key[j])
-        if times:
-            rest = [*key]
-            rest[i] -= times
-            rest[j] -= times
-            del found[key]
-            found += of.ring.from_dict({tuple(rest): coefficient}) * equal**times
-    return found
+        rest = [*key]
+        rest[i] -= times
+        rest[j] -= times
+        yield (equal**times).mul_term((tuple(rest), coefficient))
 
 
 def _squares(variables: Variables) -> Iterator[Identity]:

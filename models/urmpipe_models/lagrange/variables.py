@@ -19,6 +19,9 @@ Monomial: TypeAlias = tuple[int, ...]
 Terms: TypeAlias = Mapping[Monomial, float]
 """A polynomial as the coefficient of each monomial."""
 
+NOTHING = 1e-14
+"""A sum below this share of the largest that it adds up is what rounding left."""
+
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 """Force [N] and moment [N.m] on the tool centre point."""
 
@@ -89,24 +92,23 @@ class Variables:
             (self.constant(f) * rate for f, rate in zip(factors, self.rates, strict=True) if f), self
         )
 
-    def derivative(self, of: Polynomial, coordinate: int) -> Polynomial:
-        """Return the partial derivative by a coordinate: of cos(m q + ...) it is -m sin, of sin m cos."""
-        found = self.constant(0.0)
+    def derivative(self, of: Polynomial, coordinate: int) -> Iterator[Polynomial]:
+        """Yield the parts of a partial derivative: of cos(m q + ...) it is -m sin, of sin m cos."""
         for k, angle in enumerate(self.angles):
             if angle[coordinate]:
                 c, s = self.ring.gens[2 * k : 2 * k + 2]
-                found += self.constant(angle[coordinate]) * (of.diff(s) * c - of.diff(c) * s)
+                factor = self.constant(angle[coordinate])
+                yield factor * of.diff(s) * c
+                yield -factor * of.diff(c) * s
         if coordinate in self.slides:
-            found += of.diff(self.ring.gens[2 * len(self.angles) + self.slides.index(coordinate)])
-        return found
+            yield of.diff(self.ring.gens[2 * len(self.angles) + self.slides.index(coordinate)])
 
     def by_motion(self, of: Polynomial) -> dict[Monomial, Polynomial]:
-        """Return the factor of each product of rates, accelerations and wrench, by its exponents."""
-        still = (0,) * (len(self.ring.gens) - self.shape)
+        """Return what has the same product of rates, accelerations and wrench, by the exponents of these."""
         found: dict[Monomial, dict[Monomial, Any]] = {}
         for key, coefficient in of.items():
-            found.setdefault(key[self.shape :], {})[key[: self.shape] + still] = coefficient
-        return {motion: self.ring.from_dict(factor) for motion, factor in found.items()}
+            found.setdefault(key[self.shape :], {})[key] = coefficient
+        return {motion: self.ring.from_dict(part) for motion, part in found.items()}
 
 
 def oriented(angle: Angle) -> tuple[float, Angle]:
@@ -115,13 +117,30 @@ def oriented(angle: Angle) -> tuple[float, Angle]:
     return sign, tuple(sign * factor + 0.0 for factor in angle)  # + 0.0: no -0.0
 
 
-def total(of: Iterable[Polynomial], variables: Variables) -> Polynomial:
-    """Return the sum of polynomials."""
+def total(of: Iterable[Polynomial], variables: Variables, of_masses: bool = False) -> Polynomial:
+    """Return the sum of polynomials, without the coefficients that rounding leaves of sums that cancel.
+
+    Args:
+        of: Polynomials.
+        variables: Their variables.
+        of_masses: Whether each is of another mass, however small beside the others: a coefficient is compared
+            with what is added up to it, else with all that has the same rates, accelerations and wrench.
+    """
     found: dict[Monomial, Any] = {}
+    added: dict[Monomial, Any] = {}  # the largest
+    begin = 0 if of_masses else variables.shape
     for one in of:  # in place: SymPy copies a sum for each part that it adds
         for key, coefficient in one.items():
             found[key] = found[key] + coefficient if key in found else coefficient
-    return variables.ring.from_dict(found)
+            added[key[begin:]] = max(added.get(key[begin:], 0.0), abs(coefficient))
+    kept = {key: one for key, one in found.items() if abs(one) > NOTHING * added[key[begin:]]}
+    return variables.ring.from_dict(kept)
+
+
+def scalar_product(a: Iterable[Polynomial], b: Iterable[Polynomial], variables: Variables) -> Polynomial:
+    """Return the sum of the products of the elements of two vectors."""
+    pairs = zip(a, b, strict=True)
+    return total((y.mul_term(part) for x, y in pairs for part in x.terms()), variables)
 
 
 def variables_of(chain: Chain) -> Variables:

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from made_masses import body
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
-from urmpipe_models.chains.inertial import Inertial
 from urmpipe_models.lagrange.c_code import ARGUMENTS, c_name
 from urmpipe_models.transform import Transform, from_xyz_rpy
 
@@ -24,7 +24,7 @@ Motion = tuple[FloatArray, FloatArray, FloatArray]
 
 def random_arm(rng: np.random.Generator, coordinates: int) -> Chain:
     """Return an arm of any geometry: joints that turn or slide, fixed ones, mimics, parallel axes."""
-    joints, inertials = list[Joint](), [_inertial(rng, None)]
+    joints, inertials = list[Joint](), [body(None, rng)]
     for k in range(coordinates):
         kind: JointKind = "prismatic" if rng.random() < 0.3 else "revolute"
         joints.append(Joint(f"q{k + 1}", kind, *_frame(rng)))
@@ -36,7 +36,7 @@ def random_arm(rng: np.random.Generator, coordinates: int) -> Chain:
                     f"m{k + 1}", "revolute" if rng.random() < 0.7 else "prismatic", *_frame(rng), mimic=mimic
                 )
             )
-    inertials += [_inertial(rng, one.name) for one in joints]
+    inertials += [body(one.name, rng) for one in joints]
     frames = [_frame(rng)[0] for _ in range(3)]
     gravity = tuple(rng.normal(0.0, 9.0, 3).tolist())
     return Chain(
@@ -61,18 +61,6 @@ def _frame(rng: np.random.Generator) -> tuple[Transform, tuple[float, float, flo
     )
     x, y, z = (axis / np.linalg.norm(axis)).tolist()
     return from_xyz_rpy(rng.uniform(-0.5, 0.5, 3).tolist(), turn, "random"), (x, y, z)
-
-
-def _inertial(rng: np.random.Generator, joint: str | None) -> Inertial:
-    """Return a body of a few points, so that a body may have its inertia."""
-    points = rng.normal(0.0, 0.2, (5, 3))
-    points -= points.mean(axis=0)
-    matrix = sum(0.3 * (p @ p * np.eye(3) - np.outer(p, p)) for p in points)
-    ixx, iyy, izz, ixy, ixz, iyz = (
-        float(matrix[i, k]) for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    )
-    centre = tuple(rng.normal(0.0, 0.3, 3).tolist())
-    return Inertial(joint, 1.5, centre, (ixx, iyy, izz, ixy, ixz, iyz))
 
 
 def compiled(code: str, folder: Path) -> ctypes.CDLL:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -24,10 +25,36 @@ from urmpipe_models.lagrange.open_form import open_form
 from urmpipe_models.lagrange.text import equations_text
 from urmpipe_models.transform import from_offset
 
-QUICK = {1: (0, 12), 2: (5, 13), 3: (6, 10), 4: (3,)}
-"""Seeds of arms by their number of coordinates: with prismatic joints, mimics and parallel axes."""
+QUICK = {1: (2, 11, 14), 2: (2, 8), 3: (2, 10, 19), 4: (3,)}
+"""Seeds of arms by their number of coordinates."""
 
 CASES = [(count, seed) for count, seeds in QUICK.items() for seed in seeds]
+
+
+def seeded_arm(count: int, seed: int) -> Chain:
+    return random_arm(np.random.default_rng(seed), count)
+
+
+def parallel_neighbours(chain: Chain) -> int:
+    """How many pairs of turning joints that follow each other have parallel axes, wherever they stand."""
+    q = random_motion(np.random.default_rng(7), chain)[0].tolist()
+    placed = zip(chain.joints, list(frames(chain, q))[1:], strict=True)
+    axes = [np.array(frame.rotate(one.axis), float) for one, frame in placed if one.kind == "revolute"]
+    return sum(np.linalg.norm(np.cross(*pair)) < 1e-9 for pair in pairwise(axes))
+
+
+def test_the_arms_turn_slide_follow_and_have_parallel_axes_and_others() -> None:
+    arms = {count: [seeded_arm(count, seed) for seed in seeds] for count, seeds in QUICK.items()}
+    assert list(arms) == [1, 2, 3, 4]
+    for count, some in arms.items():
+        assert {len(chain.coordinates) for chain in some} == {count}
+        joints = [joint for chain in some for joint in chain.joints]
+        for follows in (False, True):
+            kinds = {one.kind for one in joints if (one.mimic is not None) == follows} - {"fixed"}
+            assert kinds == {"revolute", "prismatic"}
+    parallel = [parallel_neighbours(chain) for some in arms.values() for chain in some]
+    assert parallel.count(0) >= 3
+    assert len(parallel) - parallel.count(0) >= 3
 
 
 @pytest.mark.parametrize(("count", "seed"), CASES)
@@ -56,7 +83,7 @@ def test_each_term_is_that_of_the_numeric_dynamics_in_text_and_in_c(
         np.testing.assert_allclose(np.transpose(unit), mass_matrix(chain, q), rtol=0.0, atol=1e-10 * largest)
 
 
-@pytest.mark.parametrize(("count", "seed"), [(1, 8), (2, 5), (3, 6), (4, 3)])
+@pytest.mark.parametrize(("count", "seed"), [(1, 2), (1, 11), (2, 8), (3, 19), (4, 3)])
 def test_the_work_of_the_drives_is_the_change_of_energy(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     chain = random_arm(rng, count)
@@ -90,7 +117,7 @@ def test_the_work_of_the_drives_is_the_change_of_energy(count: int, seed: int) -
 
 @pytest.mark.parametrize(("count", "seed"), CASES)
 def test_the_reduction_adds_no_operation(count: int, seed: int) -> None:
-    for one in open_form(random_arm(np.random.default_rng(seed), count)).costs:
+    for one in open_form(seeded_arm(count, seed)).costs:
         assert one.reduced.additions <= one.operations.additions
         assert one.reduced.multiplications <= one.operations.multiplications
 
@@ -139,5 +166,5 @@ def test_names_that_are_none_in_a_formula_or_in_c(tmp_path: Path) -> None:
     assert "# q1: a*/b\n# q2: c1\n# c1 = cos(q1), s1 = sin(q1)\n" in text
     found = c_terms(compiled(c_code(form), tmp_path), chain, motion, [0.0] * 6)
     wanted = sum(text_terms(text)(motion, [0.0] * 6).values())
-    np.testing.assert_allclose(found["torque"], wanted, atol=1e-13)  # rounding of some 10 N.m
+    np.testing.assert_allclose(found["torque"], wanted, rtol=0.0, atol=1e-13)  # rounding of some 10 N.m
     assert "q[0], qd[0], qdd[0]: a* /b in rad, rad/s, rad/s2; tau in N.m" in c_code(form)

@@ -81,7 +81,19 @@ def test_two_uniform_links_are_those_of_the_textbook() -> None:
     assert {key: sympy.expand(found[key] - one) for key, one in wanted.items()} == dict.fromkeys(wanted, 0)
 
 
-def test_a_parallelogram_leaves_no_sum_of_angles() -> None:
+def test_a_speck_on_a_heavy_arm_keeps_its_terms() -> None:
+    """1e-12 kg at 1e-6 m from the second joint, 1e4 kg on the first link."""
+    joints = Joint("theta1"), Joint("theta2", origin=from_offset([1.0, 0.0, 0.0]))
+    inertials = Inertial("theta1", 1e4, (1.0, 0.0, 0.0)), Inertial("theta2", 1e-12, (1e-6, 0.0, 0.0))
+    text = equations_text(open_form(Chain("speck", joints, inertials=inertials, gravity=(0.0, -G, 0.0))))
+    first, second = text.split("\n\n")[1:]
+    assert "  inertia = 10000.0*theta1'' + (1e-18*c2 + 1e-24)*theta2''\n" in first
+    assert "  centrifugal = -1e-18*s2*theta2'^2\n  coriolis = -2e-18*s2*theta1'*theta2'\n" in first
+    assert "  inertia = (1e-18*c2 + 1e-24)*theta1'' + 1e-24*theta2''\n" in second
+    assert "  centrifugal = 1e-18*s2*theta1'^2\n  coriolis = 0\n  gravity = 1e-17*c12\n" in second
+
+
+def test_of_the_angles_of_a_parallelogram_the_difference_is_left() -> None:
     """The forearm keeps its direction while the upper arm turns, as in [Iso9283]_ section 5."""
     joints = (
         Joint("theta1"),
