@@ -1,10 +1,13 @@
-"""What all tests share: a cache of FMUs of the session's own, beside the user's."""
+"""What all tests share: a cache of FMUs of the session's own, and the files beside the repository."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
+
+SHARED = Path(__file__).resolve().parents[1].parent / "shared"
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -13,6 +16,14 @@ def fmu_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("URMPIPE_CACHE", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of robots and logs of others, which lies beside the repository where there is one."""
+    if not SHARED.is_dir():
+        pytest.skip("the folder shared with robots and logs of others is not beside this repository")
+    return SHARED
 
 
 def pytest_configure(config: pytest.Config) -> None:

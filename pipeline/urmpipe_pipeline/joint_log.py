@@ -30,6 +30,10 @@ SOLVED = "ik"
 """The source of a log that inverse kinematics made: a reader's name stands in others."""
 
 
+ASSUMED_PERIOD = "assumed-period"
+"""The kind of the warning of a log whose rows have neither times nor a given period."""
+
+
 def seconds(nanoseconds: IntArray) -> FloatArray:
     """Return integer `nanoseconds` as [s], each rounded once, of the same shape."""
     return np.true_divide(nanoseconds, 1e9, dtype=np.float64)
@@ -261,6 +265,11 @@ class JointLog(Shown):
         if self.tcp_rotation is None or self.rotation_form is None:
             return None
         return continuous_rotations(self.tcp_rotation, self.rotation_form)
+
+    @property
+    def period_assumed(self) -> bool:
+        """Whether the time between its rows is assumed: then its rates are, too."""
+        return any(one.kind == ASSUMED_PERIOD for one in self.warnings)
 
     @property
     def rows(self) -> int:

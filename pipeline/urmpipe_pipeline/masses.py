@@ -1,11 +1,13 @@
-"""What a person should know of the masses of an arm."""
+"""What a person should know of the masses of an arm, and of their loss in a URDF."""
 
 from __future__ import annotations
 
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.inertial import GRAVITY
 from urmpipe_pipeline.joint_log import LogWarning
 
 MASS_LEFT_OUT = "mass-left-out"
+NOT_IN_URDF = "not-in-urdf"
 
 
 def mass_notices(robot: Chain) -> list[LogWarning]:
@@ -13,7 +15,20 @@ def mass_notices(robot: Chain) -> list[LogWarning]:
     if not robot.left_out:
         return []
     names = ", ".join(robot.left_out)
-    said = f"the masses of {names} are left out: these links move by joints of their own"
+    words = f"the masses of {names} are left out: these links move by joints of their own"
     if len(robot.left_out) == 1:
-        said = f"the mass of {names} is left out: this link moves by a joint of its own"
-    return [LogWarning(MASS_LEFT_OUT, said)]
+        words = f"the mass of {names} is left out: this link moves by a joint of its own"
+    return [LogWarning(MASS_LEFT_OUT, words)]
+
+
+def lost_in_urdf(robot: Chain) -> list[LogWarning]:
+    """Return a warning of what a URDF of the arm does not hold."""
+    lost = []
+    if tuple(robot.gravity) != GRAVITY:
+        lost.append(f"gravity {[*map(float, robot.gravity)]} m/s2")
+    if robot.drives:
+        lost.append("the drives")
+    if robot.left_out:
+        lost.append("which masses are left out")
+    words = f"a URDF does not hold {' and '.join(lost)}: a TOML robot file does"
+    return [LogWarning(NOT_IN_URDF, words)] if lost else []

@@ -114,6 +114,27 @@ def test_a_hint_that_is_followed_helps(
     assert [one["message"] for one in printed] == [one.sentence("command line") for one in told]
 
 
+def test_smoothing_brings_a_noisy_log_within_its_efforts(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    log, t = tmp_path / "noisy.csv", 0.005 * np.arange(300)
+    q = [0.1, -1.2, 1.0, -0.5, 0.3, 0.2] + 0.3 * np.sin(2.0 * t[:, None] + np.arange(6))
+    q += np.random.default_rng(1).normal(0.0, 3e-4, q.shape)
+    names = ["t [s]", *(f"q{k} [rad]" for k in range(1, 7))]
+    np.savetxt(log, np.column_stack((t, q)), "%.9f", ",", header=",".join(names), comments="")
+
+    def told(*words: str) -> list[Any]:
+        run(["ingest", str(log), "--robot", "ur10", *words, "--explain", "--json", "-q"])
+        found = json.loads(capfd.readouterr().out)["warnings"]
+        return [one for one in found if one["kind"] == "effort-limit"]
+
+    (warning,) = told()
+    (hint,) = warning["hints"]
+    words = Hint(**hint).spelled("command line")
+    assert warning["message"].endswith(f"; {words} smooths the accelerations")
+    assert told(*shlex.split(words)) == []
+
+
 def recorded_beside(path: Path, q: FloatArray, held: Chain) -> Path:
     """Write a log of joint values in [rad], with the poses in which an arm is truly held."""
     position, rotation = poses_over_log(held, TRUTH)

@@ -122,7 +122,7 @@ def test_a_unit_of_ones_own_shows_its_energies_and_its_limit(urmpipe: RunCommand
     assert energy["in"] - energy["lost"] == pytest.approx(energy["stored"] + energy["residual"], rel=1e-12)
     urmpipe("report", "swinging.rrd")
     page = (tmp_path / "swinging.html").read_text(encoding="utf-8")
-    assert "Sums over swing since the first sample." in page
+    assert "Sums over swing since the first sample: " in page
     assert "Dashed: the limit of |F|, 6 N; tinted: beyond it." in page
 
 

@@ -1,10 +1,9 @@
-"""Random chains, and the files beside the repository that some tests read."""
+"""Random chains."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +17,6 @@ from urmpipe_models.drives.controller import Gains
 from urmpipe_models.drives.drive import Drive
 from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint, JointDrive
 from urmpipe_models.transform import Transform, from_offset
-
-SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 
 lengths = st.floats(-1.0, 1.0, allow_subnormal=False)
 angles = st.floats(-math.pi, math.pi, allow_subnormal=False) | st.sampled_from(
@@ -135,11 +132,3 @@ def heavy_chains() -> SearchStrategy[Chain]:
 @pytest.fixture(scope="session")
 def dh_rows() -> SearchStrategy[list[DHRow]]:
     return random_dh_rows
-
-
-@pytest.fixture(scope="session")
-def shared() -> Path:
-    """The folder of robots and logs of others, which lies beside the repository where there is one."""
-    if not SHARED.is_dir():
-        pytest.skip("the folder shared with robots and logs of others is not beside this repository")
-    return SHARED

@@ -76,8 +76,8 @@ def test_eq_8_to_11_give_places_and_velocities_of_the_mass_centres() -> None:
         D = (D + T @ derivative) @ A  # eq. 10
         T = T @ A  # eq. 8
         r = np.append(CENTRES[k], 1.0)
-        np.testing.assert_allclose((T @ r)[:3], motion.centre, atol=ROUNDED)
-        np.testing.assert_allclose((D @ r)[:3], motion.velocity, atol=10 * ROUNDED)  # eq. 9
+        np.testing.assert_allclose((T @ r)[:3], motion.centre, rtol=0.0, atol=ROUNDED)
+        np.testing.assert_allclose((D @ r)[:3], motion.velocity, rtol=0.0, atol=10 * ROUNDED)  # eq. 9
 
 
 def test_eq_12_gives_the_angular_velocity_in_the_axes_of_the_element() -> None:
@@ -86,7 +86,9 @@ def test_eq_12_gives_the_angular_velocity_in_the_axes_of_the_element() -> None:
         B = element_matrix(row, Q[k])[:3, :3]
         omega = (omega + np.array([0.0, 0.0, QD[k]])) @ B  # eq. 12: a row vector
         rest = element_matrix(row, 0.0)[:3, :3]
-        np.testing.assert_allclose(omega, rest.T @ np.array(motion.omega, dtype=float), atol=ROUNDED)
+        np.testing.assert_allclose(
+            omega, rest.T @ np.array(motion.omega, dtype=float), rtol=0.0, atol=ROUNDED
+        )
 
 
 def test_eq_13_is_lagrange_of_these_energies_term_by_term() -> None:
@@ -99,20 +101,22 @@ def test_eq_13_is_lagrange_of_these_energies_term_by_term() -> None:
     # Christoffel symbols: of the pair j, k in row i
     c = 0.5 * (slopes.transpose(1, 2, 0) + slopes.transpose(1, 0, 2) - slopes)
     near = 1e-8  # central differences: step^2 and rounding over step
-    np.testing.assert_allclose(terms.inertia, M_at(chain, Q) @ QDD, atol=1e-12)
-    np.testing.assert_allclose(terms.centrifugal, np.einsum("ijj,j->i", c, QD**2), atol=near)
+    np.testing.assert_allclose(terms.inertia, M_at(chain, Q) @ QDD, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(terms.centrifugal, np.einsum("ijj,j->i", c, QD**2), rtol=0.0, atol=near)
     pairs = sum(2.0 * c[:, j, k] * QD[j] * QD[k] for j in range(4) for k in range(j + 1, 4))
-    np.testing.assert_allclose(terms.coriolis, pairs, atol=near)
+    np.testing.assert_allclose(terms.coriolis, pairs, rtol=0.0, atol=near)
     heights = [
         (potential_energy(chain, Q + e) - potential_energy(chain, Q - e)) / (2 * step)
         for e in step * np.eye(4)
     ]
-    np.testing.assert_allclose(np.array(terms.gravity, dtype=float), heights, atol=near)
+    np.testing.assert_allclose(np.array(terms.gravity, dtype=float), heights, rtol=0.0, atol=near)
     J = np.array(jacobian(chain, list(Q)), dtype=np.float64).T
     outside = np.array([*wrench.force, *wrench.moment])
-    np.testing.assert_allclose(terms.tool, -J.T @ outside, atol=1e-12)  # F of eq. 13 is what the arm exerts
+    np.testing.assert_allclose(
+        terms.tool, -J.T @ outside, rtol=0.0, atol=1e-12
+    )  # F of eq. 13 is what the arm exerts
     total = inverse_dynamics(chain, list(Q), list(QD), list(QDD), wrench)
-    np.testing.assert_allclose(np.sum(terms, axis=0), np.array(total, dtype=float), atol=1e-12)
+    np.testing.assert_allclose(np.sum(terms, axis=0), np.array(total, dtype=float), rtol=0.0, atol=1e-12)
     twice = QD @ M_at(chain, Q) @ QD
     np.testing.assert_allclose(2.0 * kinetic_energy(chain, list(Q), list(QD)), twice, rtol=1e-13)
     assert not np.any(torque_terms(chain, list(Q), still, still).coriolis)

@@ -62,9 +62,9 @@ def test_views_have_one_scale_and_stand_as_in_a_technical_drawing() -> None:
     scale = np.ptp(side[:, 0]) / np.ptp(ARM[:, 0])
     for line, axes in ((side, [0, 2]), (front, [1, 2]), (above, [0, 1])):
         wanted = scale * (ARM - ARM[0])[:, axes] * [1.0, -1.0]
-        np.testing.assert_allclose(line - line[0], wanted, atol=ROUNDED)
-    np.testing.assert_allclose(above[:, 0], side[:, 0], atol=ROUNDED)  # above each other
-    np.testing.assert_allclose(front[:, 1], side[:, 1], atol=ROUNDED)  # beside each other
+        np.testing.assert_allclose(line - line[0], wanted, rtol=0.0, atol=ROUNDED)
+    np.testing.assert_allclose(above[:, 0], side[:, 0], rtol=0.0, atol=ROUNDED)  # above each other
+    np.testing.assert_allclose(front[:, 1], side[:, 1], rtol=0.0, atol=ROUNDED)  # beside each other
     assert front[:, 0].min() > side[:, 0].max()
     assert above[:, 1].min() > side[:, 1].max()
 
@@ -105,7 +105,7 @@ def test_numbers_at_an_axis_are_round_and_where_they_belong(size: float) -> None
     np.testing.assert_allclose(step, step[0], rtol=1e-5)  # six digits
     assert f"{step[0]:e}"[0] in "125"
     scale = np.ptp(side[:, 0]) / np.ptp(size * ARM[:, 0])
-    np.testing.assert_allclose(places, side[0, 0] + scale * told, atol=2 * ROUNDED)
+    np.testing.assert_allclose(places, side[0, 0] + scale * told, rtol=0.0, atol=2 * ROUNDED)
     assert np.diff(places).min() >= 50.0 - ROUNDED
 
 
@@ -152,6 +152,6 @@ def test_the_masses_of_a_chain_stand_where_its_joints_take_them() -> None:
     heavy, none = Inertial("q1", 2.0, (0.5, 0.0, 0.1)), Inertial("q1", 0.0)
     chain = Chain("arm", (joint,), inertials=(heavy, none))
     (mass,) = chain_masses(chain, np.array([np.pi / 2]))
-    np.testing.assert_allclose(mass.position, (0.0, 0.5, 0.1), atol=1e-15)
+    np.testing.assert_allclose(mass.position, (0.0, 0.5, 0.1), rtol=0.0, atol=1e-15)
     assert mass.mass == 2.0
     assert chain_masses(Chain("bare", (joint,)), np.zeros(1)) == []

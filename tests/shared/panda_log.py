@@ -5,22 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.robots.urdf_reader import read_urdf
 
-PANDA = (
-    Path(__file__).resolve().parents[3] / "shared" / "robots" / "Gepetto_example-robot-data" / "panda.urdf"
-)
+URDF = Path("robots", "Gepetto_example-robot-data", "panda.urdf")
+"""The file in the folder `shared`."""
 
 
-def panda() -> Chain:
+def panda(shared: Path) -> Chain:
     """The arm of the URDF, without its fingers."""
-    if not PANDA.is_file():
-        pytest.skip("needs Gepetto_example-robot-data/panda.urdf of ../shared/robots beside the checkout")
-    return read_urdf(PANDA, tip_link="panda_hand_tcp")
+    return read_urdf(shared / URDF, tip_link="panda_hand_tcp")
 
 
 def motion(t: FloatArray, pace: float = 1.0) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -10,6 +10,7 @@ from urmpipe.arm_placing import Frame, Robot, place_robot
 from urmpipe.keyword_checks import PathLike, public
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.lagrange.c_code import c_code
 from urmpipe_models.lagrange.equations import TERMS, TermName
 from urmpipe_models.lagrange.open_form import Cost, open_form
@@ -91,7 +92,7 @@ def equations(
     tool: Frame | None = None,
     base_link: str | None = None,
     tip_link: str | None = None,
-    form: FormName = "text",
+    form: FormName | None = None,
     term: TermName | Literal["all"] = "all",
     output: PathLike | None = None,
 ) -> Equations:
@@ -103,7 +104,7 @@ def equations(
         tool: The tool centre point in the frame of the arm's tip, likewise.
         base_link: Link of a URDF where the arm begins; default: its root.
         tip_link: Link of a URDF where the arm ends; default: its end.
-        form: text: a line a term; c: functions in C99.
+        form: text: a line a term; c: functions in C99; default: c for an output that ends in .c, else text.
         term: inertia, centrifugal, coriolis, gravity or tool alone; default: all of them.
         output: A file to write; it replaces only another export of a robot.
 
@@ -113,6 +114,10 @@ def equations(
 
     Source: [Iso9283]_ eq. 8-13, section 4.
     """
+    is_c = output is not None and Path(output).suffix == ".c"
+    form = form or ("c" if is_c else "text")
+    if is_c and form == "text":
+        raise OptionError(Finding(parameter="form", found=f"text for {output}", allowed="c, or another name"))
     chain = cast(Chain, place_robot(robot, base, tool, base_link=base_link, tip_link=tip_link))
     found = open_form(chain, TERMS if term == "all" else (term,))
     text = c_code(found) if form == "c" else equations_text(found)

@@ -125,6 +125,7 @@ def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -
     from urmpipe_models.robots.robot_file import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
     from urmpipe_models.robots.written import write_export
+    from urmpipe_pipeline.masses import lost_in_urdf
 
     target = output or Path(f"{Path(name).stem}.urdf")
     writers = {".urdf": urdf_text, ".toml": robot_toml}
@@ -133,6 +134,7 @@ def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -
         raise OptionError(Finding(parameter="output", found=shown(str(target)), allowed=allowed))
     chain = _placed(name, placing)
     write_export(target, writers[target.suffix.lower()](chain), Path(name))
+    terminal.warn(lost_in_urdf(chain) if target.suffix.lower() == ".urdf" else [])
     made = {"schema": 1, "robot": chain.name, "file": target}
     terminal.answer(lambda: made, lambda: say(f"Robot: {target}"))
     return 0
@@ -142,7 +144,9 @@ def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -
 @click.argument("name", metavar="NAME|FILE", type=ROBOT)
 @output_option("FILE", "Write them into a file [default: print them].")
 @click.option(
-    "--form", type=OneOf(["text", "c"]), default="text", show_default=True, help="Text, or functions in C99."
+    "--form",
+    type=OneOf(["text", "c"]),
+    help="Text, or functions in C99 [default: c for a .c file, else text].",
 )
 @click.option(
     "--term",
@@ -164,7 +168,7 @@ def equations(name: str, terminal: Terminal, **options: Any) -> int:
     Examples:
       urmpipe robot equations my-arm.urdf
       urmpipe robot equations my-arm.urdf --term gravity
-      urmpipe robot equations my-arm.urdf --form c -o my_arm.c
+      urmpipe robot equations my-arm.urdf -o my_arm.c
     """
     import urmpipe
     from urmpipe.printing.terminal import say

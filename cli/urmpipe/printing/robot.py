@@ -24,6 +24,12 @@ from urmpipe_models.transform import Transform, euler_zyx, rpy_of
 if TYPE_CHECKING:
     from rich.table import Table
 
+COLUMNS = {"velocity": "Speed", "acceleration": "Acceleration", "effort": "Effort"}
+"""The limits of a joint that have a column of their own; all but the speed only where one is known."""
+
+PER = {"velocity": "s", "acceleration": "s²"}
+"""What a rate of a joint is counted by."""
+
 
 def robots_dict(robots: Sequence[Chain]) -> dict[str, Any]:
     """Return the object that `urmpipe robot list --json` prints."""
@@ -143,13 +149,6 @@ def _value(one: Parameter) -> str:
     return f"{_figure(one.value)} m" if one.kind == "along" else f"{_figure(math.degrees(one.value))} deg"
 
 
-COLUMNS = {"velocity": "Speed", "acceleration": "Acceleration", "effort": "Effort"}
-"""The limits of a joint that have a column of their own; all but the speed only where one is known."""
-
-PER = {"velocity": "s", "acceleration": "s²"}
-"""What a rate of a joint is counted by."""
-
-
 def _joints(posed: PosedChain) -> Table:
     joints = posed.chain.joints
     shown = [
@@ -170,9 +169,7 @@ def _masses(chain: Chain) -> Table:
         title=f"Masses; {_figure(total)} kg in all",
     )  # fmt: skip
     for one in chain.inertials:
-        ixx, iyy, izz, ixy, ixz, iyz = one.inertia
-        moments = np.linalg.eigvalsh([[ixx, ixy, ixz], [ixy, iyy, iyz], [ixz, iyz, izz]]) + 0.0
-        principal = ", ".join(f"{moment:.4g}" for moment in moments)
+        principal = ", ".join(f"{moment + 0.0:.4g}" for moment in one.principal_moments)
         table.add_row(one.joint or "base", _figure(one.mass), _figures(one.centre), principal, one.source)
     return table
 
@@ -210,6 +207,14 @@ def _motion(joint: Joint, values: dict[str, float], rates: Sequence[str]) -> tup
 
 
 def _largest(joint: Joint, key: str, unit: str, factor: float) -> str:
+    """Return the largest speed, acceleration or effort of a joint in words.
+
+    Args:
+        joint: It moves.
+        key: Which of `COLUMNS`.
+        unit: Unit that its position is shown in, deg or m.
+        factor: From [rad] or [m] to that unit.
+    """
     most = getattr(joint, key)
     if not math.isfinite(most):
         return "no limit"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,8 +15,12 @@ from urmpipe_datasets import LOGS
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_name, unit_options
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.drives.controller import Gains
+from urmpipe_models.drives.drive import Drive
+from urmpipe_models.drives.joint_drives import DRIVE_KEYS, GAIN_KEYS, DrivenJoint
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.messages import Hint
+from urmpipe_models.robots.catalogue import load_robot
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.sources import LogMap
@@ -24,6 +29,7 @@ Backend = Literal["native", "python"]
 
 EXAMPLES: Mapping[str, Mapping[str, Any]] = {
     "kinematic_chain": {"robot": "urm6"},
+    "chain_dynamics": {"robot": "ur3"},
     "repolarizer": {"options": {"joints": 6}},
     "log_source": {"log": LOGS / "matlab.csv"},
 }
@@ -78,7 +84,22 @@ def example_of(unit: str) -> Unit:
     Raises:
         UrmpipeError: If there is no such unit, or with all that is wrong with a file.
     """
+    if unit_name(unit) == "driven_arm":
+        return unit_of(unit, robot=_driven(load_robot("ur3")))
     return unit_of(unit, **EXAMPLES.get(unit_name(unit), {}))
+
+
+def _driven(robot: Chain) -> Chain:
+    """Return an arm with the drive and the controller of their units' start values on each joint."""
+    starts = {
+        one.name: one.starts[0]
+        for name in ("dc_drive", "drive_controller")
+        for one in make_unit(name).parameters
+    }
+    drive = Drive(*(starts[key] for key in DRIVE_KEYS))
+    gains = Gains(*(starts[key] for key in GAIN_KEYS))
+    drives = (DrivenJoint(one, drive, starts["period"], gains, starts["u_max"]) for one in robot.coordinates)
+    return replace(robot, drives=tuple(drives))
 
 
 def _from_file(path: Path) -> Unit:

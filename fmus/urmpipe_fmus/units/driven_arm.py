@@ -29,6 +29,7 @@ from urmpipe_models.dynamics.driven_arm import (
     energies,
     joint_accelerations,
     motor_rates,
+    stable_step,
 )
 from urmpipe_models.elementwise import Element
 from urmpipe_models.robots.robot_file import chain_from_dict
@@ -36,6 +37,10 @@ from urmpipe_models.robots.robot_file import chain_from_dict
 OPTIONS: Mapping[str, str] = {
     "robot": "a robot with masses and drives: a .toml file with [drives.NAME]",
 }
+
+
+LONGEST_STEP = 5e-4
+"""The longest step of the integrator in [s]."""
 
 
 def driven_arm(robot: Chain) -> Unit:
@@ -64,7 +69,7 @@ def driven_arm(robot: Chain) -> Unit:
         outputs=model.outputs,
         derivatives=model.derivatives,
         update=model.update if any(group.driven for group in model.groups) else None,
-        internal_step=5e-4,
+        internal_step=min(LONGEST_STEP, 0.5 * stable_step(robot)),
         equations=(
             "M(q) q'' + h(q, q') + g(q) - J^T F = Mk    (eq. 13, 19; F acts on the tool from outside)",
             "Mk = k (theta1 - q) + l (omega1 - q')    (eq. 14); held: Mk = k_held (rest - q) - l_held q'",

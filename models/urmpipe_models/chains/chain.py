@@ -157,7 +157,8 @@ class Chain(Shown):
             yield from one.faults()
         for name in sorted(set(driven)):
             if name not in self.coordinates:
-                yield f"drives.{name}: found, allowed: a moving joint: {', '.join(self.coordinates)}"
+                allowed = f"a joint with a coordinate: {', '.join(self.coordinates)}"
+                yield f"drives.{name}: found a drive for it, allowed: {allowed}"
             elif driven.count(name) > 1:
                 yield f"drives.{name}: found {driven.count(name)} times, allowed: once"
 

@@ -8,6 +8,7 @@ Source: [Iso9283]_ eq. 14-19.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
@@ -23,11 +24,15 @@ from urmpipe_models.drives.drive import (
 )
 from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint
 from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
-from urmpipe_models.dynamics.forward import check_motion, forward_dynamics
+from urmpipe_models.dynamics.forward import check_motion, forward_dynamics, solved
 from urmpipe_models.dynamics.inverse import inverse_dynamics
+from urmpipe_models.dynamics.mass_matrix import mass_matrix
 from urmpipe_models.dynamics.wrench import Wrench, wrench_power
 from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import Finding, RobotError
+
+STABLE = 2.8
+"""Steps of RK4 are stable up to so many times what a decay or a swing takes for a radian."""
 
 
 class Spring(NamedTuple):
@@ -225,6 +230,30 @@ def at_rest(chain: Chain) -> list[Rest]:
     if weak:
         raise RobotError(*weak)
     return rests
+
+
+def stable_step(chain: Chain) -> float:
+    """Return below which step in [s] RK4 is stable at the start pose: by armatures, and by shafts one by one.
+
+    2.8 L / R, 2.8 J / l and 2.8 sqrt(J / k); J = 1 / (1 / I1 + (M^-1)_ii) is what turns when a shaft twists,
+    of a held joint without I1.
+
+    Args:
+        chain: The arm, with masses and a drive or a spring for each coordinate.
+    """
+    by_joint = {one.joint: one for one in chain.drives}
+    matrix = mass_matrix(chain, list(map(float, chain.start)))
+    steps = []
+    for k, name in enumerate(chain.coordinates):
+        own = by_joint[name]
+        alone = [float(k == i) for i in range(len(matrix))]
+        lightness = float(solved(matrix, alone)[k])
+        if isinstance(own, DrivenJoint):
+            lightness += 1.0 / own.drive.inertia
+            steps.append(own.drive.inductance / own.drive.resistance)
+        stiffness, damping = own.stiffness, own.damping
+        steps.append(1.0 / max(damping * lightness, math.sqrt(stiffness * lightness)))
+    return STABLE * float(min(steps))
 
 
 def _held(one: HeldJoint | DrivenJoint, q: float, torque: float) -> Rest:

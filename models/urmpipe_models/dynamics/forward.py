@@ -95,7 +95,7 @@ def check_motion(chain: Chain) -> None:
         RobotError: If the arm has no masses, or with the name of every joint whose pivot of M is 0.
     """
     faults = [
-        f"robot {chain.name}: joint {name}: moves no mass of its own, so that its motion cannot be solved;"
+        f"robot {chain.name}: joint {name}: no inertia resists its own motion, so that it cannot be solved;"
         " allowed: an inertial that only this joint moves"
         for name in _without_mass(chain)
     ]

@@ -55,12 +55,12 @@ class Links:
 
 
 def check_masses(chain: Chain) -> None:
-    """Raise an error if an arm has no masses.
+    """Raise an error if an arm has no masses, or none above 0.
 
     Raises:
         RobotError: Naming the key that is missing.
     """
-    if not chain.inertials:
+    if all(isinstance(one.mass, float) and one.mass == 0.0 for one in chain.inertials):
         raise RobotError(
             f"robot {chain.name}: key inertials: found none, allowed: the masses of the arm"
             " (in a URDF <inertial>)"

@@ -86,10 +86,13 @@ def _inertial(tree: UrdfTree, carrier: Carrier) -> Iterator[Inertial]:
 
 
 def _mass(tree: UrdfTree, link: str) -> _Mass | None:
-    """Return what a link weighs; nothing if that is nothing, or, with a fault noted, not told right."""
-    node = tree.links[link].first("inertial")
-    if node is None:
+    """Return the mass of a link; None without one, or with a fault noted."""
+    nodes = [*tree.links[link].all("inertial")]
+    for other in nodes[1:]:
+        tree.fault(f"link {link}: found a second <inertial>; allowed: one", other.line)
+    if not nodes:
         return None
+    node = nodes[0]
     place, before = f"link {link}: inertial", len(tree.faults)
     (mass,) = _numbers(tree, node, place, "mass", ("value",))
     ixx, iyy, izz, ixy, ixz, iyz = _numbers(tree, node, place, "inertia", MOMENTS)

@@ -14,7 +14,6 @@ from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.ingest import kinematics
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.runs.torques import beyond_efforts, torques
 
 
 def run_of_plan(
@@ -49,11 +48,10 @@ def run_of_plan(
         columns=tuple(_columns(chain, turned=quat_xyzw is not None)), warnings=warnings,
     )  # fmt: skip
     tcp, noticed = kinematics(chain, q, qd, qdd)
-    tau = torques(chain, q, qd, qdd)
-    noticed += beyond_efforts(log.joints, chain, t_ns, tau, t_ns)
     return Run(
         name=name, log=log, robot=chain, tsp=tsp, t_ns=t_ns, q=q, qd=qd, qdd=qdd, tcp=tcp,
-        tcp_recorded=position, audit=(), warnings=(*warnings, *noticed), provenance=made, tau=tau,
+        tcp_recorded=position, audit=(), warnings=(*warnings, *noticed), provenance=made,
+        tau=None if joints is None else joints.tau,
     )  # fmt: skip
 
 

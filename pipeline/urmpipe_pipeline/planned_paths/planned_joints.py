@@ -12,6 +12,7 @@ import numpy as np
 from urmpipe_models.arrays import BoolArray, FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.singularity import SingularityLog, singularity_over_log
+from urmpipe_pipeline.runs.torques import torques_of_log
 
 FOLLOWED = 1.0 + 1e-9
 """So much of a limit may be used: rounding."""
@@ -88,6 +89,11 @@ class PlannedJoints:
     def singularity(self) -> SingularityLog:
         """How far the arm is from a singular pose at each sample."""
         return singularity_over_log(self.chain, self.q, orientation=self.oriented)
+
+    @cached_property
+    def tau(self) -> FloatArray | None:
+        """Torques of the joints in [N.m] or [N], shape (n, joints); None of an arm without masses."""
+        return torques_of_log(self.chain, self.q, self.qd, self.qdd)
 
     @property
     def nearest_singularity(self) -> int | None:

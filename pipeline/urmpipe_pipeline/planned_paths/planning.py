@@ -29,6 +29,7 @@ from urmpipe_pipeline.planned_paths.planned_joints import FOLLOWED, PlannedJoint
 from urmpipe_pipeline.planned_paths.request import Request, Timing
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.runs.torques import MOVE_SLOWER, beyond_efforts, torque_summaries
 from urmpipe_pipeline.text import NAMED, counted, rows_text
 from urmpipe_pipeline.text import seconds as in_seconds
 
@@ -76,7 +77,7 @@ def plan_path(given: GivenPath, request: Request, progress: Progress = None) -> 
         scaled=1.0 if timing.law == "limits" else timed.scaled, tsp=timing.tsp, duration=law.duration,
         t_ns=samples.t_ns, motion=samples.motion, segment_times=law.time_at(path.bounds),
         row_times=law.time_at(path.at), joints=samples.joints, obstacles=timed.obstacles,
-        warnings=(*given.warnings, *_warnings(path, joints, timed)),
+        warnings=(*given.warnings, *_warnings(path, joints, timed), *_beyond_efforts(timed, samples)),
         provenance=provenance("plan", options, [given.file] if given.file else []),
     )  # fmt: skip
 
@@ -193,6 +194,15 @@ def _warnings(path: LineArcPath, joints: PathJoints | None, timed: _Timed) -> It
         more = f" and {counted(len(t) - NAMED, 'other time')}" if len(t) > NAMED else ""
         words = f"a joint comes to a limit, or leaves it, at t = {places}{more}: there the joints' rates step"
         yield LogWarning("limit-contact", words)
+
+
+def _beyond_efforts(timed: _Timed, samples: _Samples) -> list[LogWarning]:
+    """Return a warning if joints need more than their efforts; nothing where the arm cannot move so."""
+    joints = samples.joints
+    if joints is None or timed.obstacles or not any(math.isfinite(one.effort) for one in joints.chain.moving):
+        return []
+    names, t_ns = joints.chain.coordinates, samples.t_ns
+    return beyond_efforts(torque_summaries(names, joints.chain, t_ns, joints.tau), t_ns, MOVE_SLOWER)
 
 
 def _half_turns(path: LineArcPath) -> Iterator[LogWarning]:

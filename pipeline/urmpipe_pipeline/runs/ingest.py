@@ -15,7 +15,7 @@ from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.kinematics.forward import PointLog, point_over_log
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.choices import check_choice
-from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.joint_log import SOLVED, JointLog, LogWarning
 from urmpipe_pipeline.masses import mass_notices
 from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import Provenance, provenance
@@ -26,7 +26,7 @@ from urmpipe_pipeline.runs.plausibility import beyond_limits, implausible
 from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded
 from urmpipe_pipeline.runs.results import RowJoints, Run
 from urmpipe_pipeline.runs.robot_inference import infer_robot
-from urmpipe_pipeline.runs.torques import beyond_efforts, torques
+from urmpipe_pipeline.runs.torques import CHECK_LOG, MOVE_SLOWER, beyond_efforts, torques_of_log
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.sources.clocks.clock import unused_for_poses, unused_period
 from urmpipe_pipeline.sources.read import read_numbers
@@ -115,26 +115,24 @@ def run_of(
     found = audit_log(log, robot, interval=options.interval, repaired=options.repair)
     log = replace(log, inferences=(*log.inferences, *found.inferences))
     clocked = any(column.role == "time" for column in log.columns)
-    timed = options.period is not None or clocked
     grid = make_grid(log, tsp)
     turns = turning(log, robot)
+    timed = not log.period_assumed
     doubts = implausible(log, found.q, robot, turns, found.broken[:, 1:], timed=timed, tsp=grid.tsp)
     q, left_open = grid.resample_joints(found.q, found.unresolved)
     warnings = [*log.warnings, *far_from_recorded(robot, log), *found.warnings, *doubts]
     warnings += [*grid.warnings, *left_open]
     warnings += [unused_period("period")] if clocked and options.period else []
-    method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
-    qd, qdd = _rates(log, grid, q, method, grid.steps(found.broken), warnings)
+    qd, qdd = _rates(log, grid, q, _method(log, derivative), grid.steps(found.broken), warnings)
     tcp, noticed = kinematics(robot, q, qd, qdd)
-    tau = torques(robot, q, qd, qdd)
-    if timed:
-        noticed += beyond_efforts(log.joints, robot, grid.t_ns, tau, grid.source_ns)
     recorded = None if log.tcp_position is None else grid.resample(log.tcp_position)
-    return Run(
+    run = Run(
         name=name or log.name, log=log, robot=robot, tsp=grid.tsp, t_ns=grid.t_ns, q=q, qd=qd, qdd=qdd,
         tcp=tcp, tcp_recorded=recorded, audit=found.entries, warnings=(*warnings, *noticed), provenance=made,
-        rows=None if grid.own else RowJoints(grid.source_ns, found.q), tau=tau,
+        rows=None if grid.own else RowJoints(grid.source_ns, found.q),
+        tau=torques_of_log(robot, q, qd, qdd),
     )  # fmt: skip
+    return replace(run, warnings=(*run.warnings, *effort_warnings(run)))
 
 
 def _of_poses(log: JointLog, robot: Chain | None, made: Provenance, told: Sequence[LogWarning] = ()) -> Run:
@@ -156,6 +154,11 @@ def _refuse_senseless(tsp: float | None, derivative: str | None) -> None:
         raise OptionError(Finding(parameter="tsp", found=f"{tsp:g} s", allowed=allowed))
     if derivative is not None:
         check_choice("derivative", derivative, get_args(Method))
+
+
+def _method(log: JointLog, derivative: Method | None) -> Method:
+    """Return how a log is differentiated: as requested, else smoothed where its values are coarse."""
+    return derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
 
 
 def _rates(
@@ -182,6 +185,16 @@ def _rates(
         said += "; the differences are used"
         warnings.append(LogWarning(f"recorded-{word}", said, hints=tuple(hints)))
     return result[0], result[1]
+
+
+def effort_warnings(run: Run) -> list[LogWarning]:
+    """Return a warning if the motion of a run takes more than the efforts of its joints."""
+    log, summaries = run.log, run.torque_summaries()
+    if log.source == SOLVED:
+        return beyond_efforts(summaries, run.t_ns, MOVE_SLOWER, run.rows_ns)
+    smoothed = log.qdd is not None or _method(log, run.provenance.options.get("derivative")) == "savgol"
+    hints = () if smoothed else (Hint("derivative", "savgol", "smooths the accelerations"),)
+    return beyond_efforts(summaries, run.t_ns, CHECK_LOG, run.rows_ns, hints)
 
 
 def kinematics(

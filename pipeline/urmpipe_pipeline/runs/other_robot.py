@@ -6,19 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.masses import MASS_LEFT_OUT
 from urmpipe_pipeline.meshes import VISUAL_MISSING
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
-from urmpipe_pipeline.runs.ingest import EULER_SINGULAR, kinematics
+from urmpipe_pipeline.runs.ingest import EULER_SINGULAR, effort_warnings, kinematics
 from urmpipe_pipeline.runs.plausibility import JOINT_LIMIT, SPEED_LIMIT, beyond_limits, implausible
 from urmpipe_pipeline.runs.recorded_start import RECORDED_START
 from urmpipe_pipeline.runs.recorded_tcp import FAR_RECORDED, far_from_recorded
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.runs.torques import EFFORT_LIMIT, beyond_efforts, torques
+from urmpipe_pipeline.runs.torques import EFFORT_LIMIT, torques_of_log
 
 BY_LIMITS = (JOINT_LIMIT, SPEED_LIMIT)
 OF_ROBOT = (
@@ -40,11 +39,12 @@ def on_robot(run: Run, robot: Chain | None) -> Run:
     tcp, noticed = kinematics(robot, run.q, run.qd, run.qdd)
     _refuse_other_kinds(run, robot)
     others = [warning for warning in run.warnings if warning.kind not in OF_ROBOT]
-    tau = torques(robot, run.q, run.qd, run.qdd) if run.timed else None
-    doubts = [*far_from_recorded(robot, run.log), *_beyond_limits(run, robot, tau), *noticed]
+    tau = torques_of_log(robot, run.q, run.qd, run.qdd) if run.timed else None
+    doubts = [*far_from_recorded(robot, run.log), *_beyond_limits(run, robot), *noticed]
     made = replace(run.provenance, options={**run.provenance.options, "robot": robot.name})
     warnings = (*others, *doubts)
-    return replace(run, robot=robot, tcp=tcp, tau=tau, warnings=warnings, provenance=made)
+    moved = replace(run, robot=robot, tcp=tcp, tau=tau, warnings=warnings, provenance=made)
+    return replace(moved, warnings=(*warnings, *effort_warnings(moved)))
 
 
 def _refuse_other_kinds(run: Run, robot: Chain) -> None:
@@ -66,11 +66,8 @@ def _unit(turns: np.bool_) -> str:
     return "rad" if turns else "m"
 
 
-def _beyond_limits(run: Run, robot: Chain, tau: FloatArray | None) -> list[LogWarning]:
-    """Return what the log says against the arm's limits of place, speed and torque.
-
-    Its torques are in [N.m] or [N], shape (g, joints); None where they are not known.
-    """
+def _beyond_limits(run: Run, robot: Chain) -> list[LogWarning]:
+    """Return what the log says against the arm's limits of place and speed."""
     if not run.log.joints:
         return []
     if not run.timed:
@@ -78,10 +75,7 @@ def _beyond_limits(run: Run, robot: Chain, tau: FloatArray | None) -> list[LogWa
     read = run.provenance.options.get("read") or {}
     repaired = bool(read.get("repair"))
     found = audit_log(run.log, robot, interval=read.get("interval"), repaired=repaired)
-    clocked = any(column.role == "time" for column in run.log.columns)
-    timed = clocked or read.get("period") is not None
+    timed = not run.log.period_assumed
     turns = turning(run.log, robot)
     doubts = implausible(run.log, found.q, robot, turns, found.broken[:, 1:], timed=timed, tsp=run.tsp)
-    rows_ns = run.rows.t_ns if run.rows else run.log.t_ns if run.resampled else run.t_ns
-    efforts = beyond_efforts(run.log.joints, robot, run.t_ns, tau, rows_ns) if timed else []
-    return [*(warning for warning in doubts if warning.kind in BY_LIMITS), *efforts]
+    return [warning for warning in doubts if warning.kind in BY_LIMITS]

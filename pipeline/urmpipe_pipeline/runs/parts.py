@@ -22,7 +22,7 @@ from urmpipe_pipeline.presentation.parts import (
 from urmpipe_pipeline.presentation.section import Advice, Cell, Event, Fact, Level, Table, Value
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.runs.torques import joint_torques
+from urmpipe_pipeline.runs.torques import PERIOD_ASSUMED
 
 AUDIT_NOTES: dict[AuditKind, str] = {
     "in-between": "in-between: a linear resampling left this sample on a wrap, Step off the line of its"
@@ -110,7 +110,7 @@ def torque_table(run: Run) -> Iterator[Table]:
     """Yield the largest torque of each joint and its limit; nothing where torques are not known."""
     if run.tau is None:
         return
-    found = cache(lambda: joint_torques(run.log.joints, run.robot, run.t_ns, run.tau))
+    found = cache(run.torque_summaries)
     heads: Heads[int] = {
         "joint": ("Joint", lambda j: run.log.joints[j]),
         "max": ("Largest torque", lambda j: Value(float(f"{found()[j].max:.4g}"), found()[j].unit)),
@@ -121,6 +121,7 @@ def torque_table(run: Run) -> Iterator[Table]:
         "share_out": ("Time beyond", lambda j: Value(found()[j].share_out, "%")),
     }
     note = "The torque that the motion takes, by inverse dynamics, without friction and load at the tool."
+    note += f" {PERIOD_ASSUMED}" if run.log.period_assumed else ""
     yield Table("Joint torques", columns_of(range(len(run.log.joints)), heads), note)
 
 

@@ -20,7 +20,7 @@ from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.runs.grid import RESAMPLED, interpolate
-from urmpipe_pipeline.runs.torques import joint_torques
+from urmpipe_pipeline.runs.torques import TorqueSummary, torque_summaries
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -102,6 +102,13 @@ class Run(Result):
         return self.rows or RowJoints(self.t_ns, self.q)
 
     @property
+    def rows_ns(self) -> IntArray:
+        """Times of the file's rows in integer [ns], of rounded ones those of the clock behind, shape (n,)."""
+        if self.rows is not None:
+            return self.rows.t_ns
+        return self.log.t_ns if self.resampled else self.t_ns
+
+    @property
     def t(self) -> FloatArray:
         """Grid times in [s], shape (g,)."""
         return seconds(self.t_ns)
@@ -155,6 +162,11 @@ class Run(Result):
         """The SI unit of the torque of each joint, N.m, or N of one that slides."""
         return ["N.m" if unit == "rad" else "N" for unit in self.joint_units]
 
+    def torque_summaries(self) -> list[TorqueSummary]:
+        """Return the torque of each joint in short; none has a limit where the period is assumed."""
+        limited = not self.log.period_assumed
+        return torque_summaries(self.log.joints, self.robot, self.t_ns, self.tau, limited=limited)
+
     def as_run(self) -> Run:
         """Return this run: what results that have a run return of it."""
         return self
@@ -207,9 +219,7 @@ class Run(Result):
             "inferences": [one.to_dict(voice) for one in self.log.inferences],
             "repolarizations": [entry.to_dict() for entry in self.repolarizations],
             "audit": [entry.to_dict() for entry in self.audit],
-            "torques": [
-                one.to_dict() for one in joint_torques(self.log.joints, self.robot, self.t_ns, self.tau)
-            ],
+            "torques": [one.to_dict() for one in self.torque_summaries()],
             "warnings": [one.to_dict(voice) for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }

@@ -15,7 +15,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.figure import Computed, Figure, Line, Panel, View
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.runs.torques import joint_torques
+from urmpipe_pipeline.runs.torques import PERIOD_ASSUMED
 
 TERMS = {
     "gravity": AXIS_COLOURS["y"],
@@ -33,30 +33,32 @@ def torque_figures(run: Run) -> Iterator[Figure]:
     """Yield torques, their terms and the energies; nothing of an arm without masses, or without rates."""
     if run.robot is None or run.tau is None or len(run.t_ns) < 2:
         return
-    yield torques_figure(run, run.robot, run.tau)
+    yield joint_torques_figure(run, run.robot, run.tau)
     yield terms_figure(run, run.robot, run.tau)
     yield energy_figure(run, run.robot)
 
 
-def torques_figure(run: Run, robot: Chain, tau: FloatArray) -> Figure:
+def joint_torques_figure(run: Run, robot: Chain, tau: FloatArray) -> Figure:
     """Return the torques over time, together and joint by joint with their limits.
 
     They are in [N.m] or [N], shape (g, joints).
     """
-    names, units = run.log.joints, run.torque_units
+    names, units, limited = run.log.joints, run.torque_units, not run.log.period_assumed
     views = [View("Torques", tuple(_together(run, tau)))]
     for j, (name, unit, joint) in enumerate(zip(names, units, robot.moving, strict=True)):
         line = Line(_column(tau, j), (name,), (joint_colour(j),))
-        limit = joint.effort if math.isfinite(joint.effort) else None
+        limit = joint.effort if limited and math.isfinite(joint.effort) else None
         title = _symbol(unit, str(j + 1))
         panel = Panel(title, unit, (line,), run.t_ns, limit, limit_name="effort limit")
         views.append(View(f"Torque of {name}", (panel,)))
-    limited = any(math.isfinite(joint.effort) for joint in robot.moving)
     caption = "What the joints must exert for this motion, by the masses of the robot (inverse dynamics);"
     caption += " friction and a load at the tool are not in it."
     caption += " First all joints, then each, numbered from the base."
-    caption += " Dashed: its effort limit; tinted: where it is not enough." if limited else ""
-    return Figure("Joint torques", caption, partial(_largest_words, run, tau), tuple(views), share=2.2)
+    if not limited:
+        caption += f" {PERIOD_ASSUMED}"
+    elif any(math.isfinite(joint.effort) for joint in robot.moving):
+        caption += " Dashed: its effort limit; tinted: where it is not enough."
+    return Figure("Joint torques", caption, partial(_largest_words, run), tuple(views), share=2.2)
 
 
 def terms_figure(run: Run, robot: Chain, tau: FloatArray) -> Figure:
@@ -133,10 +135,10 @@ def _energies(run: Run, robot: Chain) -> FloatArray:
     return np.column_stack((kinetic, potential, kinetic + potential))
 
 
-def _largest_words(run: Run, tau: FloatArray) -> str:
+def _largest_words(run: Run) -> str:
     """Say how large the torque of each joint becomes, and how much of its limit that is."""
-    said = []
-    for one in joint_torques(run.log.joints, run.robot, run.t_ns, tau):
+    largest = []
+    for one in run.torque_summaries():
         share = "" if one.effort_share is None else f" ({text.percent(one.effort_share)} of its limit)"
-        said.append(f"{one.joint} {one.max:.4g} {one.unit}{share}")
-    return f"Torques of the joints of {run.name} over time. The largest: {', '.join(said)}."
+        largest.append(f"{one.joint} {one.max:.4g} {one.unit}{share}")
+    return f"Torques of the joints of {run.name} over time. The largest: {', '.join(largest)}."

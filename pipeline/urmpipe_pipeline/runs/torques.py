@@ -12,14 +12,24 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.dynamics.over_log import torque_over_log
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
 
 EFFORT_LIMIT = "effort-limit"
 
+CHECK_LOG = "check masses, clock and noise of the log"
+"""What to do where the motion of a log that was recorded takes more than a joint can give."""
+
+MOVE_SLOWER = "move slower, or check the masses"
+"""What to do where a motion that was planned or solved does."""
+
+PERIOD_ASSUMED = "The period of the rows is assumed. Torques depend on it, so no limit is applied."
+"""What stands with torques whose rates rest on an assumption."""
+
 
 @dataclass(frozen=True, slots=True)
-class JointTorque:
+class TorqueSummary:
     """The torque of a joint over a motion, in [N.m], or the force in [N] of one that slides.
 
     Attributes:
@@ -29,7 +39,7 @@ class JointTorque:
         t_max: When, in [s]; NaN likewise.
         sample_max: In which sample, from 0.
         rms: Root of its mean square.
-        effort: Its limit either way; None without one.
+        effort: Its limit either way; None without one, and where the period of the rows is assumed.
         beyond: Row numbers of the samples beyond the limit, from 0, shape (k,).
         samples: How many samples have a value.
     """
@@ -56,11 +66,11 @@ class JointTorque:
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as `urmpipe ingest --json` prints it."""
-        told = ("joint", "unit", "max", "t_max", "rms", "effort", "effort_share", "share_out")
-        return {name: getattr(self, name) for name in told}
+        keys = ("joint", "unit", "max", "t_max", "rms", "effort", "effort_share", "share_out")
+        return {key: getattr(self, key) for key in keys}
 
 
-def torques(robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray | None:
+def torques_of_log(robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray | None:
     """Return the torques of the joints in [N.m] or [N], shape (n, joints), NaN where a rate is.
 
     Args:
@@ -74,9 +84,14 @@ def torques(robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray)
     return torque_over_log(robot, q, qd, qdd)
 
 
-def joint_torques(
-    names: Sequence[str], robot: Chain | None, t_ns: IntArray, tau: FloatArray | None
-) -> list[JointTorque]:
+def torque_summaries(
+    names: Sequence[str],
+    robot: Chain | None,
+    t_ns: IntArray,
+    tau: FloatArray | None,
+    *,
+    limited: bool = True,
+) -> list[TorqueSummary]:
     """Return the torque of each joint in short; none where torques are not known.
 
     Args:
@@ -84,6 +99,7 @@ def joint_torques(
         robot: The arm, with its limits.
         t_ns: Times in integer [ns], shape (n,).
         tau: Torques in [N.m] or [N], shape (n, joints); None where they are not known.
+        limited: Whether they are held against the efforts of the joints.
     """
     if robot is None or tau is None or not len(tau):
         return []
@@ -92,16 +108,17 @@ def joint_torques(
         size = np.abs(column)
         known = size[np.isfinite(size)]
         at = int(np.nanargmax(size)) if len(known) else 0
+        effort = joint.effort if limited else math.inf
         found.append(
-            JointTorque(
+            TorqueSummary(
                 joint=name,
                 unit="N.m" if joint.kind == "revolute" else "N",
                 max=float(size[at]) if len(known) else math.nan,
                 t_max=float(t_ns[at]) / 1e9 if len(known) else math.nan,
                 sample_max=at,
                 rms=float(np.sqrt(np.mean(known**2))) if len(known) else math.nan,
-                effort=joint.effort if math.isfinite(joint.effort) else None,
-                beyond=np.flatnonzero(size > joint.effort),
+                effort=effort if math.isfinite(effort) else None,
+                beyond=np.flatnonzero(size > effort),
                 samples=len(known),
             )
         )
@@ -109,32 +126,36 @@ def joint_torques(
 
 
 def beyond_efforts(
-    names: Sequence[str],
-    robot: Chain | None,
+    summaries: Sequence[TorqueSummary],
     t_ns: IntArray,
-    tau: FloatArray | None,
-    rows_ns: IntArray,
+    advice: str,
+    rows_ns: IntArray | None = None,
+    hints: tuple[Hint, ...] = (),
 ) -> list[LogWarning]:
-    """Return a warning if joints need more than their effort: which, how often, where first, where worst.
+    """Return a warning if joints need more than their effort: which, how often, where worst, first row.
 
     Args:
-        names: Of the joints.
-        robot: The arm, with its limits.
+        summaries: The torque of each joint.
         t_ns: Times of the samples in integer [ns], shape (n,).
-        tau: Torques in [N.m] or [N], shape (n, joints); None where they are not known.
-        rows_ns: Times of the file's rows in integer [ns], shape (m,): a row nearest to the sample is named.
+        advice: What to do about it.
+        rows_ns: Times of the file's rows in integer [ns], shape (m,): the row nearest to a sample is named;
+            None where the samples are no rows of a file: their times are named.
+        hints: What to give to do so.
     """
-    found = [one for one in joint_torques(names, robot, t_ns, tau) if len(one.beyond)]
+    found = [one for one in summaries if len(one.beyond)]
     if not found:
         return []
     worst = max(found, key=lambda one: one.effort_share or 0.0)
-    first, most = _rows_at(rows_ns, t_ns[[min(int(one.beyond[0]) for one in found), worst.sample_max]])
-    said = f"{worst.joint} needs more than its effort of {worst.effort:.6g} {worst.unit} in"
-    said += f" {len(worst.beyond)} of {worst.samples} samples ({text.percent(worst.share_out or 0.0)}),"
-    said += f" at worst {worst.max:.4g} {worst.unit} in row {most}"
+    first, place = None, f"at t = {text.seconds(worst.t_max)} s"
+    if rows_ns is not None:
+        first, row = _rows_at(rows_ns, t_ns[[min(int(one.beyond[0]) for one in found), worst.sample_max]])
+        place = f"in row {row}"
+    words = f"{worst.joint} needs more than its effort of {worst.effort:.6g} {worst.unit} in"
+    words += f" {len(worst.beyond)} of {worst.samples} samples ({text.percent(worst.share_out or 0.0)}),"
+    words += f" at worst {worst.max:.4g} {worst.unit} {place}"
     others = [f"{one.joint} ({text.counted(len(one.beyond), 'sample')})" for one in found if one is not worst]
-    said += f"; also {text.enumerated(others)}" if others else ""
-    return [LogWarning(EFFORT_LIMIT, f"{said}: check masses, clock and noise of the log", first)]
+    words += f"; also {text.enumerated(others)}" if others else ""
+    return [LogWarning(EFFORT_LIMIT, f"{words}: {advice}", first, hints=hints)]
 
 
 def _rows_at(rows_ns: IntArray, t_ns: IntArray) -> list[int]:

@@ -1,4 +1,8 @@
-"""The energy balance of blocks: what went in, what was lost, what is stored, and what is left over."""
+"""The energy balance of blocks: energy in, losses, stored energy, and what they do not account for.
+
+What blocks exchange with each other is in none of the three. The residual is what the coupling of blocks
+makes, whose values are held over a step, and the work of blocks that have no energies.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,7 @@ class EnergyBalance:
     """Energies of some blocks together, counted from the first sample.
 
     Attributes:
-        supplied: Work done on the blocks from outside in [J], shape (n,).
+        supplied: Work done on the system from outside, at these blocks, in [J], shape (n,).
         lost: Heat and damping in [J], shape (n,).
         stored: Change of the stored energy in [J], shape (n,).
     """
@@ -29,7 +33,7 @@ class EnergyBalance:
 
     @property
     def residual(self) -> FloatArray:
-        """What is left over in [J], shape (n,): supplied - lost - stored."""
+        """What is not accounted for in [J], shape (n,): supplied - lost - stored."""
         with np.errstate(invalid="ignore"):
             return self.supplied - self.lost - self.stored
 

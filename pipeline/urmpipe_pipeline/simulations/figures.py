@@ -25,6 +25,10 @@ DESCRIBED = 8
 """Scalars whose extremes are told to who does not see the figure; of more, the first."""
 
 
+RESIDUAL_CAUSES = "coupling of the blocks, or a block without energies"
+"""Where energy that a balance does not account for comes from."""
+
+
 def signal_figures(simulation: Simulation, groups: Sequence[Group]) -> Iterator[Figure]:
     """Yield a figure a group of signals; nothing without a sample."""
     if not len(simulation.t_ns):
@@ -73,9 +77,9 @@ def energy_figure(simulation: Simulation, balance: EnergyBalance) -> Iterator[Fi
     ends = ", ".join(f"{name} {value:.6g} J" for name, value in zip(names, energies[-1], strict=True))
     yield Figure(
         "Energies and residual",
-        f"Sums over {blocks} since the first sample. Residual = in - lost - change of stored. It is the error"
-        " of integrating and of holding the values between blocks over a step, and the work done on blocks"
-        " without energies. A diamond marks the largest.",
+        f"Sums over {blocks} since the first sample: work done on the system from outside, losses, and change"
+        " of the stored energy. Residual = in - lost - change of stored: what they do not account for"
+        f" ({RESIDUAL_CAUSES}). A diamond marks the largest.",
         f"Energies over time, at the end: {ends}, residual {balance.residual[-1]:.6g} J.",
         (
             View("Energies", (Panel("energy", "J", (line,), simulation.t_ns, share=2.0),)),

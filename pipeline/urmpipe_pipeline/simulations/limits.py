@@ -1,4 +1,4 @@
-"""The limits of signals: that of X is the parameter X_max of its block."""
+"""The limits of signals: the limit of X is the parameter X_max of its block."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ from urmpipe_pipeline.presentation.section import (
     Value,
 )
 from urmpipe_pipeline.simulations.energy import EnergyBalance
-from urmpipe_pipeline.simulations.figures import energy_figure, path_figure, signal_figures
+from urmpipe_pipeline.simulations.figures import RESIDUAL_CAUSES, energy_figure, path_figure, signal_figures
 from urmpipe_pipeline.simulations.scene import simulation_scene
 from urmpipe_pipeline.simulations.signal_groups import ANSWERS, Group, answers_of, groups_of
 from urmpipe_pipeline.simulations.simulation import Simulation
@@ -157,8 +157,8 @@ def _energy_fact(simulation: Simulation, balance: EnergyBalance) -> Fact:
     residual = abs(float(balance.residual[worst]))
     blocks = text.counted(len({one.block for one in simulation.signals if one.is_energy}), "block")
     at, share = text.seconds(float(simulation.t[worst])), text.percent(balance.share(residual))
-    words = f"largest residual {residual:.4g} J at t = {at} s, {share} of the largest energy"
-    return Fact(ENERGY, f"{blocks}, {words}")
+    words = f"not accounted for: at most {residual:.4g} J at t = {at} s, {share} of the largest energy"
+    return Fact(ENERGY, f"{blocks}; {words} ({RESIDUAL_CAUSES})")
 
 
 def _sections(simulation: Simulation) -> Iterator[Section]:

@@ -74,7 +74,7 @@ def test_a_chain_says_all_that_is_wrong_with_masses_and_drives_at_once() -> None
         "robot arm: drives.j.l: found -1, allowed: a finite number, 0 or more",
         "robot arm: drives.j.C: found 0, allowed: a finite number, 1e-09 or more",
         "robot arm: drives.j.Kw: found nan, allowed: a finite number",
-        "robot arm: drives.frame: found, allowed: a moving joint: j",
+        "robot arm: drives.frame: found a drive for it, allowed: a joint with a coordinate: j",
         "robot arm: drives.j: found 2 times, allowed: once",
     ]
 

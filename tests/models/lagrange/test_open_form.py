@@ -40,7 +40,7 @@ def parallel_neighbours(chain: Chain) -> int:
     q = random_motion(np.random.default_rng(7), chain)[0].tolist()
     placed = zip(chain.joints, list(frames(chain, q))[1:], strict=True)
     axes = [np.array(frame.rotate(one.axis), float) for one, frame in placed if one.kind == "revolute"]
-    return sum(np.linalg.norm(np.cross(*pair)) < 1e-9 for pair in pairwise(axes))
+    return sum(float(np.linalg.norm(np.cross(*pair))) < 1e-9 for pair in pairwise(axes))
 
 
 def test_the_arms_turn_slide_follow_and_have_parallel_axes_and_others() -> None:

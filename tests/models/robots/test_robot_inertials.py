@@ -174,7 +174,7 @@ def test_what_no_body_and_no_drive_has_is_said_beside_what_no_joint_has(robot: R
     """
     own = [
         "arm.toml: robot arm: inertial on joint a: mass -1 kg; allowed: 0 or more",
-        "arm.toml: robot arm: drives.a.k: found 0, allowed: a finite number above 0",
+        "arm.toml: robot arm: drives.a.k: found 0, allowed: a finite number, 1e-09 or more",
     ]
     assert refusal(RobotError, robot, text.format(effort=0)).splitlines() == [
         "arm.toml: robot arm: joint a: effort 0; allowed: more than 0", *own,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,18 +15,20 @@ import pytest
 from arm_motion import clock
 from asserting import there
 from exported import export_result
-from made_plans import SMALL, planned
-from panda_log import PANDA, motion, panda, panda_csv
+from made_plans import DOWN, SMALL, limited, planned
+from panda_log import URDF, motion, panda, panda_csv
 from presented import cells, figures, scene_of
 from recorded import rows_of
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.chains.inertial import Inertial
 from urmpipe_models.dynamics.over_log import energies_over_log, torque_over_log
+from urmpipe_models.planning.rows import PathRows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.json_values import json_ready
 from urmpipe_pipeline.presentation.figure import Drawing, Figure
 from urmpipe_pipeline.results import present, read_recording, write_recording
+from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.other_robot import on_robot
 from urmpipe_pipeline.runs.results import Run
@@ -36,22 +39,37 @@ SAME = 1e-10
 """Of the largest torque: two ways to compute the same; found are 1e-13."""
 
 
-def rnea(q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
-    """Pinocchio's torques of the Panda without its fingers, a row a sample."""
-    model = pinocchio.buildModelFromUrdf(str(PANDA))
+Rnea = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+"""Torques of q, q' and q'', a row a sample."""
+
+
+@pytest.fixture(scope="module")
+def rnea(shared: Path) -> Rnea:
+    """Pinocchio's torques of the Panda without its fingers."""
+    model = pinocchio.buildModelFromUrdf(str(shared / URDF))
     fingers = [k for k, name in enumerate(model.names) if "finger" in name]
     for one in fingers:
         model.inertias[one] = pinocchio.Inertia.Zero()
     model = pinocchio.buildReducedModel(model, fingers, pinocchio.neutral(model))
     data = model.createData()
-    return np.array([pinocchio.rnea(model, data, *row).copy() for row in zip(q, qd, qdd, strict=True)])
+
+    def torques(q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray:
+        """Return them."""
+        return np.array([pinocchio.rnea(model, data, *row).copy() for row in zip(q, qd, qdd, strict=True)])
+
+    return torques
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> Run:
+def arm(shared: Path) -> Chain:
+    """The Panda."""
+    return panda(shared)
+
+
+@pytest.fixture(scope="module")
+def run(arm: Chain, tmp_path_factory: pytest.TempPathFactory) -> Run:
     """A log of the Panda whose second joint needs more than its effort."""
-    robot = panda()
-    return ingest_log([panda_csv(tmp_path_factory.mktemp("log"), robot.coordinates, 2.2)], robot=robot)
+    return ingest_log([panda_csv(tmp_path_factory.mktemp("log"), arm.coordinates, 2.2)], robot=arm)
 
 
 def slider(mass: float = 2.0, effort: float = np.inf) -> Chain:
@@ -68,12 +86,12 @@ def sliding(folder: Path, z: FloatArray, dt: float = 0.01) -> Path:
     return path
 
 
-def test_the_torques_of_a_log_are_those_of_pinocchio(run: Run) -> None:
+def test_the_torques_of_a_log_are_those_of_pinocchio(run: Run, rnea: Rnea) -> None:
     expected = rnea(run.q, run.qd, run.qdd)
     np.testing.assert_allclose(there(run.tau), expected, rtol=0, atol=SAME * np.abs(expected).max())
 
 
-def test_the_torques_of_the_log_are_near_those_of_the_motion_it_samples(run: Run) -> None:
+def test_the_torques_of_the_log_are_near_those_of_the_motion_it_samples(run: Run, rnea: Rnea) -> None:
     """Central differences are off by T^2 omega^2 / 12 of the acceleration: below 0.1 % at these paces."""
     expected = rnea(*motion(run.t, 2.2))
     inner = slice(1, -1)  # the ends are one-sided
@@ -81,25 +99,24 @@ def test_the_torques_of_the_log_are_near_those_of_the_motion_it_samples(run: Run
     assert error < 2e-3 * np.abs(expected).max()
 
 
-def test_a_coarse_log_is_smoothed_before(tmp_path: Path) -> None:
-    robot = panda()
-    path = panda_csv(tmp_path, robot.coordinates, 0.3, form="%+.3e")
+def test_a_coarse_log_is_smoothed_before(arm: Chain, rnea: Rnea, tmp_path: Path) -> None:
+    path = panda_csv(tmp_path, arm.coordinates, 0.3, form="%+.3e")
     expected = rnea(*motion(clock(801, 0.005), 0.3))
-    smooth, rough = (ingest_log([path], robot=robot, derivative=way) for way in (None, "central"))
+    smooth, rough = (ingest_log([path], robot=arm, derivative=way) for way in (None, "central"))
     worst = [float(np.abs(there(one.tau) - expected)[50:-50].max()) for one in (smooth, rough)]
     assert worst[0] < 0.3  # of 43 N.m; four digits of the angles
     assert worst[1] > 30.0
 
 
-def test_recorded_rates_and_accelerations_are_taken(tmp_path: Path) -> None:
-    robot, t = panda(), clock(401, 0.005)
-    names = [f"{prefix}{name}" for prefix in ("", "d_", "dd_") for name in robot.coordinates]
-    units = [unit for unit in ("rad", "rad/s", "rad/s2") for _ in robot.coordinates]
+def test_recorded_rates_and_accelerations_are_taken(arm: Chain, rnea: Rnea, tmp_path: Path) -> None:
+    t = clock(401, 0.005)
+    names = [f"{prefix}{name}" for prefix in ("", "d_", "dd_") for name in arm.coordinates]
+    units = [unit for unit in ("rad", "rad/s", "rad/s2") for _ in arm.coordinates]
     header = ",".join(["t [s]", *(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))])
     table = np.column_stack((t, *motion(t)))
     path = tmp_path / "recorded.csv"
     np.savetxt(path, table, delimiter=",", header=header, comments="", fmt="%.15g")
-    run = ingest_log([path], robot=robot)
+    run = ingest_log([path], robot=arm)
     expected = rnea(*motion(t))
     # 15 digits are written of each value.
     np.testing.assert_allclose(there(run.tau), expected, rtol=0, atol=1e-9)
@@ -178,6 +195,32 @@ def test_a_torque_beyond_the_effort_is_said(run: Run) -> None:
     )
 
 
+@pytest.mark.parametrize(("derivative", "count"), [(None, 1), ("central", 1), ("savgol", 0)])
+def test_smoothing_is_advised_where_it_is_not_used(
+    run: Run, derivative: Method | None, count: int, tmp_path: Path
+) -> None:
+    robot = there(run.robot)
+    weak = replace(robot, joints=tuple(replace(one, effort=40.0) for one in robot.joints))
+    path = panda_csv(tmp_path, weak.coordinates, 2.2)
+    for found in (
+        ingest_log([path], robot=weak, derivative=derivative),
+        on_robot(ingest_log([path], robot=run.robot, derivative=derivative), weak),
+    ):
+        (warning,) = (one for one in found.warnings if one.kind == "effort-limit")
+        assert [(one.parameter, one.value) for one in warning.hints] == count * [("derivative", "savgol")]
+
+
+def test_recorded_accelerations_are_not_to_be_smoothed(tmp_path: Path) -> None:
+    z = 0.1 * np.sin(clock(300, 0.01))
+    table = np.column_stack((clock(300, 0.01), z, -z))
+    path = tmp_path / "slide.csv"
+    np.savetxt(path, table, "%.15g", ",", header="t [s],q1 [m],dd_q1 [m/s2]", comments="")
+    (warning,) = (
+        one for one in ingest_log([path], robot=slider(effort=15.0)).warnings if one.kind == "effort-limit"
+    )
+    assert warning.hints == ()
+
+
 def test_several_joints_beyond_their_efforts_are_one_warning(run: Run) -> None:
     robot = there(run.robot)
     weak = replace(robot, joints=tuple(replace(one, effort=40.0) for one in robot.joints))
@@ -223,14 +266,27 @@ def test_rows_without_a_rate_have_no_torque(tmp_path: Path) -> None:
     assert run.to_dict()["torques"][0]["max"] == np.nanmax(np.abs(tau))
 
 
-def test_nothing_is_said_of_rows_whose_pace_is_not_known(tmp_path: Path) -> None:
+@pytest.mark.parametrize("moved", [False, True])
+def test_no_limit_is_applied_where_the_period_of_the_rows_is_assumed(moved: bool, tmp_path: Path) -> None:
     path = tmp_path / "slide.csv"
-    values = 0.1 * np.sin(np.arange(200.0))
+    values = 0.1 * np.sin(0.05 * np.arange(200.0))
     path.write_text("\n".join(["q1 [m]", *map(repr, values.tolist())]) + "\n", encoding="utf-8")
     run = ingest_log([path], robot=slider(effort=25.0))
-    if run.timed:
-        assert np.nanmax(np.abs(there(run.tau))) > 25.0
+    run = on_robot(run, slider(effort=24.0)) if moved else run
+    assert run.timed and run.log.period_assumed
+    largest = np.abs(there(run.tau)).max()
+    assert largest > 25.0
     assert [one for one in run.warnings if one.kind == "effort-limit"] == []
+    (torque,) = run.to_dict()["torques"]
+    assert torque["max"] == largest
+    assert [torque[key] for key in ("effort", "effort_share", "share_out")] == [None] * 3
+    table = next(one for one in present(run).body.tables if one.title == "Joint torques")
+    assert "period of the rows is assumed" in table.note
+    shown = figure(run, "Joint torques")
+    assert "period of the rows is assumed" in shown.caption and "Dashed" not in shown.caption
+    assert [panel.limit for view in shown.views for panel in view.panels] == [None, None]
+    given = ingest_log([path], robot=slider(effort=25.0), read=ReadOptions(period=0.005))
+    assert [one.kind for one in given.warnings if one.kind == "effort-limit"] == ["effort-limit"]
 
 
 def test_still_poses_have_no_torques(tmp_path: Path) -> None:
@@ -275,6 +331,39 @@ def test_a_plan_has_the_torques_of_its_exact_rates() -> None:
     assert np.isfinite(expected).all()
 
 
+def test_a_plan_beyond_an_effort_has_one_warning_of_its_own() -> None:
+    plan = planned(limited("ur10", effort=60.0), SMALL)
+    size, t = np.abs(there(there(plan.joints).tau)), plan.t
+    counts = np.count_nonzero(size > 60.0, axis=0)
+    worst = int(np.argmax(size.max(axis=0)))
+    at = int(np.argmax(size[:, worst]))
+    (warning,) = (one for one in plan.warnings if one.kind == "effort-limit")
+    joint = there(plan.robot).coordinates[worst]
+    begin = f"{joint} needs more than its effort of 60 N.m in {counts[worst]} of {len(t)} samples ("
+    assert warning.message.startswith(begin)
+    assert f"at worst {size[at, worst]:.4g} N.m at t = {t[at]:.3f} s" in warning.message
+    assert warning.message.endswith(": move slower, or check the masses")
+    assert (warning.row, warning.hints) == (None, ())  # its samples are no rows of the path
+    assert warning.message in [one["message"] for one in plan.to_dict()["warnings"]]
+    assert [one for one in plan.as_run().warnings if one.kind == "effort-limit"] == [warning]
+
+
+def test_a_plan_within_its_efforts_or_in_the_way_of_something_has_no_such_warning() -> None:
+    weak = limited("ur10", effort=1.0)
+    points = np.array([[0.5, 0.5, 0.3], [-0.5, -0.5, 0.3]])
+    failed = planned(weak, PathRows(points, rotation=DOWN))
+    assert failed.obstacles != ()
+    for plan in (planned(load_robot("ur10"), SMALL), failed):
+        for warnings in (plan.warnings, plan.as_run().warnings):
+            assert [one for one in warnings if one.kind == "effort-limit"] == []
+
+
+def test_a_plan_on_another_arm_is_told_to_move_slower() -> None:
+    run = on_robot(planned(load_robot("ur10"), SMALL).as_run(), limited("ur10", effort=60.0))
+    (warning,) = (one for one in run.warnings if one.kind == "effort-limit")
+    assert "move slower" in warning.message and warning.hints == ()
+
+
 # --- what is shown ---------------------------------------------------------------------------------
 
 
@@ -307,7 +396,7 @@ def test_the_terms_add_up_to_the_torque(run: Run) -> None:
         np.testing.assert_allclose(parts.values[:].sum(axis=1), there(run.tau)[:, j], rtol=0, atol=1e-11)
 
 
-def test_the_gravity_term_is_what_an_arm_at_rest_holds(run: Run) -> None:
+def test_the_gravity_term_is_what_an_arm_at_rest_holds(run: Run, rnea: Rnea) -> None:
     still = np.zeros_like(run.q)
     held = rnea(run.q, still, still)
     for j, view in enumerate(figure(run, "Terms of the torques").views):

@@ -54,9 +54,13 @@ def test_the_balance_stands_before_the_blocks_and_only_there(swinging: Simulatio
     np.testing.assert_array_equal(energies.lines[0].values, [[0, 0, 0], [4, 2, 1.5], [10, 6, 4]])
     np.testing.assert_array_equal(residual.lines[0].values, [0.0, 0.5, 0.0])
     assert (energies.unit, residual.unit, residual.peaks) == ("J", "J", (1,))
-    assert figure.caption.startswith("Sums over a, b since the first sample.")
+    assert figure.caption.startswith("Sums over a, b since the first sample: ")
     fact = facts(body)["Energy balance"]
-    assert fact == "2 blocks, largest residual 0.5 J at t = 0.005 s, 5.0 % of the largest energy"
+    assert fact == (
+        "2 blocks; not accounted for: at most 0.5 J at t = 0.005 s, 5.0 % of the largest energy"
+        " (coupling of the blocks, or a block without energies)"
+    )
+    assert "(coupling of the blocks, or a block without energies)" in figure.caption
 
 
 def test_set_points_stand_before_the_balance(swinging: Simulation) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 from urmpipe_models.arrays import IntArray
 from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.messages import Hint
-from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import LONGEST_NS, is_missing
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.cells.text_clock import DATE, DENSE_DATE, SECOND_NS, TIME_OF_DAY
@@ -235,5 +235,5 @@ def even_clock(
     hints += [Hint("time", like, "takes this column as the time: it always increases")] if like else []
     said = "no time column: the rows are taken as 5 ms apart"
     assumed = "the rows are 5 ms apart"
-    warning = LogWarning("assumed-period", said, hints=tuple(hints), assumption=assumed, role="time")
+    warning = LogWarning(ASSUMED_PERIOD, said, hints=tuple(hints), assumption=assumed, role="time")
     return times, (Inference("period", "0.005 s", "assumed", hints=(Hint("period"),)),), [warning]
