@@ -7,11 +7,16 @@ from urmpipe_models.chains.inertial import GRAVITY
 from urmpipe_pipeline.joint_log import LogWarning
 
 MASS_LEFT_OUT = "mass-left-out"
+MASS_FAULT = "mass-fault"
 NOT_IN_URDF = "not-in-urdf"
 
 
 def mass_notices(robot: Chain) -> list[LogWarning]:
     """Return a warning of the masses that the arm carries and that are not among its `inertials`."""
+    if robot.mass_faults:
+        return [
+            LogWarning(MASS_FAULT, f"the masses of the robot are not used: {'; '.join(robot.mass_faults)}")
+        ]
     if not robot.left_out:
         return []
     names = ", ".join(robot.left_out)

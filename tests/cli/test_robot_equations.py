@@ -63,7 +63,12 @@ def test_c_is_written_and_replaces_only_an_export(urmpipe: Any, pendulum: str, t
     assert code == api.equations(tmp_path / pendulum, form="c").text
     assert "\nvoid swing_torque(const double q[], const double qd[], const double qdd[]," in code
     assert urmpipe("robot", "equations", pendulum, "-o", "swing.c", "--json").code == 0
-    assert (tmp_path / "swing.c").read_text(encoding="utf-8").startswith("# urmpipe robot export: equations")
+    assert (tmp_path / "swing.c").read_text(encoding="utf-8") == code
+    ran = urmpipe("robot", "equations", pendulum, "--form", "text", "-o", "swing.c")
+    assert (ran.code, ran.err) == (
+        2,
+        "error: --form: found text for swing.c, allowed: c, or another name\n",
+    )
     (tmp_path / "mine.c").write_text("int x;", encoding="utf-8")
     ran = urmpipe("robot", "equations", pendulum, "-o", "mine.c")
     assert (ran.code, ran.err) == (

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.drives.joint_drives import HeldJoint
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.masses import mass_notices
+from urmpipe_pipeline.masses import lost_in_urdf, mass_notices
 
 
 def test_links_whose_masses_are_left_out_are_named() -> None:
@@ -19,3 +20,17 @@ def test_links_whose_masses_are_left_out_are_named() -> None:
             "the masses of left, right are left out: these links move by joints of their own",
         )
     ]
+
+
+def test_masses_that_are_not_used_say_why() -> None:
+    robot = Chain("arm", (Joint("j"),), left_out=("finger",), mass_faults=("arm.urdf:3: link a: mass", "b"))
+    words = "the masses of the robot are not used: arm.urdf:3: link a: mass; b"
+    assert mass_notices(robot) == [LogWarning("mass-fault", words)]
+
+
+def test_what_a_urdf_does_not_hold_is_named() -> None:
+    assert lost_in_urdf(Chain("arm", (Joint("j"),))) == []
+    drives = (HeldJoint("j", 1.0, 0.0),)
+    robot = Chain("arm", (Joint("j"),), gravity=(0.0, -9.81, 0.0), drives=drives, left_out=("finger",))
+    words = "a URDF does not hold gravity [0.0, -9.81, 0.0] m/s2 and the drives and which masses are left out"
+    assert lost_in_urdf(robot) == [LogWarning("not-in-urdf", f"{words}: a TOML robot file does")]

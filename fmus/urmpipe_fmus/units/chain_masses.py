@@ -28,9 +28,11 @@ class Masses(NamedTuple):
 def masses_of(robot: Chain) -> Masses:
     """Return the masses of an arm that move, their centres, and gravity as parameters.
 
-    Masses of the base, which stands still, and masses of 0 have no part in the motion and are left out.
+    Masses that stand still and masses of 0 have no part in the motion and are left out.
     """
-    moving = tuple(one for one in robot.inertials if one.joint is not None and one.mass)
+    first = next(k for k, joint in enumerate(robot.joints) if joint.kind != "fixed")
+    carriers = {joint.name for joint in robot.joints[first:]}
+    moving = tuple(one for one in robot.inertials if one.joint in carriers and one.mass)
     arm = replace(robot, inertials=moving, visuals=())
     centres = [f"centre{k}" for k in range(1, len(moving) + 1)]
 

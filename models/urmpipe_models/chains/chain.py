@@ -99,6 +99,7 @@ class Chain(Shown):
         gravity: Acceleration of gravity in the world's frame, in [m/s2]; `base` turns the arm under it.
         left_out: Links of a URDF that the arm carries and that move by joints of their own: their masses
             are not among the `inertials`.
+        mass_faults: Why the masses of a URDF are not used; then there are no `inertials`.
         drives: What drives or holds the joints; none where the description does not tell.
     """
 
@@ -114,6 +115,7 @@ class Chain(Shown):
     inertials: tuple[Inertial, ...] = ()
     gravity: Vector = GRAVITY
     left_out: tuple[str, ...] = ()
+    mass_faults: tuple[str, ...] = ()
     drives: tuple[JointDrive, ...] = ()
 
     def __post_init__(self) -> None:

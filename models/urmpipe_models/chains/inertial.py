@@ -14,11 +14,12 @@ from urmpipe_models.elementwise import ZERO, Element, Vector
 GRAVITY: tuple[float, float, float] = (0.0, 0.0, -9.81)
 """The acceleration of gravity in the world's frame, in [m/s2], where a robot file gives no other."""
 
-PRINTED_DIGITS = 5e-3
-"""Principal moments may miss the triangle inequality by this share: a thin rod in three printed digits."""
+PRINTED_DIGITS = 1e-2
+"""Principal moments may miss what a body can have by this share of the largest: a thin rod that was turned
+and printed with three digits misses it by up to 0.8 %."""
 
-ROUNDING = 1e-9
-"""A principal moment may be below 0 by this share of the largest: rounding."""
+SMALLEST_RADIUS = 3e-5
+"""They may also miss it by what the mass has at this radius in [m]: rounding of a point mass."""
 
 _Six: TypeAlias = tuple[Element, Element, Element, Element, Element, Element]
 _SixNumbers: TypeAlias = tuple[float, float, float, float, float, float]
@@ -77,7 +78,8 @@ class Inertial:
             yield f"{where}: mass 0 with an inertia; allowed: a mass, or no inertia"
         low, middle, high = self.principal_moments
         moments = f"principal moments {low:.4g}, {middle:.4g}, {high:.4g} kg.m2"
-        if low < -ROUNDING * abs(high) or high < 0.0:
+        slack = PRINTED_DIGITS * max(high, 0.0) + max(mass, 0.0) * SMALLEST_RADIUS**2
+        if low < -slack:
             yield f"{where}: {moments}; allowed: 0 or more"
-        elif low + middle < (1.0 - PRINTED_DIGITS) * high:
+        elif low + middle < high - slack:
             yield f"{where}: {moments}; allowed: none above the sum of the other two"

@@ -49,16 +49,6 @@ class DrivenJoint:
     gains: Gains = field(metadata={"stored": tuple[float, ...]})
     largest_voltage: float
 
-    @property
-    def stiffness(self) -> float:
-        """K of the shaft, in [N.m/rad] or [N/m]."""
-        return float(self.drive.stiffness)
-
-    @property
-    def damping(self) -> float:
-        """L of the shaft, in [N.m.s/rad] or [N.s/m]."""
-        return float(self.drive.damping)
-
     def __post_init__(self) -> None:
         """Make drive and gains of the plain numbers that a recording gives."""
         object.__setattr__(self, "drive", Drive(*self.drive))

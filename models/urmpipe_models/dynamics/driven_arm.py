@@ -8,10 +8,12 @@ Source: [Iso9283]_ eq. 14-19.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple, TypeAlias
 
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.drives.drive import (
     Drive,
@@ -22,9 +24,9 @@ from urmpipe_models.drives.drive import (
     shaft_torque,
     stored_energy,
 )
-from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint
+from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint, JointDrive
 from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
-from urmpipe_models.dynamics.forward import check_motion, forward_dynamics, solved
+from urmpipe_models.dynamics.forward import check_motion, forward_dynamics
 from urmpipe_models.dynamics.inverse import inverse_dynamics
 from urmpipe_models.dynamics.mass_matrix import mass_matrix
 from urmpipe_models.dynamics.wrench import Wrench, wrench_power
@@ -32,7 +34,7 @@ from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import Finding, RobotError
 
 STABLE = 2.8
-"""Steps of RK4 are stable up to so many times what a decay or a swing takes for a radian."""
+"""RK4 is stable up to this product of step and rate, for decays and undamped swings alike."""
 
 
 class Spring(NamedTuple):
@@ -233,27 +235,39 @@ def at_rest(chain: Chain) -> list[Rest]:
 
 
 def stable_step(chain: Chain) -> float:
-    """Return below which step in [s] RK4 is stable at the start pose: by armatures, and by shafts one by one.
+    """Return about how long a step of RK4 in [s] may be at the start pose, joint by joint.
 
-    2.8 L / R, 2.8 J / l and 2.8 sqrt(J / k); J = 1 / (1 / I1 + (M^-1)_ii) is what turns when a shaft twists,
-    of a held joint without I1.
+    2.8 over the largest eigenvalue of a joint with its drive or spring, all others free: (M^-1)_ii is what
+    the joint yields to its torque.
 
     Args:
         chain: The arm, with masses and a drive or a spring for each coordinate.
     """
     by_joint = {one.joint: one for one in chain.drives}
-    matrix = mass_matrix(chain, list(map(float, chain.start)))
-    steps = []
-    for k, name in enumerate(chain.coordinates):
-        own = by_joint[name]
-        alone = [float(k == i) for i in range(len(matrix))]
-        lightness = float(solved(matrix, alone)[k])
-        if isinstance(own, DrivenJoint):
-            lightness += 1.0 / own.drive.inertia
-            steps.append(own.drive.inductance / own.drive.resistance)
-        stiffness, damping = own.stiffness, own.damping
-        steps.append(1.0 / max(damping * lightness, math.sqrt(stiffness * lightness)))
-    return STABLE * float(min(steps))
+    inverse = np.linalg.inv(np.array(mass_matrix(chain, list(map(float, chain.start))), dtype=np.float64))
+    rates = (
+        np.abs(np.linalg.eigvals(_alone(by_joint[name], inverse[k, k]))).max()
+        for k, name in enumerate(chain.coordinates)
+    )
+    return float(STABLE / max(rates))
+
+
+def _alone(one: JointDrive, lightness: float) -> FloatArray:
+    """Return the matrix of q, q', theta1, theta1', i_a of a joint that yields by 1 / J to its torque."""
+    if isinstance(one, HeldJoint):
+        return np.array([[0.0, 1.0], [-one.stiffness * lightness, -one.damping * lightness]])
+    k, damping, ratio, constant, resistance, inductance, inertia = one.drive
+    torque = np.array([-k, -damping, k, damping, 0.0])
+    current = np.eye(5)[4]
+    return np.array(
+        [
+            np.eye(5)[1],
+            lightness * torque,
+            np.eye(5)[3],
+            (ratio * constant * current - torque) / inertia,
+            -(constant * ratio * np.eye(5)[3] + resistance * current) / inductance,
+        ]
+    )
 
 
 def _held(one: HeldJoint | DrivenJoint, q: float, torque: float) -> Rest:

@@ -6,9 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.dynamics.inverse import inverse_dynamics
-from urmpipe_models.dynamics.mass_matrix import mass_matrix
+from urmpipe_models.dynamics.mass_matrix import coordinate_sizes, mass_matrix
 from urmpipe_models.dynamics.wrench import Wrench
 from urmpipe_models.elementwise import Element, minus, times
 from urmpipe_models.errors import RobotError
@@ -17,7 +18,7 @@ POSES = 3
 """A pivot of M that is 0 in so many poses at random is 0 in all."""
 
 NO_MASS = 1e-12
-"""A pivot below this share of its entry of M is 0 but for rounding."""
+"""A pivot of M below this share of what the masses beyond could make it is 0 but for rounding."""
 
 
 def forward_dynamics(
@@ -89,29 +90,41 @@ def factors(matrix: Sequence[Sequence[Element]]) -> tuple[list[list[Element]], l
 
 
 def check_motion(chain: Chain) -> None:
-    """Refuse an arm whose motion cannot be solved: a joint that moves no mass of its own.
+    """Refuse an arm whose motion cannot be solved: no inertia resists a joint's own motion.
 
     Raises:
-        RobotError: If the arm has no masses, or with the name of every joint whose pivot of M is 0.
+        RobotError: If the arm has no masses, or with the name of every joint whose pivot of M is 0 in poses
+            at random, or else at the start pose.
     """
-    faults = [
-        f"robot {chain.name}: joint {name}: no inertia resists its own motion, so that it cannot be solved;"
-        " allowed: an inertial that only this joint moves"
-        for name in _without_mass(chain)
-    ]
-    if faults:
-        raise RobotError(*faults)
-
-
-def _without_mass(chain: Chain) -> Iterator[str]:
-    """Yield the coordinates whose motion needs nothing, whatever the joints before do; those are left out."""
     poses = np.random.default_rng(0).uniform(-1.0, 1.0, (len(chain.coordinates), POSES))
-    matrix = [[np.broadcast_to(entry, POSES) for entry in row] for row in mass_matrix(chain, list(poses))]
+    start = np.array(chain.start, dtype=np.float64)[:, np.newaxis]
+    for where, some in (("", poses), ("at its start pose ", start)):
+        faults = [
+            f"robot {chain.name}: joint {name}: {where}no inertia resists its own motion, so that it cannot"
+            " be solved; allowed: an inertial that only this joint moves"
+            for name in _without_inertia(chain, list(some))
+        ]
+        if faults:
+            raise RobotError(*faults)
+
+
+def _without_inertia(chain: Chain, q: Sequence[FloatArray]) -> Iterator[str]:
+    """Yield the coordinates whose motion needs nothing, whatever the joints before do; those are left out.
+
+    A pivot counts as 0 below NO_MASS of what the masses would have about the common origin.
+
+    Args:
+        chain: The arm, with masses.
+        q: Some poses in [rad] or [m], an array a coordinate.
+    """
+    count = len(q[0])
+    matrix = [[np.broadcast_to(entry, count) for entry in row] for row in mass_matrix(chain, q)]
+    sizes = coordinate_sizes(chain, q)
     kept: list[int] = []
     for i, name in enumerate(chain.coordinates):
         own = [*kept, i]
         *_, pivot = factors([[matrix[row][column] for column in own] for row in own])[1]
-        if np.max(pivot - NO_MASS * matrix[i][i]) <= 0.0:
+        if np.max(pivot - NO_MASS * sizes[i]) <= 0.0:
             yield name
         else:
             kept.append(i)

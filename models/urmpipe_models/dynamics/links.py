@@ -55,11 +55,13 @@ class Links:
 
 
 def check_masses(chain: Chain) -> None:
-    """Raise an error if an arm has no masses, or none above 0.
+    """Refuse an arm without masses.
 
     Raises:
-        RobotError: Naming the key that is missing.
+        RobotError: Naming the key that is missing, or with what is wrong with the masses of its URDF.
     """
+    if chain.mass_faults:
+        raise RobotError(*chain.mass_faults)
     if all(isinstance(one.mass, float) and one.mass == 0.0 for one in chain.inertials):
         raise RobotError(
             f"robot {chain.name}: key inertials: found none, allowed: the masses of the arm"

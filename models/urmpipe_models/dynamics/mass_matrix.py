@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.dynamics.screws import Body, inertial_force, moving_links
-from urmpipe_models.elementwise import Element, plus
+from urmpipe_models.elementwise import Element, dot, plus, times
 
 
 def mass_matrix(chain: Chain, q: Sequence[Element]) -> list[list[Element]]:
@@ -41,3 +41,28 @@ def mass_matrix(chain: Chain, q: Sequence[Element]) -> list[list[Element]]:
             if i != j:
                 matrix[column][row] = plus(matrix[column][row], entry)
     return matrix
+
+
+def coordinate_sizes(chain: Chain, q: Sequence[Element]) -> list[Element]:
+    """Return what the masses that each coordinate moves could make its entry of M, wherever its axes are.
+
+    |z|^2 times the trace of their second moments about the common origin (see `screws`) of a joint that
+    turns, |v|^2 times their mass of one that slides: what the rounding of M counts from.
+
+    Args:
+        chain: The arm, with masses.
+        q: One element per coordinate, in [rad] or [m].
+
+    Returns:
+        One element per coordinate, in [kg.m2] or [kg].
+    """
+    links, _ = moving_links(chain, q)
+    sizes: list[Element] = [0.0] * len(chain.coordinates)
+    beyond = Body()
+    for link in reversed(links):
+        beyond += link.body
+        (xx, _, _), (_, yy, _), (_, _, zz) = beyond.second
+        turning = times(dot(link.axis, link.axis), plus(plus(xx, yy), zz))
+        size = turning if link.turns else times(dot(link.slide, link.slide), beyond.mass)
+        sizes[link.coordinate] = plus(sizes[link.coordinate], size)
+    return sizes

@@ -90,7 +90,7 @@ def _over(
 
     def fill(block: slice) -> None:
         """Fill the rows of a block."""
-        columns = [list(np.ascontiguousarray(one[block].T)) for one in rows]
+        columns = [list(np.ascontiguousarray(one[block].T, dtype=np.float64)) for one in rows]
         for k, element in enumerate(work(*columns)):
             found[k, block] = element
 

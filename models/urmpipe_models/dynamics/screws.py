@@ -1,4 +1,4 @@
-"""Joints and bodies of an arm in one frame: its base's origin, the axes of the world.
+"""Joints and bodies of an arm in one frame: the origin of its first link, the axes of the world.
 
 A joint's rate q' moves all that it carries by the field v(r) = q' (z x r + v); a body answers to any field
 a(r) = G r + b with forces that its mass, its moment h and its second moments S = sum m r r^T give:
@@ -49,7 +49,7 @@ class Field:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """Masses, about the base's origin in the axes of the world.
+    """Masses, about the common origin in the axes of the world.
 
     Attributes:
         mass: m in [kg].
@@ -70,7 +70,7 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Force:
-    """A force in [N] and its moment about the base's origin in [N.m], along the axes of the world."""
+    """A force in [N] and its moment about the common origin in [N.m], along the axes of the world."""
 
     force: Vector = ZERO
     moment: Vector = ZERO
@@ -86,16 +86,16 @@ class MovingLink:
 
     Attributes:
         coordinate: Index of the coordinate that the joint follows.
+        turns: Whether it turns; else it slides.
         axis: z of a joint that turns, 0 of one that slides, times its multiplier [-].
-        slide: v: what the velocity at the base's origin is a unit of the coordinate, in [m] or [-].
-        frame: Its moving frame.
+        slide: v: what the velocity at the common origin is per unit of the coordinate, in [m] or [-].
         body: What it carries.
     """
 
     coordinate: int
+    turns: bool
     axis: Vector
     slide: Vector
-    frame: Transform
     body: Body
 
     def field(self, rate: Element) -> Field:
@@ -110,7 +110,7 @@ class MovingLink:
 
 
 def moving_links(chain: Chain, q: Sequence[Element]) -> tuple[list[MovingLink], Vector]:
-    """Return the moving joints and bodies of an arm from the base outwards, and the tool centre point [m].
+    """Return the moving joints and bodies of an arm from the base outwards, and where its tool is [m].
 
     Args:
         chain: The arm, with masses.
@@ -120,14 +120,15 @@ def moving_links(chain: Chain, q: Sequence[Element]) -> tuple[list[MovingLink], 
         RobotError: If the arm has no masses.
     """
     arm = links_of(chain)
+    first, *others = link_frames(chain, arm, q)
     found, pose = [], Transform(chain.base.rotation)
-    for link, frame in zip(arm.links, link_frames(chain, arm, q), strict=True):
+    for link, frame in zip(arm.links, (Transform(first.rotation), *others), strict=True):
         pose = pose @ frame
         along = scale(link.multiplier, pose.rotate(link.joint.axis))
         turns = link.joint.kind == "revolute"
         axis, slide = (along, cross(pose.translation, along)) if turns else (ZERO, along)
         body = _placed(pose, link.mass, link.moment, _second_moments(link.inertia))
-        found.append(MovingLink(link.coordinate, axis, slide, pose, body))
+        found.append(MovingLink(link.coordinate, turns, axis, slide, body))
     return found, pose.point(arm.tool.translation)
 
 

@@ -21,7 +21,8 @@ def angle_names(variables: Variables) -> list[str]:
 
 def coordinate_names(variables: Variables, coordinates: Sequence[str]) -> list[str]:
     """Return the names of the coordinates in text, or q1, q2, ... where a formula would be unclear."""
-    taken = {f"{kind}{name}" for kind in "cs" for name in angle_names(variables)} | set(WRENCH)
+    taken = {f"{kind}{name}" for kind in "cs" for name in angle_names(variables)}
+    taken |= {"cos", "sin", *WRENCH}
     plain = all(name.isidentifier() and name not in taken for name in coordinates)
     return list(coordinates) if plain else [f"q{k}" for k in range(1, len(coordinates) + 1)]
 

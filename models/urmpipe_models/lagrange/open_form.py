@@ -9,6 +9,7 @@ from typing import NamedTuple
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.dynamics.links import check_masses
 from urmpipe_models.errors import Finding, RobotError
+from urmpipe_models.lagrange.angles import steps
 from urmpipe_models.lagrange.energies import energies
 from urmpipe_models.lagrange.equations import TERMS, TermName, equations
 from urmpipe_models.lagrange.names import c_symbols
@@ -18,6 +19,10 @@ from urmpipe_models.lagrange.variables import Polynomial, Terms, Variables, vari
 
 MOST = 4
 """Coordinates: with each more the open form grows about tenfold, and nobody reads it."""
+
+MOST_TURNS = 9
+"""Coordinates and turns about axes that are not parallel to the one before: with each more it takes several
+times as long, some 20 s with so many, and joints that follow others turn, too."""
 
 DIGITS = 15
 """Of a coefficient, a sum of rounded products, so many are certain."""
@@ -71,7 +76,7 @@ def open_form(chain: Chain, terms: Sequence[TermName] = TERMS) -> OpenForm:
         terms: The terms to derive.
 
     Raises:
-        RobotError: If the arm has no masses, or too many coordinates.
+        RobotError: If the arm has no masses, or too many coordinates or turns.
         OptionError: If SymPy is not installed.
 
     Source: [Iso9283]_ eq. 8-13, section 4.
@@ -81,6 +86,11 @@ def open_form(chain: Chain, terms: Sequence[TermName] = TERMS) -> OpenForm:
     if count > MOST:
         allowed = f"up to {MOST} in the open form"
         raise RobotError(Finding(about=f"robot {chain.name}", found=f"{count} coordinates", allowed=allowed))
+    turns = sum(step.begins for step in steps(chain))
+    if count + turns > MOST_TURNS:
+        found = f"{count} coordinates and {turns} turns about axes that are not parallel to the one before"
+        allowed = f"up to {MOST_TURNS} of both in the open form"
+        raise RobotError(Finding(about=f"robot {chain.name}", found=found, allowed=allowed))
     variables = variables_of(chain)
     expanded = equations(energies(chain, variables), variables)
     formulas = {term: [_numbers(simplified(one[term], variables)) for one in expanded] for term in terms}

@@ -20,8 +20,8 @@ PARTS = ("visuals", "inertials", "drives")
 def read_carried(table: Table, units: Units) -> dict[str, Any]:
     """Return fields of a chain: what it shows, weighs and is driven by, in SI; faults are noted in the table.
 
-    What the file leaves out is left to a URDF. Masses that it gives take the place of a URDF's, which
-    leave none out any longer.
+    What the file leaves out is left to a URDF. Masses that it gives take the place of a URDF's, whatever is
+    wrong with those.
     """
     rows = {key: table.tables(key) if table.has(key) else [] for key in ("visuals", "inertials")}
     drives = table.named_tables("drives").items()
@@ -31,9 +31,10 @@ def read_carried(table: Table, units: Units) -> dict[str, Any]:
         "drives": tuple(read_drive(name, one) for name, one in drives),
     }
     carried: dict[str, Any] = {key: part for key, part in parts.items() if part}
-    left_out = table.texts("left_out") if table.has("left_out") else ()
-    if left_out or "inertials" in carried:
-        carried["left_out"] = left_out
+    for key in ("left_out", "mass_faults"):
+        texts = table.texts(key) if table.has(key) else ()
+        if texts or "inertials" in carried:
+            carried[key] = texts
     return {**carried, "gravity": table.numbers("gravity", 3, GRAVITY)}
 
 
@@ -49,6 +50,7 @@ def carried_to_dict(chain: Chain) -> dict[str, Any]:
     given: dict[str, Any] = {
         "gravity": [float(value) for value in chain.gravity] if chain.gravity != GRAVITY else [],
         "left_out": list(chain.left_out),
+        "mass_faults": list(chain.mass_faults),
         "visuals": [visual_to_dict(visual) for visual in chain.visuals],
         "inertials": [inertial_to_dict(inertial) for inertial in chain.inertials],
         "drives": {drive.joint: drive_to_dict(drive) for drive in chain.drives},

@@ -34,7 +34,8 @@ def read_urdf(path: str | Path, *, base_link: str | None = None, tip_link: str |
     Every joint between the two is kept, the fixed ones as frames that may carry a sensor. Only the
     three fixed joints that `write_urdf` adds for base, tip and tool become these again. What the links
     between the two look like is kept, too; mesh files are looked up but not opened. Masses are those of the
-    links between the two, and of all that is fixed to them.
+    links between the two, and of all that is fixed to them; if one that moves is not right, none is kept
+    (`Chain.mass_faults`).
 
     Args:
         path: The file.
@@ -55,7 +56,7 @@ def read_urdf(path: str | Path, *, base_link: str | None = None, tip_link: str |
     )
     carriers = list(_carriers(edges, joints, base))
     visuals = [visual for carrier in carriers for visual in _visuals(tree, carrier)]
-    inertials, left_out = chain_masses(tree, carriers)
+    masses = chain_masses(tree, carriers)
     if tree.faults:
         raise RobotError(*tree.faults)
     try:
@@ -67,8 +68,9 @@ def read_urdf(path: str | Path, *, base_link: str | None = None, tip_link: str |
             tool=tool,
             source=Path(path).name,
             visuals=tuple(visual.located(Path(path).parent) for visual in visuals),
-            inertials=inertials,
-            left_out=left_out,
+            inertials=masses.inertials,
+            left_out=masses.left_out,
+            mass_faults=masses.faults,
         )
     except RobotError as error:
         raise RobotError(*(replace(fault, file=tree.file) for fault in error.findings)) from error

@@ -212,7 +212,10 @@ def test_factors_solve_positive_definite_systems(seed: int, size: int) -> None:
     np.testing.assert_allclose(matrix @ found, right, rtol=0.0, atol=1e-13 * np.linalg.cond(matrix))
 
 
-NEEDS_MASS = "so that it cannot be solved; allowed: an inertial that only this joint moves"
+NO_INERTIA = (
+    "no inertia resists its own motion, so that it cannot be solved; allowed: an inertial that only this"
+    " joint moves"
+)
 
 
 def test_joints_that_move_no_mass_are_named() -> None:
@@ -229,9 +232,41 @@ def test_joints_that_move_no_mass_are_named() -> None:
     with pytest.raises(RobotError) as error:
         check_motion(chain)
     assert str(error.value).splitlines() == [
-        f"robot bare: joint {name}: no inertia resists its own motion, {NEEDS_MASS}" for name in ("again", "spin")
+        f"robot bare: joint {name}: {NO_INERTIA}" for name in ("again", "spin")
     ]
     check_motion(with_masses(sliding_arm()))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_point_on_the_axis_of_the_last_joint_is_found_wherever_the_arm_stands(seed: int) -> None:
+    chain = with_masses(load_robot("ur5e"), seed)
+    some = tuple(one for one in chain.inertials if one.joint != "wrist_3_joint")
+    point = Inertial("wrist_3_joint", 0.5, (0.0, 0.0, 0.05))
+    far = from_offset(100.0 * np.random.default_rng(seed).normal(size=3))
+    with pytest.raises(RobotError) as error:
+        check_motion(replace(chain, inertials=(*some, point)).placed(far))
+    assert str(error.value) == f"robot ur5e: joint wrist_3_joint: {NO_INERTIA}"
+    speck = Inertial("wrist_3_joint", 1e-3, (0.0, 0.0, 0.05), (1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0))
+    check_motion(replace(chain, inertials=(*some, speck)).placed(far))
+
+
+def test_an_arm_that_starts_where_a_joint_moves_nothing_is_refused() -> None:
+    """A spherical wrist without masses but of its last joint: with w2 at 0 the axes of w1 and w3 are one."""
+    names = ("w1", "w2", "w3")
+    joints = [Joint(name, axis=axis) for name, axis in zip(names, np.eye(3)[[2, 1, 2]].tolist(), strict=True)]
+    chain = Chain("wrist", tuple(joints), inertials=(body("w3", np.random.default_rng(1)),))
+    with pytest.raises(RobotError) as error:
+        check_motion(chain)
+    assert str(error.value) == (f"robot wrist: joint w3: at its start pose {NO_INERTIA}")
+    check_motion(replace(chain, start=(0.0, 0.5, 0.0)))
+
+
+def test_a_frame_far_before_the_first_joint_costs_no_digits() -> None:
+    chain = with_masses(load_robot("ur5e"))
+    far = replace(chain, joints=(Joint("rail", "fixed", from_offset((1e4, 0.0, 0.0))), *chain.joints))
+    q, qd, qdd = (list(row) for row in random_state(chain, 8))
+    near, there = (forward_dynamics(one, q, qd, qdd) for one in (chain, far))
+    np.testing.assert_allclose(there, near, rtol=1e-12)  # M's condition is some 1e4
 
 
 def test_an_arm_without_masses_says_which_key_is_missing() -> None:

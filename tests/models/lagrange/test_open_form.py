@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from random_arms import Motion, c_terms, compiled, random_arm, random_motion, text_terms
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.chains.inertial import Inertial
 from urmpipe_models.dynamics.inverse import inverse_dynamics
 from urmpipe_models.dynamics.mass_matrix import mass_matrix
@@ -132,6 +132,17 @@ def test_more_than_four_coordinates_are_refused() -> None:
     with pytest.raises(RobotError) as error:
         open_form(arm(5))
     assert str(error.value) == "robot arm: found 5 coordinates, allowed: up to 4 in the open form"
+
+
+def test_too_many_turns_are_refused_those_of_followers_too() -> None:
+    axes = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0))
+    joints = tuple(Joint(f"j{k}", axis=axes[k % 3], mimic=Mimic("j0", 0.5) if k else None) for k in range(11))
+    with pytest.raises(RobotError) as error:
+        open_form(Chain("twister", joints, inertials=(Inertial("j10", 1.0, (0.1, 0.2, 0.3)),)))
+    assert str(error.value) == (
+        "robot twister: found 1 coordinates and 10 turns about axes that are not parallel to the one before,"
+        " allowed: up to 9 of both in the open form"
+    )
 
 
 def test_an_arm_without_masses_is_refused() -> None:

@@ -238,7 +238,7 @@ def test_everything_wrong_is_said_at_once(robot: Any) -> None:
         " acceleration, effort",
         "arm.toml: key nmae: unknown (did you mean name?); allowed: kind, length_unit, angle_unit, name,"
         " description, source, start, base, tool, lengths, tilts, directions, limits, visuals,"
-        " inertials, drives, left_out, gravity",
+        " inertials, drives, left_out, mass_faults, gravity",
     ]
 
 

@@ -16,8 +16,9 @@ from hypothesis.strategies import SearchStrategy
 from asserting import refusal
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.dynamics.links import links_of
+from urmpipe_models.dynamics.links import check_masses, links_of
 from urmpipe_models.errors import RobotError
+from urmpipe_models.robots.robot_file import chain_from_dict, chain_to_dict
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_models.robots.urdf_writer import urdf_text, write_urdf
 from urmpipe_models.transform import translation
@@ -129,9 +130,9 @@ def test_what_hangs_on_base_tip_and_tool_is_carried_by_the_joint_before(urdf: Re
     ]  # fmt: skip
 
 
-def test_what_is_wrong_with_a_mass_is_said_with_link_and_line(urdf: Read) -> None:
-    said = refusal(
-        RobotError, urdf,
+def test_masses_that_are_not_right_are_not_used_and_say_why_with_link_and_line(urdf: Read) -> None:
+    """The kinematics are read; nothing is said of what stands still or moves on its own."""
+    robot = urdf(
         link("r", "<inertial/>"),
         link("a", '<inertial><mass/>\n<inertia ixx="1" iyy="x" izz="1" ixz="0"/></inertial>'),
         link("b", inertial(math.inf, origin='<origin xyz="1"/>')),
@@ -140,28 +141,30 @@ def test_what_is_wrong_with_a_mass_is_said_with_link_and_line(urdf: Read) -> Non
         link("e", inertial(0.0)),
         link("f", "\n" + inertial(-2.0)),
         link("g", '<inertial><mass value="1"/></inertial>'),
+        link("h", inertial(1.0) + inertial(2.0)),
         link("wheel", "<inertial/>"),
         joint("j1", "r", "a"), joint("j2", "a", "b"), joint("j3", "b", "c"), joint("j4", "c", "d"),
         joint("fixed", "c", "e", "fixed"), joint("onto", "a", "f", "fixed"), joint("moves", "b", "g"),
-        joint("rolls", "r", "wheel"),
+        joint("twice", "d", "h", "fixed"), joint("rolls", "r", "wheel"),
         tip_link="d",
     )  # fmt: skip
-    six = "ixx, iyy, izz, ixy, ixz, iyz"
-    assert said.splitlines() == [
-        "arm.urdf:2: link r: inertial: mass: no value; allowed: a number each",
-        f"arm.urdf:2: link r: inertial: inertia: no {six}; allowed: a number each",
+    assert (robot.coordinates, robot.inertials, robot.left_out) == (("j1", "j2", "j3", "j4"), (), ("g",))
+    faults = [
         "arm.urdf:3: link a: inertial: mass: no value; allowed: a number each",
         "arm.urdf:4: link a: inertial: inertia: no ixy, iyz; allowed: a number each",
         "arm.urdf:4: link a: inertial: inertia iyy: found 'x', expected a number",
         "arm.urdf:10: link f: inertial on joint j1: mass -2 kg; allowed: 0 or more",
         "arm.urdf:5: link b: inertial: mass value: found 'inf', expected a number",
         "arm.urdf:5: link b: inertial: origin xyz: found '1', expected three numbers",
-        f"arm.urdf:11: link g: inertial: inertia: no {six}; allowed: a number each",
         "arm.urdf:6: link c: inertial on joint j3: mass -1 kg; allowed: 0 or more",
         "arm.urdf:8: link e: inertial on joint j3: mass 0 with an inertia; allowed: a mass, or no inertia",
         "arm.urdf:7: link d: inertial on joint j4: principal moments 0.1, 0.1, 0.3 kg.m2; allowed: none above"
         " the sum of the other two",
+        "arm.urdf:12: link h: found a second <inertial>; allowed: one",
     ]
+    assert list(robot.mass_faults) == faults
+    assert refusal(RobotError, check_masses, robot).splitlines() == faults
+    assert chain_from_dict(chain_to_dict(robot)) == robot
 
 
 # --- out again -------------------------------------------------------------------------------------
