@@ -40,7 +40,7 @@ from urmpipe_models.dynamics.driven_arm import (
 )
 from urmpipe_models.dynamics.inverse import inverse_dynamics
 from urmpipe_models.dynamics.wrench import Wrench, wrench_power
-from urmpipe_models.errors import UrmpipeError
+from urmpipe_models.errors import UnitError, UrmpipeError
 from urmpipe_models.kinematics.forward import jacobian
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import translation
@@ -228,6 +228,43 @@ def test_a_held_pendulum_swings_with_the_root_of_k_over_j() -> None:
         unit.do_step(n * PERIOD, PERIOD)
     # RK4 in 0.5 ms at 40 rad/s: (0.02)^5 / 120 a step, 200 steps
     assert read(unit, "phi")[0] == pytest.approx(1e-6 * np.cos(rate * 0.1), abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("inertia", "k", "l", "I1", "rate"),  # the rate in [1/s] that is the largest: of what, on the right
+    [
+        (5e-5, 2500.0, 0.1, 0.5, np.sqrt(2500.0 / 5e-5)),  # shaft against link
+        (0.1, 2500.0, 5.0, 5e-4, 5.0 / 5e-4),  # shaft against rotor
+        (0.1, 2500.0, 0.1, 5e-5, 5.0 / np.sqrt(1e-3 * 5e-5)),  # motor: C i_p over the root of L I1
+        (1e-5, 2500.0, 0.0, None, np.sqrt(2500.0 / 1e-5)),  # a held joint without damping
+    ],
+)
+def test_the_internal_step_is_one_at_which_a_stiff_joint_is_stable(
+    inertia: float,
+    k: float,
+    l: float,
+    I1: float | None,
+    rate: float,  # noqa: E741 - the paper's
+) -> None:
+    drive = DRIVE._replace(stiffness=k, damping=l, inertia=I1 or 1.0)
+    chain = Chain(
+        "stiff",
+        (Joint("q"),),
+        inertials=(Inertial("q", 1e-4, (0.0, 0.0, 0.0), (inertia, inertia, inertia, 0.0, 0.0, 0.0)),),
+        drives=(driven("q", drive) if I1 else HeldJoint("q", k, l),),
+    )
+    unit = make_unit("driven_arm", robot=chain)
+    assert 0.7 < unit.internal_step * rate / 1.4 < 1.3  # half of 2.8, and what couples with it
+    arm, coarse = Instance(unit), Instance(unit)
+    for one in (arm, coarse):  # no controller: its samples swing the link by themselves
+        put(one, phi=1e-3, **(dict.fromkeys(("Kphi", "Kw", "Keps"), 0.0) if I1 else {}))
+    put(coarse, internal_step=4.0 * unit.internal_step)
+    for n in range(20):
+        arm.do_step(n * PERIOD, PERIOD)
+    assert abs(read(arm, "phi")[0]) < 1.1e-3
+    with pytest.raises(UnitError, match="is not finite"):
+        for n in range(200):
+            coarse.do_step(n * PERIOD, PERIOD)
 
 
 def test_a_force_on_the_tool_bends_the_springs_by_the_jacobian() -> None:

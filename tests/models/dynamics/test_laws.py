@@ -242,7 +242,7 @@ def test_a_point_on_the_axis_of_the_last_joint_is_found_wherever_the_arm_stands(
     chain = with_masses(load_robot("ur5e"), seed)
     some = tuple(one for one in chain.inertials if one.joint != "wrist_3_joint")
     point = Inertial("wrist_3_joint", 0.5, (0.0, 0.0, 0.05))
-    far = from_offset(100.0 * np.random.default_rng(seed).normal(size=3))
+    far = from_offset((100.0 * np.random.default_rng(seed).normal(size=3)).tolist())
     with pytest.raises(RobotError) as error:
         check_motion(replace(chain, inertials=(*some, point)).placed(far))
     assert str(error.value) == f"robot ur5e: joint wrist_3_joint: {NO_INERTIA}"
