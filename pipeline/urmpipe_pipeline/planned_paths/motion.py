@@ -51,7 +51,7 @@ def run_of_plan(
     return Run(
         name=name, log=log, robot=chain, tsp=tsp, t_ns=t_ns, q=q, qd=qd, qdd=qdd, tcp=tcp,
         tcp_recorded=position, audit=(), warnings=(*warnings, *noticed), provenance=made,
-        tau=None if joints is None else joints.tau,
+        tau=None if joints is None else joints.tau, derivative="" if joints is None else "planned",
     )  # fmt: skip
 
 

@@ -85,6 +85,19 @@ def derivatives(
     return _blanked(_central(q, tsp), 1, broken)
 
 
+def used_method(samples: int, method: Method) -> str:
+    """Return the method that `derivatives` applies to so many samples; empty where they are too few."""
+    if samples < 3:
+        return ""
+    return method if samples > POLYNOMIAL + 1 else "central"
+
+
+def acceleration_words(derivative: str, samples: int) -> str:
+    """Say what made the accelerations of so many samples; nothing where that is not known."""
+    made = {"central": "central differences", "savgol": f"savgol over {_window(samples)} samples"}
+    return f"Accelerations: {made.get(derivative, derivative)}." if derivative else ""
+
+
 def _central(q: FloatArray, tsp: float) -> tuple[FloatArray, FloatArray]:
     """Return the central differences of three samples or more."""
     count = len(q)

@@ -20,12 +20,13 @@ from urmpipe_pipeline.masses import mass_notices
 from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import Provenance, provenance
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
-from urmpipe_pipeline.runs.derivatives import Method, derivatives, other_unit, recorded_agree
+from urmpipe_pipeline.runs.derivatives import Method, derivatives, other_unit, recorded_agree, used_method
 from urmpipe_pipeline.runs.grid import Grid, make_grid
 from urmpipe_pipeline.runs.plausibility import beyond_limits, implausible
 from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded
 from urmpipe_pipeline.runs.results import RowJoints, Run
 from urmpipe_pipeline.runs.robot_inference import infer_robot
+from urmpipe_pipeline.runs.torque_noise import SMOOTHED, noise_warnings
 from urmpipe_pipeline.runs.torques import CHECK_LOG, MOVE_SLOWER, beyond_efforts, torques_of_log
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.sources.clocks.clock import unused_for_poses, unused_period
@@ -123,16 +124,16 @@ def run_of(
     warnings = [*log.warnings, *far_from_recorded(robot, log), *found.warnings, *doubts]
     warnings += [*grid.warnings, *left_open]
     warnings += [unused_period("period")] if clocked and options.period else []
-    qd, qdd = _rates(log, grid, q, _method(log, derivative), grid.steps(found.broken), warnings)
+    qd, qdd, made_by = _rates(log, grid, q, _method(log, derivative), grid.steps(found.broken), warnings)
     tcp, noticed = kinematics(robot, q, qd, qdd)
     recorded = None if log.tcp_position is None else grid.resample(log.tcp_position)
     run = Run(
         name=name or log.name, log=log, robot=robot, tsp=grid.tsp, t_ns=grid.t_ns, q=q, qd=qd, qdd=qdd,
         tcp=tcp, tcp_recorded=recorded, audit=found.entries, warnings=(*warnings, *noticed), provenance=made,
         rows=None if grid.own else RowJoints(grid.source_ns, found.q),
-        tau=torques_of_log(robot, q, qd, qdd),
+        tau=torques_of_log(robot, q, qd, qdd), derivative=made_by,
     )  # fmt: skip
-    return replace(run, warnings=(*run.warnings, *effort_warnings(run)))
+    return replace(run, warnings=(*run.warnings, *torque_warnings(run)))
 
 
 def _of_poses(log: JointLog, robot: Chain | None, made: Provenance, told: Sequence[LogWarning] = ()) -> Run:
@@ -163,8 +164,8 @@ def _method(log: JointLog, derivative: Method | None) -> Method:
 
 def _rates(
     log: JointLog, grid: Grid, q: FloatArray, method: Method, broken: IntArray, warnings: list[LogWarning]
-) -> tuple[FloatArray, FloatArray]:
-    """Return q' and q'' on the grid: the recorded ones where they agree with the differences.
+) -> tuple[FloatArray, FloatArray, str]:
+    """Return q' and q'' on the grid, and what made q'': recorded ones where they agree with differences.
 
     Fewer than three samples have no differences that could contradict what was recorded.
     """
@@ -184,16 +185,21 @@ def _rates(
             hints = [Hint("unit", {name: unit.time}, "reads the time so") for name in clocks[:1] if unit.time]
         said += "; the differences are used"
         warnings.append(LogWarning(f"recorded-{word}", said, hints=tuple(hints)))
-    return result[0], result[1]
+    rates, seconds = result
+    return rates, seconds, used_method(len(q), method) if seconds is qdd else "recorded"
 
 
-def effort_warnings(run: Run) -> list[LogWarning]:
+def torque_warnings(run: Run) -> list[LogWarning]:
+    """Return what there is to say about torques: that they are noise, or more than the joints' efforts."""
+    return [*noise_warnings(run), *_effort_warnings(run)]
+
+
+def _effort_warnings(run: Run) -> list[LogWarning]:
     """Return a warning if the motion of a run takes more than the efforts of its joints."""
     log, summaries = run.log, run.torque_summaries()
     if log.source == SOLVED:
         return beyond_efforts(summaries, run.t_ns, MOVE_SLOWER, run.rows_ns)
-    smoothed = log.qdd is not None or _method(log, run.provenance.options.get("derivative")) == "savgol"
-    hints = () if smoothed else (Hint("derivative", "savgol", "smooths the accelerations"),)
+    hints = (SMOOTHED,) if run.derivative == "central" else ()
     return beyond_efforts(summaries, run.t_ns, CHECK_LOG, run.rows_ns, hints)
 
 

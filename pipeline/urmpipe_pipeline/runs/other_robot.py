@@ -12,16 +12,18 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.masses import MASS_LEFT_OUT
 from urmpipe_pipeline.meshes import VISUAL_MISSING
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
-from urmpipe_pipeline.runs.ingest import EULER_SINGULAR, effort_warnings, kinematics
+from urmpipe_pipeline.runs.ingest import EULER_SINGULAR, kinematics, torque_warnings
 from urmpipe_pipeline.runs.plausibility import JOINT_LIMIT, SPEED_LIMIT, beyond_limits, implausible
 from urmpipe_pipeline.runs.recorded_start import RECORDED_START
 from urmpipe_pipeline.runs.recorded_tcp import FAR_RECORDED, far_from_recorded
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.torque_noise import TORQUE_NOISE
 from urmpipe_pipeline.runs.torques import EFFORT_LIMIT, torques_of_log
 
 BY_LIMITS = (JOINT_LIMIT, SPEED_LIMIT)
 OF_ROBOT = (
     EULER_SINGULAR, VISUAL_MISSING, MASS_LEFT_OUT, FAR_RECORDED, RECORDED_START, *BY_LIMITS, EFFORT_LIMIT,
+    TORQUE_NOISE,
 )  # fmt: skip
 """The kinds of the warnings that rest on the robot."""
 
@@ -44,7 +46,7 @@ def on_robot(run: Run, robot: Chain | None) -> Run:
     made = replace(run.provenance, options={**run.provenance.options, "robot": robot.name})
     warnings = (*others, *doubts)
     moved = replace(run, robot=robot, tcp=tcp, tau=tau, warnings=warnings, provenance=made)
-    return replace(moved, warnings=(*warnings, *effort_warnings(moved)))
+    return replace(moved, warnings=(*warnings, *torque_warnings(moved)))
 
 
 def _refuse_other_kinds(run: Run, robot: Chain) -> None:

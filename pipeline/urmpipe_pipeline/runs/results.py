@@ -62,7 +62,9 @@ class Run(Result):
         recording: Where it was written.
         rows: The joints on the file's rows where the grid has other samples; else None.
         tau: Torques of the joints in [N.m] or [N], shape (g, joints), NaN where a rate is; None of a robot
-            without masses and of still poses.
+            without masses, of still poses, and where no sample has one.
+        derivative: What made the accelerations: central, savgol, recorded or planned; empty without any, and
+            in recordings that do not tell.
     """
 
     name: str
@@ -81,6 +83,7 @@ class Run(Result):
     recording: Path | None = field(default=None, metadata={"stored": False})
     rows: RowJoints | None = None
     tau: FloatArray | None = field(default=None, metadata={"path": "joints/torque"})
+    derivative: str = ""
 
     @property
     def resampled(self) -> bool:
@@ -219,6 +222,7 @@ class Run(Result):
             "inferences": [one.to_dict(voice) for one in self.log.inferences],
             "repolarizations": [entry.to_dict() for entry in self.repolarizations],
             "audit": [entry.to_dict() for entry in self.audit],
+            "derivative": self.derivative or None,
             "torques": [one.to_dict() for one in self.torque_summaries()],
             "warnings": [one.to_dict(voice) for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,

@@ -14,6 +14,7 @@ from urmpipe_models.dynamics.over_log import energies_over_log, terms_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.figure import Computed, Figure, Line, Panel, View
+from urmpipe_pipeline.runs.derivatives import acceleration_words
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.runs.torques import PERIOD_ASSUMED
 
@@ -53,11 +54,12 @@ def joint_torques_figure(run: Run, robot: Chain, tau: FloatArray) -> Figure:
         views.append(View(f"Torque of {name}", (panel,)))
     caption = "What the joints must exert for this motion, by the masses of the robot (inverse dynamics);"
     caption += " friction and a load at the tool are not in it."
-    caption += " First all joints, then each, numbered from the base."
+    made = acceleration_words(run.derivative, len(run.t_ns))
+    caption += f"{f' {made}' if made else ''} First all joints, then each, numbered from the base."
     if not limited:
         caption += f" {PERIOD_ASSUMED}"
     elif any(math.isfinite(joint.effort) for joint in robot.moving):
-        caption += " Dashed: its effort limit; tinted: where it is not enough."
+        caption += " Dashed: its effort limit; blue: within it; red: beyond it."
     return Figure("Joint torques", caption, partial(_largest_words, run), tuple(views), share=2.2)
 
 

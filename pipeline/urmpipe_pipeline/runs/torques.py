@@ -56,13 +56,13 @@ class TorqueSummary:
 
     @property
     def effort_share(self) -> float | None:
-        """The largest share of its limit that it takes, above 1 beyond it; None without a limit."""
-        return None if self.effort is None else self.max / self.effort
+        """The largest share of its limit that it takes, above 1 beyond it; None without limit or samples."""
+        return None if self.effort is None or not self.samples else self.max / self.effort
 
     @property
     def share_out(self) -> float | None:
-        """Share of the samples beyond the limit, 0 to 1; None without a limit."""
-        return None if self.effort is None else len(self.beyond) / max(self.samples, 1)
+        """Share of the samples beyond the limit, 0 to 1; None without limit or samples."""
+        return None if self.effort is None or not self.samples else len(self.beyond) / self.samples
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as `urmpipe ingest --json` prints it."""
@@ -71,7 +71,7 @@ class TorqueSummary:
 
 
 def torques_of_log(robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> FloatArray | None:
-    """Return the torques of the joints in [N.m] or [N], shape (n, joints), NaN where a rate is.
+    """Return the torques of the joints in [N.m] or [N], (n, joints), NaN where a rate is; None if all are.
 
     Args:
         robot: The arm; None, and one without masses, has none.
@@ -81,7 +81,8 @@ def torques_of_log(robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: Floa
     """
     if robot is None or not robot.inertials or q.shape[1] == 0:
         return None
-    return torque_over_log(robot, q, qd, qdd)
+    tau = torque_over_log(robot, q, qd, qdd)
+    return tau if np.isfinite(tau).any() else None
 
 
 def torque_summaries(

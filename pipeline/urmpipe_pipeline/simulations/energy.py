@@ -25,11 +25,13 @@ class EnergyBalance:
         supplied: Work done on the system from outside, at these blocks, in [J], shape (n,).
         lost: Heat and damping in [J], shape (n,).
         stored: Change of the stored energy in [J], shape (n,).
+        at_first: Stored at the first sample in [J], the sizes of all blocks added up.
     """
 
     supplied: FloatArray
     lost: FloatArray
     stored: FloatArray
+    at_first: float
 
     @property
     def residual(self) -> FloatArray:
@@ -45,8 +47,12 @@ class EnergyBalance:
         return int(known[np.argmax(size[known])]) if len(known) else None
 
     def share(self, residual: float) -> float:
-        """Return a residual in [J] as a share of the largest of the three energies; 0 where all are 0."""
-        sizes = np.abs([self.supplied, self.lost, self.stored])
+        """Return a residual in [J] as a share of the largest energy; 0 where all are 0.
+
+        What is stored at the first sample is among them: what a system
+        that exchanges nothing gains is all residual.
+        """
+        sizes = np.abs(np.concatenate((self.supplied, self.lost, self.stored, [self.at_first])))
         largest = float(np.max(sizes, where=np.isfinite(sizes), initial=0.0))
         return abs(residual) / largest if largest > 0.0 else 0.0
 
@@ -65,11 +71,15 @@ def energy_balance(signals: Iterable[tuple[str, FloatArray]]) -> EnergyBalance |
             block has counts as 0.
     """
     sums: dict[str, FloatArray] = {}
+    at_first = 0.0
     for variable, values in signals:
         with np.errstate(invalid="ignore"):
             change = (values - values[:1]).sum(axis=1)
             sums[variable] = sums.get(variable, 0.0) + change
+        if variable == "energy_stored":
+            at_first += float(np.nansum(np.abs(values[:1])))
     if not sums:
         return None
     none = np.zeros(len(next(iter(sums.values()))))
-    return EnergyBalance(*(sums.get(variable, none) for variable in ENERGIES))
+    supplied, lost, stored = (sums.get(variable, none) for variable in ENERGIES)
+    return EnergyBalance(supplied, lost, stored, at_first)

@@ -158,7 +158,7 @@ def _energy_fact(simulation: Simulation, balance: EnergyBalance) -> Fact:
     blocks = text.counted(len({one.block for one in simulation.signals if one.is_energy}), "block")
     at, share = text.seconds(float(simulation.t[worst])), text.percent(balance.share(residual))
     words = f"not accounted for: at most {residual:.4g} J at t = {at} s, {share} of the largest energy"
-    return Fact(ENERGY, f"{blocks}; {words} ({RESIDUAL_CAUSES})")
+    return Fact(ENERGY, f"{blocks}; {words} in, lost or stored ({RESIDUAL_CAUSES})")
 
 
 def _sections(simulation: Simulation) -> Iterator[Section]:

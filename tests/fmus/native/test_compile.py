@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from made_masses import with_drives, with_masses
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import guid_header, native_binaries, native_missing, native_sources, this_platform
 from urmpipe_fmus.native.compile import TARGETS
@@ -269,7 +270,8 @@ def test_zig_compiles_for_this_platform_where_there_is_no_other_compiler(
 def test_sanitizers_find_nothing(oscillator: Unit, player: Unit, elementary: Unit, tmp_path: Path) -> None:
     sanitized = ["cc", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
     program = host(tmp_path, [*sanitized, "-ldl"])
-    for unit in (oscillator, player, elementary):
+    arm = make_unit("driven_arm", robot=with_drives(with_masses(load_robot("urm6")), held=["phi6"]))
+    for unit in (oscillator, player, elementary, arm):
         folder = tmp_path / unit.name
         write(folder, unit, [])
         library = folder / "unit.so"

@@ -45,6 +45,14 @@ def test_energies_of_all_blocks_count_from_the_first_sample(swinging: Simulation
     assert swinging.to_dict()["energy"] == {"in": 10.0, "lost": 6.0, "stored": 4.0, "residual": 0.0}
 
 
+def test_the_share_of_a_system_that_exchanges_nothing_is_of_what_it_stores() -> None:
+    kinetic, potential = np.array([0.0, 3.0, 5.0]), np.array([5.0, 2.0, 1e-6])
+    stored = np.column_stack((kinetic + potential, [-3.0, -3.0, -3.0]))
+    balance = there(energy_balance([("energy_stored", stored)]))
+    assert balance.at_first == 8.0
+    assert balance.share(balance.residual[2]) == pytest.approx(1e-6 / 8.0)
+
+
 def test_the_balance_stands_before_the_blocks_and_only_there(swinging: Simulation) -> None:
     body = present(swinging).body
     assert [one.title for one in body.sections] == ["Energy balance", "a"]
@@ -58,7 +66,7 @@ def test_the_balance_stands_before_the_blocks_and_only_there(swinging: Simulatio
     fact = facts(body)["Energy balance"]
     assert fact == (
         "2 blocks; not accounted for: at most 0.5 J at t = 0.005 s, 5.0 % of the largest energy"
-        " (coupling of the blocks, or a block without energies)"
+        " in, lost or stored (coupling of the blocks, or a block without energies)"
     )
     assert "(coupling of the blocks, or a block without energies)" in figure.caption
 
