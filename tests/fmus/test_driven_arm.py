@@ -231,7 +231,13 @@ def test_a_held_pendulum_swings_with_the_root_of_k_over_j() -> None:
 
 
 @pytest.mark.parametrize(
-    ("inertia", "k", "l", "I1", "rate"),  # the rate in [1/s] that is the largest: of what, on the right
+    (
+        "inertia",
+        "stiffness",
+        "damping",
+        "rotor",
+        "rate",
+    ),  # the rate in [1/s] that is the largest: of what, on the right
     [
         (5e-5, 2500.0, 0.1, 0.5, np.sqrt(2500.0 / 5e-5)),  # shaft against link
         (0.1, 2500.0, 5.0, 5e-4, 5.0 / 5e-4),  # shaft against rotor
@@ -240,24 +246,20 @@ def test_a_held_pendulum_swings_with_the_root_of_k_over_j() -> None:
     ],
 )
 def test_the_internal_step_is_one_at_which_a_stiff_joint_is_stable(
-    inertia: float,
-    k: float,
-    l: float,
-    I1: float | None,
-    rate: float,  # noqa: E741 - the paper's
+    inertia: float, stiffness: float, damping: float, rotor: float | None, rate: float
 ) -> None:
-    drive = DRIVE._replace(stiffness=k, damping=l, inertia=I1 or 1.0)
+    drive = DRIVE._replace(stiffness=stiffness, damping=damping, inertia=rotor or 1.0)
     chain = Chain(
         "stiff",
         (Joint("q"),),
         inertials=(Inertial("q", 1e-4, (0.0, 0.0, 0.0), (inertia, inertia, inertia, 0.0, 0.0, 0.0)),),
-        drives=(driven("q", drive) if I1 else HeldJoint("q", k, l),),
+        drives=(driven("q", drive) if rotor else HeldJoint("q", stiffness, damping),),
     )
     unit = make_unit("driven_arm", robot=chain)
     assert 0.7 < unit.internal_step * rate / 1.4 < 1.3  # half of 2.8, and what couples with it
     arm, coarse = Instance(unit), Instance(unit)
     for one in (arm, coarse):  # no controller: its samples swing the link by themselves
-        put(one, phi=1e-3, **(dict.fromkeys(("Kphi", "Kw", "Keps"), 0.0) if I1 else {}))
+        put(one, phi=1e-3, **(dict.fromkeys(("Kphi", "Kw", "Keps"), 0.0) if rotor else {}))
     put(coarse, internal_step=4.0 * unit.internal_step)
     for n in range(20):
         arm.do_step(n * PERIOD, PERIOD)
