@@ -27,7 +27,7 @@ from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
 from urmpipe_models.dynamics.forward import forward_dynamics
 from urmpipe_models.dynamics.inverse import inverse_dynamics
 from urmpipe_models.dynamics.mass_centres import mass_centres, mass_motions
-from urmpipe_models.dynamics.mass_matrix import mass_matrix
+from urmpipe_models.dynamics.mass_matrix import coordinate_sizes, mass_matrix
 from urmpipe_models.dynamics.terms import torque_terms
 from urmpipe_models.dynamics.wrench import Wrench, wrench_power
 from urmpipe_models.robots.catalogue import load_robot
@@ -67,7 +67,7 @@ def test_equations_of_motion_trace(arm: Chain) -> None:
     assert_traced(lambda q, v, a, w: inverse_dynamics(chain, q, v, a, wrench_of(w)), [n, n, n, 6])
     assert_traced(lambda q, v, a, w: torque_terms(chain, q, v, a, wrench_of(w)), [n, n, n, 6])
     assert_traced(lambda q, v, a, w: forward_dynamics(chain, q, v, a, wrench_of(w)), [n, n, n, 6])
-    assert_traced(lambda q: mass_matrix(chain, q), [n])
+    assert_traced(lambda q: [mass_matrix(chain, q), coordinate_sizes(chain, q)], [n])
     assert_traced(lambda q, v: [kinetic_energy(chain, q, v), potential_energy(chain, q)], [n, n])
     assert_traced(lambda q, v, w: wrench_power(chain, q, v, wrench_of(w)), [n, n, 6])
     assert_traced(lambda q: mass_centres(chain, q), [n])
