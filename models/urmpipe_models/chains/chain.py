@@ -153,7 +153,7 @@ class Chain(Shown):
             yield f"start has {len(self.start)} values; allowed: {len(self.coordinates)}, one a coordinate"
 
     def _drive_faults(self) -> Iterator[str]:
-        """Yield what is wrong with the drives and the joints that they name."""
+        """Yield the faults of the drives, and drives of joints that have no coordinate or have two."""
         driven = [one.joint for one in self.drives]
         for one in self.drives:
             yield from one.faults()

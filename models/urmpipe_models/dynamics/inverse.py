@@ -54,8 +54,9 @@ def inverse_dynamics(
         force, moment = add(force, own_force), add(moment, own_moment)
         along = dot(link.joint.axis, moment if link.joint.kind == "revolute" else force)
         torques[link.coordinate] = plus(torques[link.coordinate], times(link.multiplier, along))
-        force = frame.rotate(force)
-        moment = add(frame.rotate(moment), cross(frame.translation, force))
+        if link is not arm.links[0]:  # nothing is wanted of what the base holds
+            force = frame.rotate(force)
+            moment = add(frame.rotate(moment), cross(frame.translation, force))
     return torques
 
 

@@ -36,7 +36,7 @@ KINDS: tuple[JointKind, ...] = ("revolute", "prismatic", "fixed")
 
 
 def random_arm(seed: int) -> Chain:
-    """Two to five joints of any kind and axis, some of which follow another."""
+    """An arm of two to five joints of any kind and axis; some follow another."""
     rng = np.random.default_rng(seed)
     joints: list[Joint] = []
     for k in range(rng.integers(2, 6)):
@@ -145,7 +145,7 @@ def test_forward_dynamics_undo_the_inverse(seed: int) -> None:
     qdd = forward_dynamics(chain, q, qd, tau, wrench)
     again = inverse_dynamics(chain, q, qd, qdd, wrench)
     terms = np.array(torque_terms(chain, q, qd, qdd, wrench), dtype=float)
-    # factors of a positive definite matrix leave rounding of what is summed, whatever its condition
+    # the residual of a positive definite system is rounding of the terms, whatever its condition
     np.testing.assert_allclose(again, tau, rtol=0.0, atol=1e-12 * (1.0 + np.abs(terms).sum()))
 
 

@@ -103,7 +103,7 @@ def draw_body(
 
 
 def _seen_through(visual: Visual) -> Visual:
-    """Return a shape so that what is inside it can be seen."""
+    """Return a shape that is translucent, so that the masses inside it show."""
     red, green, blue, opacity = visual.colour or WHITE
     return replace(visual, colour=(red, green, blue, SEEN_THROUGH * opacity))
 
