@@ -8,7 +8,7 @@ from difflib import SequenceMatcher
 
 from urmpipe_models.errors import shown
 
-MOST_LISTED = 12
+MOST_LISTED = 16
 """So many names are listed; of more, those most like the one that was given."""
 LEAST_LIKE = 0.6
 """Share of letters that two names have in common, from where on one may have been meant by the other."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -15,18 +16,20 @@ from scipy.optimize import root
 from asserting import refusal
 from fmu_run import FmuRun
 from made_masses import DRIVE, driven, with_drives, with_masses
+from sliding_arm import sliding_arm
 from urmpipe_fmus.cache import cached_fmu
 from urmpipe_fmus.cosim import Block, Recorded, System, load_system, prepare, simulate
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
+from urmpipe_fmus.units.driven_arm import starts_under
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.chains.inertial import Inertial
 from urmpipe_models.drives.controller import Gains
 from urmpipe_models.drives.drive import Drive
-from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint
+from urmpipe_models.drives.joint_drives import NO_SPRING, DrivenJoint, HeldJoint, ReliefSpring
 from urmpipe_models.drives.set_point import trapezoid
 from urmpipe_models.dynamics.driven_arm import (
     Actuator,
@@ -36,12 +39,15 @@ from urmpipe_models.dynamics.driven_arm import (
     at_rest,
     energies,
     joint_accelerations,
+    joint_torques,
     motor_rates,
+    shaft_torques,
 )
 from urmpipe_models.dynamics.inverse import inverse_dynamics
+from urmpipe_models.dynamics.sampled_loop import spectral_radius
 from urmpipe_models.dynamics.wrench import Wrench, wrench_power
-from urmpipe_models.errors import UnitError, UrmpipeError
-from urmpipe_models.kinematics.forward import jacobian
+from urmpipe_models.errors import RobotError, UnitError, UrmpipeError
+from urmpipe_models.kinematics.forward import forward, jacobian
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import translation
 
@@ -100,7 +106,7 @@ class OneSystem:
         for k, (one, rest) in enumerate(zip(self.joints, self.rests, strict=True)):
             if isinstance(one, DrivenJoint):
                 theta1, omega1, current = motors[k]
-                actuators.append(Motor(one.drive, theta1, omega1, current, self.voltages[k]))
+                actuators.append(Motor(one.drive, theta1, omega1, current, self.voltages[k], one.spring))
             else:
                 actuators.append(Spring(one.stiffness, one.damping, rest.rest))
         return ArmState(list(x[: self.n]), list(x[self.n : 2 * self.n]), actuators)
@@ -418,3 +424,275 @@ def test_at_5_ms_the_blocks_are_unstable_and_at_2_5_ms_they_are_not() -> None:
     for k in range(1, 7):
         late = fine.column("arm", f"phi[{k}]")[-1] - fine.column(f"set_point{k}", "theta")[-1]
         assert abs(late) < 1e-3
+
+
+# Springs beside drives
+
+
+def sprung() -> Chain:
+    """The sliding arm with springs beside its drives, two periods, and a wrist that is held."""
+    chain = with_drives(with_masses(sliding_arm()), held=["wrist"])
+    turn, slide, wrist = chain.drives
+    assert isinstance(turn, DrivenJoint)
+    assert isinstance(slide, DrivenJoint)
+    calm = Gains(3.75, 0.375, 0.005)
+    return replace(
+        chain,
+        drives=(
+            replace(turn, gains=calm, spring=ReliefSpring(1000.0, 0.315)),
+            replace(slide, gains=calm, spring=ReliefSpring(2000.0, 0.195), period=7.5e-3),
+            wrist,
+        ),
+    )
+
+
+def without_springs(chain: Chain) -> Chain:
+    drives = (replace(one, spring=NO_SPRING) if isinstance(one, DrivenJoint) else one for one in chain.drives)
+    return replace(chain, drives=tuple(drives))
+
+
+PUSH = Wrench((20.0, -15.0, 25.0), (1.0, -2.0, 1.5))
+
+
+def test_a_spring_beside_a_drive_takes_its_torque_from_the_drive_and_the_arm_stays_at_rest() -> None:
+    chain = sprung()
+    relieved, plain = at_rest(chain), at_rest(without_springs(chain))
+    for one, own, other, q in zip(chain.drives, relieved, plain, chain.start, strict=True):
+        if isinstance(one, DrivenJoint):
+            torque = one.spring.stiffness * (one.spring.rest - q)
+            assert abs(torque) > 5.0
+            # differences of some 10 V, of rounded torques
+            assert other.voltage - own.voltage == pytest.approx(torque * 0.5 / (100.0 * 0.05), abs=1e-13)
+            assert abs(own.voltage) < abs(other.voltage)
+            assert own.rest == pytest.approx(other.rest - torque / 2500.0, abs=1e-15)
+        else:
+            assert own == other
+    unit = Instance(make_unit("driven_arm", robot=chain))
+    for n in range(20):
+        unit.do_step(n * PERIOD, PERIOD)
+    stayed = read(unit, "phi", "s")[[0, 2, 1]]
+    np.testing.assert_allclose(
+        stayed, chain.start, rtol=0.0, atol=1e-12
+    )  # rounding of torques over 2500 N.m/rad
+    np.testing.assert_allclose(
+        read(unit, "last", "last_s"), [one.voltage for one in relieved[:2]], rtol=0.0, atol=1e-9
+    )  # of it by gains of 4 V/rad, and of accelerations
+
+
+def test_the_torque_of_a_spring_is_what_its_energy_changes_by() -> None:
+    chain = sprung()
+    spring = ReliefSpring(300.0, 0.7)
+    actuators: list[Actuator] = [
+        Motor(DRIVE, 0.1, 0.2, 0.3, 0.4, spring),
+        Motor(DRIVE, 0.1, 0.2, 0.3, 0.4),
+        Spring(9.0, 1.0, 0.2),
+    ]
+    still = [0.0, 0.0, 0.0]
+
+    def own_energy(q: float) -> float:
+        """What the spring adds to the energy of the arm."""
+        bare = [actuators[1], *actuators[1:]]
+        with_it, without = (
+            energies(chain, ArmState([q, 0.1, 0.3], still, each), None).stored for each in (actuators, bare)
+        )
+        return float(with_it - without)
+
+    for q in (-0.4, 0.7, 1.1):
+        state = ArmState([q, 0.1, 0.3], still, actuators)
+        added = np.subtract(joint_torques(state), shaft_torques(state))
+        # of a square the difference is exact to rounding: 1e2 J * 1e-15 / 1e-3
+        slope = (own_energy(q + 1e-3) - own_energy(q - 1e-3)) / 2e-3
+        np.testing.assert_allclose(added, [-slope, 0.0, 0.0], rtol=0.0, atol=1e-9)
+        assert added[0] == pytest.approx(300.0 * (0.7 - q), abs=1e-12)
+
+
+def test_with_springs_no_energy_is_lost_and_the_unit_is_what_dop853_makes_of_the_equations() -> None:
+    chain = sprung()
+    chain = replace(chain, drives=tuple(
+        replace(one, period=PERIOD) if isinstance(one, DrivenJoint) else one for one in chain.drives
+    ))  # fmt: skip
+    wanted = moves(chain, np.array([0.6, 0.4, 0.0]))
+    whole, unit = OneSystem(chain, PUSH), Instance(make_unit("driven_arm", robot=chain))
+    put(unit, internal_step=2.5e-4, force=PUSH.force, moment=PUSH.moment)
+    before = whole.stored()
+    for n in range(16):
+        whole.sample(wanted(n * PERIOD))
+        whole.go(PERIOD)
+        (turn, slide, _), names = wanted(n * PERIOD).T, ("set_{}", "set_{}d", "set_{}dd")
+        for kind, points in (("phi", turn), ("s", slide)):
+            put(unit, **{name.format(kind): value for name, value in zip(names, points, strict=True)})
+        unit.do_step(n * PERIOD, PERIOD)
+    # RK4 in 0.25 ms: (h / 2 ms)^4 of the armature's time, of values that change by some 1
+    found = read(unit, "phi", "s", "theta1", "theta1_s")[[0, 2, 1, 3, 4]]
+    np.testing.assert_allclose(found, whole.x[[0, 1, 2, 6, 7]], rtol=0.0, atol=1e-7)
+    work, lost = whole.x[-4:-2]
+    change = whole.stored() - before
+    stretched = [
+        0.5 * one.spring.stiffness * ((one.spring.rest - q) ** 2 - (one.spring.rest - start) ** 2)
+        for one, q, start in zip(chain.drives, whole.x, chain.start, strict=False)
+        if isinstance(one, DrivenJoint)
+    ]
+    assert min(map(abs, stretched)) > 1e-3 * abs(work)  # no spring is lost in the bound of the balance
+    assert abs(work - change - lost) <= 1e-8 * abs(work)
+    stored, given, heat = read(unit, "energy_stored", "energy_in", "energy_lost")
+    assert abs(given - (stored - before) - heat) <= 1e-6 * abs(given)
+
+
+@needs_native
+def test_a_native_fmu_has_the_springs_of_the_instance() -> None:
+    unit, count = make_unit("driven_arm", robot=sprung()), 10
+    rng = np.random.default_rng(4)
+    columns = {
+        "set_phi": rng.uniform(0.25, 0.35, (count, 1)), "set_s": rng.uniform(0.15, 0.25, (count, 1)),
+        "force": rng.uniform(-9.0, 9.0, (count, 3)),
+    }  # fmt: skip
+    springs = {"k_spring": 800.0, "rest_spring": 0.4, "k_spring_s": 1500.0, "rest_spring_s": 0.1}
+    t = 2.5e-3 * np.arange(count, dtype=np.float64)
+    shown = [one.name for one in unit.variables if one.causality == "output"]
+    instance, expected = Instance(unit), []
+    put(instance, **springs)
+    for k, time in enumerate(t.tolist()):
+        put(instance, **{name: column[k] for name, column in columns.items()})
+        expected.append(read(instance, *shown))
+        instance.do_step(time, 2.5e-3)
+    with FmuRun(cached_fmu(unit, "native"), unit, springs) as fmu:
+        found = fmu.over(t, columns)
+    with FmuRun(cached_fmu(unit, "native"), unit, {}) as fmu:
+        assert np.abs(fmu.over(t, columns) - found).max() > 1e-2  # what the FMU is given counts
+    size = np.maximum(1.0, np.abs(expected).max(axis=0))
+    # as of any unit (test_three_ways.py): sines of other libraries differ in the last place
+    assert (np.abs(found - expected) / size).max() <= 1e-12
+
+
+def test_a_stiff_spring_beside_a_drive_shortens_the_internal_step() -> None:
+    stiff = replace(driven("q"), spring=ReliefSpring(1e7, 0.0))
+    inertia = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
+    chain = Chain(
+        "stiff", (Joint("q"),), inertials=(Inertial("q", 1e-4, (0.0, 0.0, 0.0), inertia),), drives=(stiff,)
+    )
+    unit = make_unit("driven_arm", robot=chain)
+    # 1.4 over the root of k_spring / J; the drive's own 2500 N.m/rad are 1e-4 of it
+    assert unit.internal_step == pytest.approx(1.4 / np.sqrt(1e7 / 0.1), rel=1e-2)
+    arm = Instance(unit)
+    put(arm, phi=1e-3, Kphi=0.0, Kw=0.0, Keps=0.0)
+    for n in range(20):
+        arm.do_step(n * PERIOD, PERIOD)
+    assert abs(read(arm, "phi")[0]) < 1.1e-3
+
+
+# At rest under a force
+
+
+LENGTH = 0.3
+UPPER = 0.5
+
+
+def wristed() -> Chain:
+    """Two level links: the shoulder with a drive, the wrist held by 2500 N.m/rad."""
+    lifting = (0.0, -1.0, 0.0)
+    return Chain(
+        "wristed",
+        (Joint("shoulder", axis=lifting), Joint("wrist", origin=translation(UPPER, 0.0, 0.0), axis=lifting)),
+        tip=translation(LENGTH, 0.0, 0.0),
+        inertials=(Inertial("shoulder", 3.0, (0.2, 0.0, 0.0)), Inertial("wrist", 1.0, (0.1, 0.0, 0.0))),
+        drives=(driven("shoulder"), HeldJoint("wrist", 2500.0, 5.0)),
+    )
+
+
+def test_a_held_wrist_yields_to_a_force_by_its_square_of_the_length_and_no_drive_moves() -> None:
+    chain, force = wristed(), 1e-2
+    before, under = at_rest(chain), at_rest(chain, Wrench((0.0, 0.0, force)))
+    assert before[1].q == 0.0
+    tip = forward(chain, [one.q for one in under])[-1].translation
+    # the shift is 3.6e-7 m: the second order is 1e-6 of it, and settling to 1e-12 rad as much
+    assert tip[2] == pytest.approx(force * LENGTH**2 / 2500.0, rel=5e-6)
+    assert under[0].q == 0.0
+    assert under[1].rest == before[1].rest  # the same spring
+    lifted = force * (UPPER + LENGTH)  # N.m that the shoulder need not give
+    # of currents of some 2 A, rounded
+    assert before[0].current - under[0].current == pytest.approx(lifted / 5.0, rel=1e-6)
+    moving = Instance(make_unit("driven_arm", robot=chain))
+    put(moving, **starts_under(chain, (0.0, 0.0, 30.0)))
+    start = read(moving, "phi", "last")
+    assert start[1] > 3e-3
+    for n in range(10):
+        moving.do_step(n * PERIOD, PERIOD)
+    np.testing.assert_allclose(read(moving, "phi", "last"), start, rtol=0.0, atol=1e-8)
+
+
+def test_a_force_that_is_too_large_for_the_springs_is_refused() -> None:
+    weak = replace(wristed(), drives=(driven("shoulder"), HeldJoint("wrist", 50.0, 1.0)))
+    assert at_rest(weak, Wrench((0.0, 0.0, 10.0)))[1].q == pytest.approx(0.06, abs=1e-3)
+    said = "robot wristed: force: found more than the springs of its held joints bear, allowed: less"
+    assert refusal(RobotError, at_rest, weak, Wrench((0.0, 0.0, 1e3))) == said
+    volts = refusal(RobotError, at_rest, wristed(), Wrench((0.0, 0.0, -1e3)))
+    needed = 0.5 / 5.0 * (1e3 * UPPER)  # V of the force at the wrist alone
+    match = re.fullmatch(
+        r"robot wristed: drives.shoulder: needs ([\d.]+) V to hold the arm at its start,"
+        r" allowed: u_max, 48 V",
+        volts,
+    )
+    assert match
+    assert needed < float(match[1]) < 2.0 * needed
+
+
+# The stability of the samples
+
+
+def states_of(chain: Chain) -> list[str]:
+    """Return the scalars of the unit that go from sample to sample: states and held voltages."""
+    unit = make_unit("driven_arm", robot=chain)
+    kept = (*unit.states, *(one for one in unit.memories if one.name.startswith("last")))
+    return [name for one in kept if not one.name.startswith("energy") for name in one.names]
+
+
+def radius_of_the_unit(chain: Chain, round_: float) -> float:
+    """Return the spectral radius of a round of samples by differences of the unit, to the shortest period."""
+    unit, names = make_unit("driven_arm", robot=chain), states_of(chain)
+    instance = Instance(unit)
+    rest = np.array(instance.get([instance.reference(name) for name in names]), dtype=np.float64)
+    moved = 1e-6 * np.hstack((np.eye(len(names)), -np.eye(len(names))))
+    put(instance, internal_step=1e-4)
+    instance.set([instance.reference(name) for name in names], list(rest[:, np.newaxis] + moved))
+    steps = round(round_ / 2.5e-3)
+    for n in range(steps):
+        instance.do_step(n * 2.5e-3, 2.5e-3)
+    found = np.array(instance.get([instance.reference(name) for name in names]), dtype=np.float64)
+    plus, minus = np.hsplit(found, 2)
+    size = np.abs(np.linalg.eigvals((plus - minus) / 2e-6)).max()
+    shortest = min(one.period for one in chain.drives if isinstance(one, DrivenJoint))
+    return float(size ** (shortest / round_))
+
+
+@pytest.mark.parametrize("period", [5e-3, 7.5e-3])
+def test_the_spectral_radius_is_that_of_the_unit_from_sample_to_sample(period: float) -> None:
+    turn, slide, wrist = sprung().drives
+    assert isinstance(slide, DrivenJoint)
+    chain = replace(sprung(), drives=(turn, replace(slide, period=period), wrist))
+    found = spectral_radius(chain, np.array(chain.start))
+    # RK4 in 0.1 ms: (h / 2 ms)^4 of a step's change; differences of 1e-6: rounding, 1e-16 / 1e-6, of 1e3 A/s
+    assert found == pytest.approx(radius_of_the_unit(chain, 5e-3 if period == 5e-3 else 1.5e-2), abs=1e-5)
+    assert abs(found - spectral_radius(without_springs(chain), np.array(chain.start))) > 1e-4
+
+
+def test_above_a_spectral_radius_of_1_the_simulation_grows_by_it_and_below_it_dies_away() -> None:
+    def with_gain(velocity: float) -> Chain:
+        own = replace(driven("q"), gains=Gains(7.5, velocity, 0.01), spring=ReliefSpring(200.0, 0.1))
+        return Chain("one", (Joint("q", axis=(0.0, -1.0, 0.0)),),
+                     inertials=(Inertial("q", 2.0, (0.5, 0.0, 0.0)),), drives=(own,))  # fmt: skip
+
+    gain = 0.75
+    while spectral_radius(with_gain(gain), np.zeros(1)) < 1.05:
+        gain *= 1.2
+    for chain, grows in ((with_gain(0.75), False), (with_gain(gain), True)):
+        radius = spectral_radius(chain, np.zeros(1))
+        assert (radius > 1.0) == grows
+        instance, sizes = Instance(make_unit("driven_arm", robot=chain)), []
+        rest = read(instance, "last")[0]
+        put(instance, phi=1e-7)
+        for n in range(120):
+            instance.do_step(n * PERIOD, PERIOD)
+            sizes.append(abs(read(instance, "last")[0] - rest))
+        early, late = max(sizes[40:60]), max(sizes[100:120])
+        # a slow swing shows its largest sample in a window to a factor of 2: 2^(1/60) - 1
+        assert (late / early) ** (1.0 / 60.0) == pytest.approx(radius, abs=1.2e-2)

@@ -15,7 +15,13 @@ from urmpipe_models.chains.dh import DHRow
 from urmpipe_models.chains.inertial import Inertial
 from urmpipe_models.drives.controller import Gains
 from urmpipe_models.drives.drive import Drive
-from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint, JointDrive
+from urmpipe_models.drives.joint_drives import (
+    NO_SPRING,
+    DrivenJoint,
+    HeldJoint,
+    JointDrive,
+    ReliefSpring,
+)
 from urmpipe_models.transform import Transform, from_offset
 
 lengths = st.floats(-1.0, 1.0, allow_subnormal=False)
@@ -99,7 +105,8 @@ def drives(draw: DrawFn, joint: str) -> JointDrive:
     if draw(st.booleans()):
         return HeldJoint(joint, draw(above_zero), draw(above_zero))
     drive, gains = Drive(*(draw(above_zero) for _ in range(7))), Gains(*(draw(lengths) for _ in range(3)))
-    return DrivenJoint(joint, drive, draw(above_zero), gains, draw(above_zero))
+    spring = ReliefSpring(draw(above_zero), draw(lengths)) if draw(st.booleans()) else NO_SPRING
+    return DrivenJoint(joint, drive, draw(above_zero), gains, draw(above_zero), spring)
 
 
 @st.composite

@@ -17,10 +17,13 @@ from urmpipe_models.drives.drive import Drive
 from urmpipe_models.drives.joint_drives import (
     DRIVE_KEYS,
     GAIN_KEYS,
+    NO_SPRING,
     SHORTEST_PERIOD,
     SMALLEST,
+    SPRING_KEYS,
     DrivenJoint,
     HeldJoint,
+    ReliefSpring,
 )
 from urmpipe_models.drives.set_point import JointMotion
 from urmpipe_models.dynamics.driven_arm import (
@@ -30,7 +33,7 @@ from urmpipe_models.dynamics.driven_arm import (
     MotorRates,
     Rest,
     Spring,
-    joint_torques,
+    shaft_torques,
 )
 from urmpipe_models.elementwise import Element
 
@@ -71,6 +74,11 @@ class DriveGroup:
         return "" if self.kind.kind == "revolute" else "_s"
 
     @property
+    def relieved(self) -> bool:
+        """Whether a spring relieves any of the drives."""
+        return any(one.spring != NO_SPRING for one, _ in self.driven.values())
+
+    @property
     def _limit(self) -> str:
         """Name of the voltage limit: u_max, u_s_max."""
         return f"u{self.suffix}_max"
@@ -88,6 +96,13 @@ class DriveGroup:
             period = self._parameter("period", "Time between two samples", "s", periods, SHORTEST_PERIOD)
             yield replace(period, tunable=False)
             yield replace(self._parameter("u_max", "Largest voltage", "V", largest, 0.0), name=self._limit)
+            if self.relieved:
+                stiffness, rests = zip(*(one.spring for one in joints), strict=True)
+                described = "Rigidity of the spring beside the drive"
+                form = self._unit("{torque}/{way}")
+                yield self._parameter(SPRING_KEYS[0], described, form, stiffness, 0.0)
+                described = "Where the spring beside the drive gives no torque"
+                yield self._parameter(SPRING_KEYS[1], described, self.kind.unit, rests, -np.inf)
         if self.held:
             springs = ((one.stiffness, one.damping, rest.rest) for one, rest in self.held.values())
             k, l_held, rest = zip(*springs, strict=True)
@@ -175,7 +190,10 @@ class DriveGroup:
             angle, rate, current, voltage = (
                 self._read(v, name)[j] for name in ("theta1", "omega1", "i_a", "last")
             )
-            found[k] = Motor(drive, angle, rate, current, voltage)
+            spring = NO_SPRING
+            if self.relieved:
+                spring = ReliefSpring(*(self._read(v, key)[j] for key in SPRING_KEYS))
+            found[k] = Motor(drive, angle, rate, current, voltage, spring)
         for j, k in enumerate(self.held):
             stiffness, damping, rest = (self._read(v, key)[j] for key in ("k_held", "l_held", "rest"))
             found[k] = Spring(stiffness, damping, rest)
@@ -198,7 +216,7 @@ class DriveGroup:
 
     def outputs(self, state: ArmState, voltages: Sequence[Element]) -> dict[str, tuple[Element, ...]]:
         """Return voltages and torques."""
-        torques = joint_torques(state)
+        torques = shaft_torques(state)
         found = {f"Mk{self.suffix}": tuple(torques[k] for k in sorted((*self.driven, *self.held)))}
         return found | ({f"u{self.suffix}": tuple(voltages)} if self.driven else {})
 

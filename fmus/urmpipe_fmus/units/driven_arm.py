@@ -31,7 +31,8 @@ from urmpipe_models.dynamics.driven_arm import (
     motor_rates,
     stable_step,
 )
-from urmpipe_models.elementwise import Element
+from urmpipe_models.dynamics.wrench import Wrench
+from urmpipe_models.elementwise import Element, Vector
 from urmpipe_models.robots.robot_file import chain_from_dict
 
 OPTIONS: Mapping[str, str] = {
@@ -49,7 +50,8 @@ def driven_arm(robot: Chain) -> Unit:
     Dynamics of the arm, drives and controllers are one function with one integrator: nothing is held between
     them but the voltage between two samples. It starts at rest at the robot's start pose, held against
     gravity: shafts twisted, currents and voltages set. A joint with `{ k, l }` alone is held by a spring and
-    a damper. The controllers measure the driven side, and sample as `drive_controller` does.
+    a damper. A spring beside a drive may carry a part of its load. The controllers measure the driven side,
+    and sample as `drive_controller` does.
 
     Args:
         robot: The arm, with masses and a drive or a spring for every joint.
@@ -71,8 +73,9 @@ def driven_arm(robot: Chain) -> Unit:
         update=model.update if any(group.driven for group in model.groups) else None,
         internal_step=min(LONGEST_STEP, 0.5 * stable_step(robot)),
         equations=(
-            "M(q) q'' + h(q, q') + g(q) - J^T F = Mk    (eq. 13, 19; F acts on the tool from outside)",
+            "M(q) q'' + h(q, q') + g(q) - J^T F = Mk + Ms    (eq. 13, 19; F acts on the tool from outside)",
             "Mk = k (theta1 - q) + l (omega1 - q')    (eq. 14); held: Mk = k_held (rest - q) - l_held q'",
+            "Ms = k_spring (rest_spring - q)    (where a spring relieves a drive; else Ms = 0)",
             "I1 omega1' + Mk = i_p C i_a    (eq. 15-17), u = C i_p omega1 + R i_a + L i_a'    (eq. 18)",
             "u_n = u_n-1 + Kphi (set_phi - phi) + Kw (set_phid - phid) + Keps (set_phidd - phidd),",
             "      within -u_max .. u_max, at t = n period    (eq. 20, which prints a minus)",
@@ -163,3 +166,23 @@ class _Model:
 def from_robot_toml(robot: str) -> Unit:
     """Return `driven_arm` of the arm that a text of `robot_toml` describes, bit by bit."""
     return driven_arm(chain_from_dict(tomllib.loads(robot)))
+
+
+def starts_under(robot: Chain, force: Vector) -> dict[str, tuple[Element, ...]]:
+    """Return start values of `driven_arm` by name: at rest at the start pose, a force on the tool.
+
+    What a spring holds has yielded to the force; the drives hold their joints where they were.
+
+    Args:
+        robot: The arm, with masses and a drive or a spring for every joint.
+        force: In [N], along the axes of the world.
+
+    Raises:
+        RobotError: If a voltage cannot hold the arm so, or the springs cannot.
+    """
+    rests = at_rest(robot, Wrench(force))
+    found: dict[str, tuple[Element, ...]] = {"force": force, "moment": (0.0, 0.0, 0.0)}
+    for group in drive_groups(robot, rests):
+        found |= {one.name: one.starts for one in (*group.states(), *group.memories())}
+        found[group.kind.name] = tuple(rests[k].q for k in group.kind.of(robot))
+    return found

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from urmpipe_models.drives.controller import Gains
 from urmpipe_models.drives.drive import Drive
+from urmpipe_models.elementwise import Element
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +32,22 @@ class HeldJoint:
         yield from _at_least(0.0, self.joint, {"l": self.damping})
 
 
+class ReliefSpring(NamedTuple):
+    """A spring without mass beside a drive, which carries a part of the load: k (rest - q).
+
+    Attributes:
+        stiffness: k in [N.m/rad], of a joint that slides in [N/m]; 0: there is none.
+        rest: Where it gives no torque, in [rad] or [m].
+    """
+
+    stiffness: Element
+    rest: Element
+
+
+NO_SPRING = ReliefSpring(0.0, 0.0)
+"""Of a drive that carries all of the load."""
+
+
 @dataclass(frozen=True, slots=True)
 class DrivenJoint:
     """A joint with a flexible DC drive and a sampled controller.
@@ -41,6 +58,7 @@ class DrivenJoint:
         period: Time between two samples of the controller in [s].
         gains: What a sample adds to the voltage.
         largest_voltage: u_max in [V].
+        spring: What relieves the drive of a part of its load.
     """
 
     joint: str
@@ -48,18 +66,22 @@ class DrivenJoint:
     period: float
     gains: Gains = field(metadata={"stored": tuple[float, ...]})
     largest_voltage: float
+    spring: ReliefSpring = field(default=NO_SPRING, metadata={"stored": tuple[float, ...]})
 
     def __post_init__(self) -> None:
-        """Make drive and gains of the plain numbers that a recording gives."""
+        """Make drive, gains and spring of the plain numbers that a recording gives."""
         object.__setattr__(self, "drive", Drive(*self.drive))
         object.__setattr__(self, "gains", Gains(*self.gains))
+        object.__setattr__(self, "spring", ReliefSpring(*self.spring))
 
     def faults(self) -> Iterator[str]:
         """Yield which constants no drive has; gains may have any sign (see `drive_controller`)."""
         yield from _at_least(SMALLEST, self.joint, dict(zip(DRIVE_KEYS, self.drive, strict=True)))
         yield from _at_least(SHORTEST_PERIOD, self.joint, {"period": self.period})
         yield from _at_least(0.0, self.joint, {"u_max": self.largest_voltage})
-        for key, value in zip(GAIN_KEYS, self.gains, strict=True):
+        yield from _at_least(0.0, self.joint, {SPRING_KEYS[0]: self.spring.stiffness})
+        free = zip((*GAIN_KEYS, SPRING_KEYS[1]), (*self.gains, self.spring.rest), strict=True)
+        for key, value in free:
             if not math.isfinite(value):
                 yield f"drives.{self.joint}.{key}: found {value:g}, allowed: a finite number"
 
@@ -71,6 +93,9 @@ DRIVE_KEYS = ("k", "l", "i_p", "C", "R", "L", "I1")
 
 GAIN_KEYS = ("Kphi", "Kw", "Keps")
 """The gains, as robot files and units name them."""
+
+SPRING_KEYS = ("k_spring", "rest_spring")
+"""The constants of `ReliefSpring`, as robot files and units name them."""
 
 
 SMALLEST = 1e-9

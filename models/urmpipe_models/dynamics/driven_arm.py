@@ -1,7 +1,7 @@
 """An arm that is turned by flexible drives: all of it as one system of equations.
 
 The state is q and q' of the joints, and of each joint with a drive theta1, theta1' and the current. A joint
-without a drive is held by a spring and a damper.
+without a drive is held by a spring and a damper. A spring beside a drive may carry a part of its load.
 
 Source: [Iso9283]_ eq. 14-19.
 """
@@ -24,7 +24,13 @@ from urmpipe_models.drives.drive import (
     shaft_torque,
     stored_energy,
 )
-from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint, JointDrive
+from urmpipe_models.drives.joint_drives import (
+    NO_SPRING,
+    DrivenJoint,
+    HeldJoint,
+    JointDrive,
+    ReliefSpring,
+)
 from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
 from urmpipe_models.dynamics.forward import check_motion, forward_dynamics
 from urmpipe_models.dynamics.inverse import inverse_dynamics
@@ -35,6 +41,10 @@ from urmpipe_models.errors import Finding, RobotError
 
 STABLE = 2.8
 """RK4 is stable up to this product of step and rate, for decays and undamped swings alike."""
+
+
+SETTLED, SETTLING = 1e-12, 100
+"""An arm has yielded to a wrench when no joint moves on by so much in [rad] or [m], after so many rounds."""
 
 
 class Spring(NamedTuple):
@@ -60,6 +70,7 @@ class Motor(NamedTuple):
         rate: theta1' in [rad/s] or [m/s].
         current: i_a in [A].
         voltage: U in [V].
+        spring: What relieves it of a part of the load.
     """
 
     drive: Drive
@@ -67,6 +78,7 @@ class Motor(NamedTuple):
     rate: Element
     current: Element
     voltage: Element
+    spring: ReliefSpring = NO_SPRING
 
 
 Actuator: TypeAlias = Spring | Motor
@@ -110,21 +122,23 @@ class Energies(NamedTuple):
 
 
 class Rest(NamedTuple):
-    """What holds a joint of an arm at rest against gravity.
+    """Where a joint of an arm at rest stands, and what holds it there.
 
     Attributes:
+        q: In [rad] or [m].
         rest: Where its spring gives no torque, in [rad] or [m]; of a drive theta1.
         current: i_a in [A]; 0 without a drive.
         voltage: U in [V]; 0 without a drive.
     """
 
+    q: float
     rest: float
     current: float
     voltage: float
 
 
-def joint_torques(state: ArmState) -> list[Element]:
-    """Return what shafts and springs give the joints, Mk of eq. 14 with a held joint's spring at rest.
+def shaft_torques(state: ArmState) -> list[Element]:
+    """Return Mk of eq. 14, what the shaft of each drive transmits, and what holds each joint without one.
 
     Args:
         state: The arm.
@@ -139,6 +153,26 @@ def joint_torques(state: ArmState) -> list[Element]:
         else:
             torques.append(one.stiffness * (one.rest - q) - one.damping * qd)
     return torques
+
+
+def joint_torques(state: ArmState) -> list[Element]:
+    """Return what the joints are turned with: `shaft_torques`, and of relieved drives k (rest - q) besides.
+
+    Args:
+        state: The arm.
+
+    Returns:
+        One element per coordinate, in [N.m] or [N].
+    """
+    return [
+        torque + _relief(one, q) if isinstance(one, Motor) else torque
+        for one, q, torque in zip(state.actuators, state.q, shaft_torques(state), strict=True)
+    ]
+
+
+def _relief(one: Motor, q: Element) -> Element:
+    """Return the torque of the spring beside a drive."""
+    return one.spring.stiffness * (one.spring.rest - q)
 
 
 def joint_accelerations(chain: Chain, state: ArmState, wrench: Wrench | None = None) -> list[Element]:
@@ -164,7 +198,7 @@ def motor_rates(state: ArmState) -> dict[int, MotorRates]:
             shaft_acceleration(one.drive, one.current, torque),
             current_rate(one.drive, one.voltage, one.rate, one.current),
         )
-        for k, (one, torque) in enumerate(zip(state.actuators, joint_torques(state), strict=True))
+        for k, (one, torque) in enumerate(zip(state.actuators, shaft_torques(state), strict=True))
         if isinstance(one, Motor)
     }
 
@@ -185,22 +219,27 @@ def energies(chain: Chain, state: ArmState, wrench: Wrench | None = None) -> Ene
             power_in = power_in + one.voltage * one.current
             power_lost = power_lost + lost_power(one.drive, one.rate, one.current, qd)
             stored = stored + stored_energy(one.drive, one.angle, one.rate, one.current, q)
+            stored = stored + 0.5 * _relief(one, q) * (one.spring.rest - q)
         else:
             power_lost = power_lost + one.damping * qd * qd
             stored = stored + 0.5 * one.stiffness * (one.rest - q) * (one.rest - q)
     return Energies(power_in, power_lost, stored)
 
 
-def at_rest(chain: Chain) -> list[Rest]:
+def at_rest(chain: Chain, wrench: Wrench | None = None) -> list[Rest]:
     """Return what holds an arm at its start pose: shafts twisted by gravity, currents and voltages set.
 
-    theta1 = q + tau / k, i_a = tau / (i_p C), U = R i_a.
+    theta1 = q + tau / k, i_a = tau / (i_p C), U = R i_a, tau without what a relief spring gives. Under
+    gravity alone every joint stands at the start pose. A wrench shifts those that are held by a spring, by
+    J^T F / k; the controllers keep the others there.
 
     Args:
         chain: The arm, with masses and a drive or a spring for each coordinate.
+        wrench: What acts on the tool centre point from outside, besides.
 
     Raises:
-        RobotError: With every joint that has neither, whose voltage does not hold it, or that moves no mass.
+        RobotError: With every joint that has neither, whose voltage does not hold it, or that moves no mass;
+            or if the wrench is more than the springs bear.
 
     Source: [Iso9283]_ eq. 14-19 with all derivatives 0.
     """
@@ -219,10 +258,16 @@ def at_rest(chain: Chain) -> list[Rest]:
         faults += error.findings
     if faults:
         raise RobotError(*faults)
-    still = [0.0] * len(chain.coordinates)
-    torques = inverse_dynamics(chain, list(map(float, chain.start)), still, still)
     drives = [by_joint[name] for name in chain.coordinates]
-    rests = [_held(*each) for each in zip(drives, map(float, chain.start), map(float, torques), strict=True)]
+    start = [float(value) for value in chain.start]
+    rests = [_held(*each) for each in zip(drives, start, _torques(chain, start), strict=True)]
+    if wrench is not None:
+        q = _yielded(chain, drives, [one.rest for one in rests], wrench)
+        torques = _torques(chain, q, wrench)
+        rests = [
+            rest._replace(q=value) if isinstance(own, HeldJoint) else _held(own, value, torque)
+            for own, rest, value, torque in zip(drives, rests, q, torques, strict=True)
+        ]
     weak = [
         f"robot {chain.name}: drives.{own.joint}: needs {abs(rest.voltage):.4g} V to hold the arm at its"
         f" start, allowed: u_max, {own.largest_voltage:g} V"
@@ -258,11 +303,12 @@ def _alone(one: JointDrive, lightness: float) -> FloatArray:
         return np.array([[0.0, 1.0], [-one.stiffness * lightness, -one.damping * lightness]])
     k, damping, ratio, constant, resistance, inductance, inertia = one.drive
     torque = np.array([-k, -damping, k, damping, 0.0])
+    relief = np.array([-one.spring.stiffness, 0.0, 0.0, 0.0, 0.0])
     current = np.eye(5)[4]
     return np.array(
         [
             np.eye(5)[1],
-            lightness * torque,
+            lightness * (torque + relief),
             np.eye(5)[3],
             (ratio * constant * current - torque) / inertia,
             -(constant * ratio * np.eye(5)[3] + resistance * current) / inductance,
@@ -273,6 +319,35 @@ def _alone(one: JointDrive, lightness: float) -> FloatArray:
 def _held(one: HeldJoint | DrivenJoint, q: float, torque: float) -> Rest:
     """Return what gives a joint a torque at rest."""
     if isinstance(one, HeldJoint):
-        return Rest(q + torque / one.stiffness, 0.0, 0.0)
+        return Rest(q, q + torque / one.stiffness, 0.0, 0.0)
+    torque -= one.spring.stiffness * (one.spring.rest - q)
     current = torque / driving_torque(one.drive, 1.0)
-    return Rest(q + torque / one.drive.stiffness, current, one.drive.resistance * current)
+    return Rest(q, q + torque / one.drive.stiffness, current, one.drive.resistance * current)
+
+
+def _torques(chain: Chain, q: Sequence[float], wrench: Wrench | None = None) -> list[float]:
+    """Return the torques of an arm at rest, one per coordinate, in [N.m] or [N]."""
+    still = [0.0] * len(q)
+    return [float(torque) for torque in inverse_dynamics(chain, q, still, still, wrench)]
+
+
+def _yielded(
+    chain: Chain, drives: Sequence[JointDrive], rest: Sequence[float], wrench: Wrench
+) -> list[float]:
+    """Return where an arm stands under a wrench in [rad] or [m]: q = rest - tau(q) / k of what is held.
+
+    Raises:
+        RobotError: If the springs are too weak for that to settle.
+    """
+    q = [float(value) for value in chain.start]
+    for _ in range(SETTLING):
+        found = [
+            spring - torque / own.stiffness if isinstance(own, HeldJoint) else value
+            for own, spring, value, torque in zip(drives, rest, q, _torques(chain, q, wrench), strict=True)
+        ]
+        if np.allclose(found, q, rtol=0.0, atol=SETTLED):
+            return found
+        q = found
+    raise RobotError(
+        f"robot {chain.name}: force: found more than the springs of its held joints bear, allowed: less"
+    )

@@ -21,6 +21,19 @@ def robot_names() -> tuple[str, ...]:
     return tuple(sorted((path.stem for path in ROBOTS.glob("*.toml")), key=_by_size))
 
 
+@cache
+def moving_differently() -> tuple[str, ...]:
+    """Return the names without those of arms that move as an earlier one, and differ in masses or drives."""
+    found: dict[str, Chain] = {}
+    for name in robot_names():
+        arm = _of_catalogue(name)
+        if not any(
+            (one.joints, one.base, one.tip) == (arm.joints, arm.base, arm.tip) for one in found.values()
+        ):
+            found[name] = arm
+    return tuple(found)
+
+
 def load_robot(
     name_or_path: str | Path, *, base_link: str | None = None, tip_link: str | None = None
 ) -> Chain:

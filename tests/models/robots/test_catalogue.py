@@ -20,6 +20,7 @@ NAMES = (
     "articulated6r",
     "iiwa14",
     "irb60",
+    "irb60-spring",
     "panda",
     "ur3",
     "ur5",

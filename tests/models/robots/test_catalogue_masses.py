@@ -26,8 +26,9 @@ URDFS = {
 """The file, its first and last link, and where the catalogue's base stands in the first."""
 
 
-def test_three_arms_have_masses() -> None:
-    assert {name for name in robot_names() if load_robot(name).inertials} == URDFS.keys()
+def test_three_arms_have_masses_of_a_urdf_and_irb60_assumed_ones() -> None:
+    assert {name for name in robot_names() if load_robot(name).inertials} == {*URDFS, "irb60", "irb60-spring"}
+    assert all(one.source.startswith("assumption: ") for one in load_robot("irb60").inertials)
 
 
 @pytest.mark.parametrize("name", URDFS)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Callable
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,7 @@ from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.chains.inertial import Inertial
 from urmpipe_models.drives.controller import Gains
 from urmpipe_models.drives.drive import Drive
-from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint
+from urmpipe_models.drives.joint_drives import NO_SPRING, DrivenJoint, HeldJoint, ReliefSpring
 from urmpipe_models.errors import RobotError
 from urmpipe_models.robots.robot_file import chain_from_dict, chain_to_dict, read_robot_file, robot_toml
 from urmpipe_models.robots.urdf_writer import urdf_text
@@ -137,8 +138,8 @@ def test_everything_wrong_with_masses_and_drives_is_said_at_once(robot: Read) ->
         drives.b = { l = true, kk = 3 }
         drives.c = 5
     """
-    drive = "k, l, i_p, C, R, L, I1, period, Kphi, Kw, Keps, u_max"
-    known = "i_p, C, R, L, I1, period, Kphi, Kw, Keps, u_max, k, l"
+    drive = "k, l, i_p, C, R, L, I1, period, Kphi, Kw, Keps, u_max, k_spring, rest_spring"
+    known = "i_p, C, R, L, I1, period, Kphi, Kw, Keps, u_max, k_spring, rest_spring, k, l"
     assert sorted(known.split(", ")) == sorted(drive.split(", "))
     assert refusal(RobotError, robot, text).splitlines() == [
         "arm.toml: key joints[0].effort: found 'strong', allowed: a number",
@@ -182,6 +183,54 @@ def test_what_no_body_and_no_drive_has_is_said_beside_what_no_joint_has(robot: R
     assert refusal(RobotError, robot, text.format(effort=1)).splitlines() == [
         own[0], "arm.toml: robot arm: an inertial hangs on b, no joint of the chain; allowed: a", own[1],
     ]  # fmt: skip
+
+
+SPRUNG = ARM.replace("u_max = 48\n", "u_max = 48\n{springs}\n")
+"""The arm, with keys of a spring beside the drive of its first joint."""
+
+
+def test_a_spring_beside_a_drive_is_in_si_whatever_the_units_of_the_file(robot: Read) -> None:
+    given = robot(SPRUNG.replace("{springs}", "    k_spring = 1150\n    rest_spring = -0.1"))
+    plain = robot(ARM)
+    (turn, slide), (own, other) = given.drives, plain.drives
+    assert isinstance(turn, DrivenJoint)
+    assert isinstance(own, DrivenJoint)
+    assert (turn.spring, own.spring) == (ReliefSpring(1150.0, -0.1), NO_SPRING)
+    assert (replace(turn, spring=NO_SPRING), slide) == (own, other)
+    for chain, keys in ((given, {"k_spring", "rest_spring"}), (plain, set())):
+        written = chain_to_dict(chain)["drives"]["turn"]
+        assert written.keys() & {"k_spring", "rest_spring"} == keys
+        back = chain_from_dict(tomllib.loads(robot_toml(chain)))
+        assert back == chain
+        assert bits(back) == bits(chain)
+
+
+@pytest.mark.parametrize(
+    ("springs", "said"),
+    [
+        ("k_spring = 1", "key drives.turn.rest_spring: found nothing, allowed: a finite number"),
+        ("rest_spring = 1", "key drives.turn.k_spring: found nothing, allowed: a finite number"),
+        (
+            "k_spring = -1\n    rest_spring = 1",
+            "robot arm: drives.turn.k_spring: found -1, allowed: a finite number, 0 or more",
+        ),
+        (
+            "k_spring = 1\n    rest_spring = nan",
+            "key drives.turn.rest_spring: found nan, allowed: a finite number",
+        ),
+    ],
+)
+def test_half_a_spring_and_one_that_pushes_are_refused(robot: Read, springs: str, said: str) -> None:
+    text = SPRUNG.replace("{springs}", f"    {springs}")
+    assert refusal(RobotError, robot, text) == f"arm.toml: {said}"
+
+
+def test_a_spring_beside_no_drive_asks_for_all_of_the_drive(robot: Read) -> None:
+    """`k` and `l` with the keys of a spring are a drive that lacks its others."""
+    missing = "i_p", "C", "R", "L", "I1", "period", "Kphi", "Kw", "Keps", "u_max"
+    assert refusal(RobotError, robot, f"{ARM}    k_spring = 1\n    rest_spring = 0\n").splitlines() == [
+        f"arm.toml: key drives.slide.{key}: found nothing, allowed: a finite number" for key in missing
+    ]
 
 
 def bits(chain: Chain) -> str:

@@ -23,7 +23,7 @@ from urmpipe_models.transform import Transform, from_offset
 FORMS = {
     **dict.fromkeys(("ur3", "ur3e", "ur5", "ur5e", "ur10", "ur10e"), "three parallel axes"),
     **dict.fromkeys(("arm6", "articulated6r"), "spherical wrist"),
-    **dict.fromkeys(("urm4", "urm6", "urm8", "panda", "iiwa14", "irb60"), None),
+    **dict.fromkeys(("urm4", "urm6", "urm8", "panda", "iiwa14", "irb60", "irb60-spring"), None),
 }
 
 RIGHT = math.pi / 2

@@ -1,0 +1,85 @@
+"""The stability of sampled controllers against closed forms; tests/fmus holds it against the unit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from made_masses import driven
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.inertial import Inertial
+from urmpipe_models.drives.controller import Gains
+from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint, ReliefSpring
+from urmpipe_models.dynamics.sampled_loop import spectral_radius
+
+PERIOD = 5e-3
+MASS, RADIUS = 2.0, 0.5
+GRAVITY = 9.81
+
+EXACT = 1e-7
+"""Of values of about 1: eigenvalues of rates up to 1e3 / s; differences of gravity, 1e-16 / 1e-5."""
+
+
+def two_slides(held: HeldJoint, *periods: float) -> Chain:
+    """Return slides along x, y and z, a drive on the last two: none moves the others."""
+    axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+    drives = (replace(driven(joint), period=one) for joint, one in zip("yz", periods, strict=True))
+    return Chain(
+        "slides",
+        tuple(Joint(name, "prismatic", axis=axis) for name, axis in axes.items()),
+        inertials=(Inertial("z", MASS),),
+        drives=(held, *drives),
+    )
+
+
+@pytest.mark.parametrize("periods", [(5e-3, 5e-3), (7.5e-3, 5e-3), (5e-3, 1e-2)])
+def test_what_a_damper_alone_calms_dies_away_with_half_its_damping_over_the_mass(
+    periods: tuple[float, float],
+) -> None:
+    """A sample is one of the shortest period, whatever the others are."""
+    chain = two_slides(HeldJoint("x", 800.0, 0.5), *periods)
+    expected = np.exp(-0.5 / (2.0 * MASS) * PERIOD)
+    assert spectral_radius(chain, np.zeros(3)) == pytest.approx(expected, abs=EXACT)
+    calmer = two_slides(HeldJoint("x", 800.0, 1e3), *periods)  # now a drive is the slowest
+    assert spectral_radius(calmer, np.zeros(3)) < expected - 1e-4
+
+
+def upright(*drives: DrivenJoint | HeldJoint) -> Chain:
+    """Return a pendulum that stands up at q = 0; with two drives a slide along its axis carries it."""
+    joints = Joint("s", "prismatic", axis=(0.0, 1.0, 0.0)), Joint("q", axis=(0.0, 1.0, 0.0))
+    return Chain(
+        "pendulum",
+        joints[-len(drives) :],
+        inertials=(Inertial("q", MASS, (0.0, 0.0, RADIUS)),),
+        drives=drives,
+        gravity=(0.0, 0.0, -GRAVITY),
+    )
+
+
+@pytest.mark.parametrize("stiffness", [1.0, 9.0])
+def test_a_pendulum_that_stands_up_falls_as_its_weight_and_spring_let_it(stiffness: float) -> None:
+    rate = np.sqrt(GRAVITY / RADIUS - stiffness / (MASS * RADIUS**2))
+    found = spectral_radius(upright(driven("s"), HeldJoint("q", stiffness, 0.0)), np.zeros(2))
+    assert found == pytest.approx(np.exp(rate * PERIOD), abs=EXACT)
+    assert found > 1.005
+    hanging = spectral_radius(upright(driven("s"), HeldJoint("q", stiffness, 0.1)), np.array([0.0, np.pi]))
+    assert hanging == pytest.approx(np.exp(-0.1 / (2.0 * MASS * RADIUS**2) * PERIOD), abs=EXACT)
+
+
+def test_of_a_drive_a_spring_beside_it_takes_the_weight() -> None:
+    """k_spring = m g r leaves what the drive has without gravity; without it the radius is another."""
+    weight = MASS * GRAVITY * RADIUS
+    own = driven("q")
+    relieved = upright(replace(own, spring=ReliefSpring(weight, 0.0)))
+    weightless = replace(upright(own), gravity=(0.0, 0.0, 0.0))
+    radii = [spectral_radius(one, np.zeros(1)) for one in (relieved, weightless, upright(own))]
+    assert radii[0] == pytest.approx(radii[1], abs=EXACT)
+    assert abs(radii[2] - radii[1]) > 1e2 * EXACT
+
+
+def test_a_voltage_that_no_sample_changes_stays() -> None:
+    idle = replace(driven("q"), gains=Gains(0.0, 0.0, 0.0))
+    chain = Chain("idle", (Joint("q"),), inertials=(Inertial("q", MASS, (RADIUS, 0.0, 0.0)),), drives=(idle,))
+    assert spectral_radius(chain, np.zeros(1)) == pytest.approx(1.0, abs=EXACT)
