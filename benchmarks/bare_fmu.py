@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,9 +18,18 @@ Call = Callable[[], object]
 
 
 class BareFmu:
-    """An FMU that was unpacked and is initialized here; no status is looked at."""
+    """An FMU that was unpacked and is initialized here; no status is looked at.
 
-    def __init__(self, folder: Path, identifier: str, guid: str) -> None:
+    Args:
+        folder: Where it is unpacked.
+        identifier: Its model identifier.
+        guid: Its GUID.
+        starts: Reals that are set before, by value reference.
+    """
+
+    def __init__(
+        self, folder: Path, identifier: str, guid: str, starts: Mapping[int, float] | None = None
+    ) -> None:
         from fmpy.fmi2 import FMU2Slave
 
         self._slave = FMU2Slave(
@@ -28,6 +37,8 @@ class BareFmu:
         )
         self._slave.instantiate()
         self._slave.setupExperiment(startTime=0.0)
+        if starts:
+            self._slave.setReal(list(starts), list(starts.values()))
         self._slave.enterInitializationMode()
         self._slave.exitInitializationMode()
         self.do_step = partial(

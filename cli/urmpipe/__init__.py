@@ -9,6 +9,7 @@
     simulation = urmpipe.simulate("log-to-delta", arguments={"log": "log.csv", "reference": "path.csv"})
     urmpipe.ik("targets.csv", robot="arm6").to_frame()
     urmpipe.plan("contour.csv", robot="ur5e", output="plan.csv")
+    urmpipe.accuracy("contour.csv", "irb60", limit=0.4e-3).running_speed
     urmpipe.build_fmu("kinematic_chain", robot="urm6")
 
 The functions are loaded when they are first used.
@@ -21,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 from urmpipe_models.display import Shown
 
 if TYPE_CHECKING:
+    from urmpipe.api.accuracy import accuracy as accuracy
     from urmpipe.api.build_fmu import build_fmu as build_fmu
     from urmpipe.api.compare import compare as compare
     from urmpipe.api.diagnose import diagnose as diagnose
@@ -60,6 +62,7 @@ if TYPE_CHECKING:
     from urmpipe_models.planning.rows import PathRows as PathRows
     from urmpipe_models.robots.catalogue import robot_names as robot_names
     from urmpipe_models.transform import Transform as Transform
+    from urmpipe_pipeline.accuracy.result import Accuracy as Accuracy
     from urmpipe_pipeline.comparison.comparison import Comparison as Comparison
     from urmpipe_pipeline.comparison.deviation import Deviation as Deviation
     from urmpipe_pipeline.diagnosis.result import Diagnosis as Diagnosis
@@ -75,6 +78,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOME = {
+    "Accuracy": "urmpipe_pipeline.accuracy.result",
     "BuiltFmu": "urmpipe_fmus.build",
     "Chain": "urmpipe_models.chains.chain",
     "Comparison": "urmpipe_pipeline.comparison.comparison",
@@ -108,6 +112,7 @@ _HOME = {
     "UrmpipeError": "urmpipe_models.errors",
     "UrmpipeWarning": "urmpipe.keyword_checks",
     "ViewerError": "urmpipe_models.errors",
+    "accuracy": "urmpipe.api.accuracy",
     "build_fmu": "urmpipe.api.build_fmu",
     "compare": "urmpipe.api.compare",
     "diagnose": "urmpipe.api.diagnose",

@@ -103,6 +103,10 @@ def _one_or_many(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
     return fit
 
 
+def _are_numbers(value: Any) -> bool:
+    return isinstance(value, (list, tuple, np.ndarray)) and all(map(_is_number, value))
+
+
 def _is_planned(value: Any) -> bool:
     from urmpipe_models.planning.rows import PathRows
 
@@ -128,10 +132,13 @@ KIND_OF_TOLERANCE = Kind(
     ' {"axis": 0.0035, "angle": 0.01}',
 )
 PROGRESS = Kind(callable, "a function of the share that is done, 0 to 1, such as print")
+PLANNED = Kind(_is_planned, 'a file, a test cube ("cube:..."), or PathRows')
+NUMBERS = Kind(_are_numbers, "a list of numbers")
 LINK = Kind(_is_text, "the name of a link of the URDF")
 ROBOT_FILE = Kind(_is_path, "a name, or a TOML or URDF file")
 
 KINDS = {
+    "accuracy.path": PLANNED,
     "acceleration": Kind(_is_number, "a number, in m/s2"),
     "align": _one_of("none", "start", "rigid", "tool", "base+tool"),
     "arguments": Kind(_are_arguments, 'a mapping of names to texts or numbers, such as {"log": "log.csv"}'),
@@ -146,8 +153,10 @@ KINDS = {
     "diagnose": FLAG,
     "draw": PATH,
     "duration": SECONDS,
+    "error": _one_of("time", "path"),
     "every": FLAG,
     "figures": PATH,
+    "force": NUMBERS,
     "form": _one_of("text", "c"),
     "formats": Kind(
         _one_or_many(lambda one: isinstance(one, str) and one in ("svg", "png")), "svg, png or a list of both"
@@ -158,6 +167,7 @@ KINDS = {
     "junit": PATH,
     "law": _one_of("trapezoid", "jerk", "limits"),
     "lazy": FLAG,
+    "limit": Kind(_is_number, "a number, in m"),
     "log_map": Kind(_is_map, "a map (TOML), or what `read_map` returned"),
     "method": _one_of("auto", "closed", "iterative"),
     "name_or_path": ROBOT_FILE,
@@ -165,12 +175,12 @@ KINDS = {
     "options": Kind(lambda value: isinstance(value, Mapping), 'a mapping, such as {"joints": 6}'),
     "output": PATH,
     "path": PATH,
-    "plan.path": Kind(_is_planned, 'a file, a test cube ("cube:..."), or PathRows'),
+    "plan.path": PLANNED,
     "platforms": Kind(_one_or_many(_is_text), "linux64, win64 or a list of both"),
     "progress": PROGRESS,
     "restarts": COUNT,
     "robot": Kind(_is_robot, "a name, a TOML or URDF file, or a Chain, such as urmpipe.load_robot(NAME)"),
-    "rows": _one_of("grid", "file"),
+    "rows": _one_of("grid", "file", "velocities", "samples"),
     "run": Kind(_is_run, "a Run, such as urmpipe.ingest(LOG)"),
     "seed": COUNT,
     "sides": Kind(_are_sides, 'two words in the names of columns, such as ("target", "actual")'),
@@ -190,6 +200,7 @@ KINDS = {
     "tolerance": KIND_OF_TOLERANCE,
     "tsp": SECONDS,
     "build_fmu.unit": Kind(_is_unit, "the name of a unit, a Python file with one, or a Unit"),
+    "velocities": NUMBERS,
     "velocity": Kind(_is_number, "a number, in m/s"),
     "voice": _one_of("python", "command line"),
     "within_pi": FLAG,

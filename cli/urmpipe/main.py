@@ -39,6 +39,7 @@ COMMANDS = {
     "robot": "List, show and export robots.",
     "ik": "Find joint values for poses of the tool.",
     "plan": "Plan a path of lines and arcs, and its time.",
+    "accuracy": "Measure how far a driven arm is from its path.",
     "fmu": "List units, build and check FMUs.",
     "simulate": "Run a system of blocks.",
 }
@@ -106,9 +107,11 @@ def cli() -> None:
       urmpipe view log-against-path.rrd
       urmpipe ik path.csv --robot urm6 -o joints.csv
       urmpipe plan contour.csv --robot ur5e -o plan.csv
+      urmpipe accuracy --robot irb60 --path contour.csv --limit 0.4mm
 
     Exit codes: 0 within tolerance, 1 out of tolerance (ik: a target not reached, a jump, or a joint too
-    fast; plan: the arm cannot move so; fmu check: a problem), 2 bad input or usage.
+    fast; plan: the arm cannot move so; accuracy: an error above the limit; fmu check: a problem), 2 bad
+    input or usage.
     """
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.repolarizer import FULL_TURN
-from urmpipe_models.robots.catalogue import load_robot, robot_names
+from urmpipe_models.robots.catalogue import load_robot, moving_differently
 
 MOST_SIGNS = 7
 """Of so many joints all patterns of signs are looked at: 127; of more, two at once at most."""
@@ -97,7 +97,7 @@ def unit_edits(*sides: str) -> Iterator[Edits]:
 
 def robot_edits(chain: Chain) -> Iterator[Edits]:
     """Yield the other robots of the catalogue with as many joints."""
-    for name in robot_names():
+    for name in moving_differently():
         other = load_robot(name)
         if name != chain.name and len(other.moving) == len(chain.moving):
             yield (Edit("other_robot", robot=other, name=name),)

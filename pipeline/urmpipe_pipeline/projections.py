@@ -12,7 +12,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.dynamics.over_log import mass_centres_over_log
-from urmpipe_pipeline.palette import INK_COLOUR, MASS_COLOUR
+from urmpipe_pipeline.palette import INK_COLOUR, MASS_COLOUR, REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.parts import spot_at
 from urmpipe_pipeline.presentation.scene import Spot, ball_sizes
 
@@ -82,18 +82,20 @@ class Sketch:
         path: Where a point goes in [m], shape (m, 3).
         spots: Places with a word.
         masses: Masses of the arms.
+        asked: Where the point was to go in [m], shape (k, 3); grey, behind the path.
     """
 
     arms: Sequence[FloatArray]
     path: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     spots: Sequence[Spot] = ()
     masses: Sequence[Mass] = ()
+    asked: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
 
     @property
     def extent(self) -> tuple[FloatArray, FloatArray]:
         """Its least and its largest coordinates in [m], shape (3,) each."""
         places = [*(one.position for one in self.spots), *(one.position for one in self.masses)]
-        every = np.concatenate([*self.arms, self.path, np.array(places).reshape(-1, 3)])
+        every = np.concatenate([*self.arms, self.path, self.asked, np.array(places).reshape(-1, 3)])
         every = every[np.isfinite(every).all(axis=1)]
         return every.min(axis=0), every.max(axis=0)
 
@@ -206,6 +208,8 @@ def _drawn(sketch: Sketch, frame: _Frame) -> Iterator[str]:
     for arm in sketch.arms:
         style = f'stroke="#4a7ba6" stroke-width="{width}" stroke-linejoin="round" opacity="{opacity:g}"'
         yield _polyline(frame.placed(arm), style)
+    if len(sketch.asked):
+        yield _polyline(frame.placed(sketch.asked), f'stroke="{REFERENCE_COLOUR}" stroke-width="3"')
     if len(sketch.path):
         yield _polyline(frame.placed(sketch.path), 'stroke="#d55e00" stroke-width="2"')
     centres = frame.placed(np.array([one.position for one in sketch.masses]).reshape(-1, 3))

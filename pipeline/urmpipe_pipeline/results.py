@@ -11,6 +11,9 @@ from pathlib import Path
 from typing import Any, TypeGuard
 
 from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.accuracy import exports as accuracy_exports
+from urmpipe_pipeline.accuracy import presenter as accuracy
+from urmpipe_pipeline.accuracy.result import Accuracy
 from urmpipe_pipeline.comparison import exports as comparison_exports
 from urmpipe_pipeline.comparison import presenter as comparison
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -57,6 +60,7 @@ KINDS: tuple[Kind, ...] = (
     Kind("simulation", Simulation, simulations.present, simulation_exports.exports),
     Kind("solved targets", SolvedTargets, solved_targets.present, solved_targets.exports),
     Kind("plan", PlannedPath, planned_paths.present, planned_paths.exports),
+    Kind("accuracy", Accuracy, accuracy.present, accuracy_exports.exports),
 )
 """Every kind."""
 

@@ -61,7 +61,7 @@ def test_without_a_robot(capsys: Captured) -> None:
     (said,) = refused(capsys, "targets.csv")
     assert said == (
         "error: --robot: found none, allowed: a TOML, a URDF or one of arm6, articulated6r,"
-        " iiwa14, irb60, panda, ur3, ur5, ur10, ur3e, ur5e, ur10e, urm4, urm6, urm8"
+        " iiwa14, irb60, irb60-spring, panda, ur3, ur5, ur10, ur3e, ur5e, ur10e, urm4, urm6, urm8"
     )
 
 

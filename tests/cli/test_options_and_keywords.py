@@ -10,6 +10,7 @@ import click
 import pytest
 
 import urmpipe
+from urmpipe.commands.accuracy import accuracy
 from urmpipe.commands.compare import compare
 from urmpipe.commands.diagnose import diagnose
 from urmpipe.commands.export import export
@@ -24,6 +25,7 @@ from urmpipe.commands.view import view
 from urmpipe_models.spelling import option_of
 
 COMMANDS: dict[str, tuple[click.Command, Callable[..., Any]]] = {
+    "accuracy": (accuracy, urmpipe.accuracy),
     "build": (fmu.commands["build"], urmpipe.build_fmu),
     "compare": (compare, urmpipe.compare),
     "diagnose": (diagnose, urmpipe.diagnose),
@@ -37,7 +39,8 @@ COMMANDS: dict[str, tuple[click.Command, Callable[..., Any]]] = {
     "view": (view, urmpipe.view),
 }
 
-OPERANDS = {
+OPERANDS: dict[str, set[str]] = {
+    "accuracy": set(),
     "build": {"unit"},
     "compare": {"reference", "logs"},
     "diagnose": {"reference", "log"},

@@ -15,7 +15,7 @@ ELSEWHERE = {
 }
 """What is run by tests of its own: a part of the line, and why."""
 
-HEAVY = ("urmpipe fmu build", "urmpipe simulate")
+HEAVY = ("urmpipe fmu build", "urmpipe simulate", "urmpipe accuracy")
 """What compiles, and so is slow."""
 
 WRITTEN_BY_A_SCRIPT = "docs/commands.md"

@@ -11,7 +11,7 @@ from click.core import ParameterSource
 import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import table_options
-from urmpipe.options.types import DURATION, JointValuesType, OneOf, WholeType
+from urmpipe.options.types import DURATION, JOINT_VALUES, OneOf, WholeType
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.solved_targets.result import SolvedTargets
@@ -48,7 +48,7 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 )
 @click.option(
     "--start",
-    type=JointValuesType(),
+    type=JOINT_VALUES,
     help="Joint values to be near to, in rad and m [default: the robot's own].",
 )
 @click.option(

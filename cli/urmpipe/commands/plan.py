@@ -11,7 +11,7 @@ import click
 import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import path_options
-from urmpipe.options.types import DURATION, JointValuesType, NumberType, OneOf
+from urmpipe.options.types import DURATION, JOINT_VALUES, NumberType, OneOf
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.planned_paths.result import PlannedPath
@@ -51,7 +51,7 @@ PLACED = ("base", "tool", "base_link", "tip_link")
 @click.option("--tsp", type=DURATION, default="5ms", show_default=True, help="Time from sample to sample.")
 @click.option(
     "--start",
-    type=JointValuesType(),
+    type=JOINT_VALUES,
     help="Joint values to be near to at the first sample, in rad and m [default: the robot's own].",
 )
 @path_options
@@ -100,11 +100,11 @@ def _print(result: PlannedPath, options: Mapping[str, Any], replaces: bool) -> N
 
 def _reading(log: Path, options: Mapping[str, Any]) -> str:
     """Return the command that reads a plan: an arm of the catalogue is found by its joints and its path."""
-    from urmpipe_models.robots.catalogue import robot_names
+    from urmpipe_models.robots.catalogue import moving_differently
     from urmpipe_models.spelling import option_of, pasted
 
     placed = [option_of(name) for name in PLACED if options[name] is not None]
     command = f"urmpipe ingest {pasted(log)}"
-    if options["robot"] is not None and (placed or options["robot"] not in robot_names()):
+    if options["robot"] is not None and (placed or options["robot"] not in moving_differently()):
         command += f" --robot {pasted(options['robot'])}"
     return f"{command} with the same {', '.join(placed)}" if placed else command

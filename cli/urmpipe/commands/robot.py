@@ -10,7 +10,7 @@ import click
 
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import placing_options
-from urmpipe.options.types import ROBOT, JointValuesType, OneOf
+from urmpipe.options.types import JOINT_VALUES, ROBOT, OneOf
 from urmpipe.usage import Group
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def list_(terminal: Terminal) -> int:
 @click.argument("name", metavar="NAME|FILE", type=ROBOT)
 @click.option(
     "--q",
-    type=JointValuesType(),
+    type=JOINT_VALUES,
     help="Its pose, in rad and m [default: the start pose].",
 )
 @click.option("--picture", metavar="FILE.svg", type=click.Path(path_type=Path), help="Draw it into a file.")

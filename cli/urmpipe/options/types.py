@@ -173,10 +173,19 @@ class NamesType(click.ParamType[Any]):
         return tuple(part.strip() for part in value.split(",")) if isinstance(value, str) else value
 
 
-class JointValuesType(click.ParamType[tuple[float, ...]]):
-    """Joint values as Q1,Q2,... in rad and m, one for each joint in the robot's order."""
+class NumbersType(click.ParamType[tuple[float, ...]]):
+    """Finite numbers in a unit that is not written behind them, parted by commas.
 
-    name = "Q1,Q2,..."
+    Args:
+        name: What the value is called in the help.
+        unit: The unit.
+        example: Such a value.
+    """
+
+    def __init__(self, name: str, unit: str, example: str) -> None:
+        self.name = name
+        self._unit = unit
+        self._example = example
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
@@ -189,8 +198,31 @@ class JointValuesType(click.ParamType[tuple[float, ...]]):
         except ValueError:
             values = ()
         if not values or not all(map(math.isfinite, values)):
-            self.fail(f"found {shown(value)}, allowed: numbers in rad and m, such as 0,3.14,0.5", param, ctx)
+            allowed = f"numbers in {self._unit}, such as {self._example}"
+            self.fail(f"found {shown(value)}, allowed: {allowed}", param, ctx)
         return values
+
+
+JOINT_VALUES = NumbersType("Q1,Q2,...", "rad and m", "0,3.14,0.5")
+"""Joint values, one for each joint in the robot's order."""
+
+
+class LengthType(click.ParamType[float]):
+    """A positive length in m, or with its unit behind it: 0.0004 or 0.4mm."""
+
+    name = "LENGTH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the length in [m]."""
+        if isinstance(value, float):
+            return value
+        length = quantity(str(value), LENGTHS)
+        if not 0.0 < length < math.inf:
+            self.fail(f"found {shown(value)}, allowed: a positive length in m, such as 0.4mm", param, ctx)
+        return length
+
+
+LENGTH = LengthType()
 
 
 class DurationType(click.ParamType[float]):

@@ -59,7 +59,7 @@ def deviation_arrows(one: Deviation, radius: float) -> Arrows:
 
     Of very many poses those that deviate most are drawn.
     """
-    factor = _factor(one.statistics["norm"].max, radius) or 1
+    factor = drawn_larger(one.statistics["norm"].max, radius) or 1
     size = np.asarray(one.delta[:, 3])
     drawn = np.sort(np.argsort(-size, kind="stable")[:MOST_ARROWS])
     start = np.asarray(one.reference)[drawn]
@@ -115,7 +115,7 @@ def _enlarged(one: Deviation, radius: float) -> Path | None:
 
     Only that of the log whose arm is drawn: a line a log would hide all of them.
     """
-    factor = _factor(one.statistics["norm"].max, radius)
+    factor = drawn_larger(one.statistics["norm"].max, radius)
     if factor is None:
         return None
     position = one.reference + factor * (np.asarray(one.actual) - one.reference)
@@ -123,7 +123,7 @@ def _enlarged(one: Deviation, radius: float) -> Path | None:
     return Path(f"deviation x{factor}", position, one.t_ns, DEVIATION_COLOUR, sample=one.sample, kept=kept)
 
 
-def _factor(largest: float, radius: float) -> int | None:
+def drawn_larger(largest: float, radius: float) -> int | None:
     """Return the largest factor that keeps a deviation inside the scene; None where none makes it seen."""
     factor = next((factor for factor in FACTORS if factor * largest <= radius), None)
     return None if factor is None or factor * largest < LEAST_SEEN * radius else factor

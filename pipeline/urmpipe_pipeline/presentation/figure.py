@@ -43,6 +43,7 @@ class Line:
         steps: True for what changes only from one row to the next.
         points: True for rows that nothing joins.
         t_ns: Time of each row in [ns], shape (n,), where it is not the panel's.
+        strong: True for what decides among lines over a quantity: it is wider.
         stacked: True for the parts of a sum: a page stacks them as areas, those above 0 and those below 0;
             the viewer, which has no areas, draws lines.
     """
@@ -55,6 +56,7 @@ class Line:
     points: bool = False
     t_ns: IntArray | None = None
     stacked: bool = False
+    strong: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +64,7 @@ class Mark:
     """A mark on a line.
 
     Attributes:
-        t_ns: Its time in [ns] (its row, from 0, where the panel has no times).
+        t_ns: Its time in [ns] (its row, from 0, where the panel has no times or is over a quantity).
         value: In the panel's unit.
         shape: Turned up or down for turns added or taken, a cross for a doubt, a diamond for the largest.
         colour: As #rrggbb.
@@ -86,11 +88,13 @@ class Over:
         values: In `unit`, shape (n,).
         title: Its symbol or name.
         unit: SI.
+        joined: Whether lines join the rows that have a value; the quantity grows from row to row.
     """
 
     values: FloatArray
     title: str
     unit: str
+    joined: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +110,7 @@ class Panel:
         signed: False for a size, which is never negative: its axis begins at 0 and has one limit.
         peaks: Rows that are marked on each line as its largest, and kept by whoever thins out.
         marks: Further marks.
-        over: A quantity as the horizontal axis instead of the time; rows are points then.
+        over: A quantity as the horizontal axis instead of the time; rows are points then, or joined.
         logarithmic: Whether the axis is logarithmic.
         small: True for a deviation, shown in mm and deg; False for a place, shown in m and rad.
         tinted: Rows to tint besides those out of the limit, shape (n,); None for none.
@@ -149,7 +153,8 @@ class Figure:
         caption: What is drawn and what to look for, one or two sentences.
         alt: What it shows, for who does not see it; a function where that takes a look at all its arrays.
         views: At least one.
-        instants: Times in [ns] at which a line goes through all panels, with a word each.
+        instants: Times in [ns] at which a line goes through all panels, with a word each; rows, from 0, where
+            a quantity is the axis that joined lines go along.
         opened: Number of the view that the viewer opens; None: all of them, one below the other.
         share: Height of its row in the viewer relative to others; of each row if all views are open.
         beside: Whether the viewer shows its views as further tabs of the figure before it.

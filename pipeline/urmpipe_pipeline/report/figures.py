@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.arrays import IntArray
 from urmpipe_pipeline.presentation.figure import Figure, Over, Panel
 from urmpipe_pipeline.report import spec
-from urmpipe_pipeline.report.panels import MARKED, Names, Span, across, axis_of, drawn_panel
+from urmpipe_pipeline.report.panels import MARKED, Names, Span, across, axis_of, drawn_panel, place_of
 from urmpipe_pipeline.report.spec import Spec
 from urmpipe_pipeline.report.traces import instant, label
 
@@ -101,12 +101,13 @@ def _spec(figure: Figure, panels: Sequence[Panel], span: Span) -> Spec:
     drawn = [drawn_panel(panel, number, names, span) for number, panel in enumerate(panels)]
     over = panels[0].over
     if over is not None:
-        found = spec.stacked(drawn, _quantity_axis(over))
+        through = list(_through(figure, panels[0], over)) if over.joined else []
+        found = spec.stacked(drawn, _quantity_axis(over), through)
         found["layout"] |= {"hovermode": "closest"}
         return found
     timed = axis_of(panels[0]) == "t"
     axis = spec.time_axis if timed else spec.row_axis
-    places = ((at / 1e9 if timed else at + 1, words) for at, words in figure.instants.items())
+    places = ((place_of(panels[0], at), words) for at, words in figure.instants.items())
     through = [instant(at, words, span.start, span.end) for at, words in places]
     found = spec.stacked(drawn, axis(span.start, span.end), through)
     if any(one.stacked for panel in panels for one in panel.lines):  # the parts of all sums are too many
@@ -114,6 +115,13 @@ def _spec(figure: Figure, panels: Sequence[Panel], span: Span) -> Spec:
     if through and names.first:
         found["layout"]["legend"] |= {"y": LEGEND_Y}
     return found
+
+
+def _through(figure: Figure, panel: Panel, over: Over) -> Iterator[Spec]:
+    """Yield a line through the panels at each row that a figure over a quantity marks."""
+    start, end = float(np.nanmin(over.values[:])), float(np.nanmax(over.values[:]))
+    for row, words in figure.instants.items():
+        yield instant(place_of(panel, row), words, min(start, 0.0), end)
 
 
 def _quantity_axis(over: Over) -> Spec:

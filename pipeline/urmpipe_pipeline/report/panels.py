@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,9 @@ DOTS = 1500
 
 MARKED = 1000
 """Marks of a panel at most: a browser draws no more of them with ease."""
+
+WIDTHS = (1.4, 2.8)
+"""Of lines over a quantity, and of the one that decides, in pixels."""
 
 AREA = 0.6
 """Opacity of the parts of a sum."""
@@ -137,6 +140,13 @@ def across(panel: Panel, one: Line) -> FloatArray:
     return np.arange(1.0, len(one.values) + 1.0) if t_ns is None else seconds(t_ns[:])
 
 
+def place_of(panel: Panel, at: int) -> float:
+    """Return where a time in [ns], or a row from 0, stands on the horizontal axis of a panel."""
+    if panel.over is not None:
+        return float(panel.over.values[at])
+    return at / 1e9 if axis_of(panel) == "t" else at + 1.0
+
+
 def _times(panel: Panel, one: Line) -> IntArray | None:
     return panel.t_ns if one.t_ns is None else one.t_ns
 
@@ -156,11 +166,12 @@ def drawn_panel(panel: Panel, number: int, names: Names, span: Span) -> spec.Pan
     title = f"{label(panel.title)} [{label(unit) if unit not in ('', '1') else '-'}]"
     look: Spec = {"rangemode": "normal" if panel.signed else "tozero"}
     if panel.logarithmic:
-        look = _logarithmic(curves, (panel.limit or 0.0) * factor)
+        joined = panel.over is not None and panel.over.joined
+        look = _logarithmic(curves, (panel.limit or 0.0) * factor, whole=joined)
     elif all(one.line.steps and np.isin(one.raw[np.isfinite(one.raw)], (0.0, 1.0)).all() for one in curves):
         look = {"range": [-0.1, 1.1], "tickvals": [0, 1]}  # yes or no
     if panel.over is not None:
-        return spec.Panel(title, list(_clouds(curves, panel.over, panel.peaks, unit)), (), panel.share, look)
+        return _over(panel, panel.over, curves, spec.Panel(title, (), (), panel.share, look), names, number)
     traces = [
         *_areas(panel, [one for one in curves if one.line.stacked], number, names, unit),
         *_lines(panel, [one for one in curves if not one.line.stacked], number, names, unit),
@@ -248,7 +259,7 @@ def _marks(panel: Panel, factor: float, names: Names, number: int) -> Iterator[S
         some.setdefault((one.name, one.colour), []).append(one)
     for (name, colour), items in some.items():
         yield marks(
-            np.array([one.t_ns / 1e9 if axis_of(panel) == "t" else one.t_ns + 1 for one in items]),
+            np.array([place_of(panel, one.t_ns) for one in items]),
             factor * np.array([one.value for one in items]),
             colour,
             [SYMBOLS[one.shape] for one in items],
@@ -281,12 +292,52 @@ def _shapes(panel: Panel, curves: Sequence[_Curve], span: Span, unit: str, facto
     return [band(0.0, high), *found, level(high, words, above=largest > LOW * panel.limit)]
 
 
-def _logarithmic(curves: Sequence[_Curve], limit: float) -> Spec:
-    """Return a logarithmic axis that reaches the limit and far below the least of the largest values."""
+def _logarithmic(curves: Sequence[_Curve], limit: float, *, whole: bool) -> Spec:
+    """Return a logarithmic axis that reaches the limit, and all values, or far below the largest."""
+    every = np.concatenate([[limit], *(one.values for one in curves)])
+    if whole and (every > 0.0).any():
+        every = every[every > 0.0]
+        return {"type": "log", "range": np.log10([every.min() / 1.5, 1.5 * every.max()]).tolist()}
     most = np.array([np.nanmax(np.abs(one.values), initial=0.0) for one in curves])
     most = most[most > 0.0] if (most > 0.0).any() else np.ones(1)
     top = max(float(most.max()), limit)
     return {"type": "log", "range": np.log10([most.min() / DEPTH, 1.5 * top]).tolist()}
+
+
+def _over(
+    panel: Panel, over: Over, curves: Sequence[_Curve], empty: spec.Panel, names: Names, number: int
+) -> spec.Panel:
+    """Return a panel over a quantity: clouds of points, or lines with marks and what is allowed."""
+    unit, factor = _shown_unit(panel)
+    if not over.joined:
+        return replace(empty, traces=list(_clouds(curves, over, panel.peaks, unit)))
+    traces = [*_joined(curves, over, unit, names, number), *_marks(panel, factor, names, number)]
+    if panel.limit is None:
+        return replace(empty, traces=traces)
+    high = factor * panel.limit
+    words = f"{high:.6g} {label(unit)}".rstrip()
+    return replace(empty, traces=traces, shapes=[level(high, words, above=True)])
+
+
+def _joined(curves: Sequence[_Curve], over: Over, unit: str, names: Names, number: int) -> Iterator[Spec]:
+    """Yield each curve over a quantity as a line through its known rows, or as points."""
+    quantity = np.asarray(over.values[:], dtype=np.float64)
+    for one in curves:
+        known = np.isfinite(one.values)
+        x, y = quantity[known], one.values[known]
+        digits = [pointer_digits(*pair) for pair in ((over.unit, x), (unit, y))]
+        yield {
+            "type": "scatter",
+            "mode": "markers" if one.line.points else "lines+markers",
+            "name": label(one.name),
+            "x": typed(x, precision(x, digits[0])),
+            "y": typed(y, precision(y, digits[1])),
+            "line": stroke(one.colour) | {"width": WIDTHS[one.line.strong]},
+            "marker": {"color": one.colour, "size": 7 if one.line.points else 5},
+            "hovertemplate": f"{label(over.title)} %{{x:{told(x, digits[0])}}} {label(over.unit)}<br>"
+            f"{label(one.name)} %{{y:{told(y, digits[1])}}} {label(unit)}<extra></extra>",
+            "showlegend": False,
+        } | names.entry(one.name, number)
 
 
 def _clouds(curves: Sequence[_Curve], over: Over, peaks: Sequence[int], unit: str) -> Iterator[Spec]:

@@ -15,8 +15,9 @@ from urmpipe_pipeline.presentation.exports import Exports
 Format = Literal["csv", "parquet", "mat", "tum"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 
-RowNames = Literal["grid", "file"]
-"""grid: the run on its grid, in SI; file: the rows of the file, its columns in its own units."""
+RowNames = Literal["grid", "file", "velocities", "samples"]
+"""grid: the run on its grid, in SI; file: the rows of the file, its columns in its own units; of an accuracy
+velocities: the errors of each; samples: those of all its motions."""
 
 PoseNames = Literal["fk", "recorded"]
 """By forward kinematics, or as the log recorded them."""

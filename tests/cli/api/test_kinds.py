@@ -17,6 +17,7 @@ from urmpipe.systems.units import Backend
 from urmpipe_models.inverse.solve import METHODS
 from urmpipe_models.lagrange.equations import TERMS
 from urmpipe_models.planning.stretches import ARCS
+from urmpipe_pipeline.accuracy.result import DECIDES
 from urmpipe_pipeline.comparison.compare import Tcp
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.planned_paths.request import LAWS
@@ -50,6 +51,7 @@ RIGHT = {
         "time",
         "velocity",
         "acceleration",
+        "limit",
     },
     "a list": {"logs", "inputs", "platforms", "formats", "joints", "measured"},
     "a mapping": {"arguments", "options", "unit", "interval"},
@@ -84,6 +86,8 @@ def given(function: str, run: urmpipe.Run, folder: Path) -> dict[str, Any]:
     if function == "plan":
         one_of_each["path"] = "cube:wall,a=0.2,r=0.02,x=0.5,y=0,z=0.3"
     needed = {name: one_of_each[name] for name, one in parameters.items() if one.default is Parameter.empty}
+    if function == "accuracy":
+        return needed | {"robot": "irb60", "path": "cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1"}
     return needed | ({"robot": "ur5e"} if "robot" in parameters else {})
 
 
@@ -119,6 +123,7 @@ def test_each_kind_is_of_a_keyword() -> None:
         ("arcs", ARCS),
         ("backend", get_args(Backend)),
         ("derivative", get_args(Method)),
+        ("error", DECIDES),
         ("form", get_args(FormName)),
         ("law", LAWS),
         ("method", METHODS),

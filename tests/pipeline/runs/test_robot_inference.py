@@ -9,13 +9,13 @@ import pytest
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
-from urmpipe_models.robots.catalogue import load_robot, robot_names
+from urmpipe_models.robots.catalogue import load_robot, moving_differently
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
 
 ROWS = 60
-ARMS = [name for name in robot_names() if len(load_robot(name).moving) in {4, 6, 7}]
+ARMS = [name for name in moving_differently() if len(load_robot(name).moving) in {4, 6, 7}]
 
 
 def motion(joints: int = 6) -> FloatArray:

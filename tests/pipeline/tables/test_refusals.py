@@ -34,7 +34,8 @@ def said(kind: type[UrmpipeError], work: Callable[[], Any]) -> str:
 def test_options_that_make_no_sense() -> None:
     options: Any = ExportOptions
     assert said(OptionError, lambda: options("xlsx")) == "--to: found xlsx, allowed: csv, parquet, mat, tum"
-    assert said(OptionError, lambda: options("csv", "own")) == "--rows: found own, allowed: grid, file"
+    rows = "grid, file, velocities, samples"
+    assert said(OptionError, lambda: options("csv", "own")) == f"--rows: found own, allowed: {rows}"
     assert said(OptionError, lambda: options("tum", None, "ik")) == "--tcp: found ik, allowed: fk, recorded"
     assert said(OptionError, lambda: options("csv", tcp="fk")) == (
         "--tcp: found fk with a table (csv), allowed: with trajectories; --to tum writes them"

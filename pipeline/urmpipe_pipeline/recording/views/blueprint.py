@@ -44,6 +44,9 @@ LINE_LENGTH = 115
 BESIDE = [1, 2]
 """Shares of the width for a long summary and the plots, where no arm stands below the summary."""
 
+SHORT = 0.5
+"""A tab that lasts less than this share of the longest has a time axis of its own."""
+
 HIGH = 0.16
 """Share of the height from which a plot has room for many numbers at its axis."""
 
@@ -155,8 +158,19 @@ def _plots(plots: Plots, parts: Sequence[_Part]) -> View | Container | None:
     if sum(len(figure.views) for part in shown for figure in part.figures) <= SEEN_AT_ONCE:
         views = [view for part in shown for view, _ in _rows(plots, part, part.title)]
         return rrb.Grid(*views, grid_columns=COLUMNS if len(views) > 2 * COLUMNS else 1)
-    tabs = [_stacked(_rows(plots, part), f"{part.verdict} {part.title}".strip()) for part in shown]
+    tabs = []
+    for part in shown:
+        plots.own = _own_axis(plots, part)
+        tabs.append(_stacked(_rows(plots, part), f"{part.verdict} {part.title}".strip()))
     return rrb.Tabs(*tabs, active_tab=next((i for i, part in enumerate(shown) if part.opened), 0))
+
+
+def _own_axis(plots: Plots, part: _Part) -> tuple[int, int] | None:
+    """Return from where to where a section goes in [ns] or rows that is much shorter than all; else None."""
+    own, _ = whole_axis(part.figures)
+    if own is None or plots.whole is None or own[0] == own[1]:
+        return None
+    return own if own[1] - own[0] < SHORT * (plots.whole[1] - plots.whole[0]) else None
 
 
 def _rows(plots: Plots, part: _Part, about: str = "") -> list[Row]:

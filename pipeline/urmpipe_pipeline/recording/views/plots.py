@@ -60,6 +60,7 @@ class Plots:
             where nothing is plotted.
         timed: Whether there are times.
         plotted: The arrays of the result that views show, by where they stand.
+        own: Where the views of a much shorter part begin and end, in [ns] or rows; None: as all others.
     """
 
     stream: RecordingStream
@@ -67,6 +68,7 @@ class Plots:
     whole: tuple[int, int] | None
     timed: bool
     plotted: set[str] = field(default_factory=set)
+    own: tuple[int, int] | None = None
     _looks: dict[str, _Look] = field(default_factory=dict)
     _shares_axis: bool = True
 
@@ -130,12 +132,14 @@ class Plots:
             origin="/",
             contents=list(entities),
             name=name,
-            axis_x=rrb.TimeAxis(link="LinkToGlobal", view_range=self._range()),
+            axis_x=rrb.TimeAxis(
+                link="LinkToGlobal" if self.own is None else "Independent", view_range=self._range()
+            ),
             axis_y=None if span is None else rrb.ScalarAxis(range=span),
             plot_legend=rrb.PlotLegend("RightTop", visible=legend),
             overrides={entity: look.style() for entity, look in overrides.items()} or None,
         )
-        if self._shares_axis:
+        if self._shares_axis and self.own is None:
             view.id, self._shares_axis = SHARED_AXIS, False
         return view
 
@@ -146,7 +150,7 @@ class Plots:
 
         if self.whole is None or self.whole[0] == self.whole[1]:
             return None
-        first, last = self.whole
+        first, last = self.whole if self.own is None else self.own
         key, span = "nanos" if self.timed else "seq", last - first
         edges = math.floor(first - BEFORE * span), math.ceil(last + AFTER * span)
         start, end = (rr.TimeRangeBoundary.absolute(**{key: at}) for at in edges)

@@ -1,0 +1,117 @@
+"""`urmpipe accuracy`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import urmpipe
+from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.reading import path_options
+from urmpipe.options.types import JOINT_VALUES, LENGTH, NumbersType, NumberType, OneOf
+
+if TYPE_CHECKING:
+    from urmpipe_pipeline.accuracy.result import Accuracy
+
+
+@click.command(short_help="Measure how far a driven arm is from its path.")
+@click.option(
+    "--path",
+    required=True,
+    metavar="PATH.csv|cube:...",
+    help="Rows x, y, z and r, or a test cube, as of plan.",
+)
+@click.option(
+    "--velocities",
+    type=NumbersType("V1,V2,...", "m/s", "0.1,0.2"),
+    default="0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8,0.9,1.0",
+    show_default=True,
+    help="Largest speeds along the path, in m/s.",
+)
+@click.option(
+    "--acceleration",
+    type=NumberType("M/S2", "m/s2"),
+    help="Largest acceleration along the path, at all of them [default: 6; with --law limits none].",
+)
+@click.option(
+    "--law",
+    type=OneOf(["trapezoid", "jerk", "limits"]),
+    default="trapezoid",
+    show_default=True,
+    help="Within speed and acceleration; within --jerk, too; or as fast as the joints' limits allow.",
+)
+@click.option("--jerk", type=NumberType("M/S3", "m/s3"), help="Largest jerk along the path, of --law jerk.")
+@click.option(
+    "--arcs",
+    type=OneOf(["tangential", "total"]),
+    default="tangential",
+    show_default=True,
+    help="What the acceleration limits on arcs; total: v^2 / r counts, too.",
+)
+@click.option(
+    "--limit",
+    type=LENGTH,
+    help="Largest error allowed, as 0.4mm: judge the velocities, and find the largest within it.",
+)
+@click.option(
+    "--error",
+    type=OneOf(["time", "path"]),
+    default="time",
+    show_default=True,
+    help="What is judged: the distance from the set point of the same time, or from the path.",
+)
+@click.option(
+    "--force",
+    type=NumbersType("FX,FY,FZ", "N", "0,0,-50"),
+    help="What acts on the tool from outside, in N, along the axes of the world [default: nothing].",
+)
+@click.option(
+    "--start",
+    type=JOINT_VALUES,
+    help="Joint values to be near to at the first sample, in rad and m [default: the robot's own].",
+)
+@click.option(
+    "--backend",
+    type=OneOf(["native", "python"]),
+    help="What the arm runs as [default: native if it can be built here].",
+)
+@output_option("RUN.rrd", "Write a recording of the runs.")
+@path_options
+@output_options
+def accuracy(path: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
+    """Run an arm with drives along a path at some velocities, and tell how far it is from it.
+
+    The path is planned at each velocity, its set points lead the arm's controllers. With --limit there is a
+    verdict, and the running speed is found: the largest velocity within the limit, to 1 %. The robot needs
+    masses, and a drive or a spring for every joint.
+
+    \b
+    Examples:
+      urmpipe accuracy --robot irb60 --path cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1
+      urmpipe accuracy --robot irb60 --path contour.csv --limit 0.4mm -o run.rrd
+      urmpipe accuracy --robot my-arm.toml --path contour.csv --error path --json
+      urmpipe accuracy --robot my-arm.toml --path contour.csv --force 0,0,-50
+
+    Exit codes: 0 done, with --limit every velocity is within it, 1 one is not, 2 bad input or usage.
+    """
+    from urmpipe.systems.blocks import ON_PYTHON
+
+    replaces = output is not None and output.exists()
+    with terminal.progress(f"Running along {path}") as progress:
+        result = urmpipe.accuracy(path, output=output, told=terminal.note, progress=progress, **options)
+    terminal.warn([one for one in result.warnings if one.kind != ON_PYTHON])  # that is told already
+    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces))
+    return 1 if result.verdict == "fail" else 0
+
+
+def _print(result: Accuracy, replaces: bool) -> None:
+    """Print what the runs came to, and what was written."""
+    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.terminal import print_recording
+    from urmpipe_pipeline.results import present
+
+    print_presentation(present(result))
+    if result.recording is not None:
+        print_recording(result.recording, replaced=replaces)

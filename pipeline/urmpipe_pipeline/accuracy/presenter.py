@@ -1,0 +1,126 @@
+"""How an accuracy shows itself: the running speed, errors over velocity, then a section a velocity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import partial
+
+from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
+from urmpipe_pipeline.accuracy.figures import motion_figures, velocity_figure
+from urmpipe_pipeline.accuracy.parts import (
+    at_velocity,
+    error_cell,
+    events,
+    facts,
+    headline,
+    motion_facts,
+    shown_motion,
+    velocities_table,
+)
+from urmpipe_pipeline.accuracy.result import Accuracy
+from urmpipe_pipeline.accuracy.scene import accuracy_scene, arm_drawing, path_figure
+from urmpipe_pipeline.presentation.digits import written
+from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table, recording_fact
+from urmpipe_pipeline.presentation.section import (
+    Block,
+    Cell,
+    Check,
+    Fact,
+    Judged,
+    Presentation,
+    Section,
+    Value,
+)
+
+
+def present(result: Accuracy) -> Presentation:
+    """Return what an accuracy shows."""
+    every, motion = tuple(facts(result)), shown_motion(result)
+    return Presentation(
+        name=result.name,
+        headline=headline(result),
+        verdict=result.verdict,
+        facts=every,
+        body=_body(result, every),
+        word="simulated",
+        opens_at_ns=int(motion.t_ns[motion.worst]),
+        scene=partial(accuracy_scene, result),
+        lines=(line(result),),
+        created=result.provenance.created,
+    )
+
+
+def line(result: Accuracy) -> Mapping[str, Cell]:
+    """Return an arm among others: how fast it may run, its errors at the slowest and the fastest velocity."""
+    slow, fast = (end(result.errors, key=lambda one: one.velocity) for end in (min, max))
+    speed = result.running_speed
+    found: dict[str, Cell] = {
+        "Robot": result.robot.name,
+        "Path": result.name,
+        "Verdict": Judged(result.verdict),
+        "Running speed": None if speed is None else Value(float(f"{speed:.4g}"), "m/s"),
+        "Limit": Value(result.limit, "m", given=True),
+        "Decides": result.decides,
+    }
+    for one in dict.fromkeys((slow, fast)):
+        found[f"Error at {at_velocity(one.velocity)}"] = error_cell(result, one, result.decides)
+        found[f"At voltage limit at {at_velocity(one.velocity)}"] = Value(one.saturated, "%")
+    return found
+
+
+def _body(result: Accuracy, every: tuple[Fact, ...]) -> Section:
+    title = f"Accuracy of {result.robot.name}, {result.name}"
+    tables = [velocities_table(result, "Errors by velocity", result.errors, linked=True)]
+    if result.tried:
+        tried = "Velocities run to find the running speed"
+        tables.append(velocities_table(result, tried, result.tried, folded=True))
+    return Section(
+        title,
+        result.verdict,
+        (*every, recording_fact(result.recording)),
+        tuple(tables),
+        blocks=partial(_page, result),
+        checks=tuple(_checks(result)),
+        properties={
+            "running_speed": result.running_speed,
+            "limit": result.limit,
+            "decides": result.decides,
+            "loop_radius": result.loop_radius,
+            "compiled": result.compiled,
+        },
+        warnings=result.warnings,
+        sections=tuple(_motion(result, one) for one in result.motions),
+    )
+
+
+def _checks(result: Accuracy) -> Iterator[Check]:
+    """Yield a check a velocity; nothing without a limit."""
+    for one in result.errors:
+        verdict = result.within(one)
+        if verdict is not None:
+            found = error_cell(result, one, result.decides)
+            allowed = written(Value(result.limit, "m", given=True), unit=True)
+            said = f"{written(found, unit=True)} ({result.decides}), allowed: {allowed}"
+            yield Check(at_velocity(one.velocity), verdict, said if verdict == "fail" else "")
+
+
+def _page(result: Accuracy) -> Iterator[Block]:
+    """Yield what only a page shows: errors over velocity, the arm and the path of the motion shown first."""
+    yield velocity_figure(result)
+    yield arm_drawing(result)
+    yield path_figure(shown_motion(result))
+    if result.provenance.inputs:
+        yield inputs_table("Input files", result.provenance.inputs)
+    yield provenance_table(result.provenance)
+
+
+def _motion(result: Accuracy, motion: DrivenMotion) -> Section:
+    """Return the section of a motion."""
+    return Section(
+        at_velocity(motion.velocity),
+        result.within(motion.errors),
+        tuple(motion_facts(result, motion)),
+        figures=partial(motion_figures, result, motion),
+        events=partial(events, motion),
+        opened=motion is shown_motion(result),
+    )

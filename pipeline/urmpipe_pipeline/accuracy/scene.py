@@ -1,0 +1,95 @@
+"""What stands in space of an accuracy: the arm, planned and real path, the deviation enlarged."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.kinematics.forward import points_over_log
+from urmpipe_pipeline import text
+from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
+from urmpipe_pipeline.accuracy.parts import at_velocity, shown_motion
+from urmpipe_pipeline.accuracy.result import Accuracy
+from urmpipe_pipeline.comparison.scene import drawn_larger
+from urmpipe_pipeline.comparison.trajectory import extent
+from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR, REFERENCE_COLOUR, run_colour
+from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure
+from urmpipe_pipeline.presentation.parts import ends, spot_at
+from urmpipe_pipeline.presentation.scene import Arm, Path, Scene, Spot
+from urmpipe_pipeline.projections import ABOVE, FRONT, SIDEWAYS, Sketch, projected
+
+ARMS = 8
+"""Poses of the arm in a drawing, at most."""
+
+
+def accuracy_scene(result: Accuracy) -> Scene:
+    """Return the arm along the contour, what was planned, and where it was, coloured by its deviation."""
+    motion = shown_motion(result)
+    at = motion.worst
+    arm = Arm(result.robot, motion.q, motion.t_ns, run_colour(0), kept=(at,))
+    now = Path("planned", motion.planned, motion.t_ns, REFERENCE_COLOUR, asked=True, kept=(at,), line=False)
+    larger = _larger(motion)
+    said = f"real path coloured by ‖Δ‖{f', in crimson the {larger.name}' if larger else ''}"
+    title = f"Arm and paths at {at_velocity(motion.velocity)} [m], {said}"
+    return Scene(title, (arm,), (*_paths(motion), now), (_worst(motion),))
+
+
+def path_figure(motion: DrivenMotion) -> SpaceFigure:
+    """Return the planned and the real path of a motion, and its deviation enlarged."""
+    larger = _larger(motion)
+    drawn = f" Crimson: {larger.name}." if larger else ""
+    return SpaceFigure(
+        f"Path in space at {at_velocity(motion.velocity)}",
+        f"Equal scale on all axes. Grey: planned; the colour is the distance from the set point.{drawn}",
+        f"Planned and real path at {at_velocity(motion.velocity)} in space. {_worst(motion).words}.",
+        _paths(motion),
+        (*ends(motion.position), _worst(motion)),
+    )
+
+
+def arm_drawing(result: Accuracy) -> Drawing:
+    """Return the arm along the contour in three projections, with the deviation enlarged.
+
+    Source: [Iso9283]_ Fig. 4.
+    """
+    motion = shown_motion(result)
+    larger, asked = _larger(motion), np.clip(motion.corner_ns, 0, motion.t_ns[-1])
+    at = np.unique(np.searchsorted(motion.t_ns, [motion.t_ns[0], *asked, motion.t_ns[-1]]))
+    at = at[np.unique(np.linspace(0, len(at) - 1, ARMS).astype(np.intp))]
+    run = motion.position if larger is None else larger.position
+    spot = Spot(spot_at(run[motion.worst]), "largest error", DEVIATION_COLOUR)
+    arms = points_over_log(result.robot, motion.q[at])
+    words = "real path" if larger is None else larger.name
+    title = f"{result.robot.name} at {at_velocity(motion.velocity)}: planned path grey, {words} orange"
+    svg = projected(Sketch(list(arms), run, (spot,), asked=motion.planned), (SIDEWAYS, FRONT, ABOVE), title)
+    alt = (
+        f"The arm at {len(at)} poses from the side, from the front and from above, planned path and {words}."
+    )
+    return Drawing(f"Arm on the path at {at_velocity(motion.velocity)}", alt, svg)
+
+
+def _paths(motion: DrivenMotion) -> tuple[Path, ...]:
+    """Return the planned path, the real one coloured by its deviation, and the deviation enlarged."""
+    real = Path(
+        "real: ‖Δ‖", motion.position, motion.t_ns, AXIS_COLOURS["norm"], values=motion.delta[:, 3],
+        kept=(motion.worst,),
+    )  # fmt: skip
+    larger = _larger(motion)
+    planned = Path("planned", motion.planned, None, REFERENCE_COLOUR, asked=True)
+    return (planned, real) if larger is None else (planned, real, larger)
+
+
+def _larger(motion: DrivenMotion) -> Path | None:
+    """Return planned + factor (position - planned); None where it shows nothing."""
+    factor = drawn_larger(float(motion.delta[:, 3].max()), extent(motion.planned) / 2.0)
+    if factor is None:
+        return None
+    position: FloatArray = motion.planned + factor * (motion.position - motion.planned)
+    return Path(f"deviation x{factor}", position, motion.t_ns, DEVIATION_COLOUR, kept=(motion.worst,))
+
+
+def _worst(motion: DrivenMotion) -> Spot:
+    """Return where a motion is furthest from its set point."""
+    said = text.quantity(float(motion.delta[motion.worst, 3]), "m")
+    when = text.seconds(float(motion.t[motion.worst]))
+    return Spot(spot_at(motion.position[motion.worst]), f"‖Δ‖ {said} at {when} s", DEVIATION_COLOUR)

@@ -1,0 +1,163 @@
+"""`urmpipe accuracy`: the running speed is looked for from below; what makes no sense is told."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+import urmpipe
+from urmpipe.driven_runs.running_speed import Within, running_speed
+from urmpipe.main import run
+
+Captured = pytest.CaptureFixture[str]
+
+CUBE = ("--path", "cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1")
+
+
+def runs(good: Callable[[float], bool]) -> tuple[list[float], Within]:
+    """Return what is within a limit by a rule, and the velocities that it is asked for."""
+    asked: list[float] = []
+
+    def within(velocities: Sequence[float]) -> list[bool]:
+        asked.extend(velocities)
+        return [good(one) for one in velocities]
+
+    return asked, within
+
+
+def test_the_running_speed_is_known_to_one_percent() -> None:
+    asked, within = runs(lambda v: v <= 0.537)
+    found = running_speed(within, [0.1, 0.5, 1.0])
+    assert found is not None
+    assert found <= 0.537
+    assert any(0.537 < one <= 1.01 * found * (1 + 1e-12) for one in asked)
+
+
+def test_the_first_velocity_that_fails_bounds_it() -> None:
+    found = running_speed(runs(lambda v: v < 0.3 or v > 0.6)[1], [0.8, 0.2, 0.4])
+    assert found is not None
+    assert 0.3 / 1.01 <= found < 0.3
+
+
+@pytest.mark.parametrize(("good", "speed"), [(True, 10.0), (False, None)])
+def test_all_or_none_within(good: bool, speed: float | None) -> None:
+    assert running_speed(runs(lambda _: good)[1], [0.1, 1.0]) == speed
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--velocities", "0,-1"], "--velocities: found 0.0, -1.0, allowed: finite numbers of m/s above 0"),
+        (["--velocities", "nan"], "--velocities: found 'nan', allowed: numbers in m/s, such as 0.1,0.2"),
+        (["--velocities", "abc"], "--velocities: found 'abc', allowed: numbers in m/s, such as 0.1,0.2"),
+        (["--limit", "0"], "--limit: found '0', allowed: a positive length in m, such as 0.4mm"),
+        (["--force", "1,2"], "--force: found [1.0, 2.0], allowed: three finite numbers of N"),
+        (["--law", "limit"], "--law: found 'limit' (did you mean limits?), allowed: trapezoid, jerk, limits"),
+    ],
+)  # fmt: skip
+def test_values_that_are_refused(capsys: Captured, options: list[str], said: str) -> None:
+    assert run(["accuracy", "--robot", "irb60", *CUBE, *options]) == 2
+    assert capsys.readouterr().err == f"error: {said}\n"
+
+
+def test_path_and_robot_are_asked_for(capsys: Captured) -> None:
+    assert run(["accuracy", "--robot", "irb60"]) == 2
+    assert capsys.readouterr().err.startswith("error: found no --path, allowed: urmpipe accuracy ")
+    assert run(["accuracy", *CUBE]) == 2
+    assert capsys.readouterr().err == "error: --robot: found none, allowed: an arm with masses and drives\n"
+
+
+def test_the_log_of_a_plan_is_no_path(
+    capsys: Captured, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["plan", CUBE[1], "--robot", "irb60", "-o", "plan.csv", "-q"]) == 0
+    assert run(["accuracy", "--robot", "irb60", "--path", "plan.csv"]) == 2
+    said = "error: plan.csv: found the log of a plan, allowed: the rows that it was made of\n"
+    assert capsys.readouterr().err == said
+
+
+ARM = """
+name = "flat"
+kind = "joints"
+start = [0.5, 1.0]
+tip = { steps = [{ along = "x", value = 0.4 }] }
+
+[[joints]]
+name = "a"
+
+[[joints]]
+name = "b"
+origin = { steps = [{ along = "x", value = 0.5 }] }
+"""
+
+MASSES = "".join(
+    f"""
+[[inertials]]
+joint = "{joint}"
+mass = 2.0
+centre = [0.2, 0, 0]
+inertia = [0.01, 0.05, 0.05, 0, 0, 0]
+source = "made up"
+"""
+    for joint in "ab"
+)
+
+
+def drive(joint: str, gain: float = 7.5) -> str:
+    """Return the drive of a joint."""
+    return (
+        f"\n[drives.{joint}]\nk = 2500.0\nl = 5.0\ni_p = 100\nC = 0.05\nR = 0.5\nL = 0.001\nI1 = 0.5\n"
+        f"period = 0.005\nKphi = {gain}\nKw = 0.75\nKeps = 0.01\nu_max = 48.0\n"
+    )
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a short path and an arm."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "path.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.497,0\n")
+    (tmp_path / "arm.toml").write_text(ARM + MASSES + drive("a") + drive("b"))
+    return tmp_path
+
+
+GIVEN = ("accuracy", "--robot", "arm.toml", "--path", "path.csv", "--backend", "python", "--json")
+
+
+@pytest.mark.slow
+def test_errors_and_verdict(folder: Path, capsys: Captured) -> None:
+    codes = [run([*GIVEN, "--velocities", "0.1,0.05", *more]) for more in ((), ("--limit", "1um"))]
+    assert codes == [0, 1]
+    assert capsys.readouterr().err.count("note: the arm runs in NumPy") <= 2
+    result = urmpipe.accuracy(
+        "path.csv", "arm.toml", velocities=[0.1, 0.05, 0.1], limit=1.0, backend="python"
+    )
+    assert [one.velocity for one in result.errors] == [0.1, 0.05]
+    assert result.verdict == "pass"
+    rows = result.to_frame().set_index("velocity")
+    assert [rows.error[v] for v in (0.1, 0.05)] == result.to_dict()["errors"]
+
+
+@pytest.mark.slow
+def test_an_arm_that_diverges(folder: Path, capsys: Captured) -> None:
+    (folder / "path.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.49,0\n")
+    (folder / "arm.toml").write_text(ARM + MASSES + drive("a", -7500.0) + drive("b"))
+    assert run([*GIVEN, "--velocities", "0.01"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["errors"] == [None]
+    assert found["diverged"][0]["joint"] in ("a", "b")
+    assert run([*GIVEN, "--velocities", "0.01", "--limit", "1mm"]) == 1
+
+
+def test_an_arm_without_masses_and_drives(folder: Path, capsys: Captured) -> None:
+    (folder / "arm.toml").write_text(ARM)
+    assert run([*GIVEN[:-1]]) == 2
+    drives = "not found, allowed: the drive of the joint, or { k, l } of a spring that holds it"
+    assert capsys.readouterr().err.splitlines() == [
+        "error: robot flat: key inertials: not found, allowed: its masses",
+        f"error: robot flat: key drives.a: {drives}",
+        f"error: robot flat: key drives.b: {drives}",
+    ]
