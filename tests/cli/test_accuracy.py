@@ -11,6 +11,7 @@ import pytest
 import urmpipe
 from urmpipe.driven_runs.running_speed import Within, running_speed
 from urmpipe.main import run
+from urmpipe_pipeline.accuracy.published import fig7_rows
 
 Captured = pytest.CaptureFixture[str]
 
@@ -131,7 +132,8 @@ GIVEN = ("accuracy", "--robot", "arm.toml", "--path", "path.csv", "--backend", "
 def test_errors_and_verdict(folder: Path, capsys: Captured) -> None:
     codes = [run([*GIVEN, "--velocities", "0.1,0.05", *more]) for more in ((), ("--limit", "1um"))]
     assert codes == [0, 1]
-    assert capsys.readouterr().err.count("note: the arm runs in NumPy") <= 2
+    slower = "note: the arm runs in NumPy, some two hundred times slower than machine code\n"
+    assert capsys.readouterr().err == 2 * slower
     result = urmpipe.accuracy(
         "path.csv", "arm.toml", velocities=[0.1, 0.05, 0.1], limit=1.0, backend="python"
     )
@@ -139,6 +141,30 @@ def test_errors_and_verdict(folder: Path, capsys: Captured) -> None:
     assert result.verdict == "pass"
     rows = result.to_frame().set_index("velocity")
     assert [rows.error[v] for v in (0.1, 0.05)] == result.to_dict()["errors"]
+
+
+@pytest.mark.slow
+def test_the_error_that_decides_is_chosen_and_a_cube_is_its_rows(capsys: Captured) -> None:
+    given = ("accuracy", "--robot", "irb60", *CUBE, "--velocities", "0.3", "--json")
+    assert run([*given]) == 0
+    found = json.loads(capsys.readouterr().out)
+    (error,), (path_error,) = found["errors"], found["path_errors"]
+    assert path_error < error
+    between = f"{(error + path_error) / 2:.6f}"
+    verdicts = []
+    for which, code in (("time", 1), ("path", 0)):
+        assert run([*given, "--limit", between, "--error", which]) == code
+        verdicts.append(json.loads(capsys.readouterr().out))
+    assert [one["verdict"] for one in verdicts] == ["fail", "pass"]
+    assert [one["decides"] for one in verdicts] == ["time", "path"]
+    by_path = verdicts[1]
+    speed, tried = by_path["running_speed"], by_path["tried"]
+    held = {one["velocity"]: one["path_error"] <= float(between) for one in tried}
+    assert held[speed]
+    assert min(v for v, within in held.items() if not within and v > speed) <= 1.01 * speed * (1 + 1e-12)
+    assert 0.3 in held
+    rows = urmpipe.accuracy(fig7_rows(), "irb60", velocities=[0.3])
+    assert [one.error for one in rows.errors] == [error]
 
 
 @pytest.mark.slow
@@ -161,3 +187,30 @@ def test_an_arm_without_masses_and_drives(folder: Path, capsys: Captured) -> Non
         f"error: robot flat: key drives.a: {drives}",
         f"error: robot flat: key drives.b: {drives}",
     ]
+
+
+def test_each_joint_needs_a_drive_or_a_spring_and_one_a_drive(folder: Path, capsys: Captured) -> None:
+    spring = "\n[drives.{}]\nk = 100.0\nl = 1.0\n"
+    (folder / "arm.toml").write_text(ARM + MASSES + drive("a"))
+    assert run([*GIVEN[:-1]]) == 2
+    (folder / "arm.toml").write_text(ARM + MASSES + spring.format("a") + spring.format("b"))
+    assert run([*GIVEN[:-1]]) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        "error: robot flat: key drives.b: not found, allowed: the drive of the joint, or { k, l } of a spring"
+        " that holds it",
+        "error: robot flat: key drives: found no joint with a drive, allowed: one at least",
+    ]
+
+
+def test_a_path_out_of_reach_and_a_recording_are_refused(folder: Path, capsys: Captured) -> None:
+    (folder / "path.csv").write_text("x,y,z\n0.5,0.5,0\n1.5,0.5,0\n")
+    assert run([*GIVEN[:-1]]) == 2
+    (far,) = capsys.readouterr().err.splitlines()
+    assert far.startswith("error: path.csv:3: found (1.5, 0.5, 0) m, 0.681 m out of reach of flat,")
+    (folder / "path.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.4,0\n")
+    assert run(["plan", "path.csv", "-o", "plan.rrd", "-q"]) == 0
+    capsys.readouterr()
+    assert run([*GIVEN[:3], "--path", "plan.rrd"]) == 2
+    (said,) = capsys.readouterr().err.splitlines()
+    assert said.startswith("error: plan.rrd: ")
+    assert "a table (CSV) of rows, or a test cube (cube:...)" in said

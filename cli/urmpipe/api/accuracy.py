@@ -49,6 +49,9 @@ POSES = 10
 REACHED = 1.0 - 1e-6
 """A velocity of which the plan reaches this share is reached."""
 
+SLOWER = "some two hundred"
+"""How much longer ten velocities of irb60 take in NumPy (benchmarks/results/accuracy.md)."""
+
 RUNNING = 0.9
 """Share of the work that the runs are."""
 
@@ -239,10 +242,10 @@ def _runs(
     assert joints is not None
     chosen, slow = chosen_backend(backend)
     notes = []
-    if slow:
-        said = f"the arm runs in NumPy, some three hundred times slower than machine code: {slow}"
-        notes.append(LogWarning(ON_PYTHON, said))
+    if chosen == "python":
+        said = f"the arm runs in NumPy, {SLOWER} times slower than machine code{f': {slow}' if slow else ''}"
         told(said)
+        notes += [LogWarning(ON_PYTHON, said)] if slow else []
     unit = ArmUnit(replace(arm, start=tuple(joints.q[0].tolist())), force)
     return ArmRuns(unit, plan, chosen == "native", told, progress), notes
 

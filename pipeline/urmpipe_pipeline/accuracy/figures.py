@@ -49,13 +49,12 @@ def velocity_figure(result: Accuracy) -> Figure:
             Mark(
                 at.index(v),
                 one.error,
-                "up",
+                "up" if one.least else "cross",
                 INK_COLOUR,
-                f"published: more than {1e3 * one.error:g} mm",
+                f"published: {'more than ' if one.least else ''}{1e3 * one.error:g} mm",
                 "published",
             )
             for v, one in points.items()
-            if one.least
         ]
     name, colour = ERRORS[result.decides]
     marks += [
@@ -101,7 +100,7 @@ def _velocity_caption(result: Accuracy, *, published: bool) -> str:
     said += f" {MEANT[result.decides]}. Diamonds: velocities asked for."
     said += " Dashed: the limit." if result.limit is not None else ""
     said += " Dotted: the running speed, the largest within it." if result.running_speed is not None else ""
-    said += ' Dark points: [Iso9283] Fig. 7; at a triangle only "more than" is known.' if published else ""
+    said += ' Dark crosses: [Iso9283] Fig. 7; at the triangle only "more than" is known.' if published else ""
     gone = [at_velocity(one.velocity) for one in result.errors if one.diverged is not None]
     return said + (f" No point at {text.enumerated(gone)}: the arm diverged." if gone else "")
 

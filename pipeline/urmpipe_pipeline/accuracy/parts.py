@@ -85,6 +85,7 @@ def facts(result: Accuracy) -> Iterator[Fact]:
         speed = result.running_speed
         yield Fact("Running speed", "none" if speed is None else at_velocity(speed))
         yield Fact("Limit", text.allowed(result.limit))
+    yield Fact("Robot", f"{result.robot.name}: {result.robot.description}".removesuffix(": "), brief=False)
     yield Fact("Error that decides", f"{result.decides}: {MEANT[result.decides]}")
     yield Fact("Acceleration", acceleration_words(result))
     if any(result.force):
