@@ -11,7 +11,6 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError, for_each, shown
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.results import kind_of, read_recording
@@ -19,11 +18,12 @@ from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.other_robot import on_robot
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.sources.vocabulary import key
 
-JUDGED = "found the recording of a {}, allowed: one that ingest wrote"
+JUDGED = "found the recording of {}, allowed: one that ingest wrote"
 
 WITH_BASELINE = Hint("baseline", None, "compares it, alone, with an earlier one")
 
@@ -138,10 +138,12 @@ def _recorded(operand: Path, judged: Sequence[Hint]) -> MadeRun:
     result = read_recording(operand)
     if isinstance(result, MADE_RUNS):
         return result
-    if isinstance(result, (Comparison, Diagnosis)):
-        hints = judged if isinstance(result, Comparison) else ()
-        raise RecordingError(Finding(JUDGED.format(kind_of(result).name), str(operand), hints=tuple(hints)))
-    raise RecordingError(Finding(SIMULATION, file=str(operand)))
+    if isinstance(result, Simulation):
+        raise RecordingError(Finding(SIMULATION, file=str(operand)))
+    hints = judged if isinstance(result, Comparison) else ()
+    raise RecordingError(
+        Finding(JUDGED.format(kind_of(result).with_article), str(operand), hints=tuple(hints))
+    )
 
 
 def load_comparison(operand: Path) -> Comparison | None:

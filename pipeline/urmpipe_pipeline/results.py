@@ -52,6 +52,11 @@ class Kind:
     present: Callable[[Any], Presentation]
     exports: Callable[[Any], Exports] | None = None
 
+    @property
+    def with_article(self) -> str:
+        """Its name in a sentence: a run, an accuracy."""
+        return f"{'an' if self.name[0] in 'aeiou' else 'a'} {self.name}"
+
 
 KINDS: tuple[Kind, ...] = (
     Kind("run", Run, runs.present, run_exports.exports),
@@ -126,5 +131,5 @@ def exports(result: Result) -> Exports:
     """
     kind = kind_of(result)
     if kind.exports is None:
-        raise OptionError(f"a {kind.name} has no tables")
+        raise OptionError(f"{kind.with_article} has no tables")
     return kind.exports(result)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,7 +14,9 @@ import pytest
 from exported import export_result
 from recorded import rows_of
 from same_results import assert_same
+from urmpipe_models.errors import RecordingError
 from urmpipe_pipeline.accuracy.result import Accuracy
+from urmpipe_pipeline.operands import load_runs
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.tables import ExportOptions
 
@@ -83,3 +86,10 @@ def test_its_samples_leave(accuracy: Callable[..., Accuracy], tmp_path: Path, to
 def test_its_trajectories_leave(accuracy: Callable[..., Accuracy], tmp_path: Path) -> None:
     done = export_result(accuracy(0.5, 1.0), tmp_path / "p.tum", ExportOptions("tum"))
     assert len(done.files) == 2
+
+
+def test_its_recording_is_no_operand(limited: Accuracy, tmp_path: Path) -> None:
+    write_recording(limited, tmp_path / "one.rrd")
+    said = "one.rrd: found the recording of an accuracy, allowed: one that ingest wrote"
+    with pytest.raises(RecordingError, match=re.escape(said)):
+        load_runs([tmp_path / "one.rrd"])
