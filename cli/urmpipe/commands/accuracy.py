@@ -9,8 +9,9 @@ import click
 
 import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.planning import law_options, start_option
 from urmpipe.options.reading import path_options
-from urmpipe.options.types import JOINT_VALUES, LENGTH, NumbersType, NumberType, OneOf
+from urmpipe.options.types import LENGTH, NumbersType, OneOf
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.accuracy.result import Accuracy
@@ -30,26 +31,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="Largest speeds along the path, in m/s.",
 )
-@click.option(
-    "--acceleration",
-    type=NumberType("M/S2", "m/s2"),
-    help="Largest acceleration along the path, at all of them [default: 6; with --law limits none].",
-)
-@click.option(
-    "--law",
-    type=OneOf(["trapezoid", "jerk", "limits"]),
-    default="trapezoid",
-    show_default=True,
-    help="Within speed and acceleration; within --jerk, too; or as fast as the joints' limits allow.",
-)
-@click.option("--jerk", type=NumberType("M/S3", "m/s3"), help="Largest jerk along the path, of --law jerk.")
-@click.option(
-    "--arcs",
-    type=OneOf(["tangential", "total"]),
-    default="tangential",
-    show_default=True,
-    help="What the acceleration limits on arcs; total: v^2 / r counts, too.",
-)
+@law_options
 @click.option(
     "--limit",
     type=LENGTH,
@@ -67,11 +49,7 @@ if TYPE_CHECKING:
     type=NumbersType("FX,FY,FZ", "N", "0,0,-50"),
     help="What acts on the tool from outside, in N, along the axes of the world [default: nothing].",
 )
-@click.option(
-    "--start",
-    type=JOINT_VALUES,
-    help="Joint values to be near to at the first sample, in rad and m [default: the robot's own].",
-)
+@start_option
 @click.option(
     "--backend",
     type=OneOf(["native", "python"]),

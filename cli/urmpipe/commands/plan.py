@@ -10,8 +10,9 @@ import click
 
 import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.planning import law_options, start_option
 from urmpipe.options.reading import path_options
-from urmpipe.options.types import DURATION, JOINT_VALUES, NumberType, OneOf
+from urmpipe.options.types import DURATION, NumberType
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.planned_paths.result import PlannedPath
@@ -28,32 +29,9 @@ PLACED = ("base", "tool", "base_link", "tip_link")
     type=NumberType("M/S", "m/s"),
     help="Largest speed [default: 0.5; with --law limits none].",
 )
-@click.option(
-    "--acceleration",
-    type=NumberType("M/S2", "m/s2"),
-    help="Largest acceleration along the path [default: 6; with --law limits none].",
-)
-@click.option(
-    "--law",
-    type=OneOf(["trapezoid", "jerk", "limits"]),
-    default="trapezoid",
-    show_default=True,
-    help="Within speed and acceleration; within --jerk, too; or as fast as the joints' limits allow.",
-)
-@click.option("--jerk", type=NumberType("M/S3", "m/s3"), help="Largest jerk along the path, of --law jerk.")
-@click.option(
-    "--arcs",
-    type=OneOf(["tangential", "total"]),
-    default="tangential",
-    show_default=True,
-    help="What the acceleration limits on arcs; total: v^2 / r counts, too.",
-)
+@law_options
 @click.option("--tsp", type=DURATION, default="5ms", show_default=True, help="Time from sample to sample.")
-@click.option(
-    "--start",
-    type=JOINT_VALUES,
-    help="Joint values to be near to at the first sample, in rad and m [default: the robot's own].",
-)
+@start_option
 @path_options
 @output_options
 def plan(path: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
