@@ -132,7 +132,7 @@ GIVEN = ("accuracy", "--robot", "arm.toml", "--path", "path.csv", "--backend", "
 def test_errors_and_verdict(folder: Path, capsys: Captured) -> None:
     codes = [run([*GIVEN, "--velocities", "0.1,0.05", *more]) for more in ((), ("--limit", "1um"))]
     assert codes == [0, 1]
-    slower = "note: the arm runs in NumPy, some two hundred times slower than machine code\n"
+    slower = "note: the arm runs in NumPy, some hundred times slower than machine code\n"
     assert capsys.readouterr().err == 2 * slower
     result = urmpipe.accuracy(
         "path.csv", "arm.toml", velocities=[0.1, 0.05, 0.1], limit=1.0, backend="python"

@@ -49,7 +49,7 @@ POSES = 10
 REACHED = 1.0 - 1e-6
 """A velocity of which the plan reaches this share is reached."""
 
-SLOWER = "some two hundred"
+SLOWER = "some hundred"
 """How much longer ten velocities of irb60 take in NumPy (benchmarks/results/accuracy.md)."""
 
 RUNNING = 0.9
