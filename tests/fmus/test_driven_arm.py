@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -618,6 +619,18 @@ def test_a_held_wrist_yields_to_a_force_by_its_square_of_the_length_and_no_drive
     for n in range(10):
         moving.do_step(n * PERIOD, PERIOD)
     np.testing.assert_allclose(read(moving, "phi", "last"), start, rtol=0.0, atol=1e-8)
+
+
+def test_a_spring_weaker_than_the_weight_it_hangs_by_bears_a_small_force() -> None:
+    """3 kg hang 0.5 m below: 14.7 N.m/rad by the weight beside 9 of the spring."""
+    mass = Inertial("hanging", 3.0, (0.5, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    chain = Chain(
+        "pendulum", (Joint("hanging", axis=(0.0, 1.0, 0.0)),), tip=translation(0.5, 0.0, 0.0),
+        start=(math.pi / 2,), inertials=(mass,), drives=(HeldJoint("hanging", 9.0, 1.0),),
+    )  # fmt: skip
+    (under,) = at_rest(chain, Wrench((0.1, 0.0, 0.0)))
+    # along x, which raises the tip: F l over both rigidities; the next order is that angle squared
+    assert math.pi / 2 - under.q == pytest.approx(0.05 / (9.0 + 3.0 * 9.81 * 0.5), rel=1e-5)
 
 
 def test_a_force_that_is_too_large_for_the_springs_is_refused() -> None:

@@ -43,8 +43,11 @@ STABLE = 2.8
 """RK4 is stable up to this product of step and rate, for decays and undamped swings alike."""
 
 
-SETTLED, SETTLING = 1e-12, 100
-"""An arm has yielded to a wrench when no joint moves on by so much in [rad] or [m], after so many rounds."""
+SETTLED, NEARLY = 1e-12, 1e-9
+"""How near held joints are brought to where they stand under a wrench, and have to be, in [rad] or [m]."""
+
+FURTHEST = 0.5 * np.pi
+"""A spring that yields to a wrench by more, in [rad] or [m], does not bear it."""
 
 
 class Spring(NamedTuple):
@@ -334,20 +337,34 @@ def _torques(chain: Chain, q: Sequence[float], wrench: Wrench | None = None) -> 
 def _yielded(
     chain: Chain, drives: Sequence[JointDrive], rest: Sequence[float], wrench: Wrench
 ) -> list[float]:
-    """Return where an arm stands under a wrench in [rad] or [m]: q = rest - tau(q) / k of what is held.
+    """Return where an arm stands under a wrench in [rad] or [m]: k (rest - q) = tau(q) of what is held.
 
     Raises:
-        RobotError: If the springs are too weak for that to settle.
+        RobotError: If the springs do not hold it within a quarter of a turn.
     """
-    q = [float(value) for value in chain.start]
-    for _ in range(SETTLING):
-        found = [
-            spring - torque / own.stiffness if isinstance(own, HeldJoint) else value
-            for own, spring, value, torque in zip(drives, rest, q, _torques(chain, q, wrench), strict=True)
-        ]
-        if np.allclose(found, q, rtol=0.0, atol=SETTLED):
-            return found
-        q = found
-    raise RobotError(
-        f"robot {chain.name}: force: found more than the springs of its held joints bear, allowed: less"
-    )
+    from scipy.optimize import root
+
+    start = np.array([float(value) for value in chain.start])
+    held = [k for k, own in enumerate(drives) if isinstance(own, HeldJoint)]
+    if not held:
+        return [float(value) for value in start]
+    stiffness = np.array([own.stiffness for own in drives if isinstance(own, HeldJoint)])
+
+    def standing(moved: FloatArray) -> FloatArray:
+        """Return the pose when the held joints have moved by so much, shape (coordinates,), [rad] or [m]."""
+        q = start.copy()
+        q[held] += moved
+        return q
+
+    def lacking(moved: FloatArray) -> FloatArray:
+        """Return by how far the springs would have to be turned further, shape (held,), [rad] or [m]."""
+        q = standing(moved)
+        torques = np.array(_torques(chain, q.tolist(), wrench))
+        return np.asarray(torques[held] / stiffness + q[held] - np.array(rest)[held])
+
+    moved = np.asarray(root(lacking, np.zeros(len(held)), tol=SETTLED).x)
+    if np.abs(moved).max() > FURTHEST or np.abs(lacking(moved)).max() > NEARLY:
+        raise RobotError(
+            f"robot {chain.name}: force: found more than the springs of its held joints bear, allowed: less"
+        )
+    return [float(value) for value in standing(moved)]

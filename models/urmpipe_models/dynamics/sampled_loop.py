@@ -101,6 +101,7 @@ def _weight_stiffness(chain: Chain, q: FloatArray) -> FloatArray:
     still, count = [0.0] * len(q), len(q)
 
     def weight(at: FloatArray) -> FloatArray:
+        """Return the torques of gravity in [N.m] or [N], shape (n,)."""
         return np.array(inverse_dynamics(chain, at.tolist(), still, still), dtype=np.float64)
 
     moved = STEP * np.eye(count)
