@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Unpack
 
+from urmpipe.api.iso_options import Cycles, iso_options
 from urmpipe.arm_placing import Frame, Robot
 from urmpipe.keyword_checks import (
     WRITTEN_FIRST,
@@ -39,6 +40,7 @@ from urmpipe_pipeline.results import kind_of, present, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.recorded_tcp import LACKING_TOOL
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets.given_targets import TargetsLike
 from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
 from urmpipe_pipeline.tables.table_csv import write_table
 
@@ -61,12 +63,17 @@ def compare(
     tip_link: str | None = None,
     tsp: float | None = None,
     derivative: Method | None = None,
-    tolerance: float | str | Mapping[str, float] = DEFAULT_TOLERANCE,
+    tolerance: float | str | Mapping[str, float] | None = None,
     tcp: Tcp = "fk",
-    sync: SyncOption = "start",
+    sync: SyncOption | None = None,
     align: AlignMode = "none",
     sides: tuple[str, str] | None = None,
     diagnose: bool = False,
+    iso: bool = False,
+    cycles: Cycles | None = None,
+    planes: int | None = None,
+    band: float | None = None,
+    targets: TargetsLike | None = None,
     baseline: PathLike | Comparison | None = None,
     noise: float | Mapping[str, float] | None = None,
     strict: bool = False,
@@ -92,14 +99,23 @@ def compare(
         tsp: Period of a log's grid in [s].
         derivative: How a log is differentiated: central or savgol.
         tolerance: Largest deviation allowed of an axis in [m], or in [m] and [rad] by kind, or as a text with
-            units, such as "axis=3.5mm,angle=0.5deg".
+            units, such as "axis=3.5mm,angle=0.5deg"; default: 3.5 mm an axis. With `iso` of criteria, such as
+            "AP=0.4mm,AV=5%"; default: none.
         tcp: Where a log was: fk or recorded.
-        sync: How the clocks are put together: start, auto, or t_reference - t_log in [s].
+        sync: How the clocks are put together: start, auto, or t_reference - t_log in [s]; default: start,
+            with `iso` auto.
         align: How a log is moved in space first: none, start, rigid, tool or base+tool.
         sides: Two words in the names of the columns of one log, such as ("target", "actual"): what was asked
             for is the reference of what was done; "rest" for the columns without the other word.
         diagnose: Whether the `diagnosis` of each run says why it deviates. Base and tool are causes then: not
             with `align`.
+        iso: Whether the logs are the cycles of a test after ISO 9283, or one log in which the motion repeats:
+            its criteria are judged, see docs/iso.md. Not with `align` or `diagnose`.
+        cycles: First and last row of each cycle of one log, from 1, as "1:1477,1478:2955" or pairs; default:
+            found by its returns to the start.
+        planes: How many planes cut the command path; default: 50.
+        band: Half of the width of the band round a final pose in [m]; default: 0.1 mm.
+        targets: The poses to judge, as `ik` takes them; default: those in which the reference rests.
         baseline: An earlier comparison, to tell what changed since.
         noise: Changes since then that mean nothing, in [m], or in [m] and [rad] by kind; default: 1 um and
             1 urad.
@@ -125,9 +141,15 @@ def compare(
     }  # fmt: skip
     told = None if junit is None else Path(junit)
     with errors_in_junit(told, kept, voice), guarded_outputs(outputs, kept) as parts:
-        options = CompareOptions(_allowed(tolerance), tcp, sync, align, _with_unit(tolerance), diagnose)
         level = _noise_level(noise, baseline)
         given = resolved(reading, robot, base, tool, base_link, tip_link)
+        test = iso_options(
+            reference, iso=iso, cycles=cycles, planes=planes, band=band, targets=targets, read=given.options
+        )
+        options = CompareOptions(
+            _allowed(tolerance, iso=iso), tcp, _clocks(sync, iso=iso),
+            align, _with_unit(tolerance), diagnose, test,
+        )  # fmt: skip
         _refuse_unused(operands, {**reading, "tsp": tsp, "derivative": derivative, "sides": sides})
         earlier = None if baseline is None else _earlier(baseline)
         load = partial(
@@ -154,14 +176,21 @@ def _operands(reference: Operand | Comparison, logs: Sequence[Operand]) -> list[
     return [reference, *logs]
 
 
-def _allowed(tolerance: float | str | Mapping[str, float]) -> Mapping[str, float]:
-    """Return what is allowed in [m] and [rad], by kind."""
+def _allowed(tolerance: float | str | Mapping[str, float] | None, *, iso: bool) -> Mapping[str, float]:
+    """Return what is allowed by kind, in [m] and [rad], or of criteria in their units."""
+    if tolerance is None:
+        return {} if iso else {"axis": DEFAULT_TOLERANCE}
     if isinstance(tolerance, str):
         return parse_tolerance(tolerance)
     return tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
 
 
-def _with_unit(tolerance: float | str | Mapping[str, float]) -> frozenset[str]:
+def _clocks(sync: SyncOption | None, *, iso: bool) -> SyncOption:
+    """Return how clocks are put together: as given, else each cycle for itself, or all at the start."""
+    return ("auto" if iso else "start") if sync is None else sync
+
+
+def _with_unit(tolerance: float | str | Mapping[str, float] | None) -> frozenset[str]:
     """Return the kinds of which it was said with a unit what is allowed."""
     return kinds_with_unit(tolerance) if isinstance(tolerance, str) else frozenset()
 
@@ -199,6 +228,8 @@ def _compared(
         raise OptionError("found a comparison as the reference, allowed: with a baseline, and without logs")
     given = (Path(one) if isinstance(one, (str, Path)) else one for one in operands)
     first, *others = load([one for one in given if not isinstance(one, Comparison)])
+    if options.iso is not None and not others:
+        raise OptionError(Finding(parameter="iso", found="no log", allowed="a reference and its cycles"))
     return compare_runs(first, others, options) if others else compare_recorded(first, options)
 
 

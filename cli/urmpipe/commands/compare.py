@@ -14,7 +14,7 @@ from urmpipe.options.given import for_logs, options_given
 from urmpipe.options.grouped import Command
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import log_options
-from urmpipe.options.types import OneOf, ParsedType
+from urmpipe.options.types import LENGTH, OneOf, ParsedType
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.comparison.comparison import Comparison
@@ -28,6 +28,13 @@ def _noise(text: str) -> dict[str, float]:
     from urmpipe_pipeline.comparison.baseline import parse_noise
 
     return parse_noise(text)
+
+
+def _cycles(text: str) -> tuple[tuple[int, int], ...]:
+    """Return the rows of cycles, from 1."""
+    from urmpipe_pipeline.iso9283.cycles import parse_cycles
+
+    return parse_cycles(text)
 
 
 def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command], Command]:
@@ -52,6 +59,32 @@ def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command]
     "--diagnose",
     is_flag=True,
     help="Say why each log deviates, too: docs/diagnose.md. Base and tool are causes then: not with --align.",
+)
+@click.option(
+    "--iso",
+    is_flag=True,
+    help="The logs are the cycles of a test after ISO 9283, or one log in which the motion repeats: accuracy"
+    " and repeatability of poses, paths and speed (docs/iso.md). --tolerance is of criteria then, as"
+    " AP=0.4mm,RP=0.1mm,AT=1mm,AV=5%, and has no default.",
+)
+@click.option(
+    "--cycles",
+    metavar="FIRST:LAST,...",
+    type=ParsedType("FIRST:LAST,...", _cycles),
+    help="With --iso: the rows of each cycle of one log, from 1 [default: found by returns to the start].",
+)
+@click.option(
+    "--planes", type=int, metavar="N", help="With --iso: planes that cut the command path [default: 50]."
+)
+@click.option(
+    "--band", type=LENGTH, help="With --iso: half width of the band round a final pose [default: 0.1mm]."
+)
+@click.option(
+    "--targets",
+    metavar="FILE.csv",
+    type=click.Path(path_type=Path),
+    help="With --iso: the poses to judge, a row each: x, y, z, perhaps an orientation [default: the rests of"
+    " REFERENCE].",
 )
 @_file("--junit", metavar="FILE.xml", help="Write the verdicts as JUnit XML, for GitLab, Jenkins and GitHub.")
 @_file(
@@ -97,6 +130,7 @@ def compare(
       urmpipe compare rtde.csv --sides target,actual --robot ur5e
       urmpipe compare path.csv log.csv --robot urm6 --junit v.xml --csv v.csv
       urmpipe compare path.csv a.csv b.csv --robot urm6 --diagnose
+      urmpipe compare path.csv test.csv --robot urm6 --iso --tolerance AP=1mm
       urmpipe compare today.rrd --baseline released.rrd --noise 5um
 
     Exit codes: 0 within tolerance and not worse than the baseline, 1 not so, 2 bad input or usage.
@@ -107,6 +141,9 @@ def compare(
     made = None if logs or not options["baseline"] else _made_before(ctx, reference)
     if not options["baseline"] and not options_given(ctx, "noise".__eq__):
         options["noise"] = None  # what a lab says for the calls that have a baseline
+    for name in ("tolerance", "sync") if options["iso"] else ():
+        if not options_given(ctx, name.__eq__):
+            options[name] = None  # the defaults, and what a lab says, are for logs that are judged one by one
     target = None if made else output or Path(default_name(reference, logs))
     replaces = target is not None and target.exists()
     with terminal.progress(f"Writing {target}", shown=target is not None) as progress:
@@ -124,7 +161,7 @@ def compare(
     written = {"JUnit": options["junit"], "Statistics": options["csv"]}
     terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces, written))
     terminal.tell_failure(result)
-    return 0 if result.verdict == "pass" else 1
+    return 1 if result.verdict == "fail" else 0
 
 
 def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) -> None:

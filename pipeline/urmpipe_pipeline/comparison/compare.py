@@ -15,6 +15,7 @@ from urmpipe_pipeline.comparison.alignment import align
 from urmpipe_pipeline.comparison.assumptions import assumptions
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.iso_cycles import IsoOptions, judge_cycles
 from urmpipe_pipeline.comparison.matching import (
     JOINTS_ALONE,
     NO_ROBOT,
@@ -54,6 +55,8 @@ RECORDED_APART = 1e-3
 third of the default tolerance."""
 
 
+NO_ALIGNMENT_ISO = "none with iso: an alignment would hide AP and AT"
+
 NO_ALIGNMENT = "none with a diagnosis, which names base and tool as causes"
 
 
@@ -72,6 +75,8 @@ class CompareOptions:
         diagnose: Whether it is asked why each log deviates. Base and tool are causes then: no alignment may
             be asked for, and only a log that was measured in a frame of its own, whose base and tool are
             always unknown, is moved first.
+        iso: How the logs are evaluated as the cycles of a test after ISO 9283, whose criteria the tolerance
+            is for; None: each log is judged for itself.
     """
 
     tolerance: Mapping[str, float] = field(default_factory=lambda: {"axis": DEFAULT_TOLERANCE})
@@ -80,12 +85,25 @@ class CompareOptions:
     align: AlignMode = "none"
     with_unit: frozenset[str] = frozenset()
     diagnose: bool = False
+    iso: IsoOptions | None = None
 
     def __post_init__(self) -> None:
-        check_tolerance(self.tolerance)
+        if self.iso is not None:
+            self._refuse_with_iso()
+        check_tolerance(self.tolerance, iso=self.iso is not None)
         check_choice("tcp", self.tcp, get_args(Tcp))
         check_sync(self.sync)
         check_choice("align", self.align, get_args(AlignMode))
+
+    def _refuse_with_iso(self) -> None:
+        """Raise an `OptionError` with what does not go with criteria after ISO 9283."""
+        faults = []
+        if self.align != "none":
+            faults.append(Finding(parameter="align", found=self.align, allowed=NO_ALIGNMENT_ISO))
+        if self.diagnose:
+            faults.append(Finding(parameter="diagnose", found="with iso", allowed="one of the two"))
+        if faults:
+            raise OptionError(*faults)
 
 
 def trajectory(run: Run, tcp: Tcp = "fk", *, alone: bool = False) -> Trajectory:
@@ -130,13 +148,16 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     chosen = options or CompareOptions()
     if not runs:
         raise OptionError("compare: no log to hold against the reference; at least one is needed")
-    _refuse_poses_as_motion(reference, runs, chosen.sync)
+    if chosen.iso is None or len(runs) > 1:
+        _refuse_poses_as_motion(reference, runs, chosen)
     chosen = _joined([(run, _goes_by_record(run, chosen.tcp)) for run in (reference, *runs)], chosen)
     alone = _joints_alone(reference, runs, chosen)
     reference, *runs = _named_apart((reference, *runs))
     sides = (_side(run, chosen.tcp, alone=alone) for run in runs)
     asked = _side(reference, chosen.tcp, alone=alone)
     wanted = asked.trajectory
+    if chosen.iso is not None:
+        return _test(asked, list(sides), chosen)
     deviations = for_each(lambda done: _deviation(asked, done, chosen), sides)
     told = [*(one.of(reference.name) for one in reference.warnings), *exchanged(reference, runs)]
     if chosen.tcp == "fk":
@@ -147,6 +168,19 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
         failed = [one for one in deviations if one.verdict == "fail"]
         told += [hint.of(one.name) for one in failed for hint in lacking_tool(one.run.robot, one.run.log)]
     return _comparison(wanted, deviations, chosen, told, _taken_for_granted(reference, runs, chosen))
+
+
+def _test(asked: Side, done: Sequence[Side], options: CompareOptions) -> Comparison:
+    """Return the comparison of the cycles of a test after ISO 9283."""
+    assert options.iso is not None
+    found = judge_cycles(asked, done, options.iso, options.sync, options.tolerance)
+    reference, runs = asked.run, [one.run for one in done]
+    told = [*(one.of(reference.name) for one in reference.warnings), *found.warnings]
+    if len(runs) == 1:  # its cycles are parts of it
+        told = [*(one.of(runs[0].name) for one in runs[0].warnings), *told]
+    assumed = _taken_for_granted(reference, runs, options)
+    made = _comparison(asked.trajectory, found.deviations, options, told, assumed)
+    return replace(made, name=f"{runs[0].name}-against-{reference.name}", iso=found.test)
 
 
 def _side(run: Run, tcp: Tcp, *, alone: bool) -> Side:
@@ -201,7 +235,7 @@ def _recorded_roles(options: CompareOptions, *turning: AlignMode) -> set[Role]:
     return {"position", "rotation"} if turned else {"position"}
 
 
-def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], sync: SyncOption) -> None:
+def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], options: CompareOptions) -> None:
     """Raise if still poses are held against a motion, or against more or fewer poses.
 
     Still poses are held against still poses row by row; any other offset would interpolate between them.
@@ -215,8 +249,8 @@ def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], sync: SyncOptio
     if others := [run for run in runs if run.log.rows != wanted]:
         allowed = f"{wanted}, as {reference.name} has: still poses are compared row by row"
         raise LogError(*(lacking(run, f"found {run.log.rows} rows, allowed: {allowed}") for run in others))
-    if sync != "start":
-        found = f"{sync} of still poses"
+    if options.sync != "start" and not (options.iso and options.sync == "auto"):
+        found = f"{options.sync} of still poses"
         raise OptionError(Finding(parameter="sync", found=found, allowed="start, row by row"))
 
 
@@ -306,7 +340,7 @@ def _comparison(
 ) -> Comparison:
     bare = {kind: value for kind, value in options.tolerance.items() if kind not in options.with_unit}
     warnings = [*large_tolerances(bare), *told]
-    for one in deviations:
+    for one in deviations if options.iso is None else ():
         warnings += sync_doubts(one.name, one.sync, one.run.tsp)
         warnings += left_out_warnings(one, reference)
         warnings += [*thin_evidence(one), *open_frames(one)]
@@ -317,6 +351,8 @@ def _comparison(
     inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
     given = {name: getattr(options, name) for name in ("tcp", "sync", "align")}
     given |= {"diagnose": True} if options.diagnose else {}
+    if options.iso is not None:
+        given |= {"iso": True, **{name: getattr(options.iso, name) for name in ("cycles", "planes", "band")}}
     name = f"{deviations[0].name}-" if len(deviations) == 1 else ""
     return Comparison(
         f"{name}against-{reference.name}",

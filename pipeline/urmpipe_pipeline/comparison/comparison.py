@@ -12,6 +12,7 @@ from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Verdict
 from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.iso9283.result import IsoTest
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
@@ -41,6 +42,7 @@ class Comparison(Result):
         baseline: What changed since an earlier comparison, if it was held against one.
         assumptions: What the verdict takes for granted, each as the end of "assuming ...".
         on_rows: Whether the logs were judged on their own rows; before that was so, on the grid.
+        iso: The test after ISO 9283 whose cycles the runs are; its criteria are judged, the runs are not.
     """
 
     name: str
@@ -53,15 +55,23 @@ class Comparison(Result):
     baseline: BaselineComparison | None = None
     assumptions: tuple[str, ...] = ()
     on_rows: bool = False
+    iso: IsoTest | None = None
 
     @property
     def within_tolerance(self) -> bool:
-        """Whether every log passes, whatever a baseline says."""
+        """Whether every log passes, or all criteria do, whatever a baseline says."""
+        if self.iso is not None:
+            return self.iso.verdict != "fail"
         return all(run.verdict == "pass" for run in self.runs)
 
     @property
-    def verdict(self) -> Verdict:
-        """Pass if every log passes and, where there is a baseline, nothing is worse than there."""
+    def verdict(self) -> Verdict | None:
+        """Pass if every log passes and, where there is a baseline, nothing is worse than there.
+
+        Of a test after ISO 9283 its criteria count; None if none of them has a tolerance, without a baseline.
+        """
+        if self.iso is not None and self.iso.verdict is None:
+            return None if self.baseline is None else self.baseline.verdict
         kept = self.baseline is None or self.baseline.verdict == "pass"
         return "pass" if self.within_tolerance and kept else "fail"
 
@@ -97,7 +107,13 @@ class Comparison(Result):
         return sorted(self.runs, key=by_tolerance)[-1]
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """Yield one row a log and quantity: the offset of the clocks, the statistics and the verdict."""
+        """Yield one row a log and quantity: the offset of the clocks, the statistics and the verdict.
+
+        Of a test after ISO 9283 one row a criterion and place.
+        """
+        if self.iso is not None:
+            yield from self.iso.rows()
+            return
         for run in self.runs:
             for one in run.all_statistics:
                 offset = run.sync.offset if run.run.timed else None
@@ -139,5 +155,6 @@ class Comparison(Result):
             "ranking": [run.name for run in self.ranking],
             "warnings": [one.to_dict(voice) for one in self.warnings],
             "baseline": None if self.baseline is None else self.baseline.to_dict(),
+            "iso": None if self.iso is None else self.iso.to_dict(),
             "recording": str(self.recording) if self.recording else None,
         }

@@ -138,7 +138,7 @@ class Deviation(Shown):
         joint_statistics: One a joint, by its name in the log; none where a side has no joints.
         start: delta at the first compared sample in [m]: x, y, z, norm (the paper's mutual calibration).
         speed_correlation: Pearson's r of the norm and the speed; None where one of them does not change.
-        verdict: pass or fail.
+        verdict: pass or fail; None of a cycle, which is not judged alone.
         diagnosis: Why it deviates, where that was asked for.
     """
 
@@ -163,7 +163,7 @@ class Deviation(Shown):
     joint_statistics: dict[str, Statistics]
     start: tuple[float, float, float, float]
     speed_correlation: float | None
-    verdict: Verdict
+    verdict: Verdict | None
     diagnosis: Diagnosis | None = None
 
     @property

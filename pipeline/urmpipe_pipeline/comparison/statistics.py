@@ -79,9 +79,10 @@ def describe(
     )
 
 
-def overall(statistics: Iterable[Statistics]) -> Verdict:
-    """Return fail if any quantity fails."""
-    return "fail" if any(one.verdict == "fail" for one in statistics) else "pass"
+def overall(statistics: Iterable[Statistics]) -> Verdict | None:
+    """Return fail if any quantity fails; None if none has a tolerance."""
+    verdicts = {one.verdict for one in statistics} - {None}
+    return None if not verdicts else "fail" if "fail" in verdicts else "pass"
 
 
 def correlation(first: FloatArray, second: FloatArray) -> float | None:

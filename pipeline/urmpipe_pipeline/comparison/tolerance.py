@@ -11,13 +11,23 @@ from numbers import Real
 from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.measure_units import units_of
 from urmpipe_models.messages import Hint
+from urmpipe_pipeline.iso9283.criteria import UNITS as CRITERIA
 
 LENGTHS, ANGLES = ({"": Decimal(1), **units_of(si)} for si in ("m", "rad"))
-UNITS: dict[str, dict[str, Decimal]] = {
-    **dict.fromkeys(("axis", "x", "y", "z", "norm", "path"), LENGTHS),
-    **dict.fromkeys(("angle", "joint"), ANGLES),
+WRITTEN = {
+    "m": LENGTHS,
+    "rad": ANGLES,
+    "1": {"": Decimal(1), "%": Decimal("0.01")},
+    **{si: {"": Decimal(1), **units_of(si)} for si in ("s", "m/s")},
 }
-"""What a tolerance may be of, and the units that it may be written in.
+"""The units that a quantity may be written in, by its own."""
+
+DEVIATIONS = ("axis", "x", "y", "z", "norm", "path", "angle", "joint")
+UNITS: dict[str, dict[str, Decimal]] = {
+    **{kind: ANGLES if kind in ("angle", "joint") else LENGTHS for kind in DEVIATIONS},
+    **{name: WRITTEN[unit] for name, unit in CRITERIA.items()},
+}
+"""What a tolerance may be of, deviations and criteria after ISO 9283, and the units it may be written in.
 
 axis holds for x, y and z each; joint for each joint: a number without a unit is in rad where the joint turns
 and in m where it slides. A unit of length is refused there: joints that turn would take it for rad.
@@ -32,8 +42,14 @@ ALLOWED_NUMBERS = (
     "numbers of axis, x, y, z, norm, path in m, of angle, joint in rad (m of a joint that slides)"
 )
 
+ALLOWED_CRITERIA = (
+    "criteria: AP=, RP=, AD=, RD=, vAP=, OV=, dAP=, dRP=, AT=, RT=, CR=, CO= (m, mm, um), PSt= (s, ms), AV=,"
+    " RV= (%), FV= (m/s, mm/s), AP_rz=, RP_ry=, AT_rx=, ... (rad, mrad, deg)"
+)
+"""What a tolerance of a test after ISO 9283 may be of."""
+
 NUMBER = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
-QUANTITY = re.compile(rf"\s*(?:±|\+-)?\s*({NUMBER})\s*([a-z]*)\s*")
+QUANTITY = re.compile(rf"\s*(?:±|\+-)?\s*({NUMBER})\s*([a-z/%]*)\s*")
 """A number in plain digits and its unit, ± before it or not."""
 
 DECIMAL_COMMA = re.compile(r"\s*[0-9]+,[0-9]+\s*[a-z]*\s*")
@@ -96,22 +112,24 @@ def _parts(text: str, bare: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...
 
 
 def check_tolerance(
-    tolerance: Mapping[str, float], parameter: str = "tolerance", *, zero: bool = False
+    tolerance: Mapping[str, float], parameter: str = "tolerance", *, zero: bool = False, iso: bool = False
 ) -> None:
     """Raise an `OptionError` with everything in a tolerance that is no kind or no positive number.
 
     Args:
-        tolerance: In [m] or [rad], by kind.
+        tolerance: In [m] or [rad], by kind; of criteria in their units.
         parameter: The keyword that gave it, for messages.
         zero: Whether 0 is allowed.
+        iso: Whether criteria after ISO 9283 are judged, which need none; else deviations.
     """
     sign = "0 or positive" if zero else "positive"
+    kinds, allowed = (CRITERIA, ALLOWED_CRITERIA) if iso else (DEVIATIONS, ALLOWED_NUMBERS)
     faults = [
-        Finding(parameter=parameter, found=f"{kind}={value}", allowed=f"{ALLOWED_NUMBERS}; {sign}")
+        Finding(parameter=parameter, found=f"{kind}={value}", allowed=f"{allowed}; {sign}")
         for kind, value in tolerance.items()
-        if kind not in UNITS or not isinstance(value, Real) or not _fits(float(value), zero)
+        if kind not in kinds or not isinstance(value, Real) or not _fits(float(value), zero)
     ]
-    if not tolerance:
+    if not tolerance and not iso:
         faults = [Finding(parameter=parameter, found="nothing", allowed=ALLOWED_NUMBERS)]
     if faults:
         raise OptionError(*faults)

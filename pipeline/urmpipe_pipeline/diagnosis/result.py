@@ -140,7 +140,7 @@ class Diagnosis(Result):
 
     Attributes:
         name: The log's name.
-        verdict: That of the comparison.
+        verdict: That of the comparison; None if nothing was judged.
         samples: How many samples were looked at.
         unit: m of positions, rad of joints alone.
         rms: Root mean square of the deviation before, in `unit`.
@@ -157,7 +157,7 @@ class Diagnosis(Result):
     """
 
     name: str
-    verdict: Literal["pass", "fail"]
+    verdict: Literal["pass", "fail"] | None
     samples: int
     unit: Literal["m", "rad"]
     rms: float

@@ -1,0 +1,268 @@
+"""The cycles of a test after ISO 9283: logs, or parts of one, each beside the command on its own clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.matching import lacking, match
+from urmpipe_pipeline.comparison.measure import measure
+from urmpipe_pipeline.comparison.sync import SyncOption
+from urmpipe_pipeline.comparison.trajectory import Sync, Trajectory
+from urmpipe_pipeline.diagnosis.sides import Side
+from urmpipe_pipeline.iso9283.command_path import Bend
+from urmpipe_pipeline.iso9283.cycles import FoundCycles, check_cycles, find_cycles
+from urmpipe_pipeline.iso9283.likeness import alike
+from urmpipe_pipeline.iso9283.measure import Command, Followed, Marks, follow, marks_of
+from urmpipe_pipeline.iso9283.measure import measure as measure_criteria
+from urmpipe_pipeline.iso9283.motion import Motion, motion_of
+from urmpipe_pipeline.iso9283.poses import Poses
+from urmpipe_pipeline.iso9283.result import Cycle, IsoTest
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.runs.part import part_of
+
+UNLIKE = "sync-unlike"
+
+CUT = "cut-cycle"
+
+FEW = "few-cycles"
+
+TREMBLING = "noise-beyond-band"
+
+ENOUGH = {"poses": 30, "paths": 10}
+"""Cycles that the standard takes."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IsoOptions:
+    """How a test after ISO 9283 is evaluated.
+
+    Attributes:
+        cycles: First and last row of each cycle of one log, from 1; None: found by its returns to the start.
+        planes: How many planes cut the command path.
+        band: Half of the width of the band round a final pose in [m].
+        targets: Poses to judge; None: those in which the reference rests.
+        bends: Where the reference is known to turn.
+        stops: When the reference is known to stop in [s], if for a moment only.
+    """
+
+    cycles: tuple[tuple[int, int], ...] | None = None
+    planes: int = 50
+    band: float = 1e-4
+    targets: Poses | None = None
+    bends: tuple[Bend, ...] = ()
+    stops: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        faults = []
+        if self.planes < 1:
+            faults.append(Finding(parameter="planes", found=str(self.planes), allowed="1 or more"))
+        if not 0.0 < self.band < np.inf:
+            faults.append(Finding(parameter="band", found=f"{self.band:g}", allowed="a positive length in m"))
+        if faults:
+            raise OptionError(*faults)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class JudgedCycles:
+    """The cycles of a test, and what they tell.
+
+    Attributes:
+        deviations: The deviation of each cycle from the reference at the same times.
+        test: The criteria.
+        warnings: What a person should know.
+    """
+
+    deviations: tuple[Deviation, ...]
+    test: IsoTest
+    warnings: tuple[LogWarning, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Candidate:
+    """What may be a cycle: a log or a part of one, and its first row in the log, from 0."""
+
+    side: Side
+    motion: Motion
+    first: int
+    last: int
+
+
+def judge_cycles(
+    asked: Side, done: Sequence[Side], options: IsoOptions, sync: SyncOption, tolerance: Mapping[str, float]
+) -> JudgedCycles:
+    """Return what the cycles of a test tell: n logs, or one in which the motion repeats.
+
+    Args:
+        asked: The reference.
+        done: The logs, at least one.
+        options: How they are evaluated.
+        sync: How the clock of each cycle is put together with the reference's; auto goes by the planes that
+            both cross.
+        tolerance: Largest absolute values allowed, by criterion.
+
+    Raises:
+        LogError: If no cycle follows the reference, or a criterion with a tolerance has no value.
+        OptionError: If rows are given for the cycles of several logs, or are wrong.
+    """
+    command = _motion(asked)
+    candidates, told = _candidates(command, done, options)
+    marks = marks_of(Command(command, options.targets, options.bends, options.stops, options.planes))
+    kept, left_out = _followed(command, marks, candidates, asked.run.name)
+    if not kept:
+        raise LogError(*(lacking(done[0].run, one.message) for one in (*told, *left_out)))
+    found = measure_criteria(marks, [one for _, one in kept], options.band, tolerance)
+    clocks = [_sync(sync, one, asked.run.timed) for _, one in kept]
+    cycles = tuple(
+        Cycle(one.side.run.name, one.first + 1, one.last + 1, clock.offset if one.motion.timed else None)
+        for (one, _), clock in zip(kept, clocks, strict=True)
+    )
+    test = IsoTest(cycles, found.criteria, found.poses, found.path, options.band)
+    _refuse_unvalued(test, tolerance)
+    deviations = tuple(
+        _deviation(asked, one.side, clock) for (one, _), clock in zip(kept, clocks, strict=True)
+    )
+    doubts = [*_few(test), *_trembling([one for one, _ in kept], test)]
+    return JudgedCycles(deviations, test, (*told, *left_out, *doubts))
+
+
+def _motion(side: Side) -> Motion:
+    """Return where a side was, as the criteria take it."""
+    one = side.trajectory
+    t = one.t if side.run.timed else np.arange(len(one.t_ns), dtype=np.float64)
+    return motion_of(side.run.name, t, one.position, one.quat_xyzw, timed=side.run.timed)
+
+
+def _candidates(
+    command: Motion, done: Sequence[Side], options: IsoOptions
+) -> tuple[list[_Candidate], list[LogWarning]]:
+    """Return what may be cycles, and what was left out of one log."""
+    if len(done) > 1:
+        if options.cycles is not None:
+            found = f"rows of cycles and {len(done)} logs, each of which is a cycle"
+            raise OptionError(Finding(parameter="cycles", found=found, allowed="one log"))
+        return [_Candidate(one, _motion(one), 0, one.run.log.rows - 1) for one in done], []
+    (side,) = done
+    whole = _motion(side)
+    if options.cycles is not None:
+        check_cycles(options.cycles, side.run.log.rows)
+        rows = [(first - 1, last - 1) for first, last in options.cycles]
+        return [_part(side, *one, number) for number, one in enumerate(rows, 1)], []
+    seen = find_cycles(command, whole)
+    if not seen.rows:
+        said = f"found no motion as in {command.name} that returns to its start, allowed: one that repeats it"
+        raise LogError(lacking(side.run, said))
+    of_log = FoundCycles(
+        *(tuple((int(whole.row[a]), int(whole.row[b])) for a, b in some)
+          for some in (seen.rows, seen.cut, seen.other))
+    )  # fmt: skip
+    if len(of_log.rows) == 1 and not of_log.cut:
+        return [_Candidate(side, whole, 0, side.run.log.rows - 1)], []
+    parts = [_part(side, *one, number) for number, one in enumerate(of_log.rows, 1)]
+    return parts, list(_left_out(side.run.name, of_log))
+
+
+def _part(side: Side, first: int, last: int, number: int) -> _Candidate:
+    """Return a part of a log as what may be a cycle."""
+    name = f"cycle {number}"
+    part = Side(
+        part_of(side.run, first, last, name), _cut(side.trajectory, first, last, name), side.by_joints
+    )
+    return _Candidate(part, _motion(part), first, last)
+
+
+def _cut(whole: Trajectory, first: int, last: int, name: str) -> Trajectory:
+    """Return some rows of a trajectory, both ends included, on their own clock."""
+    rows = slice(first, last + 1)
+    broken = whole.broken
+    return replace(
+        whole, name=name, t_ns=whole.t_ns[rows] - whole.t_ns[first], position=whole.position[rows],
+        quat_xyzw=None if whole.quat_xyzw is None else whole.quat_xyzw[rows],
+        q=None if whole.q is None else whole.q[rows],
+        broken=None if broken is None else broken[(broken >= first) & (broken < last)] - first,
+    )  # fmt: skip
+
+
+def _left_out(name: str, found: FoundCycles) -> Iterator[LogWarning]:
+    """Yield what of a log is in no cycle."""
+    for first, last in found.cut:
+        said = f"rows {first + 1} to {last + 1} are no whole cycle, and left out"
+        yield LogWarning(CUT, said, row=first + 1, about=name)
+    for first, last in found.other:
+        said = f"rows {first + 1} to {last + 1}, between two cycles, are another motion, and left out"
+        yield LogWarning(UNLIKE, said, row=first + 1, about=name)
+
+
+def _followed(
+    command: Motion, marks: Marks, candidates: Sequence[_Candidate], reference: str
+) -> tuple[list[tuple[_Candidate, Followed]], list[LogWarning]]:
+    """Return the cycles that follow the command, and what is to be told of the others."""
+    kept, told = [], []
+    for one in candidates:
+        moves = marks.path is not None
+        unlike = moves and not (one.motion.timed and len(one.motion) > 1 and alike(command, one.motion))
+        found = f"its path is not like that of {reference}" if unlike else follow(marks, one.motion)
+        if isinstance(found, str):
+            told.append(LogWarning(UNLIKE, f"left out: {found}", about=one.side.run.name))
+        else:
+            kept.append((one, found))
+    return kept, told
+
+
+def _sync(option: SyncOption, cycle: Followed, timed: bool) -> Sync:
+    """Return how the clock of a cycle is put together with the reference's."""
+    if not timed or option == "start":
+        return Sync()
+    return Sync("auto", cycle.offset, "planes") if option == "auto" else Sync("given", float(option))
+
+
+def _deviation(asked: Side, done: Side, sync: Sync) -> Deviation:
+    """Return the deviation of a cycle at the same times; nothing of it is judged."""
+    matched = match(asked.trajectory, done.trajectory, sync)
+    if not len(matched.sample):
+        said = f"no sample in common with {asked.run.name} (time offset {sync.offset} s)"
+        raise LogError(lacking(done.run, said))
+    return measure(done.run, asked.trajectory, matched, {})
+
+
+def _refuse_unvalued(test: IsoTest, tolerance: Mapping[str, float]) -> None:
+    """Raise a `LogError` with each criterion that has a tolerance and no value."""
+    values = {one.name: one.value for one in test.overall}
+    count = text.counted(len(test.cycles), "cycle")
+    lacks = [name for name in tolerance if values.get(name) is None]
+    if lacks:
+        known = ", ".join(name for name, value in values.items() if value is not None)
+        allowed = f"criteria that this test tells: {known}"
+        raise LogError(
+            *(
+                Finding(
+                    parameter="tolerance",
+                    found=f"{name}, which {count} of this motion do not tell",
+                    allowed=allowed,
+                )
+                for name in lacks
+            )
+        )
+
+
+def _few(test: IsoTest) -> Iterator[LogWarning]:
+    """Yield a warning if there are fewer cycles than the standard takes."""
+    count = len(test.cycles)
+    parts = {"poses": test.poses is not None, "paths": test.path is not None}
+    few = [f"{ENOUGH[part]} for {part}" for part, there in parts.items() if there and count < ENOUGH[part]]
+    if few:
+        yield LogWarning(FEW, f"{text.counted(count, 'cycle')}; ISO 9283 takes {' and '.join(few)}")
+
+
+def _trembling(cycles: Sequence[_Candidate], test: IsoTest) -> Iterator[LogWarning]:
+    """Yield a warning if the noise of the cycles leaves the band about final poses."""
+    noise = float(np.median([one.motion.noise for one in cycles]))
+    if any(one.value is not None for one in test.overall if one.name == "PSt") and 3.0 * noise > test.band:
+        said = f"PSt and OV are what noise makes of them: {text.quantity(3.0 * noise, 'm')} (three standard"
+        said += f" deviations) leaves the band of {text.allowed(test.band)}"
+        yield LogWarning(TREMBLING, said, parameter="band")

@@ -1,0 +1,347 @@
+"""The command path: its corners, legs and stops, and the planes that cut it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_pipeline.iso9283.motion import ROUNDING, Motion
+
+CORNER = np.radians(30.0)
+"""A corner is where the direction turns by this much or more, in [rad] ..."""
+
+WITHIN = 0.005
+"""... within this time of commanded motion in [s]."""
+
+ZONE = 0.1
+"""The zone of a corner reaches so far along its legs: this share of the shorter one."""
+
+TREMBLE = 10.0
+"""Vertices nearer to each other than so many standard deviations of the noise tell no direction."""
+
+STRAIGHT = 1e-4
+"""A path is taken apart into straight pieces to this share of its extent ..."""
+
+LEVEL = 0.02
+"""... and a piece is a leg if its middle half is straight to this share of that: a piece of an arc is not."""
+
+STEADY = 0.01
+"""A commanded speed that varies by this share of itself is constant."""
+
+FEWEST = 4
+"""Rows of the command in the middle half of a leg whose speed is judged, at least."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bend:
+    """Where a command is known to turn: an arc of a plan that rounds a corner.
+
+    Attributes:
+        begins: When it begins to turn in [s].
+        ends: When it has turned in [s].
+        corner: Where the corner is in [m].
+    """
+
+    begins: float
+    ends: float
+    corner: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CommandCorner:
+    """A corner of the command path.
+
+    Attributes:
+        point: Where the straight legs before and behind it meet, in [m], shape (3,).
+        before: Direction of the path before it [-], shape (3,).
+        behind: Direction of the path behind it [-], shape (3,).
+        begins: Arc length at which it begins to turn in [m].
+        ends: Arc length at which it has turned in [m].
+        middles: Arc lengths in [m] half way to the corner, stop or end before, and to that behind it.
+        zone: Between which arc lengths in [m] no plane cuts.
+        straight: Whether the leg behind it is straight.
+    """
+
+    point: FloatArray
+    before: FloatArray
+    behind: FloatArray
+    begins: float
+    ends: float
+    middles: tuple[float, float]
+    zone: tuple[float, float]
+    straight: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CommandLeg:
+    """A straight leg with a constant commanded speed.
+
+    Attributes:
+        begins: Arc length at which its middle half begins in [m].
+        ends: Arc length at which its middle half ends in [m].
+        direction: Its direction [-], shape (3,).
+        speed: The commanded speed v_c in [m/s].
+    """
+
+    begins: float
+    ends: float
+    direction: FloatArray
+    speed: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stations:
+    """Places along the command path, each with the plane normal to it.
+
+    Attributes:
+        s: Arc lengths in [m], shape (k,), rising.
+        t: When the command is there in [s], shape (k,).
+        point: Where that is in [m], shape (k, 3).
+        normal: Direction of the path there [-], shape (k, 3).
+    """
+
+    s: FloatArray
+    t: FloatArray
+    point: FloatArray
+    normal: FloatArray
+
+
+class _Turn(NamedTuple):
+    """Where the path turns: between which arc lengths in [m], and where its corner is, if that is known."""
+
+    begins: float
+    ends: float
+    corner: FloatArray | None
+
+
+class CommandPath:
+    """The path of a command: its vertices where it moves, by arc length.
+
+    Args:
+        motion: The command.
+        bends: Where it is known to turn; corners that are seen in its rows join them.
+    """
+
+    def __init__(self, motion: Motion, bends: Sequence[Bend] = ()) -> None:
+        self.motion = motion
+        rows = _vertices(motion)
+        self._place, self._arrives = motion.position[rows], motion.t[rows]
+        step = np.diff(self._place, axis=0)
+        length = np.linalg.norm(step, axis=1)
+        self.s: FloatArray = np.concatenate(([0.0], np.cumsum(length)))
+        self._direction: FloatArray = step / length[:, np.newaxis]
+        self._leaves, self._stops = _leaving(motion, rows)
+        self._pieces = list(self._straight_pieces())
+        self.corners = self._corners(bends)
+        self.legs = tuple(self._legs())
+
+    @property
+    def total(self) -> float:
+        """Its length in [m]."""
+        return float(self.s[-1])
+
+    @property
+    def position(self) -> FloatArray:
+        """Its vertices in [m], shape (n, 3)."""
+        return self._place
+
+    def planes(self, count: int) -> Stations:
+        """Return planes normal to the path, even in arc length over all that lies in no zone of a corner."""
+        edges = [0.0, *(edge for one in self.corners for edge in one.zone), self.total]
+        free = np.maximum(np.diff(np.maximum.accumulate(edges))[::2], 0.0)
+        begins = np.maximum.accumulate(edges)[::2]
+        along = (np.arange(count) + 0.5) / count * free.sum()
+        ends = np.cumsum(free)
+        which = np.minimum(np.searchsorted(ends, along, side="right"), len(free) - 1)
+        return self.stations(begins[which] + along - (ends - free)[which])
+
+    def stations(self, s: FloatArray) -> Stations:
+        """Return the places at arc lengths in [m], shape (k,)."""
+        piece = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self._direction) - 1)
+        share = (s - self.s[piece]) / (self.s[piece + 1] - self.s[piece])
+        t = self._leaves[piece] + share * (self._arrives[piece + 1] - self._leaves[piece])
+        point = self._place[piece] + share[:, np.newaxis] * (self._place[piece + 1] - self._place[piece])
+        return Stations(s, t, point, self._direction[piece])
+
+    def speed(self, s: FloatArray) -> FloatArray:
+        """Return the commanded speed at arc lengths in [m], in [m/s], both of shape (k,)."""
+        piece = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self._direction) - 1)
+        return np.asarray(self._speeds[piece])
+
+    @property
+    def _speeds(self) -> FloatArray:
+        """Speed along each piece in [m/s], shape (n - 1,)."""
+        return np.diff(self.s) / (self._arrives[1:] - self._leaves[:-1])
+
+    def _corners(self, bends: Sequence[Bend]) -> tuple[CommandCorner, ...]:
+        """Return all corners in order: those that are known, and those that its rows show elsewhere."""
+        known = [self._bend(one) for one in bends]
+        seen = [
+            one
+            for one in self._turns()
+            if not any(other.begins <= one.ends and one.begins <= other.ends for other in known)
+        ]
+        every = sorted(known + seen, key=lambda one: one.begins)
+        return tuple(self._corner(k, every) for k in range(len(every)))
+
+    def _bend(self, one: Bend) -> _Turn:
+        """Return between which arc lengths a known bend lies, and its corner."""
+        begins, ends = np.interp([one.begins, one.ends], self._arrives, self.s).tolist()
+        return _Turn(begins, ends, np.array(one.corner))
+
+    def _turns(self) -> Iterator[_Turn]:
+        """Yield between which arc lengths the direction turns as at a corner."""
+        moving = np.concatenate(([0.0], np.cumsum(self._arrives[1:] - self._leaves[:-1])))
+        count = len(self._direction)
+        begin = np.arange(1, count)
+        end = np.searchsorted(moving, moving[begin] + WITHIN + ROUNDING, side="right") - 1
+        end = np.clip(end, begin, count - 1)
+        stops = np.concatenate(([0], np.cumsum(self._stops)))
+        through = stops[end + 1] == stops[begin]  # without a stop in between
+        cosine = np.einsum("ni,ni->n", self._direction[begin - 1], self._direction[end])
+        found = np.flatnonzero(through & (cosine <= np.cos(CORNER) + 1e-12))
+        while len(found):
+            apart = (k for k in range(1, len(found)) if begin[found[k]] > end[found[k - 1]])
+            last = next(apart, len(found))
+            first, final = begin[found[0]], end[found[last - 1]]
+            yield _Turn(float(self.s[first]), float(self.s[final]), None)
+            found = found[last:]
+
+    def _corner(self, number: int, every: Sequence[_Turn]) -> CommandCorner:
+        """Return a corner among all of them."""
+        begins, ends, point = every[number]
+        edges = [edge for one in every for edge in (one.begins, one.ends)]
+        bounds: FloatArray = np.unique([0.0, self.total, *self.s[self._stops].tolist(), *edges])
+        start = float(bounds[int(np.searchsorted(bounds, begins)) - 1]) if begins > 0.0 else 0.0
+        stop = float(bounds[min(int(np.searchsorted(bounds, ends, side="right")), len(bounds) - 1)])
+        room = ZONE * min(begins - start, stop - ends)
+        middles = (start + begins) / 2.0, (ends + stop) / 2.0
+        before, _ = self._heading(middles[0], begins, at_end=True)
+        behind, straight = self._heading(ends, middles[1], at_end=False)
+        if point is None:
+            point = _meeting(*self._ends(begins, before), *self._ends(ends, behind))
+        zone = begins - room, ends + room
+        return CommandCorner(point, before, behind, begins, ends, middles, zone, straight)
+
+    def _ends(self, s: float, direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the point at an arc length in [m], shape (3,), and a direction [-], shape (3,)."""
+        return self.stations(np.array([s])).point[0], direction
+
+    def _heading(self, first: float, last: float, *, at_end: bool) -> tuple[FloatArray, bool]:
+        """Return the direction at an end of a stretch [-], shape (3,), and whether that is straight."""
+        a, b = self.stations(np.array([first, last])).point
+        inside = self._place[(self.s > first) & (self.s < last)]
+        chord = b - a
+        length = float(np.linalg.norm(chord))
+        if length > 0.0 and _off(inside, a, chord / length) <= self._level:
+            return chord / length, True
+        piece = (
+            np.searchsorted(self.s, last, side="left") if at_end else np.searchsorted(self.s, first, "right")
+        )
+        return self._direction[int(np.clip(piece - 1, 0, len(self._direction) - 1))], False
+
+    @property
+    def _coarse(self) -> float:
+        """How far a straight piece may be from the path in [m]."""
+        return max(STRAIGHT * self.motion.extent, 100.0 * self.motion.noise)
+
+    @property
+    def _level(self) -> float:
+        """How far a leg may be from straight in [m]."""
+        return max(LEVEL * self._coarse, 5.0 * self.motion.noise)
+
+    def _straight_pieces(self) -> Iterator[tuple[int, int]]:
+        """Yield the vertices at which straight pieces of the path begin and end, in order.
+
+        A piece is parted at its furthest vertex until none is further away than `_coarse`; and at stops.
+        """
+        marks = [0, *np.flatnonzero(self._stops[1:-1]) + 1, len(self.s) - 1]
+        waiting = list(pairwise(marks))[::-1]
+        while waiting:
+            first, last = waiting.pop()
+            chord = self._place[last] - self._place[first]
+            length = np.linalg.norm(chord)
+            out = self._place[first + 1 : last] - self._place[first]
+            if length > 0.0:
+                along = np.clip(out @ chord / length**2, 0.0, 1.0)
+                out = out - along[:, np.newaxis] * chord
+            off = np.linalg.norm(out, axis=1)
+            if last - first < 2 or off.max() <= self._coarse:
+                yield int(first), int(last)
+                continue
+            middle = first + 1 + int(np.argmax(off))
+            waiting += [(middle, last), (first, middle)]
+
+    def _legs(self) -> Iterator[CommandLeg]:
+        """Yield the straight legs whose middle half has a constant commanded speed."""
+        speeds, shake = self._speeds, 12.0 * self.motion.noise
+        for first, last in self._pieces:
+            begins, ends = (self.s[first] + share * (self.s[last] - self.s[first]) for share in (0.25, 0.75))
+            inside = np.flatnonzero((self.s[:-1] >= begins) & (self.s[1:] <= ends))
+            if len(inside) < FEWEST:
+                continue
+            marks = self.stations(np.array([begins, ends]))
+            direction = (marks.point[1] - marks.point[0]) / (ends - begins)
+            straight = _off(self._place[inside], marks.point[0], direction) <= self._level
+            steps = self._arrives[inside + 1] - self._leaves[inside]
+            least, most = float(speeds[inside].min()), float(speeds[inside].max())
+            if straight and most - least <= STEADY * most + shake / float(np.median(steps)):
+                yield CommandLeg(
+                    float(begins), float(ends), direction, float((ends - begins) / np.diff(marks.t)[0])
+                )
+
+
+def _vertices(motion: Motion) -> IntArray:
+    """Return the rows of a motion at which it has moved on, as far as its noise lets one tell, shape (k,)."""
+    place, least = motion.position, TREMBLE * motion.noise
+    step = np.linalg.norm(np.diff(place, axis=0), axis=1)
+    rows = np.append(0, np.flatnonzero(step > 0.0) + 1)
+    if not (step[step > 0.0] < least).any():
+        return rows.astype(np.int64)
+    kept, (x, y, z) = [0], place[0].tolist()
+    for row, (u, v, w) in zip(rows[1:].tolist(), place[rows[1:]].tolist(), strict=True):
+        if (u - x) ** 2 + (v - y) ** 2 + (w - z) ** 2 >= least**2:
+            kept.append(row)
+            x, y, z = u, v, w
+    return np.array(kept, np.int64)
+
+
+def _leaving(motion: Motion, rows: IntArray) -> tuple[FloatArray, BoolArray]:
+    """Return when each vertex is left in [s], and whether the command stops there, shape (k,) both."""
+    leaves = motion.t[rows].copy()
+    stays = np.append(rows[1:] - 1, len(motion) - 1)
+    stands = stays > rows
+    near = np.linalg.norm(motion.position[stays] - motion.position[rows], axis=1) <= TREMBLE * motion.noise
+    stands &= near
+    leaves[stands] = motion.t[stays[stands]]
+    stops = np.zeros(len(rows), bool)
+    for rest in motion.rests:
+        stops[np.clip(np.searchsorted(rows, (rest.first + rest.last) // 2, side="right") - 1, 0, None)] = True
+    return leaves, stops
+
+
+def _off(places: FloatArray, start: FloatArray, direction: FloatArray) -> float:
+    """Return how far places, shape (n, 3), are at most from a line, in [m]."""
+    out = places - start
+    out = out - np.outer(out @ direction, direction)
+    return float(np.linalg.norm(out, axis=1).max(initial=0.0))
+
+
+def _meeting(end: FloatArray, before: FloatArray, start: FloatArray, behind: FloatArray) -> FloatArray:
+    """Return where two lines come nearest to each other, half way between, in [m], shape (3,).
+
+    Of opposite directions: the point between the ends of both.
+    """
+    cosine = float(before @ behind)
+    sine = 1.0 - cosine**2
+    if sine < 1e-6:
+        return np.asarray((end + start) / 2.0)
+    gap = start - end
+    first = (gap @ before - cosine * (gap @ behind)) / sine
+    second = (cosine * (gap @ before) - gap @ behind) / sine
+    return np.asarray((end + first * before + start + second * behind) / 2.0)

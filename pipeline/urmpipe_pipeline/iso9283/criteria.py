@@ -1,0 +1,81 @@
+"""The criteria after ISO 9283: what they are called, their units, and their verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+ANGLES = ("rz", "ry", "rx")
+"""The angles of an orientation, R = Rz(rz) Ry(ry) Rx(rx), in the order of their columns."""
+
+UNITS: dict[str, str] = {
+    "AP": "m", "RP": "m",
+    **{f"{name}_{angle}": "rad" for name in ("AP", "RP") for angle in ANGLES},
+    "AD": "m", "RD": "m", "vAP": "m", "PSt": "s", "OV": "m", "dAP": "m", "dRP": "m",
+    "AT": "m", "RT": "m",
+    **{f"{name}_{angle}": "rad" for name in ("AT", "RT") for angle in ANGLES},
+    "CR": "m", "CO": "m", "AV": "1", "RV": "1", "FV": "m/s",
+}  # fmt: skip
+"""Every criterion, in the order in which it is told, and its SI unit; 1 of a share."""
+
+MEANING: dict[str, str] = {
+    "AP": "pose accuracy", "RP": "pose repeatability",
+    "AD": "distance accuracy", "RD": "distance repeatability",
+    "vAP": "multi-directional pose accuracy variation",
+    "PSt": "pose stabilisation time", "OV": "pose overshoot",
+    "dAP": "drift of pose accuracy", "dRP": "drift of pose repeatability",
+    "AT": "path accuracy", "RT": "path repeatability",
+    "CR": "cornering round-off error", "CO": "cornering overshoot",
+    "AV": "path velocity accuracy", "RV": "path velocity repeatability", "FV": "path velocity fluctuation",
+}  # fmt: skip
+"""What they are called in words; those of one angle are called as those of the position."""
+
+
+@dataclass(frozen=True, slots=True)
+class Criterion:
+    """The value of one criterion.
+
+    Attributes:
+        name: AP, RP, AP_rz, ...
+        at: The pose, plane, corner or leg it is of, such as "pose 1"; None: the largest of all.
+        value: In `unit`; signed of AV; None where the cycles do not tell it.
+        unit: m, rad, s, m/s or 1 (a share).
+        cycles: How many cycles it rests on.
+        tolerance: Largest absolute value allowed, or None.
+        verdict: pass or fail; None without a tolerance.
+    """
+
+    name: str
+    at: str | None
+    value: float | None
+    unit: str
+    cycles: int
+    tolerance: float | None = None
+    verdict: Literal["pass", "fail"] | None = None
+
+    @property
+    def used(self) -> float | None:
+        """Share of its tolerance that it uses up; None without one."""
+        if self.tolerance is None or self.value is None:
+            return None
+        return abs(self.value) / self.tolerance
+
+
+def judged(
+    name: str, at: str | None, value: float | None, cycles: int, tolerance: Mapping[str, float]
+) -> Criterion:
+    """Return a criterion with its verdict.
+
+    Args:
+        name: What it is called.
+        at: Where it is; None over all.
+        value: Its value in its unit.
+        cycles: How many cycles it rests on.
+        tolerance: Largest absolute values allowed, by criterion, in their units.
+    """
+    allowed = tolerance.get(name)
+    if allowed is None or value is None:
+        return Criterion(name, at, value, UNITS[name], cycles, allowed)
+    verdict: Literal["pass", "fail"] = "pass" if abs(value) <= allowed else "fail"
+    return Criterion(name, at, value, UNITS[name], cycles, allowed, verdict)

@@ -1,0 +1,65 @@
+"""Whether two motions go along the same path in the same order, however fast."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.iso9283.motion import Motion
+
+POINTS = 150
+"""Points, even in arc length, by which a path is told."""
+
+BLOCKS = 3000
+"""A motion is averaged to no more rows than this first: that holds its noise down."""
+
+ALIKE = 0.2
+"""Paths are alike if no point is further away than this share of the command's extent. Half of a square, its
+other way round and the next of its corners are half an extent away or more."""
+
+
+def outline(motion: Motion) -> FloatArray:
+    """Return points of a motion's path that are even in its arc length, in [m], shape (150, 3).
+
+    Steps that its noise may make count for nothing, so that a rest is no way.
+    """
+    block = max(len(motion) // BLOCKS, 1)
+    first = np.arange(0, len(motion), block)
+    sizes = np.diff(np.append(first, len(motion)))[:, np.newaxis]
+    place = np.add.reduceat(motion.position, first, axis=0) / sizes
+    step = np.linalg.norm(np.diff(place, axis=0), axis=1)
+    shake = 6.0 * motion.noise / np.sqrt(block)
+    along = np.concatenate(([0.0], np.cumsum(np.where(step > shake, step, 0.0))))
+    at = np.linspace(0.0, along[-1], POINTS)
+    return np.column_stack([np.interp(at, along, values) for values in place.T])
+
+
+def apart(first: FloatArray, second: FloatArray) -> float:
+    """Return the discrete Frechet distance of two paths in [m]: the shortest leash of two that go forward.
+
+    d_ij = max(|a_i - b_j|, min(d_i-1,j-1, d_i-1,j, d_i,j-1)), along the diagonals.
+
+    Args:
+        first: Points a in [m], shape (n, 3).
+        second: Points b in [m], shape (m, 3).
+
+    Source: Eiter and Mannila 1994, Computing discrete Frechet distance.
+    """
+    n, m = len(first), len(second)
+    square = (first**2).sum(axis=1)[:, np.newaxis] + (second**2).sum(axis=1) - 2.0 * first @ second.T
+    distance = np.sqrt(np.maximum(square, 0.0))
+    before = np.full(n + 1, np.inf)  # of the diagonal i + j - 2, by i + 1
+    last = np.full(n + 1, np.inf)
+    last[1] = distance[0, 0]
+    for diagonal in range(1, n + m - 1):
+        i = np.arange(max(0, diagonal - m + 1), min(n, diagonal + 1))
+        reach = np.minimum(np.minimum(before[i], last[i]), last[i + 1])
+        now = np.full(n + 1, np.inf)
+        now[i + 1] = np.maximum(distance[i, diagonal - i], reach)
+        before, last = last, now
+    return float(last[n])
+
+
+def alike(command: Motion, motion: Motion) -> bool:
+    """Tell whether a motion goes along the path of a command."""
+    return apart(outline(command), outline(motion)) <= ALIKE * command.extent

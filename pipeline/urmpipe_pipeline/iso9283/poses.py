@@ -1,0 +1,136 @@
+"""The poses of a command, and where each cycle attained them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.orientation import angle_between
+from urmpipe_pipeline.iso9283.in_order import in_order
+from urmpipe_pipeline.iso9283.motion import Motion, Rest
+
+SAME = (1e-4, 1e-3)
+"""Poses that are no further apart than this in [m] and [rad] are one pose."""
+
+SLOW = 0.1
+"""Where a command stops for a moment only, a cycle is there where it is slowest: slower than this share of
+its largest speed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """Poses, in the order in which they are attained.
+
+    Attributes:
+        position: In [m], shape (k, 3).
+        quat_xyzw: Orientations [-], shape (k, 4); None without them.
+        moving: Whether the command stops there for a moment only, one each.
+        closed: Whether a cycle begins in the last one: where it starts it attains nothing.
+    """
+
+    position: FloatArray
+    quat_xyzw: FloatArray | None
+    moving: tuple[bool, ...] = ()
+    closed: bool = False
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+    def alike(self, first: int, second: int) -> bool:
+        """Tell whether two of them are one pose."""
+        near = float(np.linalg.norm(self.position[first] - self.position[second])) <= SAME[0]
+        if self.quat_xyzw is None or not near:
+            return near
+        turned = angle_between(self.quat_xyzw[[first]], self.quat_xyzw[[second]])
+        return float(turned[0]) <= SAME[1]
+
+    @property
+    def named_apart(self) -> tuple[tuple[int, ...], ...]:
+        """The numbers of those that are one pose, from 0, for each pose that is attained more than once."""
+        groups: list[list[int]] = []
+        for k in range(len(self)):
+            own = next((one for one in groups if self.alike(one[0], k)), None)
+            if own is None:
+                groups.append([k])
+            else:
+                own.append(k)
+        return tuple(tuple(one) for one in groups if len(one) > 1)
+
+
+def poses_of(command: Motion, stops: Sequence[float] = ()) -> Poses:
+    """Return the poses of a command: where it rests; of still poses every row.
+
+    A rest that it begins with is left out if it ends in the same pose: every cycle attains that at its end.
+
+    Args:
+        command: The motion that was asked for.
+        stops: Times in [s] at which it is known to stop, if for a moment only.
+    """
+    if not command.timed:
+        return Poses(command.position, command.quat_xyzw, (False,) * len(command))
+    rests = list(command.rests)
+    moments = [moment for t in stops if (moment := _moment(command, t, rests)) is not None]
+    every = sorted(rests + moments, key=lambda one: one.first)
+    found = _gathered(command, every, [one in moments for one in every])
+    if len(found) > 1 and every[0].first == 0 and found.alike(0, len(found) - 1):
+        found = _gathered(command, every[1:], [one in moments for one in every[1:]])
+        return replace(found, closed=True)
+    return found
+
+
+def _moment(command: Motion, t: float, rests: Sequence[Rest]) -> Rest | None:
+    """Return the row at which a command stops for a moment; None if it rests then."""
+    row = int(np.argmin(np.abs(command.t - t)))
+    known = any(one.first - 1 <= row <= one.last + 1 for one in rests)
+    return None if known else Rest(row, row)
+
+
+def _gathered(command: Motion, rests: Sequence[Rest], moving: Sequence[bool]) -> Poses:
+    """Return the poses in which a command rests."""
+    found = [command.pose(one) for one in rests]
+    position = np.array([place for place, _ in found]).reshape(-1, 3)
+    quats = [turned for _, turned in found if turned is not None]
+    return Poses(position, np.array(quats) if quats else None, tuple(moving))
+
+
+def attained(cycle: Motion, poses: Poses) -> tuple[Rest, ...] | int:
+    """Return where a cycle rests in each pose, or the number of the first, from 0, that it does not attain.
+
+    Of its rests those are taken that follow each other in the order of the poses and are nearest to them in
+    all; where a command stops for a moment only, moments at which the cycle is slowest count, too. Of still
+    poses each row is one.
+    """
+    if not cycle.timed:
+        if len(cycle) != len(poses):
+            return min(len(cycle), len(poses) - 1)
+        return tuple(Rest(row, row) for row in range(len(cycle)))
+    rests = [*cycle.rests, *(_slowest(cycle) if any(poses.moving) else ())]
+    rests.sort(key=lambda one: one.first)
+    if poses.closed and rests and _starts(cycle, rests[0]):
+        rests = rests[1:]
+    places = np.array([cycle.pose(one)[0] for one in rests]).reshape(-1, 3)
+    order = np.arange(len(rests), dtype=np.float64)
+    stages = [(order, np.linalg.norm(places - wanted, axis=1)) for wanted in poses.position]
+    chosen = in_order(stages)
+    return chosen if isinstance(chosen, int) else tuple(rests[k] for k in chosen)
+
+
+def _slowest(cycle: Motion) -> list[Rest]:
+    """Return the rows, one each, at which a cycle is slowest outside its rests, its ends among them."""
+    speed = cycle.speed
+    at_row = np.minimum(np.append(speed[0], speed), np.append(speed, speed[-1]))
+    lower = np.append(True, at_row[1:] <= at_row[:-1]) & np.append(at_row[:-1] < at_row[1:], True)
+    lower &= at_row <= SLOW * speed.max()
+    lower[[0, -1]] = True
+    for one in cycle.rests:
+        lower[max(one.first - 1, 0) : one.last + 2] = False
+    return [Rest(int(row), int(row)) for row in np.flatnonzero(lower)]
+
+
+def _starts(cycle: Motion, rest: Rest) -> bool:
+    """Tell whether a cycle begins in a rest: nothing leads to it."""
+    way = cycle.position[: rest.first + 1] - cycle.pose(rest)[0]
+    return bool(np.linalg.norm(way, axis=1).max() <= SAME[0] + 10.0 * cycle.noise)

@@ -1,0 +1,140 @@
+"""What a test after ISO 9283 found: cycles, criteria, and what is drawn of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.iso9283.corners import CornerPath
+from urmpipe_pipeline.iso9283.criteria import Criterion
+from urmpipe_pipeline.iso9283.speeds import LegSpeed
+
+
+@dataclass(frozen=True, slots=True)
+class Cycle:
+    """A cycle of a test.
+
+    Attributes:
+        name: What it is called.
+        row: Its first row in its log, from 1.
+        last_row: Its last row in its log, from 1.
+        sync_offset: t_reference - t_cycle in [s]; None of still poses.
+    """
+
+    name: str
+    row: int
+    last_row: int
+    sync_offset: float | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AttainedPoses:
+    """The poses of a test, and where each cycle attained them.
+
+    Attributes:
+        command: In [m], shape (k, 3).
+        attained: In [m], shape (n, k, 3): cycles, poses, coordinates.
+        command_quat: Commanded orientations x, y, z, w [-], shape (k, 4); None without them.
+        attained_quat: Attained ones [-], shape (n, k, 4); None without them.
+    """
+
+    command: FloatArray
+    attained: FloatArray
+    command_quat: FloatArray | None = None
+    attained_quat: FloatArray | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CutPath:
+    """The command path cut by planes, and where the cycles cross them.
+
+    Attributes:
+        s: Arc length of each plane along the command in [m], shape (m,).
+        command: Where the command crosses it in [m], shape (m, 3).
+        normal: Direction of the command there [-], shape (m, 3).
+        crossed: Where the cycles cross it in [m], shape (n, m, 3).
+        accuracy: AT of each plane in [m], shape (m,).
+        repeatability: RT of each plane in [m], shape (m,); None of one cycle.
+        path: The command in [m], shape (c, 3).
+        speed_s: Arc lengths at which speeds are drawn in [m], shape (q,).
+        speed: Speed of each cycle there in [m/s], shape (n, q).
+        commanded_speed: That of the command in [m/s], shape (q,).
+        legs: Straight legs with a constant commanded speed.
+        corners: Corners of the command.
+        total: Length of the command in [m].
+    """
+
+    s: FloatArray
+    command: FloatArray
+    normal: FloatArray
+    crossed: FloatArray
+    accuracy: FloatArray
+    repeatability: FloatArray | None
+    path: FloatArray
+    speed_s: FloatArray
+    speed: FloatArray
+    commanded_speed: FloatArray
+    legs: tuple[LegSpeed, ...]
+    corners: tuple[CornerPath, ...]
+    total: float
+
+    @property
+    def mean(self) -> FloatArray:
+        """The mean path: barycentres at the planes in [m], shape (m, 3)."""
+        return np.asarray(self.crossed.mean(axis=0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IsoTest:
+    """Accuracy and repeatability of a motion that was repeated, after ISO 9283.
+
+    Attributes:
+        cycles: The cycles that were judged.
+        criteria: Every criterion, over all and where it is, in the order of `criteria.UNITS`.
+        poses: The poses; None if the command rests nowhere.
+        path: The path; None of still poses, and where nothing moves.
+        band: Half of the width of the band that poses are stabilised in, in [m].
+    """
+
+    cycles: tuple[Cycle, ...]
+    criteria: tuple[Criterion, ...]
+    poses: AttainedPoses | None
+    path: CutPath | None
+    band: float
+
+    @property
+    def overall(self) -> tuple[Criterion, ...]:
+        """Each criterion over all poses, planes, corners or legs."""
+        return tuple(one for one in self.criteria if one.at is None)
+
+    def worst_of(self, name: str) -> Criterion:
+        """Return where a criterion is largest."""
+        own = [one for one in self.criteria if one.name == name and one.at is not None]
+        return max(own, key=lambda one: abs(one.value or 0.0))
+
+    def at(self, where: str, name: str) -> Criterion | None:
+        """Return a criterion of a pose, plane, corner or leg, such as "pose 1"; None where it has none."""
+        found = (one for one in self.criteria if one.at == where and one.name == name)
+        return next(found, None)
+
+    @property
+    def verdict(self) -> Literal["pass", "fail"] | None:
+        """Fail if a criterion is out of its tolerance; None if none has one."""
+        verdicts = {one.verdict for one in self.overall} - {None}
+        return None if not verdicts else "fail" if "fail" in verdicts else "pass"
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield one row a criterion and place, as JSON has it."""
+        yield from (asdict(one) for one in self.criteria)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the object `iso` of `urmpipe compare --json`."""
+        return {
+            "cycles": [asdict(one) for one in self.cycles],
+            "poses": 0 if self.poses is None else len(self.poses.command),
+            "criteria": list(self.rows()),
+        }

@@ -1,0 +1,24 @@
+"""What a plan knows of its path as a command: where arcs round its corners, and when it stops."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from urmpipe_pipeline.iso9283.command_path import CORNER, Bend
+from urmpipe_pipeline.planned_paths.result import PlannedPath
+
+
+def bends_of(plan: PlannedPath) -> tuple[Bend, ...]:
+    """Return the corners that arcs of a plan round by 30 deg or more, each with its times."""
+    arcs = [k for k, kind in enumerate(plan.path.kinds) if kind == "arc"]
+    times, angle = plan.segment_times.tolist(), plan.path.length / np.maximum(plan.path.radius, 1e-12)
+    return tuple(
+        Bend(times[k], times[k + 1], (float(x), float(y), float(z)))
+        for k, (x, y, z) in zip(arcs, plan.corners, strict=True)
+        if angle[k] >= CORNER - 1e-9
+    )
+
+
+def stops_of(plan: PlannedPath) -> tuple[float, ...]:
+    """Return when a plan stops in [s], its start and its end among them."""
+    return tuple(plan.row_times[plan.path.stop_row].tolist())
