@@ -113,6 +113,16 @@ def _is_planned(value: Any) -> bool:
     return isinstance(value, PathRows) or _is_path(value)
 
 
+def _are_cycles(value: Any) -> bool:
+    pairs = isinstance(value, (list, tuple)) and len(value) > 0
+    return _is_text(value) or (
+        pairs
+        and all(
+            isinstance(one, (list, tuple)) and len(one) == 2 and all(map(_is_count, one)) for one in value
+        )
+    )
+
+
 def _one_of(*names: str) -> Kind:
     return Kind(lambda value: isinstance(value, str) and value in names, ", ".join(names))
 
@@ -146,7 +156,9 @@ KINDS = {
     "audit": PATH,
     "backend": _one_of("native", "python"),
     "base_link": LINK,
+    "band": Kind(_is_number, "a number, in m"),
     "csv": PATH,
+    "cycles": Kind(_are_cycles, 'a text such as "1:1477,1478:2955", or pairs of rows, such as [(1, 1477)]'),
     "baseline": Kind(_is_baseline, "a recording, or what `compare` returned"),
     "build_fmu.log": Kind(_is_table, "a log: CSV, or a folder of plots"),
     "derivative": _one_of("central", "savgol"),
@@ -163,6 +175,7 @@ KINDS = {
     ),
     "ik.tolerance": Kind(_is_number, "a number, in m"),
     "inputs": PATHS,
+    "iso": FLAG,
     "jerk": Kind(_is_number, "a number, in m/s3"),
     "junit": PATH,
     "law": _one_of("trapezoid", "jerk", "limits"),
@@ -176,6 +189,7 @@ KINDS = {
     "output": PATH,
     "path": PATH,
     "plan.path": PLANNED,
+    "planes": COUNT,
     "platforms": Kind(_one_or_many(_is_text), "linux64, win64 or a list of both"),
     "progress": PROGRESS,
     "restarts": COUNT,

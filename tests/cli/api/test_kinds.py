@@ -52,6 +52,8 @@ RIGHT = {
         "velocity",
         "acceleration",
         "limit",
+        "band",
+        "planes",
     },
     "a list": {"logs", "inputs", "platforms", "formats", "joints", "measured"},
     "a mapping": {"arguments", "options", "unit", "interval"},
