@@ -8,11 +8,20 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.transform import Transform, rpy_of
-from urmpipe_pipeline.comparison.change import Absent, BaselineComparison, Change, Difference
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.change import (
+    Absent,
+    BaselineComparison,
+    Change,
+    CriterionChange,
+    Difference,
+)
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Statistics
 from urmpipe_pipeline.comparison.tolerance import allowed_for, check_tolerance, parse_tolerance
+from urmpipe_pipeline.iso9283.criteria import Criterion
 
 LENGTHS = ("axis", "norm", "path")
 """The kinds that a noise without a name is for."""
@@ -23,6 +32,9 @@ DEFAULT_NOISE = dict.fromkeys((*LENGTHS, "angle", "joint"), 1e-6)
 1 um and 1 urad: a twentieth of what the best arms repeat to (0.02 mm), yet more than rounding to the six
 digits of a text log, interpolation and other versions of the libraries move a deviation by.
 """
+
+OTHER_NOISE = 1e-6
+"""Likewise of criteria after ISO 9283 that are no lengths and no angles: in [s], [m/s] and of shares."""
 
 Key: TypeAlias = tuple[str, str, str]
 """Kind, quantity and unit: a joint may be called x."""
@@ -50,7 +62,7 @@ def complete_noise(noise: float | Mapping[str, float] | None) -> dict[str, float
     """
     given = noise if isinstance(noise, Mapping) else {} if noise is None else dict.fromkeys(LENGTHS, noise)
     if given:
-        check_tolerance(given, "noise", zero=True)
+        check_tolerance(given, "noise", zero=True, iso=None)
     return DEFAULT_NOISE | dict(given)
 
 
@@ -73,9 +85,11 @@ def against_baseline(
             given is 1 um and 1 urad.
 
     Raises:
-        OptionError: If a noise is none.
+        OptionError: If a noise is none, or only one of the two is a test after ISO 9283.
     """
     level = complete_noise(noise)
+    if now.iso is not None or before.iso is not None:
+        return _tests(now, before, level)
     pairs = _pairs(now, before)
     return BaselineComparison(
         name=before.name,
@@ -88,6 +102,38 @@ def against_baseline(
         gone=tuple(_absent(before, {old.name: (run, old) for run, old in pairs})),
         differences=tuple(_differences(now, before, pairs)),
     )
+
+
+def _tests(now: Comparison, before: Comparison, noise: Mapping[str, float]) -> BaselineComparison:
+    """Return what changed since an earlier test after ISO 9283: its criteria over all."""
+    if now.iso is None or before.iso is None:
+        sides = ("a test after ISO 9283", "a comparison log by log")
+        found, allowed = sides if now.iso is None else sides[::-1]
+        raise OptionError(Finding(parameter="baseline", found=found, allowed=allowed))
+    tests = before.iso, now.iso
+    old, new = ({one.name: one for one in side.overall if one.value is not None} for side in tests)
+    counts = [text.counted(len(side.cycles), "cycle") for side in tests]
+    return BaselineComparison(
+        name=before.name,
+        recording=before.recording,
+        noise=noise,
+        changes=(),
+        new=tuple(Absent(now.name, name) for name in new if name not in old),
+        gone=tuple(Absent(now.name, name) for name in old if name not in new),
+        differences=(
+            *_differing(_made(before), _made(now)),
+            *_differing({"cycles": counts[0]}, {"cycles": counts[1]}),
+        ),
+        criteria=tuple(
+            CriterionChange(old[name], one, _noise_of(one, noise)) for name, one in new.items() if name in old
+        ),
+    )
+
+
+def _noise_of(one: Criterion, noise: Mapping[str, float]) -> float:
+    """Return what of a change of a criterion means nothing, in its unit: its own, else that of its kind."""
+    kind = {"m": "norm", "rad": "angle"}.get(one.unit, "")
+    return noise.get(one.name, noise.get(kind, OTHER_NOISE))
 
 
 def _pairs(now: Comparison, before: Comparison) -> list[Pair]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.change import BaselineComparison, Change, Worse
+from urmpipe_pipeline.comparison.change import BaselineComparison, Change, CriterionChange, Worse
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.comparison.wording import quantity_name, size_of, symbol
 from urmpipe_pipeline.json_values import plain
@@ -51,6 +51,29 @@ def baseline_checks(found: BaselineComparison, run: str) -> Iterator[Check]:
             yield _check(run, f"{lost.quantity} is there", said)
 
 
+def criterion_checks(found: BaselineComparison) -> Iterator[Check]:
+    """Yield a check for each criterion after ISO 9283 that was compared then."""
+    for one in found.criteria:
+        noise = f" (noise {written(Value(one.noise, _shown(one.now.unit), given=True), unit=True)})"
+        said = f"{one.now.name}: {criterion_words(one)}{noise}" if one.worse else ""
+        yield _check("criteria", one.now.name, said)
+    for lost in found.gone:
+        said = f"{lost.quantity}: in the baseline, without a value now"
+        yield _check("criteria", f"{lost.quantity} is there", said)
+
+
+def criterion_words(one: CriterionChange) -> str:
+    """Return a criterion before and now: "0.1000 → 0.2000 mm"."""
+    unit = _shown(one.now.unit)
+    before, now = abs(one.before.value or 0.0), abs(one.now.value or 0.0)
+    return f"{written(Value(before, unit, now))} → {written(Value(now, unit, before), unit=True)}"
+
+
+def _shown(unit: str) -> str:
+    """Return the unit by which a criterion is written: shares as %."""
+    return "%" if unit == "1" else unit
+
+
 def _check(run: str, name: str, said: str) -> Check:
     """Return a check that fails if there is something to say."""
     about = f"{run} against baseline"
@@ -60,6 +83,8 @@ def _check(run: str, name: str, said: str) -> Check:
 def since_words(found: BaselineComparison) -> str:
     """Return how much is worse than a baseline: "5 quantities worse, 1 gone", "nothing worse"."""
     said = [f"{quantities(len(found.worse))} worse"] if found.worse else []
+    criteria = text.enumerated([one.now.name for one in found.worse_criteria])
+    said += [f"{criteria} worse"] if criteria else []
     said += [f"{len(found.gone)} gone"] if found.gone else []
     return ", ".join(said) or "nothing worse"
 
@@ -108,6 +133,13 @@ def _tables(found: BaselineComparison) -> Iterator[Table]:
     changed = sorted((one for one in found.changes if one.changed), key=lambda one: not one.worse)
     if changed:
         yield Table(f"Changed since {found.name} by more than the noise", columns_of(changed, _HEADS))
+    criteria = sorted(
+        (one for one in found.criteria if one.worse or one.better), key=lambda one: not one.worse
+    )
+    if criteria:
+        yield Table(
+            f"Criteria changed since {found.name} by more than the noise", columns_of(criteria, _CRITERIA)
+        )
     if found.differences:
         rows = [(one.what, plain(one.before), plain(one.now)) for one in found.differences]
         heads = {"what": "What", "before": "before", "now": "now"}
@@ -141,6 +173,14 @@ def _verdict(one: Change, verdict: Verdict | None) -> Judged:
     """Return a verdict where it changed."""
     return Judged(verdict if one.before.verdict != one.now.verdict else None)
 
+
+_CRITERIA: Heads[CriterionChange] = {
+    "name": ("Criterion", lambda one: one.now.name),
+    "worse": ("worse", lambda one: "worse" if one.worse else "better"),
+    "before": ("before", lambda one: Value(one.before.value, _shown(one.now.unit))),
+    "now": ("now", lambda one: Value(one.now.value, _shown(one.now.unit))),
+}
+"""The columns of criteria that changed, by their keys."""
 
 _HEADS: Heads[Change] = {
     "run": ("Log", lambda one: Ref(one.run)),

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from urmpipe_pipeline.comparison.deviation import Statistics, Verdict
+from urmpipe_pipeline.iso9283.criteria import Criterion
 
 Worse: TypeAlias = Literal["max", "rms", "share_out", "samples"]
 
@@ -96,6 +97,43 @@ class Change:
 
 
 @dataclass(frozen=True, slots=True)
+class CriterionChange:
+    """How a criterion after ISO 9283, over all, stands to the baseline.
+
+    Attributes:
+        before: That of the baseline.
+        now: That of now.
+        noise: What means nothing, in its unit.
+    """
+
+    before: Criterion
+    now: Criterion
+    noise: float
+
+    @property
+    def worse(self) -> bool:
+        """Whether its absolute value grew by more than the noise."""
+        return abs(self.now.value or 0.0) > abs(self.before.value or 0.0) + self.noise
+
+    @property
+    def better(self) -> bool:
+        """Whether its absolute value fell by more than the noise."""
+        return abs(self.before.value or 0.0) > abs(self.now.value or 0.0) + self.noise
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {
+            "name": self.now.name,
+            "unit": self.now.unit,
+            "noise": self.noise,
+            "before": self.before.value,
+            "now": self.now.value,
+            "worse": self.worse,
+            "better": self.better,
+        }
+
+
+@dataclass(frozen=True, slots=True)
 class Absent:
     """What only one of the two comparisons has.
 
@@ -132,6 +170,8 @@ class BaselineComparison:
         new: What the earlier one did not have.
         gone: What only the earlier one had.
         differences: What differs in the way the two were made.
+        criteria: Of tests after ISO 9283: one a criterion that has a value in both; the cycles themselves are
+            not held against each other.
     """
 
     name: str
@@ -141,6 +181,7 @@ class BaselineComparison:
     new: tuple[Absent, ...]
     gone: tuple[Absent, ...]
     differences: tuple[Difference, ...]
+    criteria: tuple[CriterionChange, ...] = ()
 
     @property
     def worse(self) -> tuple[Change, ...]:
@@ -150,7 +191,12 @@ class BaselineComparison:
     @property
     def verdict(self) -> Verdict:
         """Fail if a quantity is worse, or something that was compared before is compared no more."""
-        return "fail" if self.worse or self.gone else "pass"
+        return "fail" if self.worse or self.worse_criteria or self.gone else "pass"
+
+    @property
+    def worse_criteria(self) -> tuple[CriterionChange, ...]:
+        """The criteria that are worse than before, beyond the noise."""
+        return tuple(one for one in self.criteria if one.worse)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
@@ -163,4 +209,5 @@ class BaselineComparison:
             "new": [asdict(one) for one in self.new],
             "gone": [asdict(one) for one in self.gone],
             "differences": [asdict(one) for one in self.differences],
+            "criteria": [one.to_dict() for one in self.criteria],
         }

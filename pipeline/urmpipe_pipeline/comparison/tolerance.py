@@ -112,7 +112,11 @@ def _parts(text: str, bare: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...
 
 
 def check_tolerance(
-    tolerance: Mapping[str, float], parameter: str = "tolerance", *, zero: bool = False, iso: bool = False
+    tolerance: Mapping[str, float],
+    parameter: str = "tolerance",
+    *,
+    zero: bool = False,
+    iso: bool | None = False,
 ) -> None:
     """Raise an `OptionError` with everything in a tolerance that is no kind or no positive number.
 
@@ -120,10 +124,11 @@ def check_tolerance(
         tolerance: In [m] or [rad], by kind; of criteria in their units.
         parameter: The keyword that gave it, for messages.
         zero: Whether 0 is allowed.
-        iso: Whether criteria after ISO 9283 are judged, which need none; else deviations.
+        iso: Whether criteria after ISO 9283 are judged, which need none; else deviations; None: of either.
     """
     sign = "0 or positive" if zero else "positive"
-    kinds, allowed = (CRITERIA, ALLOWED_CRITERIA) if iso else (DEVIATIONS, ALLOWED_NUMBERS)
+    allowed = ALLOWED_CRITERIA if iso else ALLOWED_NUMBERS
+    kinds = UNITS if iso is None else CRITERIA if iso else DEVIATIONS
     faults = [
         Finding(parameter=parameter, found=f"{kind}={value}", allowed=f"{allowed}; {sign}")
         for kind, value in tolerance.items()
