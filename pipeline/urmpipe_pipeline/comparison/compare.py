@@ -179,7 +179,7 @@ def _test(asked: Side, done: Sequence[Side], options: CompareOptions) -> Compari
     if len(runs) == 1:  # its cycles are parts of it
         told = [*(one.of(runs[0].name) for one in runs[0].warnings), *told]
     assumed = _taken_for_granted(reference, runs, options)
-    made = _comparison(asked.trajectory, found.deviations, options, told, assumed)
+    made = _comparison(found.command, found.deviations, options, told, assumed)
     return replace(made, name=f"{runs[0].name}-against-{reference.name}", iso=found.test)
 
 

@@ -16,7 +16,7 @@ from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.trajectory import Sync, Trajectory
 from urmpipe_pipeline.diagnosis.sides import Side
 from urmpipe_pipeline.iso9283.command_path import Bend
-from urmpipe_pipeline.iso9283.cycles import FoundCycles, check_cycles, find_cycles
+from urmpipe_pipeline.iso9283.cycles import FoundCycles, check_cycles, find_cycles, first_cycle
 from urmpipe_pipeline.iso9283.likeness import alike
 from urmpipe_pipeline.iso9283.measure import Command, Followed, Marks, follow, marks_of
 from urmpipe_pipeline.iso9283.measure import measure as measure_criteria
@@ -73,11 +73,13 @@ class JudgedCycles:
     """The cycles of a test, and what they tell.
 
     Attributes:
+        command: The reference, once.
         deviations: The deviation of each cycle from the reference at the same times.
         test: The criteria.
         warnings: What a person should know.
     """
 
+    command: Trajectory
     deviations: tuple[Deviation, ...]
     test: IsoTest
     warnings: tuple[LogWarning, ...]
@@ -110,6 +112,7 @@ def judge_cycles(
         LogError: If no cycle follows the reference, or a criterion with a tolerance has no value.
         OptionError: If rows are given for the cycles of several logs, or are wrong.
     """
+    asked, rows = _once(asked)
     command = _motion(asked)
     candidates, told = _candidates(command, done, options)
     marks = marks_of(Command(command, options.targets, options.bends, options.stops, options.planes))
@@ -122,13 +125,26 @@ def judge_cycles(
         Cycle(one.side.run.name, one.first + 1, one.last + 1, clock.offset if one.motion.timed else None)
         for (one, _), clock in zip(kept, clocks, strict=True)
     )
-    test = IsoTest(cycles, found.criteria, found.poses, found.path, options.band)
+    test = IsoTest(cycles, found.criteria, found.poses, found.path, options.band, rows)
     _refuse_unvalued(test, tolerance)
     deviations = tuple(
         _deviation(asked, one.side, clock) for (one, _), clock in zip(kept, clocks, strict=True)
     )
     doubts = [*_few(test), *_trembling([one for one, _ in kept], test)]
-    return JudgedCycles(deviations, test, (*told, *left_out, *doubts))
+    return JudgedCycles(asked.trajectory, deviations, test, (*told, *left_out, *doubts))
+
+
+def _once(asked: Side) -> tuple[Side, tuple[int, int] | None]:
+    """Return what is asked for in each cycle, and its rows, from 1, in a reference that repeats itself."""
+    whole = _motion(asked)
+    rows = first_cycle(whole)
+    if rows is None:
+        return asked, None
+    first, last = (int(whole.row[row]) for row in rows)
+    return replace(asked, trajectory=_cut(asked.trajectory, first, last, asked.trajectory.name)), (
+        first + 1,
+        last + 1,
+    )
 
 
 def _motion(side: Side) -> Motion:
@@ -238,16 +254,8 @@ def _refuse_unvalued(test: IsoTest, tolerance: Mapping[str, float]) -> None:
     if lacks:
         known = ", ".join(name for name, value in values.items() if value is not None)
         allowed = f"criteria that this test tells: {known}"
-        raise LogError(
-            *(
-                Finding(
-                    parameter="tolerance",
-                    found=f"{name}, which {count} of this motion do not tell",
-                    allowed=allowed,
-                )
-                for name in lacks
-            )
-        )
+        found = [f"{name}, which {count} of this motion cannot tell" for name in lacks]
+        raise LogError(*(Finding(parameter="tolerance", found=one, allowed=allowed) for one in found))
 
 
 def _few(test: IsoTest) -> Iterator[LogWarning]:

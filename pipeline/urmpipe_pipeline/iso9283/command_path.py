@@ -21,8 +21,9 @@ WITHIN = 0.005
 ZONE = 0.1
 """The zone of a corner reaches so far along its legs: this share of the shorter one."""
 
-TREMBLE = 10.0
-"""Vertices nearer to each other than so many standard deviations of the noise tell no direction."""
+TREMBLE = 30.0
+"""Vertices nearer to each other than so many standard deviations of the noise tell no direction: at this
+distance it is known to 4 deg, and 30 deg are eight times that."""
 
 STRAIGHT = 1e-4
 """A path is taken apart into straight pieces to this share of its extent ..."""
@@ -33,8 +34,14 @@ LEVEL = 0.02
 STEADY = 0.01
 """A commanded speed that varies by this share of itself is constant."""
 
+TOLD = 0.1
+"""No speed is told to be constant where noise alone may make it vary by this share of itself."""
+
 FEWEST = 4
 """Rows of the command in the middle half of a leg whose speed is judged, at least."""
+
+LEAST = 1e-12
+"""Arc lengths that differ by no more than this in [m] are one: what rounding leaves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,12 +92,14 @@ class CommandLeg:
         begins: Arc length at which its middle half begins in [m].
         ends: Arc length at which its middle half ends in [m].
         direction: Its direction [-], shape (3,).
+        length: How long its middle half is in [m].
         speed: The commanded speed v_c in [m/s].
     """
 
     begins: float
     ends: float
     direction: FloatArray
+    length: float
     speed: float
 
 
@@ -129,7 +138,7 @@ class CommandPath:
 
     def __init__(self, motion: Motion, bends: Sequence[Bend] = ()) -> None:
         self.motion = motion
-        rows = _vertices(motion)
+        self._rows = rows = _vertices(motion)
         self._place, self._arrives = motion.position[rows], motion.t[rows]
         step = np.diff(self._place, axis=0)
         length = np.linalg.norm(step, axis=1)
@@ -234,11 +243,10 @@ class CommandPath:
 
     def _heading(self, first: float, last: float, *, at_end: bool) -> tuple[FloatArray, bool]:
         """Return the direction at an end of a stretch [-], shape (3,), and whether that is straight."""
-        a, b = self.stations(np.array([first, last])).point
-        inside = self._place[(self.s > first) & (self.s < last)]
-        chord = b - a
+        inside = self._place[(self.s >= first - LEAST) & (self.s <= last + LEAST)]
+        chord = inside[-1] - inside[0] if len(inside) > 1 else np.zeros(3)
         length = float(np.linalg.norm(chord))
-        if length > 0.0 and _off(inside, a, chord / length) <= self._level:
+        if length > 0.0 and _off(inside, inside[0], chord / length) <= self._level:
             return chord / length, True
         piece = (
             np.searchsorted(self.s, last, side="left") if at_end else np.searchsorted(self.s, first, "right")
@@ -279,21 +287,22 @@ class CommandPath:
 
     def _legs(self) -> Iterator[CommandLeg]:
         """Yield the straight legs whose middle half has a constant commanded speed."""
-        speeds, shake = self._speeds, 12.0 * self.motion.noise
+        speeds, shake = self.motion.speed, 10.0 * self.motion.speed_error
         for first, last in self._pieces:
             begins, ends = (self.s[first] + share * (self.s[last] - self.s[first]) for share in (0.25, 0.75))
             inside = np.flatnonzero((self.s[:-1] >= begins) & (self.s[1:] <= ends))
             if len(inside) < FEWEST:
                 continue
             marks = self.stations(np.array([begins, ends]))
-            direction = (marks.point[1] - marks.point[0]) / (ends - begins)
+            chord = marks.point[1] - marks.point[0]
+            length = float(np.linalg.norm(chord))
+            direction = chord / length
             straight = _off(self._place[inside], marks.point[0], direction) <= self._level
-            steps = self._arrives[inside + 1] - self._leaves[inside]
-            least, most = float(speeds[inside].min()), float(speeds[inside].max())
-            if straight and most - least <= STEADY * most + shake / float(np.median(steps)):
-                yield CommandLeg(
-                    float(begins), float(ends), direction, float((ends - begins) / np.diff(marks.t)[0])
-                )
+            own = speeds[self._rows[inside[0]] : self._rows[inside[-1] + 1]]
+            least, most = float(own.min()), float(own.max())
+            if straight and shake <= TOLD * most and most - least <= STEADY * most + shake:
+                duration = float(marks.t[1] - marks.t[0])
+                yield CommandLeg(float(begins), float(ends), direction, length, length / duration)
 
 
 def _vertices(motion: Motion) -> IntArray:

@@ -71,6 +71,22 @@ def find_cycles(command: Motion, motion: Motion) -> FoundCycles:
     return _told(motion, found, extent)
 
 
+def first_cycle(motion: Motion) -> tuple[int, int] | None:
+    """Return the first and the last row, from 0, of the first cycle of a command that repeats; else None.
+
+    It repeats if it comes back to its start, and goes the same path from there to the start once more.
+    """
+    if not motion.timed or not motion.extent:
+        return None
+    starts = _visits(motion, motion.position[0], motion.extent)
+    for k in range(1, min((len(starts) + 1) // 2, LOOKED_AT + 1)):
+        ends = (starts[0], starts[k]), (starts[k], starts[2 * k])
+        first, second = (outline(motion.part(*one, "")) for one in ends)
+        if apart(first, second) <= ALIKE * motion.extent:
+            return 0, starts[k]
+    return None
+
+
 def _told(motion: Motion, found: Sequence[tuple[int, int]], extent: float) -> FoundCycles:
     """Return cycles so that no two share a row, and the rows that are in none though the arm moves there."""
     rows = [

@@ -98,6 +98,11 @@ class Motion:
         """Speed from one row to the next in [m/s], as free of noise as `slow` is, shape (n - 1,)."""
         return _speeds(self.t, self.position, _window(self.t, self.position, STILL[0]))
 
+    @cached_property
+    def speed_error(self) -> float:
+        """Standard error of `speed` in [m/s]."""
+        return _error(self.t, self.position, _window(self.t, self.position, STILL[0]))
+
     def pose(self, rest: Rest) -> tuple[FloatArray, FloatArray | None]:
         """Return where it stands in the second half of a rest: in [m], shape (3,), and how [-], shape (4,).
 

@@ -98,6 +98,8 @@ class IsoTest:
         poses: The poses; None if the command rests nowhere.
         path: The path; None of still poses, and where nothing moves.
         band: Half of the width of the band that poses are stabilised in, in [m].
+        reference_rows: The rows of the reference, from 1, that are the command of each cycle, where that
+            repeats itself; None: all.
     """
 
     cycles: tuple[Cycle, ...]
@@ -105,6 +107,7 @@ class IsoTest:
     poses: AttainedPoses | None
     path: CutPath | None
     band: float
+    reference_rows: tuple[int, int] | None = None
 
     @property
     def overall(self) -> tuple[Criterion, ...]:

@@ -51,7 +51,7 @@ def leg_speed(name: str, leg: CommandLeg, cycles: Sequence[Motion], times: Float
 
     Source: after ISO 9283, from common knowledge.
     """
-    means = (leg.ends - leg.begins) / (times[:, 1] - times[:, 0])
+    means = leg.length / (times[:, 1] - times[:, 0])
     spread = 3.0 * float(means.std(ddof=1)) / leg.speed if len(means) > 1 else None
     spans = [
         span for one, ends in zip(cycles, times, strict=True) if (span := _span(one, leg, ends)) is not None

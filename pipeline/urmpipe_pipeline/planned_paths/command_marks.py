@@ -15,7 +15,7 @@ def bends_of(plan: PlannedPath) -> tuple[Bend, ...]:
     return tuple(
         Bend(times[k], times[k + 1], (float(x), float(y), float(z)))
         for k, (x, y, z) in zip(arcs, plan.corners, strict=True)
-        if angle[k] >= CORNER - 1e-9
+        if CORNER - 1e-9 <= angle[k] < np.pi and np.isfinite(x)
     )
 
 
