@@ -30,7 +30,6 @@ from urmpipe_pipeline.comparison.baseline import against_baseline, complete_nois
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.sync import SyncOption
-from urmpipe_pipeline.comparison.tables import statistics_rows
 from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.warnings import BEYOND, EXCHANGED, LARGE_NOISE, large_noises
@@ -162,10 +161,11 @@ def compare(
             made = _with_noise(made, level)
         _refuse_doubts(strict, made)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
+        shown = present(result)
         if told is not None:
-            write_junit(present(result), parts["junit"], told, voice)
-        if csv is not None:
-            write_table(statistics_rows(result), parts["statistics"], Path(csv))
+            write_junit(shown, parts["junit"], told, voice)
+        if csv is not None and shown.rows is not None:
+            write_table(shown.rows(), parts["statistics"], Path(csv))
         return recorded(result, output, kept, progress)
 
 

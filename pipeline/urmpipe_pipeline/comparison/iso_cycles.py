@@ -118,7 +118,7 @@ def judge_cycles(
     marks = marks_of(Command(command, options.targets, options.bends, options.stops, options.planes))
     kept, left_out = _followed(command, marks, candidates, asked.run.name)
     if not kept:
-        raise LogError(*(lacking(done[0].run, one.message) for one in (*told, *left_out)))
+        raise LogError(*(one.as_finding() for one in (*told, *left_out)))
     found = measure_criteria(marks, [one for _, one in kept], options.band, tolerance)
     clocks = [_sync(sync, one, asked.run.timed) for _, one in kept]
     cycles = tuple(

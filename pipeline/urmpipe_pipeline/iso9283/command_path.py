@@ -15,8 +15,14 @@ from urmpipe_pipeline.iso9283.motion import ROUNDING, Motion
 CORNER = np.radians(30.0)
 """A corner is where the direction turns by this much or more, in [rad] ..."""
 
+BACK = np.radians(150.0)
+"""Where it turns by more than this in [rad] the path goes back."""
+
 WITHIN = 0.005
 """... within this time of commanded motion in [s]."""
+
+SHARE = 0.01
+"""A vertex belongs to a corner if the path turns there by this share of the corner's turn."""
 
 ZONE = 0.1
 """The zone of a corner reaches so far along its legs: this share of the shorter one."""
@@ -82,6 +88,16 @@ class CommandCorner:
     middles: tuple[float, float]
     zone: tuple[float, float]
     straight: bool
+
+    @property
+    def anchors(self) -> tuple[float, ...]:
+        """Arc lengths in [m] at which cycles are held together about it: half way to both sides, and itself.
+
+        Without the last where the path goes back: no plane across it is crossed for sure.
+        """
+        if float(self.before @ self.behind) < np.cos(BACK):
+            return self.middles
+        return self.middles[0], (self.begins + self.ends) / 2.0, self.middles[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -217,9 +233,17 @@ class CommandPath:
         while len(found):
             apart = (k for k in range(1, len(found)) if begin[found[k]] > end[found[k - 1]])
             last = next(apart, len(found))
-            first, final = begin[found[0]], end[found[last - 1]]
+            first, final = self._narrowed(int(begin[found[0]]), int(end[found[last - 1]]))
             yield _Turn(float(self.s[first]), float(self.s[final]), None)
             found = found[last:]
+
+    def _narrowed(self, first: int, last: int) -> tuple[int, int]:
+        """Return the first and the last of some vertices at which the path turns by a share of the whole."""
+        vertex = np.arange(first, last + 1)
+        cosine = np.einsum("ni,ni->n", self._direction[vertex - 1], self._direction[vertex])
+        turn = np.arccos(np.clip(cosine, -1.0, 1.0))
+        turning = vertex[turn >= SHARE * turn.sum()]
+        return int(turning[0]), int(turning[-1])
 
     def _corner(self, number: int, every: Sequence[_Turn]) -> CommandCorner:
         """Return a corner among all of them."""

@@ -60,7 +60,7 @@ def mean_path(cycles: Sequence[Motion], times: FloatArray) -> FloatArray:
         shares = [_shares(one.t, t, lasting) for one, t, lasting in zip(cycles, begins, lasts, strict=True)]
         share = np.unique(np.concatenate([[0.0, 1.0], *shares]))
         places = [
-            one.at(t + share * lasting)[0] for one, t, lasting in zip(cycles, begins, lasts, strict=True)
+            one.places(t + share * lasting) for one, t, lasting in zip(cycles, begins, lasts, strict=True)
         ]
         parts.append(np.mean(places, axis=0))
     return np.concatenate(parts)
@@ -95,7 +95,7 @@ def corner_path(name: str, corner: CommandCorner, command: FloatArray, mean: Flo
     out = mean - corner.point
     foot = np.outer(out @ corner.behind, corner.behind)
     off = np.linalg.norm(out - foot, axis=1)
-    off[out @ outward <= 0.0] = 0.0
+    off[out @ outward <= LEAST] = 0.0
     most = int(np.argmax(off))
     if off[most] < LEAST:
         return CornerPath(name, corner.point, command, mean, nearest, rounding, None, None, 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,7 +25,7 @@ DRAWN = 1000
 """Places along the path at which speeds are drawn."""
 
 LEAST = 1e-9
-"""Places that are no further apart than this in [m] are one, a direction that is shorter is none."""
+"""Places along the path that are no further apart than this in [m] are one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +56,7 @@ class Marks:
         path: The command path; None where nothing moves.
         stations: Planes in order: those of AT, those about corners and at the ends of legs.
         planes: Which of them cut the path for AT, shape (m,).
-        corners: Which three of them belong to each corner.
+        corners: Which of them belong to each corner.
         legs: Which two of them belong to each leg.
     """
 
@@ -63,7 +64,7 @@ class Marks:
     path: CommandPath | None = None
     stations: Stations | None = None
     planes: tuple[int, ...] = ()
-    corners: tuple[tuple[int, int, int], ...] = ()
+    corners: tuple[tuple[int, ...], ...] = ()
     legs: tuple[tuple[int, int], ...] = ()
 
 
@@ -101,24 +102,14 @@ def marks_of(command: Command) -> Marks:
         return Marks(poses)
     path = CommandPath(motion, command.bends)
     planes = path.planes(command.planes)
-    bisectors = [(one.begins + one.ends) / 2.0 for one in path.corners]
-    s = np.concatenate(
-        [
-            planes.s,
-            *(
-                [one.middles[0], turn, one.middles[1]]
-                for one, turn in zip(path.corners, bisectors, strict=True)
-            ),
-            *([one.begins, one.ends] for one in path.legs),
-        ]
-    )
-    count, turns = len(planes.s), len(planes.s) + 3 * len(path.corners)
+    about = [one.anchors for one in path.corners]
+    s = np.concatenate([planes.s, *about, *([one.begins, one.ends] for one in path.legs)])
     found = path.stations(s)
-    for k, one in enumerate(path.corners):
-        both = one.before + one.behind
-        size = float(np.linalg.norm(both))
-        found.normal[count + 3 * k + 1] = both / size if size > LEAST else one.before
-        found.point[count + 3 * k + 1] = one.point
+    firsts = len(planes.s) + np.cumsum([0, *map(len, about)])
+    for one, first in zip(path.corners, firsts.tolist(), strict=False):
+        if len(one.anchors) == 3:  # the plane in the middle bisects the corner
+            both = one.before + one.behind
+            found.normal[first + 1], found.point[first + 1] = both / np.linalg.norm(both), one.point
     order = np.argsort(s, kind="stable")
     new = np.diff(s[order], prepend=-1.0) > LEAST  # planes that are one are crossed at one time
     place = np.empty(len(s), np.int64)
@@ -126,9 +117,9 @@ def marks_of(command: Command) -> Marks:
     at, every = order[new], place.tolist()
     return Marks(
         poses, path, Stations(found.s[at], found.t[at], found.point[at], found.normal[at]),
-        tuple(every[:count]),
-        tuple((every[k], every[k + 1], every[k + 2]) for k in range(count, turns, 3)),
-        tuple((every[k], every[k + 1]) for k in range(turns, len(s), 2)),
+        tuple(every[: len(planes.s)]),
+        tuple(tuple(every[a:b]) for a, b in pairwise(firsts.tolist())),
+        tuple((every[k], every[k + 1]) for k in range(firsts[-1], len(s), 2)),
     )  # fmt: skip
 
 
@@ -263,8 +254,8 @@ def _speed_over(cycle: Motion, t: FloatArray, s: FloatArray, wanted: FloatArray)
 def _turns(marks: Marks, command: Motion, motions: Sequence[Motion], times: FloatArray) -> Iterator[Found]:
     """Yield the criteria of the angles at the planes; nothing where a side has no orientation."""
     planes = np.array(marks.planes)
-    wanted = None if marks.stations is None else command.at(marks.stations.t[planes])[1]
-    found = [one.at(t)[1] for one, t in zip(motions, times, strict=True)]
+    wanted = None if marks.stations is None else command.turned(marks.stations.t[planes])
+    found = [one.turned(t) for one, t in zip(motions, times, strict=True)]
     quats = [one for one in found if one is not None]
     if wanted is None or len(quats) < len(motions):
         return

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.orientation import slerp
 
 STILL = (1e-3, 1e-3)
@@ -86,22 +84,27 @@ class Motion:
         return tuple(Rest(*one) for one in spans if self.t[one[1]] - self.t[one[0]] >= REST - ROUNDING)
 
     @cached_property
-    def slow(self) -> NDArray[np.bool_]:
+    def slow(self) -> BoolArray:
         """Where it rests from one row to the next, shape (n - 1,)."""
-        still = _below(self.t, self.position, STILL[0])
+        still = self.speed < max(STILL[0], SURE * self.speed_error)
         if self.quat_xyzw is not None:  # |dq| is half of a small angle
-            still &= _below(self.t, self.quat_xyzw, STILL[1] / 2.0)
+            wide, error = _window(self.t, self.quat_xyzw, STILL[1] / 2.0)
+            still &= _speeds(self.t, self.quat_xyzw, wide) < max(STILL[1] / 2.0, SURE * error)
         return still
 
     @cached_property
     def speed(self) -> FloatArray:
-        """Speed from one row to the next in [m/s], as free of noise as `slow` is, shape (n - 1,)."""
-        return _speeds(self.t, self.position, _window(self.t, self.position, STILL[0]))
+        """Speed from one row to the next in [m/s], over rows enough for its noise, shape (n - 1,)."""
+        return _speeds(self.t, self.position, self._window[0])
 
-    @cached_property
+    @property
     def speed_error(self) -> float:
         """Standard error of `speed` in [m/s]."""
-        return _error(self.t, self.position, _window(self.t, self.position, STILL[0]))
+        return self._window[1]
+
+    @cached_property
+    def _window(self) -> tuple[int, float]:
+        return _window(self.t, self.position, STILL[0])
 
     def pose(self, rest: Rest) -> tuple[FloatArray, FloatArray | None]:
         """Return where it stands in the second half of a rest: in [m], shape (3,), and how [-], shape (4,).
@@ -117,18 +120,18 @@ class Motion:
         turned = self.quat_xyzw[rows].mean(axis=0)
         return place, turned / np.linalg.norm(turned)
 
-    def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray | None]:
-        """Return where it is at times in [s], shape (k,), in [m], shape (k, 3), and how [-], shape (k, 4).
+    def places(self, t: FloatArray) -> FloatArray:
+        """Return where it is at times in [s], shape (k,), in [m], shape (k, 3): straight between its rows."""
+        return np.column_stack([np.interp(t, self.t, values) for values in self.position.T])
 
-        Between its rows on straight lines and great arcs.
-        """
-        place = np.column_stack([np.interp(t, self.t, values) for values in self.position.T])
-        if self.quat_xyzw is None or len(self) < 2:
-            return place, None if self.quat_xyzw is None else np.repeat(self.quat_xyzw, len(t), axis=0)
+    def turned(self, t: FloatArray) -> FloatArray | None:
+        """Return how it is turned at times in [s], shape (k,), [-], shape (k, 4): on great arcs."""
+        quat = self.quat_xyzw
+        if quat is None or len(self) < 2:
+            return None if quat is None else np.repeat(quat, len(t), axis=0)
         after = np.clip(np.searchsorted(self.t, t), 1, len(self) - 1)
         share = (t - self.t[after - 1]) / (self.t[after] - self.t[after - 1])
-        turned = slerp(self.quat_xyzw[after - 1], self.quat_xyzw[after], np.clip(share, 0.0, 1.0))
-        return place, turned
+        return slerp(quat[after - 1], quat[after], np.clip(share, 0.0, 1.0))
 
     def part(self, first: int, last: int, name: str) -> Motion:
         """Return some of its rows, both ends included, on their own clock."""
@@ -166,28 +169,17 @@ def _noise(values: FloatArray) -> float:
     return float(GAUSSIAN * np.median(third, axis=0).max() / THIRD)
 
 
-def _below(t: FloatArray, values: FloatArray, allowed: float) -> NDArray[np.bool_]:
-    """Return where columns, shape (n, k), change more slowly than allowed or than noise lets one tell."""
-    wide = _window(t, values, allowed)
-    return _speeds(t, values, wide) < max(allowed, SURE * _error(t, values, wide))
+def _window(t: FloatArray, values: FloatArray, allowed: float) -> tuple[int, float]:
+    """Return over how many rows on either side a speed is told, and its standard error.
 
-
-def _window(t: FloatArray, values: FloatArray, allowed: float) -> int:
-    """Return over how many rows on either side a speed is told, so that noise stays below what is allowed.
-
-    Both sides together are no wider than the shortest rest.
+    The fewest by which noise stays below what is allowed; both sides together are no wider than the shortest
+    rest.
     """
     step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
-    widest = max(int(REST / 2.0 / step), 1)
-    windows: Iterator[int] = iter(range(1, widest + 1))
-    return next((one for one in windows if SURE * _error(t, values, one) <= allowed), widest)
-
-
-def _error(t: FloatArray, values: FloatArray, wide: int) -> float:
-    """Return the standard error of a speed that is told over so many rows on either side."""
-    step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
-    each = _noise(values) * np.sqrt(2.0 / wide) / (wide * step)
-    return float(each * np.sqrt(values.shape[1]))
+    single = _noise(values) * float(np.sqrt(2.0 * values.shape[1])) / step  # over n rows: n^-1.5 of it
+    enough = int(np.ceil((SURE * single / allowed) ** (2.0 / 3.0)))
+    wide = int(np.clip(enough, 1, max(int(REST / 2.0 / step), 1)))
+    return wide, single / wide**1.5
 
 
 def _speeds(t: FloatArray, values: FloatArray, wide: int) -> FloatArray:

@@ -1,0 +1,357 @@
+"""`compare --iso`: what comes in, what comes out, exit codes, recordings and baselines."""
+
+from __future__ import annotations
+
+import csv
+import json
+import xml.etree.ElementTree as ET
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import urmpipe
+from driven_paths import joint_log
+from panda_log import panda
+from rail_arm import rail_arm
+from repeated import along, judged, logs, overall, value, written
+from repeated import told as told_by
+from urmpipe.main import run
+from urmpipe_fmus.native import native_missing
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.results import read_recording
+
+Captured = pytest.CaptureFixture[str]
+
+SQUARE = [(0.3, 0.1, 0.2), (0.4, 0.1, 0.2), (0.4, 0.2, 0.2), (0.3, 0.2, 0.2), (0.3, 0.1, 0.2)]
+"""Corners in [m]."""
+
+NOISE = 2e-5
+"""Standard deviation of what a cycle trembles, in [m]."""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a square to run, four cycles of it, and all of them in one log."""
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(1)
+    square = along(SQUARE, 0.2)
+    cycles = [square + 1e-4 + NOISE * rng.standard_normal(square.shape) for _ in range(4)]
+    written(tmp_path / "square.csv", square)
+    logs(tmp_path, cycles)
+    written(tmp_path / "all.csv", np.vstack(cycles))
+    return tmp_path
+
+
+FILES = [f"cycle{k}.csv" for k in range(1, 5)]
+
+
+def iso(*arguments: str) -> int:
+    """Return the exit code of a test on the command line, without a word of what is fine."""
+    return run(["compare", "square.csv", *arguments, "--iso", "-q", "-o", "run.rrd"])
+
+
+def answer(captured: Captured, *arguments: str) -> dict[str, object]:
+    """Return what a test prints as JSON."""
+    captured.readouterr()
+    run(["compare", "square.csv", *arguments, "--iso", "--json", "-o", "run.rrd"])
+    found: dict[str, object] = json.loads(captured.readouterr().out)
+    return found
+
+
+def read(path: str) -> Comparison:
+    """Return the comparison of a recording."""
+    found = read_recording(Path(path))
+    assert isinstance(found, Comparison)
+    return found
+
+
+def test_without_a_tolerance_nothing_is_judged(capsys: Captured) -> None:
+    assert run(["compare", "square.csv", *FILES, "--iso"]) == 0
+    printed = capsys.readouterr().out
+    assert "no criterion is judged" in printed
+    assert "After ISO 9283" in printed
+    told = answer(capsys, *FILES)
+    assert told["verdict"] is None
+    runs = told["runs"]
+    assert isinstance(runs, list)
+    assert [one["name"] for one in runs] == [f"cycle{k}" for k in range(1, 5)]
+    assert {one["verdict"] for one in runs} == {None}
+
+
+def test_a_tolerance_decides_the_exit_code() -> None:
+    assert iso(*FILES, "--tolerance", "AP=0.4mm,RP=0.4mm") == 0
+    assert iso(*FILES, "--tolerance", "AP=0.1mm,RP=0.4mm") == 1
+    assert iso(*FILES, "--tolerance", "AP=0.4mm,AV=5%,PSt=10s,FV=1m/s,AT=0.4mm") == 0
+
+
+def test_json_has_the_cycles_and_every_criterion(capsys: Captured) -> None:
+    told = answer(capsys, *FILES, "--tolerance", "AP=0.4mm")["iso"]
+    assert isinstance(told, dict)
+    assert sorted(told) == ["criteria", "cycles", "poses"]
+    assert told["poses"] == 1
+    for k, one in enumerate(told["cycles"], 1):
+        assert (one["name"], one["row"], one["last_row"]) == (f"cycle{k}", 1, 601)
+        assert one["sync_offset"] == pytest.approx(0.0, abs=2e-3)  # s: a shift of 0.1 mm is 0.5 ms at 0.2 m/s
+    (ap,) = [one for one in told["criteria"] if (one["name"], one["at"]) == ("AP", None)]
+    # Five standard errors of the mean of 4 x 51 rows of noise a coordinate: 5 sqrt(3) NOISE / sqrt(200).
+    assert ap["value"] == pytest.approx(np.sqrt(3.0) * 1e-4, abs=1.3e-5)
+    assert {k: ap[k] for k in ("unit", "cycles", "tolerance", "verdict")} == {
+        "unit": "m", "cycles": 4, "tolerance": 4e-4, "verdict": "pass",
+    }  # fmt: skip
+    units = {one["name"]: one["unit"] for one in told["criteria"]}
+    assert {units[name] for name in ("AV", "RV")} == {"1"}
+    assert (units["FV"], units["PSt"]) == ("m/s", "s")
+    places = {one["at"] for one in told["criteria"] if one["name"] == "AT"}
+    assert places == {None, *(f"plane {k}" for k in range(1, 51))}
+
+
+def test_cycles_of_one_log_are_found_and_told(capsys: Captured) -> None:
+    told = answer(capsys, "all.csv")["iso"]
+    assert isinstance(told, dict)
+    rows = [(one["row"], one["last_row"]) for one in told["cycles"]]
+    assert rows[0][0] == 1
+    assert rows[-1][1] == 4 * 601
+    assert all(b[0] == a[1] + 1 for a, b in pairwise(rows))
+    ends = np.array([last for _, last in rows[:-1]])
+    # The cycles are 601 rows long, and rest for 100 rows before and behind their ends.
+    assert np.all(np.abs(ends - 601 * np.arange(1, 4)) < 100)
+
+
+def test_given_cycles_are_taken_as_they_are(capsys: Captured) -> None:
+    told = answer(capsys, "all.csv", "--cycles", "1:601,602:1202")["iso"]
+    assert isinstance(told, dict)
+    assert [(one["row"], one["last_row"]) for one in told["cycles"]] == [(1, 601), (602, 1202)]
+    pairs = told_by(Path("square.csv"), Path("all.csv"), cycles=[(1, 601), (602, 1202)])
+    assert len(pairs.cycles) == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--iso", "--align", "rigid"], "--align: found rigid, allowed: none with iso"),
+        (["--iso", "--diagnose"], "--diagnose: found with iso, allowed: one of the two"),
+        (["--iso", "--cycles", "1:601"], "--cycles: found rows of cycles and 4 logs"),
+        (["--iso", "--planes", "0"], "--planes: found 0, allowed: 1 or more"),
+        (["--iso", "--band", "0"], "--band: found '0', allowed: a positive length in m"),
+        (["--iso", "--band", "-1mm"], "--band: found '-1mm', allowed: a positive length in m"),
+        (["--iso", "--tolerance", "axis=1mm"], "--tolerance: found axis=0.001, allowed: criteria"),
+        (["--iso", "--tolerance", "3.5mm"], "--tolerance: found axis=0.0035, allowed: criteria"),
+        (["--tolerance", "AP=1mm"], "--tolerance: found AP=0.001, allowed: numbers of axis"),
+        (["--iso", "--tolerance", "RV=5mm"], "--tolerance: found 'RV=5mm'"),
+        (["--cycles", "1:2"], "--cycles: found no test, allowed: with iso"),
+        (["--targets", "square.csv"], "--targets: found no test, allowed: with iso"),
+        (["--planes", "5"], "--planes: found no test, allowed: with iso"),
+        (["--band", "1mm"], "--band: found no test, allowed: with iso"),
+    ],
+)
+def test_what_does_not_go_is_exit_code_2(options: list[str], said: str, capsys: Captured) -> None:
+    assert run(["compare", "square.csv", *FILES, *options]) == 2
+    assert said in capsys.readouterr().err
+    assert not list(Path().glob("*.rrd"))
+
+
+@pytest.mark.parametrize(
+    ("cycles", "said"),
+    [
+        ("1:601,601:1202", "found 1:601 and 601:1202, allowed: no row in two cycles"),
+        ("1:601,602:99999", "found 602:99999, allowed: 1 to 2404"),
+        ("601:1", "found 601:1, allowed: 1 to 2404, the first row before the last"),
+        ("1-601", "found '1-601', allowed: rows from 1 as FIRST:LAST"),
+        ("", "found '', allowed: rows from 1 as FIRST:LAST"),
+    ],
+)
+def test_bad_cycles_are_exit_code_2(cycles: str, said: str, capsys: Captured) -> None:
+    assert run(["compare", "square.csv", "all.csv", "--iso", "--cycles", cycles]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_a_tolerance_for_what_has_no_value_is_exit_code_2(capsys: Captured) -> None:
+    assert iso("cycle1.csv", "--tolerance", "RP=1mm,vAP=1mm") == 2
+    told = capsys.readouterr().err
+    assert "--tolerance: found RP, which 1 cycle of this motion cannot tell" in told
+    assert "--tolerance: found vAP, which 1 cycle of this motion cannot tell" in told
+    assert not Path("run.rrd").exists()
+
+
+def test_one_cycle_has_what_needs_no_spread() -> None:
+    found = overall(told_by(Path("square.csv"), Path("cycle1.csv")))
+    given = {name for name, value in found.items() if value is not None}
+    assert given == {"AP", "PSt", "OV", "AT", "CR", "CO", "AV", "FV"}
+
+
+def test_a_reference_alone_is_no_test(capsys: Captured) -> None:
+    assert run(["compare", "square.csv", "--iso"]) == 2
+    assert "--iso: found no log, allowed: a reference and its cycles" in capsys.readouterr().err
+
+
+def test_junit_and_csv_have_the_criteria() -> None:
+    assert iso(*FILES, "--tolerance", "AP=0.1mm,RP=1mm", "--junit", "v.xml", "--csv", "v.csv") == 1
+    root = ET.parse("v.xml").getroot()
+    cases = {one.get("name"): one.find("failure") is not None for one in root.iter("testcase")}
+    assert cases == {"AP": True, "RP": False}
+    with Path("v.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    test = read("run.rrd").iso
+    assert test is not None
+    assert [row["name"] for row in rows] == [one.name for one in test.criteria]
+    assert [row["value"] for row in rows] == [
+        "" if one.value is None else repr(one.value) for one in test.criteria
+    ]
+
+
+def test_a_recording_read_back_has_the_same_criteria_bit_for_bit() -> None:
+    made = urmpipe.compare(
+        "square.csv", FILES, iso=True, tolerance="AP=0.4mm", output="run.rrd", junit="v.xml"
+    )
+    again = read("run.rrd")
+    assert made.iso is not None
+    assert again.iso is not None
+    assert again.iso.criteria == made.iso.criteria
+    assert again.iso.cycles == made.iso.cycles
+    assert again.verdict == "pass"
+    assert made.iso.path is not None
+    assert again.iso.path is not None
+    assert again.iso.path.crossed.tobytes() == made.iso.path.crossed.tobytes()
+    assert judged(made).to_dict() == judged(again).to_dict()
+
+
+def test_recordings_are_cycles_too() -> None:
+    for name in ("square", *(f"cycle{k}" for k in range(1, 5)), "all"):
+        urmpipe.ingest(f"{name}.csv", output=f"{name}.rrd")
+    files = told_by(Path("square.csv"), [Path(one) for one in FILES])
+    again = told_by(Path("square.rrd"), [Path(f"cycle{k}.rrd") for k in range(1, 5)])
+    assert again.criteria == files.criteria
+    assert (
+        told_by(Path("square.rrd"), Path("all.rrd")).criteria
+        == told_by(Path("square.csv"), Path("all.csv")).criteria
+    )
+
+
+def test_targets_replace_the_rests_of_the_reference() -> None:
+    Path("targets.csv").write_text("x [mm],y [mm],z [mm]\n300,100,201\n", encoding="utf-8")
+    found = told_by(Path("square.csv"), [Path(one) for one in FILES], targets="targets.csv")
+    # 0.1 mm beside the square in x and y, 0.9 mm below the target in z; noise as above.
+    assert value(found, "AP") == pytest.approx(np.sqrt(1e-8 + 1e-8 + 0.81e-6), abs=1.3e-5)
+
+
+def test_a_lab_s_tolerance_is_for_logs_one_by_one() -> None:
+    Path("urmpipe.toml").write_text("[compare]\ntolerance = 'axis=1mm'\nsync = 'start'\n", encoding="utf-8")
+    assert iso(*FILES) == 0
+    assert read("run.rrd").tolerance == {}
+    assert {one.sync.mode for one in read("run.rrd").runs} == {"auto"}
+
+
+def test_a_later_test_is_held_against_an_earlier_one(capsys: Captured) -> None:
+    assert iso(*FILES) == 0
+    Path("run.rrd").rename("before.rrd")
+    square = along(SQUARE, 0.2)
+    rng = np.random.default_rng(2)
+    logs(Path(), [square + 2e-4 + NOISE * rng.standard_normal(square.shape) for _ in range(4)])
+    assert (
+        iso(*FILES, "--baseline", "before.rrd", "--junit", "v.xml", "--noise", "0.05mm,FV=1m/s,PSt=9s,OV=9mm")
+        == 1
+    )
+    result = read("run.rrd")
+    assert result.baseline is not None
+    worse = {one.now.name for one in result.baseline.worse_criteria}
+    assert {"AP", "AT"} <= worse
+    assert "RP" not in worse
+    failed = {
+        one.get("name") for one in ET.parse("v.xml").iter("testcase") if one.find("failure") is not None
+    }
+    assert failed == worse
+    told = answer(capsys, *FILES, "--baseline", "run.rrd")
+    baseline = told["baseline"]
+    assert isinstance(baseline, dict)
+    assert told["verdict"] == baseline["verdict"] == "pass"
+    assert all(one["before"] == one["now"] for one in baseline["criteria"])
+
+
+def test_a_test_is_not_held_against_a_comparison_log_by_log(capsys: Captured) -> None:
+    run(["compare", "square.csv", "cycle1.csv", "-q", "-o", "before.rrd"])
+    assert iso("cycle1.csv", "--baseline", "before.rrd") == 2
+    said = "--baseline: found a comparison log by log, allowed: a test after ISO 9283"
+    assert said in capsys.readouterr().err
+
+
+def test_strict_makes_few_cycles_an_error(capsys: Captured) -> None:
+    assert iso(*FILES, "--strict") == 2
+    assert "4 cycles; ISO 9283 takes 30 for poses and 10 for paths" in capsys.readouterr().err
+
+
+def joints_of(arm: Chain) -> FloatArray:
+    """Return joint values from rest to rest and back in [rad] or [m], shape (n, joints)."""
+    share = np.concatenate([np.zeros(100), np.sin(np.linspace(0.0, np.pi, 401)) ** 2, np.zeros(100)])
+    return np.array(arm.start) + share[:, np.newaxis] * np.linspace(0.2, 0.4, len(arm.start))
+
+
+@pytest.mark.parametrize("name", ["ur5e", "panda (URDF)", "rail arm (URDF)"])
+def test_joints_and_their_tool_tell_the_same(name: str, shared: Path) -> None:
+    arm = {"ur5e": lambda: load_robot("ur5e"), "panda (URDF)": lambda: panda(shared)}.get(name, rail_arm)()
+    rng = np.random.default_rng(3)
+    q = joints_of(arm)
+    cycles = [q + 1e-5 * rng.standard_normal(q.shape) for _ in range(3)]
+    joint_log(Path("ref.csv"), arm, q)
+    many = [joint_log(Path(f"j{k}.csv"), arm, one) for k, one in enumerate(cycles)]
+    by_joints = told_by(Path("ref.csv"), many, robot=arm)
+    written(Path("tool.csv"), poses_over_log(arm, q)[0])
+    tools = [written(Path(f"t{k}.csv"), poses_over_log(arm, one)[0]) for k, one in enumerate(cycles)]
+    by_tool = overall(told_by(Path("tool.csv"), tools))
+    angles = [one for one in overall(by_joints) if "_r" in one]
+    assert len(angles) == 12  # of the joints, which have an orientation
+    found = overall(by_joints)
+    for criterion in ("AT", "RT", "CR", "CO", "AV", "RV", "FV"):
+        # Kinematics of the same joints, computed twice: rounding, in m, m/s and shares.
+        assert found.get(criterion) == pytest.approx(by_tool.get(criterion), abs=1e-9), criterion
+    for criterion in ("AP", "RP"):
+        # Orientations tremble, too: they rest a few rows later. Noise of 1e-5 rad at 1 m, of 40 rows.
+        assert found[criterion] == pytest.approx(by_tool[criterion], abs=5e-6), criterion
+
+
+def test_a_plan_gives_its_corners_stops_and_speed() -> None:
+    rows = [
+        "x,y,z,r",
+        "0.3,-0.2,0.3,0",
+        "0.5,-0.2,0.3,0.02",
+        "0.5,0.2,0.3,0",
+        "0.3,0.2,0.3,0.01",
+        "0.3,0,0.3,0",
+    ]
+    Path("rows.csv").write_text("\n".join(rows), encoding="utf-8")
+    plan = urmpipe.plan("rows.csv", velocity=0.2, acceleration=2.0, output="plan.rrd")
+    written(Path("as_planned.csv"), plan.position, plan.t)
+    for reference in (plan, "plan.rrd"):
+        test = judged(urmpipe.compare(reference, ["as_planned.csv", "as_planned.csv"], iso=True))
+        assert test.poses is not None
+        assert test.path is not None
+        # Samples stand up to 2.5 ms beside a stop: a t^2 / 2 = 6.25e-6 m.
+        assert test.poses.command == pytest.approx(plan.stops, abs=7e-6)
+        corners = np.array([one.point for one in test.path.corners])
+        wanted = np.array([plan.corners[0], plan.stops[1], plan.corners[1]])
+        assert corners == pytest.approx(wanted, abs=1e-6)
+        assert [one.commanded for one in test.path.legs] == pytest.approx(
+            [0.2] * len(test.path.legs), abs=1e-9
+        )
+        assert len(test.path.legs) == 4
+        found = overall(test)
+        for name in ("AP", "RP", "AT", "RT", "RV", "AV"):
+            assert found[name] == pytest.approx(0.0, abs=1e-12), name  # the very samples, cut twice alike
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(native_missing(())), reason=f"runs native FMUs: {native_missing(())}")
+def test_repeated_logs_of_simulate_come_through() -> None:
+    found = [urmpipe.simulate("driven-arm") for _ in range(3)]
+    arm, values = load_robot("ur3"), [one.signal("arm.phi").values for one in found]
+    many = [joint_log(Path(f"s{k}.csv"), arm, one) for k, one in enumerate(values)]
+    test = told_by(many[0], many, robot="ur3")
+    told = overall(test)
+    assert len(test.cycles) == 3
+    assert told["AT"] == pytest.approx(0.0, abs=1e-12)  # one simulation, three times: rounding
+    assert told["RT"] == pytest.approx(0.0, abs=1e-12)
