@@ -209,8 +209,11 @@ def _left_out(name: str, found: FoundCycles) -> Iterator[LogWarning]:
     for first, last in found.cut:
         said = f"rows {first + 1} to {last + 1} are no whole cycle, and left out"
         yield LogWarning(CUT, said, row=first + 1, about=name)
-    for first, last in found.other:
+    if found.other:
+        first, last = found.other[0]
         said = f"rows {first + 1} to {last + 1}, between two cycles, are another motion, and left out"
+        more = len(found.other) - 1
+        said += f"; so are {more} more such stretches" if more else ""
         yield LogWarning(UNLIKE, said, row=first + 1, about=name)
 
 

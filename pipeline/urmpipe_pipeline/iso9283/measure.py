@@ -14,6 +14,7 @@ from urmpipe_pipeline.iso9283.command_path import Bend, CommandPath, Stations
 from urmpipe_pipeline.iso9283.corners import CornerPath, corner_path, mean_path
 from urmpipe_pipeline.iso9283.criteria import UNITS, Criterion, judged
 from urmpipe_pipeline.iso9283.crossings import Crossings, crossings
+from urmpipe_pipeline.iso9283.likeness import ALIKE
 from urmpipe_pipeline.iso9283.motion import Motion, Rest
 from urmpipe_pipeline.iso9283.pose_criteria import Found, angle_criteria, pose_criteria
 from urmpipe_pipeline.iso9283.poses import Poses, attained, poses_of
@@ -53,6 +54,7 @@ class Marks:
 
     Attributes:
         poses: The commanded poses.
+        reach: How far from a pose a rest may be that is told to be in it, in [m].
         path: The command path; None where nothing moves.
         stations: Planes in order: those of AT, those about corners and at the ends of legs.
         planes: Which of them cut the path for AT, shape (m,).
@@ -61,6 +63,7 @@ class Marks:
     """
 
     poses: Poses
+    reach: float
     path: CommandPath | None = None
     stations: Stations | None = None
     planes: tuple[int, ...] = ()
@@ -98,8 +101,10 @@ def marks_of(command: Command) -> Marks:
     """Return the poses of a command, and the planes that cut its path."""
     motion = command.motion
     poses = command.targets or poses_of(motion, command.stops)
+    places = np.vstack((motion.position, poses.position))
+    reach = ALIKE * float(np.ptp(places, axis=0).max(initial=0.0))
     if not motion.timed or not motion.extent or bool(motion.slow.all()):
-        return Marks(poses)
+        return Marks(poses, reach)
     path = CommandPath(motion, command.bends)
     planes = path.planes(command.planes)
     about = [one.anchors for one in path.corners]
@@ -116,7 +121,7 @@ def marks_of(command: Command) -> Marks:
     place[order] = np.cumsum(new) - 1
     at, every = order[new], place.tolist()
     return Marks(
-        poses, path, Stations(found.s[at], found.t[at], found.point[at], found.normal[at]),
+        poses, reach, path, Stations(found.s[at], found.t[at], found.point[at], found.normal[at]),
         tuple(every[: len(planes.s)]),
         tuple(tuple(every[a:b]) for a, b in pairwise(firsts.tolist())),
         tuple((every[k], every[k + 1]) for k in range(firsts[-1], len(s), 2)),
@@ -125,9 +130,9 @@ def marks_of(command: Command) -> Marks:
 
 def follow(marks: Marks, cycle: Motion) -> Followed | str:
     """Return a cycle beside the command, or why it does not follow that to its end."""
-    rests = attained(cycle, marks.poses)
+    rests = attained(cycle, marks.poses, marks.reach)
     if isinstance(rests, int):
-        return f"it does not attain pose {rests + 1}"
+        return f"it does not rest at pose {rests + 1}"
     if marks.stations is None:
         return Followed(cycle, rests, None, 0.0)
     crossed = crossings(cycle, marks.stations)

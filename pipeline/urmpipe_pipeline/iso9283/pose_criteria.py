@@ -87,7 +87,7 @@ def _directions(attained: FloatArray, poses: Poses) -> Iterator[Found]:
     than 30 deg are one.
     """
     centre = attained.mean(axis=0)
-    for group in poses.named_apart:
+    for group in poses.visited_again:
         own = [k for k in group if k > 0]
         ways = [poses.position[k] - poses.position[k - 1] for k in own]
         pairs = [(own[i], own[j]) for i, j in combinations(range(len(own)), 2) if _differ(ways[i], ways[j])]

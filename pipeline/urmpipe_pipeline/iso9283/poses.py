@@ -48,7 +48,7 @@ class Poses:
         return float(turned[0]) <= SAME[1]
 
     @property
-    def named_apart(self) -> tuple[tuple[int, ...], ...]:
+    def visited_again(self) -> tuple[tuple[int, ...], ...]:
         """The numbers of those that are one pose, from 0, for each pose that is attained more than once."""
         groups: list[list[int]] = []
         for k in range(len(self)):
@@ -96,12 +96,17 @@ def _gathered(command: Motion, rests: Sequence[Rest], moving: Sequence[bool]) ->
     return Poses(position, np.array(quats) if quats else None, tuple(moving))
 
 
-def attained(cycle: Motion, poses: Poses) -> tuple[Rest, ...] | int:
+def attained(cycle: Motion, poses: Poses, reach: float) -> tuple[Rest, ...] | int:
     """Return where a cycle rests in each pose, or the number of the first, from 0, that it does not attain.
 
     Of its rests those are taken that follow each other in the order of the poses and are nearest to them in
     all; where a command stops for a moment only, moments at which the cycle is slowest count, too. Of still
     poses each row is one.
+
+    Args:
+        cycle: The cycle.
+        poses: The commanded poses.
+        reach: How far a rest may be from its pose in [m].
     """
     if not cycle.timed:
         if len(cycle) != len(poses):
@@ -113,9 +118,12 @@ def attained(cycle: Motion, poses: Poses) -> tuple[Rest, ...] | int:
         rests = rests[1:]
     places = np.array([cycle.pose(one)[0] for one in rests]).reshape(-1, 3)
     order = np.arange(len(rests), dtype=np.float64)
-    stages = [(order, np.linalg.norm(places - wanted, axis=1)) for wanted in poses.position]
+    far = [np.linalg.norm(places - wanted, axis=1) for wanted in poses.position]
+    stages = [(order[one <= reach], one[one <= reach]) for one in far]
     chosen = in_order(stages)
-    return chosen if isinstance(chosen, int) else tuple(rests[k] for k in chosen)
+    if isinstance(chosen, int):
+        return chosen
+    return tuple(rests[int(stage[0][k])] for stage, k in zip(stages, chosen, strict=True))
 
 
 def _slowest(cycle: Motion) -> list[Rest]:
