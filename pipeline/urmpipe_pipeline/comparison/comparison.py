@@ -121,6 +121,12 @@ class Comparison(Result):
 
     def _headline(self) -> str:
         """Return its verdict, and that of each log: the worst first, so that it is not what is cut."""
+        if self.iso is not None:
+            worst = (
+                f"{one.name} {one.value:.4g} {one.unit}" for one in self.iso.overall if one.value is not None
+            )
+            cycles = number_of(len(self.iso.cycles), "cycle")
+            return line_of(f"{self.name}: {self.verdict or 'not judged'}", cycles, *worst)
         logs = (
             f"{one.name} {one.verdict} ({one.decisive.max:.4g} {one.decisive.unit})"
             for one in reversed(self.ranking)

@@ -15,7 +15,7 @@ from urmpipe_pipeline.comparison.measure import measure
 from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.trajectory import Sync, Trajectory
 from urmpipe_pipeline.diagnosis.sides import Side
-from urmpipe_pipeline.iso9283.command_path import Bend
+from urmpipe_pipeline.iso9283.command_path import Bend, Stop
 from urmpipe_pipeline.iso9283.cycles import FoundCycles, check_cycles, find_cycles, first_cycle
 from urmpipe_pipeline.iso9283.likeness import alike
 from urmpipe_pipeline.iso9283.measure import Command, Followed, Marks, follow, marks_of
@@ -48,7 +48,7 @@ class IsoOptions:
         band: Half of the width of the band round a final pose in [m].
         targets: Poses to judge; None: those in which the reference rests.
         bends: Where the reference is known to turn.
-        stops: When the reference is known to stop in [s], if for a moment only.
+        stops: Where the reference is known to stop, if for a moment only.
     """
 
     cycles: tuple[tuple[int, int], ...] | None = None
@@ -56,7 +56,7 @@ class IsoOptions:
     band: float = 1e-4
     targets: Poses | None = None
     bends: tuple[Bend, ...] = ()
-    stops: tuple[float, ...] = ()
+    stops: tuple[Stop, ...] = ()
 
     def __post_init__(self) -> None:
         faults = []

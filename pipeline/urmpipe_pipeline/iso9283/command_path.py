@@ -19,7 +19,7 @@ BACK = np.radians(150.0)
 """Where it turns by more than this in [rad] the path goes back."""
 
 WITHIN = 0.005
-"""... within this time of commanded motion in [s]."""
+"""... within this time of commanded motion in [s], or within a row where rows are further apart."""
 
 SHARE = 0.01
 """A vertex belongs to a corner if the path turns there by this share of the corner's turn."""
@@ -63,6 +63,19 @@ class Bend:
     begins: float
     ends: float
     corner: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Where a command is known to stop, if for a moment only.
+
+    Attributes:
+        t: When in [s].
+        place: Where in [m].
+    """
+
+    t: float
+    place: tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -224,7 +237,8 @@ class CommandPath:
         moving = np.concatenate(([0.0], np.cumsum(self._arrives[1:] - self._leaves[:-1])))
         count = len(self._direction)
         begin = np.arange(1, count)
-        end = np.searchsorted(moving, moving[begin] + WITHIN + ROUNDING, side="right") - 1
+        within = max(WITHIN, float(np.median(np.diff(self.motion.t)))) + ROUNDING
+        end = np.searchsorted(moving, moving[begin] + within, side="right") - 1
         end = np.clip(end, begin, count - 1)
         stops = np.concatenate(([0], np.cumsum(self._stops)))
         through = stops[end + 1] == stops[begin]  # without a stop in between

@@ -10,7 +10,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.iso9283.approach import settling
-from urmpipe_pipeline.iso9283.command_path import Bend, CommandPath, Stations
+from urmpipe_pipeline.iso9283.command_path import Bend, CommandPath, Stations, Stop
 from urmpipe_pipeline.iso9283.corners import CornerPath, corner_path, mean_path
 from urmpipe_pipeline.iso9283.criteria import UNITS, Criterion, judged
 from urmpipe_pipeline.iso9283.crossings import Crossings, crossings
@@ -37,14 +37,14 @@ class Command:
         motion: The motion.
         targets: Poses to judge instead of those in which it rests.
         bends: Where it is known to turn.
-        stops: When it is known to stop in [s], if for a moment only.
+        stops: Where it is known to stop, if for a moment only.
         planes: How many planes cut its path.
     """
 
     motion: Motion
     targets: Poses | None = None
     bends: tuple[Bend, ...] = ()
-    stops: tuple[float, ...] = ()
+    stops: tuple[Stop, ...] = ()
     planes: int = 50
 
 

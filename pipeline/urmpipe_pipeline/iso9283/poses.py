@@ -9,6 +9,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.orientation import angle_between
+from urmpipe_pipeline.iso9283.command_path import Stop
 from urmpipe_pipeline.iso9283.in_order import in_order
 from urmpipe_pipeline.iso9283.motion import Motion, Rest
 
@@ -60,40 +61,43 @@ class Poses:
         return tuple(tuple(one) for one in groups if len(one) > 1)
 
 
-def poses_of(command: Motion, stops: Sequence[float] = ()) -> Poses:
+def poses_of(command: Motion, stops: Sequence[Stop] = ()) -> Poses:
     """Return the poses of a command: where it rests; of still poses every row.
 
     A rest that it begins with is left out if it ends in the same pose: every cycle attains that at its end.
 
     Args:
         command: The motion that was asked for.
-        stops: Times in [s] at which it is known to stop, if for a moment only.
+        stops: Where it is known to stop, if for a moment only.
     """
     if not command.timed:
         return Poses(command.position, command.quat_xyzw, (False,) * len(command))
-    rests = list(command.rests)
-    moments = [moment for t in stops if (moment := _moment(command, t, rests)) is not None]
-    every = sorted(rests + moments, key=lambda one: one.first)
-    found = _gathered(command, every, [one in moments for one in every])
-    if len(found) > 1 and every[0].first == 0 and found.alike(0, len(found) - 1):
-        found = _gathered(command, every[1:], [one in moments for one in every[1:]])
-        return replace(found, closed=True)
+    known = [(one, command.pose(one)[0], False) for one in command.rests]
+    moments = [(_row_at(command, one.t), np.array(one.place), True) for one in stops]
+    known += [one for one in moments if not any(_touch(one[0], rest) for rest in command.rests)]
+    known.sort(key=lambda one: one[0].first)
+    found = _gathered(command, known)
+    if len(found) > 1 and known[0][0].first == 0 and found.alike(0, len(found) - 1):
+        return replace(_gathered(command, known[1:]), closed=True)
     return found
 
 
-def _moment(command: Motion, t: float, rests: Sequence[Rest]) -> Rest | None:
-    """Return the row at which a command stops for a moment; None if it rests then."""
+def _row_at(command: Motion, t: float) -> Rest:
+    """Return the row of a command that is nearest to a time in [s]."""
     row = int(np.argmin(np.abs(command.t - t)))
-    known = any(one.first - 1 <= row <= one.last + 1 for one in rests)
-    return None if known else Rest(row, row)
+    return Rest(row, row)
 
 
-def _gathered(command: Motion, rests: Sequence[Rest], moving: Sequence[bool]) -> Poses:
-    """Return the poses in which a command rests."""
-    found = [command.pose(one) for one in rests]
-    position = np.array([place for place, _ in found]).reshape(-1, 3)
-    quats = [turned for _, turned in found if turned is not None]
-    return Poses(position, np.array(quats) if quats else None, tuple(moving))
+def _touch(one: Rest, other: Rest) -> bool:
+    """Tell whether two stretches of rows overlap, or stand beside each other."""
+    return one.first <= other.last + 1 and other.first <= one.last + 1
+
+
+def _gathered(command: Motion, known: Sequence[tuple[Rest, FloatArray, bool]]) -> Poses:
+    """Return the poses in which a command rests: the rows, the place, and whether it is a moment of each."""
+    position = np.array([place for _, place, _ in known]).reshape(-1, 3)
+    quats = [turned for one, _, _ in known if (turned := command.pose(one)[1]) is not None]
+    return Poses(position, np.array(quats) if quats else None, tuple(moment for _, _, moment in known))
 
 
 def attained(cycle: Motion, poses: Poses, reach: float) -> tuple[Rest, ...] | int:
@@ -112,8 +116,9 @@ def attained(cycle: Motion, poses: Poses, reach: float) -> tuple[Rest, ...] | in
         if len(cycle) != len(poses):
             return min(len(cycle), len(poses) - 1)
         return tuple(Rest(row, row) for row in range(len(cycle)))
-    rests = [*cycle.rests, *(_slowest(cycle) if any(poses.moving) else ())]
-    rests.sort(key=lambda one: one.first)
+    rests = list(cycle.rests)
+    if any(poses.moving):
+        rests = sorted([*rests, *_moments(cycle, reach / 4.0)], key=lambda one: one.first)
     if poses.closed and rests and _starts(cycle, rests[0]):
         rests = rests[1:]
     places = np.array([cycle.pose(one)[0] for one in rests]).reshape(-1, 3)
@@ -126,16 +131,26 @@ def attained(cycle: Motion, poses: Poses, reach: float) -> tuple[Rest, ...] | in
     return tuple(rests[int(stage[0][k])] for stage, k in zip(stages, chosen, strict=True))
 
 
-def _slowest(cycle: Motion) -> list[Rest]:
-    """Return the rows, one each, at which a cycle is slowest outside its rests, its ends among them."""
+def _moments(cycle: Motion, near: float) -> list[Rest]:
+    """Return the rows, one each, at which a cycle is slowest, its ends among them: none about a rest.
+
+    Args:
+        cycle: The cycle.
+        near: What is no further in [m] from the next rest, or from that before, belongs to it: a cycle that
+            overshoots is slow where it turns back.
+    """
     speed = cycle.speed
     at_row = np.minimum(np.append(speed[0], speed), np.append(speed, speed[-1]))
     lower = np.append(True, at_row[1:] <= at_row[:-1]) & np.append(at_row[:-1] < at_row[1:], True)
     lower &= at_row <= SLOW * speed.max()
     lower[[0, -1]] = True
-    for one in cycle.rests:
-        lower[max(one.first - 1, 0) : one.last + 2] = False
-    return [Rest(int(row), int(row)) for row in np.flatnonzero(lower)]
+    rows = np.flatnonzero(lower)
+    begins = np.array([one.first for one in cycle.rests])
+    places = np.array([cycle.pose(one)[0] for one in cycle.rests])
+    for step in (-1, 0) if len(begins) else ():
+        rest = np.clip(np.searchsorted(begins, rows, side="right") + step, 0, len(begins) - 1)
+        rows = rows[np.linalg.norm(cycle.position[rows] - places[rest], axis=1) > near]
+    return [Rest(int(row), int(row)) for row in rows]
 
 
 def _starts(cycle: Motion, rest: Rest) -> bool:

@@ -139,5 +139,6 @@ class IsoTest:
         return {
             "cycles": [asdict(one) for one in self.cycles],
             "poses": 0 if self.poses is None else len(self.poses.command),
+            "reference_rows": None if self.reference_rows is None else list(self.reference_rows),
             "criteria": list(self.rows()),
         }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_pipeline.iso9283.command_path import CORNER, Bend
+from urmpipe_pipeline.iso9283.command_path import CORNER, Bend, Stop
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 
 
@@ -19,6 +19,9 @@ def bends_of(plan: PlannedPath) -> tuple[Bend, ...]:
     )
 
 
-def stops_of(plan: PlannedPath) -> tuple[float, ...]:
-    """Return when a plan stops in [s], its start and its end among them."""
-    return tuple(plan.row_times[plan.path.stop_row].tolist())
+def stops_of(plan: PlannedPath) -> tuple[Stop, ...]:
+    """Return where and when a plan stops, its start and its end among them."""
+    times = plan.row_times[plan.path.stop_row].tolist()
+    return tuple(
+        Stop(t, (float(x), float(y), float(z))) for t, (x, y, z) in zip(times, plan.stops, strict=True)
+    )
