@@ -112,7 +112,7 @@ def judge_cycles(
         LogError: If no cycle follows the reference, or a criterion with a tolerance has no value.
         OptionError: If rows are given for the cycles of several logs, or are wrong.
     """
-    asked, rows = _once(asked)
+    asked, rows = _once(asked) if len(done) == 1 else (asked, None)
     command = _motion(asked)
     candidates, told = _candidates(command, done, options)
     marks = marks_of(Command(command, options.targets, options.bends, options.stops, options.planes))

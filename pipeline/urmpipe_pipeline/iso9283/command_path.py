@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
-from urmpipe_pipeline.iso9283.motion import ROUNDING, Motion
+from urmpipe_pipeline.iso9283.motion import ROUNDING, Motion, apart_rows
 
 CORNER = np.radians(30.0)
 """A corner is where the direction turns by this much or more, in [rad] ..."""
@@ -19,7 +19,7 @@ BACK = np.radians(150.0)
 """Where it turns by more than this in [rad] the path goes back."""
 
 WITHIN = 0.005
-"""... within this time of commanded motion in [s], or within a row where rows are further apart."""
+"""... within this time of commanded motion in [s], or between two vertices where these are further apart."""
 
 SHARE = 0.01
 """A vertex belongs to a corner if the path turns there by this share of the corner's turn."""
@@ -167,7 +167,7 @@ class CommandPath:
 
     def __init__(self, motion: Motion, bends: Sequence[Bend] = ()) -> None:
         self.motion = motion
-        self._rows = rows = _vertices(motion)
+        self._rows = rows = apart_rows(motion.position, TREMBLE * motion.noise)
         self._place, self._arrives = motion.position[rows], motion.t[rows]
         step = np.diff(self._place, axis=0)
         length = np.linalg.norm(step, axis=1)
@@ -237,7 +237,7 @@ class CommandPath:
         moving = np.concatenate(([0.0], np.cumsum(self._arrives[1:] - self._leaves[:-1])))
         count = len(self._direction)
         begin = np.arange(1, count)
-        within = max(WITHIN, float(np.median(np.diff(self.motion.t)))) + ROUNDING
+        within = max(WITHIN, float(np.median(np.diff(self._arrives)))) + ROUNDING
         end = np.searchsorted(moving, moving[begin] + within, side="right") - 1
         end = np.clip(end, begin, count - 1)
         stops = np.concatenate(([0], np.cumsum(self._stops)))
@@ -245,7 +245,7 @@ class CommandPath:
         cosine = np.einsum("ni,ni->n", self._direction[begin - 1], self._direction[end])
         found = np.flatnonzero(through & (cosine <= np.cos(CORNER) + 1e-12))
         while len(found):
-            apart = (k for k in range(1, len(found)) if begin[found[k]] > end[found[k - 1]])
+            apart = (k for k in range(1, len(found)) if begin[found[k]] > end[found[k - 1]] + 1)
             last = next(apart, len(found))
             first, final = self._narrowed(int(begin[found[0]]), int(end[found[last - 1]]))
             yield _Turn(float(self.s[first]), float(self.s[final]), None)
@@ -294,12 +294,12 @@ class CommandPath:
     @property
     def _coarse(self) -> float:
         """How far a straight piece may be from the path in [m]."""
-        return max(STRAIGHT * self.motion.extent, 100.0 * self.motion.noise)
+        return max(STRAIGHT * self.motion.extent, 200.0 * self.motion.noise)
 
     @property
     def _level(self) -> float:
         """How far a leg may be from straight in [m]."""
-        return max(LEVEL * self._coarse, 5.0 * self.motion.noise)
+        return max(LEVEL * self._coarse, 10.0 * self.motion.noise)
 
     def _straight_pieces(self) -> Iterator[tuple[int, int]]:
         """Yield the vertices at which straight pieces of the path begin and end, in order.
@@ -343,29 +343,11 @@ class CommandPath:
                 yield CommandLeg(float(begins), float(ends), direction, length, length / duration)
 
 
-def _vertices(motion: Motion) -> IntArray:
-    """Return the rows of a motion at which it has moved on, as far as its noise lets one tell, shape (k,)."""
-    place, least = motion.position, TREMBLE * motion.noise
-    step = np.linalg.norm(np.diff(place, axis=0), axis=1)
-    rows = np.append(0, np.flatnonzero(step > 0.0) + 1)
-    if not (step[step > 0.0] < least).any():
-        return rows.astype(np.int64)
-    kept, (x, y, z) = [0], place[0].tolist()
-    for row, (u, v, w) in zip(rows[1:].tolist(), place[rows[1:]].tolist(), strict=True):
-        if (u - x) ** 2 + (v - y) ** 2 + (w - z) ** 2 >= least**2:
-            kept.append(row)
-            x, y, z = u, v, w
-    return np.array(kept, np.int64)
-
-
 def _leaving(motion: Motion, rows: IntArray) -> tuple[FloatArray, BoolArray]:
     """Return when each vertex is left in [s], and whether the command stops there, shape (k,) both."""
-    leaves = motion.t[rows].copy()
-    stays = np.append(rows[1:] - 1, len(motion) - 1)
-    stands = stays > rows
-    near = np.linalg.norm(motion.position[stays] - motion.position[rows], axis=1) <= TREMBLE * motion.noise
-    stands &= near
-    leaves[stands] = motion.t[stays[stands]]
+    moves = np.append(np.flatnonzero(~motion.slow), len(motion) - 1)  # rows from which it moves on
+    stays = np.minimum(moves[np.searchsorted(moves, rows)], np.append(rows[1:] - 1, len(motion) - 1))
+    leaves = motion.t[np.maximum(stays, rows)]
     stops = np.zeros(len(rows), bool)
     for rest in motion.rests:
         stops[np.clip(np.searchsorted(rows, (rest.first + rest.last) // 2, side="right") - 1, 0, None)] = True

@@ -45,7 +45,8 @@ def find_cycles(command: Motion, motion: Motion) -> FoundCycles:
 
     A cycle goes from a visit of the command's start to a visit of its end, and its path is like the
     command's; of several such ends the one that is most alike. It is cut in the middle of the visits: inside
-    the rest, if it rests there. A motion that is one cycle as a whole is that.
+    the rest, if it rests there. A motion that is one cycle as a whole is that, and any beside a command that
+    rests all the time.
 
     Args:
         command: The motion that was asked for, once.
@@ -53,7 +54,9 @@ def find_cycles(command: Motion, motion: Motion) -> FoundCycles:
     """
     if not motion.timed:
         return _of_still_poses(command, motion)
-    extent, wanted = command.extent, outline(command)
+    if command.slow.all():
+        return FoundCycles(((0, len(motion) - 1),))
+    extent, wanted = command.extent, outline(command, command.extent)
     starts = _visits(motion, command.position[0], extent)
     closed = float(np.linalg.norm(command.position[-1] - command.position[0])) <= AT_START * extent
     ends = starts if closed else _visits(motion, command.position[-1], extent)
@@ -61,14 +64,33 @@ def find_cycles(command: Motion, motion: Motion) -> FoundCycles:
     for start in starts:
         if found and start < found[-1][1]:
             continue
-        later = [end for end in ends if end > start][:LOOKED_AT]
-        far = [apart(wanted, outline(motion.part(start, end, ""))) for end in later]
-        if far and min(far) <= ALIKE * extent:
-            found.append((start, later[int(np.argmin(far))]))
+        end = _end(motion, start, [one for one in ends if one > start], wanted, extent)
+        if end is not None:
+            found.append((start, end))
     if not found:
-        whole = apart(wanted, outline(motion)) <= ALIKE * extent
+        whole = apart(wanted, outline(motion, extent)) <= ALIKE * extent
         return FoundCycles(((0, len(motion) - 1),) if whole else ())
     return _told(motion, found, extent)
+
+
+def _end(motion: Motion, start: int, ends: Sequence[int], wanted: FloatArray, extent: float) -> int | None:
+    """Return the row at which a cycle from a row on is most like a command; None if none is.
+
+    Args:
+        motion: The motion.
+        start: The row at which the cycle begins.
+        ends: The rows at which it may end.
+        wanted: The outline of the command in [m], shape (k, 3).
+        extent: That of the command in [m].
+    """
+    best, least = None, ALIKE * extent
+    for end in ends[:LOOKED_AT]:
+        far = apart(wanted, outline(motion.part(start, end, ""), extent))
+        if far <= least:
+            best, least = end, far
+        elif best is not None:
+            break
+    return best
 
 
 def first_cycle(motion: Motion) -> tuple[int, int] | None:
@@ -81,7 +103,7 @@ def first_cycle(motion: Motion) -> tuple[int, int] | None:
     starts = _visits(motion, motion.position[0], motion.extent)
     for k in range(1, min((len(starts) + 1) // 2, LOOKED_AT + 1)):
         ends = (starts[0], starts[k]), (starts[k], starts[2 * k])
-        first, second = (outline(motion.part(*one, "")) for one in ends)
+        first, second = (outline(motion.part(*one, ""), motion.extent) for one in ends)
         if apart(first, second) <= ALIKE * motion.extent:
             return 0, starts[k]
     return None

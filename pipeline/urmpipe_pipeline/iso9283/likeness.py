@@ -5,33 +5,40 @@ from __future__ import annotations
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
-from urmpipe_pipeline.iso9283.motion import Motion
+from urmpipe_pipeline.iso9283.motion import Motion, apart_rows
 
 POINTS = 150
 """Points, even in arc length, by which a path is told."""
 
-BLOCKS = 3000
-"""A motion is averaged to no more rows than this first: that holds its noise down."""
+BLOCKS = 1500
+"""A motion is averaged to no more rows than twice this first: that holds its noise down."""
+
+STEP = 0.01
+"""A path goes on in steps of this share of the command's extent: what trembles, or rests, is no way."""
+
+SURE = 8.0
+"""Steps are no shorter than so many standard deviations of the noise."""
 
 ALIKE = 0.2
 """Paths are alike if no point is further away than this share of the command's extent. Half of a square, its
 other way round and the next of its corners are half an extent away or more."""
 
 
-def outline(motion: Motion) -> FloatArray:
+def outline(motion: Motion, extent: float) -> FloatArray:
     """Return points of a motion's path that are even in its arc length, in [m], shape (150, 3).
 
-    Steps that its noise may make count for nothing, so that a rest is no way.
+    Args:
+        motion: The motion.
+        extent: That of the command in [m].
     """
     block = max(len(motion) // BLOCKS, 1)
     first = np.arange(0, len(motion), block)
     sizes = np.diff(np.append(first, len(motion)))[:, np.newaxis]
     place = np.add.reduceat(motion.position, first, axis=0) / sizes
-    step = np.linalg.norm(np.diff(place, axis=0), axis=1)
-    shake = 6.0 * motion.noise / np.sqrt(block)
-    along = np.concatenate(([0.0], np.cumsum(np.where(step > shake, step, 0.0))))
+    path = place[apart_rows(place, max(STEP * extent, SURE * motion.noise / np.sqrt(block)))]
+    along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))))
     at = np.linspace(0.0, along[-1], POINTS)
-    return np.column_stack([np.interp(at, along, values) for values in place.T])
+    return np.column_stack([np.interp(at, along, values) for values in path.T])
 
 
 def apart(first: FloatArray, second: FloatArray) -> float:
@@ -62,4 +69,5 @@ def apart(first: FloatArray, second: FloatArray) -> float:
 
 def alike(command: Motion, motion: Motion) -> bool:
     """Tell whether a motion goes along the path of a command."""
-    return apart(outline(command), outline(motion)) <= ALIKE * command.extent
+    extent = command.extent
+    return apart(outline(command, extent), outline(motion, extent)) <= ALIKE * extent

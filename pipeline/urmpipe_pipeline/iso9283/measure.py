@@ -103,8 +103,8 @@ def marks_of(command: Command) -> Marks:
     poses = command.targets or poses_of(motion, command.stops)
     places = np.vstack((motion.position, poses.position))
     reach = ALIKE * float(np.ptp(places, axis=0).max(initial=0.0))
-    if not motion.timed or not motion.extent or bool(motion.slow.all()):
-        return Marks(poses, reach)
+    if not motion.timed or bool(motion.slow.all()):
+        return Marks(poses, reach if len(poses) > 1 else np.inf)
     path = CommandPath(motion, command.bends)
     planes = path.planes(command.planes)
     about = [one.anchors for one in path.corners]

@@ -145,7 +145,7 @@ class Motion:
 def motion_of(
     name: str, t: FloatArray, position: FloatArray, quat_xyzw: FloatArray | None, *, timed: bool
 ) -> Motion:
-    """Return a motion of the rows that have a place.
+    """Return a motion of the rows that have a place; still poses keep all, since their numbers count.
 
     Args:
         name: What it is called.
@@ -154,11 +154,33 @@ def motion_of(
         quat_xyzw: Orientations [-], shape (n, 4); taken only if each row with a place has one.
         timed: Whether the rows are a motion.
     """
-    known = np.flatnonzero(np.isfinite(position).all(axis=1))
+    known = np.flatnonzero(np.isfinite(position).all(axis=1) | (not timed))
     quat = None if quat_xyzw is None else quat_xyzw[known]
     if quat is not None and not np.isfinite(quat).all():
         quat = None
     return Motion(name, t[known], position[known], quat, timed, known.astype(np.int64))
+
+
+def apart_rows(place: FloatArray, least: float) -> IntArray:
+    """Return rows of places in [m], shape (n, 3), of which each is no nearer than `least` to that before.
+
+    Args:
+        place: The places.
+        least: In [m]; of 0 the rows at which the place changes.
+
+    Returns:
+        Their numbers from 0, shape (k,).
+    """
+    step = np.linalg.norm(np.diff(place, axis=0), axis=1)
+    rows = np.append(0, np.flatnonzero(step > 0.0) + 1)
+    if not (step[step > 0.0] < least).any():
+        return rows.astype(np.int64)
+    kept, (x, y, z) = [0], place[0].tolist()
+    for row, (u, v, w) in zip(rows[1:].tolist(), place[rows[1:]].tolist(), strict=True):
+        if (u - x) ** 2 + (v - y) ** 2 + (w - z) ** 2 >= least**2:
+            kept.append(row)
+            x, y, z = u, v, w
+    return np.array(kept, np.int64)
 
 
 def _noise(values: FloatArray) -> float:

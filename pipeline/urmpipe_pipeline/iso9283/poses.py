@@ -77,7 +77,7 @@ def poses_of(command: Motion, stops: Sequence[Stop] = ()) -> Poses:
     known += [one for one in moments if not any(_touch(one[0], rest) for rest in command.rests)]
     known.sort(key=lambda one: one[0].first)
     found = _gathered(command, known)
-    if len(found) > 1 and known[0][0].first == 0 and found.alike(0, len(found) - 1):
+    if len(found) > 1 and _starts(command, known[0][0]) and found.alike(0, len(found) - 1):
         return replace(_gathered(command, known[1:]), closed=True)
     return found
 
@@ -115,6 +115,9 @@ def attained(cycle: Motion, poses: Poses, reach: float) -> tuple[Rest, ...] | in
     if not cycle.timed:
         if len(cycle) != len(poses):
             return min(len(cycle), len(poses) - 1)
+        missing = np.flatnonzero(~np.isfinite(cycle.position).all(axis=1))
+        if len(missing):
+            return int(missing[0])
         return tuple(Rest(row, row) for row in range(len(cycle)))
     rests = list(cycle.rests)
     if any(poses.moving):
