@@ -19,7 +19,7 @@ WIDTH = 100
 
 PAGES = {
     "ingest": "[logs.md](logs.md), [recording-logs.md](recording-logs.md)",
-    "compare": "[compare.md](compare.md), [ci.md](ci.md)",
+    "compare": "[compare.md](compare.md), [iso.md](iso.md), [ci.md](ci.md)",
     "diagnose": "[diagnose.md](diagnose.md)",
     "robot": "[robots.md](robots.md), [dynamics.md](dynamics.md)",
     "ik": "[ik.md](ik.md), [targets.md](targets.md)",

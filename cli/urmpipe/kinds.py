@@ -194,7 +194,7 @@ KINDS = {
     "progress": PROGRESS,
     "restarts": COUNT,
     "robot": Kind(_is_robot, "a name, a TOML or URDF file, or a Chain, such as urmpipe.load_robot(NAME)"),
-    "rows": _one_of("grid", "file", "velocities", "samples"),
+    "rows": _one_of("grid", "file", "velocities", "samples", "criteria"),
     "run": Kind(_is_run, "a Run, such as urmpipe.ingest(LOG)"),
     "seed": COUNT,
     "sides": Kind(_are_sides, 'two words in the names of columns, such as ("target", "actual")'),

@@ -15,6 +15,7 @@ import pytest
 
 import urmpipe
 from diagnoses import diagnosis_of
+from pages import lay_repeated
 from urmpipe.main import COMMANDS, cli, run
 from urmpipe_datasets import LOGS
 from urmpipe_models.inverse.targets import targets_of
@@ -79,6 +80,16 @@ def test_each_key_of_a_diagnosis_is_named() -> None:
     found = keys(replace(one, diagnosis=diagnosis_of(one)).to_dict())
     assert found - NAMED == set()
     assert {"rms_before", "from_sample", "needs", "reason", "words"} <= found
+
+
+def test_each_key_of_a_test_after_iso_9283_is_named(tmp_path: Path) -> None:
+    lay_repeated(tmp_path)
+    before = urmpipe.compare(tmp_path / "square.csv", tmp_path / "test.csv", iso=True)
+    result = urmpipe.compare(tmp_path / "square.csv", tmp_path / "test.csv", iso=True, baseline=before)
+    found = result.to_dict()
+    assert keys(found) - NAMED == set()
+    assert {"cycles", "poses", "criteria", "at", "last_row"} <= keys(found["iso"])
+    assert {"before", "now", "worse", "better"} <= keys(found["baseline"]["criteria"])
 
 
 def test_each_key_of_a_simulation_is_named() -> None:

@@ -12,10 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import bilinear, lfilter
 from scipy.spatial.transform import Rotation
 
 from urmpipe.main import run
 from urmpipe_datasets import LOGS
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -90,6 +92,63 @@ def lay_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "planar.toml").write_text(snippets("docs/dynamics.md", "toml")[0], encoding="utf-8")
     system = next(one for one in snippets("docs/simulate.md", "toml") if one.startswith("[system]"))
     (folder / "my-system.toml").write_text(system, encoding="utf-8")
+    lay_repeated(folder)
+
+
+SQUARE = np.array([[0.4, -0.1, 0.3], [0.6, -0.1, 0.3], [0.6, 0.1, 0.3], [0.4, 0.1, 0.3], [0.4, -0.1, 0.3]])
+"""Corners of a path in [m]: it rests in the third and the last, and runs through the others."""
+
+MARKS = np.array([[0.5, 0.0, 0.3], [0.6, 0.1, 0.4], [0.4, 0.1, 0.2], [0.4, -0.1, 0.2], [0.6, -0.1, 0.4]])
+"""Five poses in [m]: the middle of a cube, and four of its corners."""
+
+SPAN = 0.4
+"""Length of the path from rest to rest in [m]."""
+
+
+def lay_repeated(folder: Path) -> None:
+    """Write a path round a square, logs in which it is repeated, and poses that were measured 30 times."""
+    (folder / "square.csv").write_text(table_of(around(1, 150)[1], timed=True), encoding="utf-8")
+    (folder / "square-rows.csv").write_text(snippets("docs/iso.md", "csv")[0], encoding="utf-8")
+    for name, cycles, seed in (("test", 10, 0), ("run1", 1, 1), ("run2", 1, 2), ("run3", 1, 3)):
+        (folder / f"{name}.csv").write_text(table_of(repeated(cycles, seed), timed=True), encoding="utf-8")
+    visits = np.tile(MARKS, (30, 1)) + np.random.default_rng(4).normal([2e-4, -1e-4, 5e-5], 3e-5, (150, 3))
+    (folder / "marks.csv").write_text(table_of(MARKS), encoding="utf-8")
+    (folder / "visits.csv").write_text(table_of(visits), encoding="utf-8")
+
+
+def around(cycles: int, steady: int) -> tuple[FloatArray, FloatArray]:
+    """Return the way in [m], shape (n,), and the place in [m], shape (n, 3), every 10 ms.
+
+    Args:
+        cycles: How often it goes round.
+        steady: Rows at constant speed from rest to rest: 150 make 0.25 m/s.
+    """
+    rise = np.linspace(0.05, 0.95, 10)
+    speed = np.concatenate((np.zeros(30), rise, np.ones(steady), rise[::-1], np.zeros(30)))
+    way = SPAN * np.cumsum(np.tile(speed / speed.sum(), 2 * cycles))
+    at = np.linspace(0.0, 2.0 * SPAN, len(SQUARE))
+    return way, np.column_stack([np.interp(way % (2.0 * SPAN), at, one) for one in SQUARE.T])
+
+
+def repeated(cycles: int, seed: int) -> FloatArray:
+    """Return where an arm was that went round the square, in [m], shape (n, 3), every 10 ms.
+
+    It is 1 % slow and swings with 60 rad/s; it is off by 0.23 mm, by 0.03 mm of chance at each rest, and by
+    5 um of noise.
+    """
+    chance = np.random.default_rng(seed)
+    way, asked = around(cycles, 152)
+    swung = lfilter(*bilinear([3600.0], [1.0, 84.0, 3600.0], 100.0), asked - asked[0], axis=0)
+    rests = chance.normal([2e-4, -1e-4, 5e-5], 3e-5, (2 * cycles + 1, 3))
+    off = [np.interp(way / SPAN, np.arange(len(rests)), one) for one in rests.T]
+    return np.asarray(asked[0] + swung + np.column_stack(off) + chance.normal(0.0, 5e-6, asked.shape))
+
+
+def table_of(place: FloatArray, *, timed: bool = False) -> str:
+    """Return places in [m], shape (n, 3), as a log: rows every 10 ms, or still poses."""
+    columns = np.column_stack((0.01 * np.arange(len(place)), place)) if timed else place
+    rows = [",".join(f"{value:.6f}" for value in row) for row in columns.tolist()]
+    return "\n".join(["t [s]," * timed + "x [m],y [m],z [m]", *rows]) + "\n"
 
 
 def rtde_log() -> str:

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 @output_option("FILE", "The file [default: RUN-ROWS.FORMAT here].")
 @click.option(
     "--rows",
-    type=OneOf(["grid", "file", "velocities", "samples"]),
+    type=OneOf(["grid", "file", "velocities", "samples", "criteria"]),
     help="The run on its grid in SI, or the file's own rows, names and units [default: grid]; of an accuracy"
-    " its velocities or all samples [default: velocities].",
+    " its velocities or all samples [default: velocities]; of a test (compare --iso) its criteria.",
 )
 @click.option(
     "--tcp",

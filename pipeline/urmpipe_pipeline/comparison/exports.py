@@ -1,7 +1,8 @@
-"""What leaves of a comparison: the compared samples of all logs, and both trajectories of each."""
+"""What leaves of a comparison: the compared samples and both trajectories of all logs, and criteria."""
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import Any
 
@@ -12,6 +13,8 @@ from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.matching import joint_order
+from urmpipe_pipeline.iso9283.result import IsoTest
+from urmpipe_pipeline.iso9283.tables import COLUMNS
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.exports import (
     ExportColumn,
@@ -39,9 +42,11 @@ def exports(comparison: Comparison) -> Exports:
         "verdict": comparison.verdict,
         "runs": [run.name for run in comparison.runs],
     }
-    rows = Rows(partial(delta_table, comparison), lambda table: _fields(comparison))
+    rows = {"compared": Rows(partial(delta_table, comparison), lambda table: _fields(comparison))}
+    if comparison.iso is not None:
+        rows["criteria"] = Rows(partial(criteria_table, comparison.iso), partial(_criteria, comparison))
     poses = {"": lambda rows: _poses(comparison)}
-    return Exports("comparison", about, {"compared": rows}, poses, {}, (NO_ORIENTATION,))
+    return Exports("comparison", about, rows, poses, {}, (NO_ORIENTATION,))
 
 
 def delta_table(comparison: Comparison) -> ExportTable:
@@ -70,6 +75,36 @@ def delta_table(comparison: Comparison) -> ExportTable:
     columns.append(ExportColumn("out_of_tolerance", "", outside))
     clock = np.concatenate([run.run.log.clock_start_ns + run.t_ns for run in runs])
     return ExportTable(tuple(columns), clock if timed else None)
+
+
+def criteria_table(test: IsoTest) -> ExportTable:
+    """Return a row a criterion and place of a test after ISO 9283, in SI; what is not there is NaN or empty.
+
+    Each row has its own unit: 1 of a share.
+    """
+    texts = {
+        name: np.array([str(getattr(one, name) or "") for one in test.criteria])
+        for name in ("name", "at", "unit", "verdict")
+    }
+    numbers = {
+        name: np.array(
+            [math.nan if (value := getattr(one, name)) is None else value for one in test.criteria]
+        )
+        for name in ("value", "tolerance")
+    }
+    every = texts | numbers | {"cycles": np.array([one.cycles for one in test.criteria])}
+    columns = (ExportColumn(name, "", every[name]) for name in COLUMNS)
+    return ExportTable(tuple(columns), None)
+
+
+def _criteria(comparison: Comparison, table: ExportTable) -> dict[str, Any]:
+    """Return the fields of a table of criteria: its texts as cells, its numbers as arrays."""
+    columns = {one.name: np.asarray(one.values) for one in table.columns}
+    return {
+        "comparison": encodable(comparison.name),
+        "reference": encodable(comparison.reference.name),
+        **{name: values.tolist() if values.dtype.kind == "U" else values for name, values in columns.items()},
+    }
 
 
 def _joint_delta(comparison: Comparison, run: Deviation) -> FloatArray:

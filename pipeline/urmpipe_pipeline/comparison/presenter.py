@@ -12,6 +12,7 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.facts import alignment_words, decisive_facts, deviation_facts, sync_words
 from urmpipe_pipeline.comparison.figures import deviation_figures, overview_figure, path_figure, speed_cloud
+from urmpipe_pipeline.comparison.iso_presenter import present_test
 from urmpipe_pipeline.comparison.scene import comparison_scene
 from urmpipe_pipeline.comparison.tables import (
     comparison_lines,
@@ -47,6 +48,8 @@ from urmpipe_pipeline.runs.playback_figures import playback_figures
 
 def present(result: Comparison) -> Presentation:
     """Return what a comparison shows."""
+    if result.iso is not None:
+        return present_test(result, result.iso)
     worst = result.worst
     colour = run_colour(result.runs.index(worst))
     return Presentation(

@@ -28,8 +28,10 @@ def brief_columns(table: Table, *, every: bool = False) -> Iterator[Column]:
 
 
 def rows_within(table: Table, most: int) -> slice:
-    """Return the rows that are shown of a table: of one that ranks verdicts, best to worst, the last."""
-    ranks = any(isinstance(cell, Judged) for one in table.columns for cell in one.cells)
+    """Return the rows that are shown of a table: of one that ranks verdicts, the worst."""
+    ranks = not table.worst_first and any(
+        isinstance(cell, Judged) for one in table.columns for cell in one.cells
+    )
     return slice(-most, None) if ranks and len(table.columns[0].cells) > most else slice(most)
 
 

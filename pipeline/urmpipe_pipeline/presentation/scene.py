@@ -133,6 +133,23 @@ class Sheets:
     colour: str
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Balls:
+    """Balls that one sees through.
+
+    Attributes:
+        name: What they are, and how much larger they are drawn.
+        centre: In [m], shape (n, 3).
+        radius: In [m], shape (n,).
+        colour: As #rrggbb.
+    """
+
+    name: str
+    centre: FloatArray
+    radius: FloatArray
+    colour: str
+
+
 @dataclass(frozen=True, slots=True)
 class Spot:
     """A place with a word.
@@ -180,6 +197,7 @@ class Scene:
         spots: Places with a word.
         targets: What was asked for, if it was poses.
         arrows: What is drawn at places, at all times.
+        balls: What is drawn about places, at all times.
     """
 
     title: str = ""
@@ -188,6 +206,7 @@ class Scene:
     spots: tuple[Spot, ...] = ()
     targets: Targets | None = None
     arrows: Arrows | None = None
+    balls: Balls | None = None
 
 
 def ball_sizes(masses: Sequence[Element]) -> FloatArray:

@@ -127,6 +127,7 @@ class Table:
         note: A line under it.
         brief: Whether it is shown where there is little room.
         folded: Whether a page opens it only on request.
+        worst_first: Whether it ranks verdicts from worst to best; else from best to worst, if it has some.
     """
 
     title: str
@@ -134,6 +135,7 @@ class Table:
     note: str = ""
     brief: bool = True
     folded: bool = False
+    worst_first: bool = False
 
 
 @dataclass(frozen=True, slots=True)

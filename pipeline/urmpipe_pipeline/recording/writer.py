@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 AHEAD = 3
 """Slices under way at a time: there is always one to be written, and memory stays low."""
 
+MANY = 2_000_000
+"""Rows of all arrays together from which on only those that the viewer plots stand by themselves: times and
+numbers of rows would take as much room as the values."""
+
 SPARE = 64 * 2**20
 """Bytes that must be free on the disk before a slice is sent: it, what is on its way, and the footer."""
 
@@ -120,13 +124,15 @@ def _described(
     """Send what is no array: what is there to be looked at with its layout, and the metadata.
 
     Returns:
-        The arrays, long ones packed but those that the viewer plots whole; and the metadata.
+        The arrays, long ones packed but those that the viewer plots whole, of very many rows all but these;
+        and the metadata.
     """
     import rerun as rr
 
     stream.send_recording_name(encodable(shown.name))
     blueprint, opening, plotted = send_views(stream, shown, _entities(encoded))
-    packed = encoded.packed(LONG, plotted)
+    rows = sum(column.rows for column in encoded.columns if column.plotted)
+    packed = encoded.packed(LONG if rows <= MANY else 0, plotted)
     metadata = document(kind, packed.tree, packed.clocks)
     stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, **opening._asdict()))
     stream.send_blueprint(blueprint)

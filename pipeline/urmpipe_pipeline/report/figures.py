@@ -26,8 +26,9 @@ SMALL_PX = 400
 PANEL_PX = ((1, 112), (4, 150), (8, 220))
 """Height of one panel among some, by the number of lines that it has at most."""
 
-LEGEND_Y = 1.025
-"""Where the legend begins, in heights of the plot: above the words at the head of a line through it."""
+LEGEND_Y, OVER_LEGEND_Y = 1.025, 1.06
+"""Where the legend begins, in heights of the plot: above the words at the head of a line through it; in a
+figure over a quantity, which is lower."""
 
 
 def span_of(figures: Iterable[Figure]) -> Span:
@@ -104,7 +105,7 @@ def _spec(figure: Figure, panels: Sequence[Panel], span: Span) -> Spec:
         through = list(_through(figure, panels[0], over)) if over.joined else []
         found = spec.stacked(drawn, _quantity_axis(over), through)
         found["layout"] |= {"hovermode": "closest"}
-        return found
+        return _with_room(found, names, through, OVER_LEGEND_Y)
     timed = axis_of(panels[0]) == "t"
     axis = spec.time_axis if timed else spec.row_axis
     places = ((place_of(panels[0], at), words) for at, words in figure.instants.items())
@@ -112,8 +113,13 @@ def _spec(figure: Figure, panels: Sequence[Panel], span: Span) -> Spec:
     found = spec.stacked(drawn, axis(span.start, span.end), through)
     if any(one.stacked for panel in panels for one in panel.lines):  # the parts of all sums are too many
         found["layout"]["hoversubplots"] = "overlaying"
+    return _with_room(found, names, through, LEGEND_Y)
+
+
+def _with_room(found: Spec, names: Names, through: Sequence[Spec], height: float) -> Spec:
+    """Return a figure with its legend above the words at the head of lines through it."""
     if through and names.first:
-        found["layout"]["legend"] |= {"y": LEGEND_Y}
+        found["layout"]["legend"] |= {"y": height}
     return found
 
 

@@ -40,6 +40,9 @@ DOTS = 1500
 MARKED = 1000
 """Marks of a panel at most: a browser draws no more of them with ease."""
 
+FEW = 100
+"""Rows of a line over a quantity that are drawn as points, too, at most."""
+
 WIDTHS = (1.4, 2.8)
 """Of lines over a quantity, and of the one that decides, in pixels."""
 
@@ -328,16 +331,23 @@ def _joined(curves: Sequence[_Curve], over: Over, unit: str, names: Names, numbe
         digits = [pointer_digits(*pair) for pair in ((over.unit, x), (unit, y))]
         yield {
             "type": "scatter",
-            "mode": "markers" if one.line.points else "lines+markers",
+            "mode": _mode(one, int(known.sum())),
             "name": label(one.name),
             "x": typed(x, precision(x, digits[0])),
             "y": typed(y, precision(y, digits[1])),
-            "line": stroke(one.colour) | {"width": WIDTHS[one.line.strong]},
+            "line": stroke(one.colour, DASHES[one.line.dashed]) | {"width": WIDTHS[one.line.strong]},
             "marker": {"color": one.colour, "size": 7 if one.line.points else 5},
             "hovertemplate": f"{label(over.title)} %{{x:{told(x, digits[0])}}} {label(over.unit)}<br>"
             f"{label(one.name)} %{{y:{told(y, digits[1])}}} {label(unit)}<extra></extra>",
             "showlegend": False,
         } | names.entry(one.name, number)
+
+
+def _mode(curve: _Curve, rows: int) -> str:
+    """Return whether a curve over a quantity is points, or a line, its rows as points if they are few."""
+    if curve.line.points:
+        return "markers"
+    return "lines" if curve.line.dashed or rows > FEW else "lines+markers"
 
 
 def _clouds(curves: Sequence[_Curve], over: Over, peaks: Sequence[int], unit: str) -> Iterator[Spec]:

@@ -15,9 +15,10 @@ from urmpipe_pipeline.presentation.exports import Exports
 Format = Literal["csv", "parquet", "mat", "tum"]
 FORMATS: tuple[Format, ...] = get_args(Format)
 
-RowNames = Literal["grid", "file", "velocities", "samples"]
+RowNames = Literal["grid", "file", "velocities", "samples", "criteria"]
 """grid: the run on its grid, in SI; file: the rows of the file, its columns in its own units; of an accuracy
-velocities: the errors of each; samples: those of all its motions."""
+velocities: the errors of each; samples: those of all its motions; criteria: those of a test
+after ISO 9283."""
 
 PoseNames = Literal["fk", "recorded"]
 """By forward kinematics, or as the log recorded them."""

@@ -16,6 +16,7 @@ from recorded import columns, entities, packed, rows_of, static, times_of, views
 from toys import COLOURS, PLOT, STEP_NS, Toy, figure, line, panel, recorded, root_of, shown, toy
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.figure import Figure, Mark, Over, Panel, Shape, View
+from urmpipe_pipeline.recording import writer
 from urmpipe_pipeline.recording.views.axes import LOW, MARGIN, TALL, span_with_numbers
 from urmpipe_pipeline.recording.views.plots import COPIED, LONG, ROWS, SHARED_AXIS
 
@@ -213,6 +214,18 @@ def test_a_long_array_of_a_hidden_view_is_shown_by_its_overview_and_packed(tmp_p
     ends = columns(path, f"{hidden}/instants/0", SCALARS)
     assert ends == [[np.min(values[np.isfinite(values)])], [9.0]]
     assert len(columns(path, "/values", PACKED)) < 10  # many rows stand as one
+
+
+def test_of_very_many_rows_only_what_is_plotted_stands_by_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = toy()
+    rows, plotted = len(one.values), shown(figure(panel(one)))
+    assert len(columns(recorded(shown(), tmp_path, one), "/values", SCALARS)) == rows
+    monkeypatch.setattr(writer, "MANY", rows - 1)
+    assert len(columns(recorded(plotted, tmp_path, one), "/values", SCALARS)) == rows
+    bare = recorded(shown(), tmp_path, one)
+    assert len(columns(bare, "/values", PACKED)) == 1 and not columns(bare, "/values", SCALARS)
 
 
 def test_what_is_plotted_over_a_quantity_is_left_to_the_report() -> None:

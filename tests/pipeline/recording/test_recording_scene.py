@@ -24,8 +24,8 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import JOINT_COLOURS, REFERENCE_COLOUR, run_colour
+from urmpipe_pipeline.presentation.scene import Balls, Scene, Spot
 from urmpipe_pipeline.presentation.scene import Path as Way
-from urmpipe_pipeline.presentation.scene import Scene, Spot
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW, FILLED, WIDE
 from urmpipe_pipeline.recording.views.geometry import drawn_arm, drawn_path, extent
@@ -96,6 +96,25 @@ def test_what_decides_is_drawn(make_comparison: MakeComparison) -> None:
     assert arm is not None and 465 in arm.moving.rows
     moving = [drawn_path(way) for way in scene.paths if way.t_ns is not None]
     assert len(moving) == 3 and all(465 in way.moving.rows for way in moving)
+
+
+# --- balls -----------------------------------------------------------------------------------------
+
+
+def test_balls_are_seen_through_and_in_view(tmp_path: Path) -> None:
+    centre, radius = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]]), np.array([0.5, 2.0])
+    way = Way("one", centre, None, "#000000")
+    path = recorded(
+        shown(scene=Scene("s", paths=(way,), balls=Balls("b", centre, radius, "#21c3ff"))), tmp_path
+    )
+    np.testing.assert_array_equal(static(path, f"{SCENE}/balls", "Ellipsoids3D:centers"), centre)
+    sizes = static(path, f"{SCENE}/balls", "Ellipsoids3D:half_sizes")
+    np.testing.assert_array_equal(sizes, np.repeat(radius[:, np.newaxis], 3, axis=1))
+    (colour,) = static(path, f"{SCENE}/balls", "Ellipsoids3D:colors")
+    assert 0 < colour & 0xFF < 255
+    points = extent(None, (), [drawn_path(way)], None, balls=Balls("", centre, radius, ""))
+    assert points.min(axis=0).tolist() == [-1.0, -0.5, -0.5]
+    assert points.max(axis=0).tolist() == [3.0, 4.0, 5.0]
 
 
 # --- lines -----------------------------------------------------------------------------------------

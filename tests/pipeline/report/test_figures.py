@@ -446,3 +446,23 @@ def test_parts_of_a_sum_are_stacked_on_both_sides_of_0() -> None:
     assert line["name"] == "sum"
     assert made.spec["layout"]["hoversubplots"] == "overlaying"  # the pointer tells one sum
     go.Figure(made.spec)
+
+
+def test_a_line_over_a_quantity_is_parted_dashed_and_pointed() -> None:
+    quantity = np.append(np.linspace(0.0, 1.0, 150), np.nan)
+    quantity = np.concatenate((quantity, quantity))  # twice there and a gap: two runs of one line
+    many, few = np.tile(np.append(np.sin(quantity[:150]), 0.0), 2), np.full(len(quantity), np.nan)
+    few[[0, 149]] = 0.5
+    lines = (
+        Line(many, ("runs",), (RED,)),
+        Line(few, ("allowed",), (BLUE,), dashed=True),
+        Line(few, ("few",), (BLUE,)),
+    )
+    over = Over(quantity, "s", "m", joined=True)
+    made = drawn(figure(Panel("v", "m/s", lines, over=over), instants={10: "corner"}))
+    assert {one["name"]: (one["mode"], one["line"]["dash"]) for one in made.spec["data"]} == {
+        "runs": ("lines", "solid"), "allowed": ("lines", "dash"), "few": ("lines+markers", "solid"),
+    }  # fmt: skip
+    x = numbers(trace(made, "runs")["x"])
+    assert np.flatnonzero(np.isnan(x)).tolist() == [150, 301]
+    assert made.spec["layout"]["legend"]["y"] > 1.0  # above the word of the corner

@@ -17,7 +17,7 @@ from urmpipe_pipeline.palette import (
     rgb,
     value_colours,
 )
-from urmpipe_pipeline.presentation.scene import ArmMark, Arrows, Scene, Spot, ball_sizes
+from urmpipe_pipeline.presentation.scene import ArmMark, Arrows, Balls, Scene, Spot, ball_sizes
 from urmpipe_pipeline.recording.sending import ROOT, keys, shown_path, times_at
 from urmpipe_pipeline.recording.views.camera import EYE, eye_distance, seen
 from urmpipe_pipeline.recording.views.geometry import (
@@ -52,7 +52,7 @@ THIN = 0.5
 """Thickness of every second ghost beside the others."""
 
 OPACITY = 90
-"""Of the bones of a ghost, of 255: seven of them, one in front of the other, let the arm itself through."""
+"""Of balls and the bones of a ghost, of 255: seven, one in front of the other, let the arm itself through."""
 
 STRIPS = 256
 """Poses of the skeleton sent at a time: decoding a chunk of strips takes time by the square of its rows."""
@@ -75,7 +75,7 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
     targets = None if scene.targets is None else drawn_targets(scene.targets)
     if arm is None and not paths and not ghosts and targets is None:
         return None
-    points = extent(arm, ghosts, paths, targets, scene.arrows)
+    points = extent(arm, ghosts, paths, targets, scene.arrows, scene.balls)
     centre, size = ball(points)
     stream.log(ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     labelled = [one for one in scene.arms if one.label]
@@ -87,6 +87,8 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
         _draw_spot(stream, spot, f"spot {number}", size)
     if scene.arrows is not None:
         _draw_arrows(stream, scene.arrows, size)
+    if scene.balls is not None:
+        _draw_balls(stream, scene.balls)
     if targets is not None:
         _draw_targets(stream, targets, size)
     for number, ghost in enumerate(ghosts):
@@ -227,6 +229,19 @@ def _draw_arrows(stream: RecordingStream, arrows: Arrows, size: float) -> None:
     drawn = rr.Arrows3D(origins=start, vectors=vectors, colors=colours, radii=[FRAME * size])
     stream.log(root, drawn, static=True)
     stream.log(f"{root}/starts", rr.Points3D(start, colors=colours, radii=[TARGET * size]), static=True)
+
+
+def _draw_balls(stream: RecordingStream, balls: Balls) -> None:
+    """Draw balls at all times, seen through."""
+    import rerun as rr
+
+    drawn = rr.Ellipsoids3D(
+        centers=balls.centre.astype(np.float32),
+        radii=balls.radius.astype(np.float32),
+        colors=[(*rgb(balls.colour), OPACITY)],
+        fill_mode=rr.components.FillMode.Solid,
+    )
+    stream.log(shown_path("scene", "balls"), drawn, static=True)
 
 
 def _label(words: str, colour: str = LABEL_COLOUR) -> Points3D:

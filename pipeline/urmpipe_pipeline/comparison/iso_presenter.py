@@ -1,0 +1,240 @@
+"""How a test after ISO 9283 shows itself: its verdict and criteria, then poses, path, corners and speed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
+from functools import partial
+
+from urmpipe_pipeline import text
+from urmpipe_pipeline.assumptions import assuming
+from urmpipe_pipeline.comparison.baseline_section import baseline_section, criterion_checks, worse_facts
+from urmpipe_pipeline.comparison.change import BaselineComparison
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Verdict
+from urmpipe_pipeline.comparison.iso_scene import iso_scene
+from urmpipe_pipeline.iso9283.criteria import Criterion
+from urmpipe_pipeline.iso9283.drawings import corner_drawing, pose_drawing
+from urmpipe_pipeline.iso9283.figures import deviation_figure, path_figure, speed_figure
+from urmpipe_pipeline.iso9283.result import CutPath, IsoTest
+from urmpipe_pipeline.iso9283.tables import (
+    corner_table,
+    criteria_rows,
+    criteria_tables,
+    cycles_table,
+    leg_table,
+    plane_table,
+    pose_tables,
+)
+from urmpipe_pipeline.iso9283.wording import (
+    amount_words,
+    check_words,
+    criteria_words,
+    decisive,
+    meaning,
+    overall_of,
+    tolerance_words,
+    value_of,
+    where,
+    worst_first,
+)
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.presentation.parts import inputs_table, minute, provenance_table, recording_fact
+from urmpipe_pipeline.presentation.section import (
+    Block,
+    Cell,
+    Check,
+    Fact,
+    Judged,
+    Presentation,
+    Ref,
+    Section,
+    Table,
+    Value,
+)
+
+
+def present_test(result: Comparison, test: IsoTest) -> Presentation:
+    """Return what a comparison shows that is a test after ISO 9283."""
+    return Presentation(
+        name=result.name,
+        headline=headline(result, test),
+        verdict=result.verdict,
+        facts=(*_decisive_facts(test), *_against(result, test)),
+        body=_body(result, test),
+        word="" if result.verdict else "measured",
+        scene=partial(iso_scene, result, test),
+        lines=(_line(result, test),),
+        rows=partial(criteria_rows, test),
+        created=result.provenance.created,
+    )
+
+
+def headline(result: Comparison, test: IsoTest) -> str:
+    """Return which criteria are out of tolerance, or how close to it the cycles come; and against what."""
+    who, against = _cycles(result, test), f"against {result.reference.name}"
+    worst = decisive(test)
+    failed = [one for one in worst_first(test.overall) if one.verdict == "fail"]
+    if worst is None:
+        said = f"{who} {against}: no criterion is judged, none has a tolerance"
+    elif failed:
+        said = f"{who} out of tolerance {against}: {criteria_words(failed)}"
+    else:
+        said = f"{who} within tolerance {against}: {amount_words(worst)}"
+    if result.baseline is not None:
+        worse = f"{'and' if failed else 'but'} worse" if result.baseline.verdict == "fail" else "not worse"
+        said += f", {worse} than the baseline {result.baseline.name}"
+    return said + assuming(result.assumptions)
+
+
+def _cycles(result: Comparison, test: IsoTest) -> str:
+    """Return how many cycles there are, and of which log if they are of one."""
+    count = text.counted(len(test.cycles), "cycle")
+    files = {one.run.log.files for one in result.runs}
+    name = result.name.removesuffix(f"-against-{result.reference.name}")
+    return f"{count} of {name}" if len(files) == 1 and name else count
+
+
+def _decisive_facts(test: IsoTest) -> Iterator[Fact]:
+    """Yield which criterion decided, how much of its tolerance it uses up, and where."""
+    one = decisive(test)
+    if one is not None:
+        used = text.portion(one.used or 0.0)
+        yield Fact("Decided by", f"{amount_words(one)} ({used} the tolerance)", meaning(one.name))
+        yield Fact("Where", where(test, one))
+
+
+def _against(result: Comparison, test: IsoTest) -> Iterator[Fact]:
+    """Yield what is worse than a baseline, how much was tested, against what, and what is allowed."""
+    since = result.baseline
+    yield from worse_facts(since) if since is not None and since.verdict == "fail" else ()
+    parts = [text.counted(len(test.cycles), "cycle")]
+    parts += [text.counted(len(test.poses.command), "pose")] if test.poses is not None else []
+    parts += [text.counted(len(test.path.s), "plane")] if test.path is not None else []
+    yield Fact("After ISO 9283", text.enumerated(parts))
+    yield Fact("Reference", result.reference.name, brief=False)
+    yield Fact("Tolerance", tolerance_words(result.tolerance), brief=False)
+
+
+def _body(result: Comparison, test: IsoTest) -> Section:
+    sections = list(_sections(test))
+    if result.baseline is not None:
+        sections.append(_against_baseline(result.baseline, len(sections)))
+    worst = sorted(sections, key=lambda one: one.verdict != "fail")  # what fails is read first
+    return Section(
+        f"Test {result.name}",
+        result.verdict,
+        (
+            *_against(result, test),
+            Fact("Made", minute(result.provenance), brief=False),
+            recording_fact(result.recording),
+        ),
+        (*criteria_tables(test), cycles_table(test)),
+        blocks=partial(_files, result),
+        warnings=tuple(_warnings(result)),
+        sections=tuple(replace(one, rank=worst.index(one)) for one in sections),
+    )
+
+
+def _warnings(result: Comparison) -> Iterator[LogWarning]:
+    """Yield the warnings of the comparison, and those of its logs by their names."""
+    yield from result.warnings
+    yield from (one.of(run.name) for run in result.runs for one in run.run.warnings)
+
+
+def _files(result: Comparison) -> Iterator[Block]:
+    """Yield the files, and how the comparison was made."""
+    yield inputs_table("Reference files", result.reference.files)
+    files = dict.fromkeys(file for run in result.runs for file in run.run.log.files)
+    yield inputs_table("Files of the cycles", files)
+    yield provenance_table(result.provenance)
+
+
+def _sections(test: IsoTest) -> Iterator[Section]:
+    """Yield a section about each part that there is of a test."""
+    poses, path = test.poses, test.path
+    if poses is not None:
+        facts = (
+            Fact("Poses", Value(len(poses.command)), brief=False),
+            Fact("Band", Value(test.band, "m", given=True), brief=False),
+        )
+        yield _section(test, "Poses", facts, pose_tables(test), lambda: (pose_drawing(test, poses),))
+    if path is None:
+        return
+    facts = (
+        Fact("Length", Value(path.total, "m"), brief=False),
+        Fact("Planes", Value(len(path.s)), brief=False),
+    )
+    yield _section(test, "Path", facts, (), partial(_path_blocks, test, path))
+    if path.corners:
+        yield _section(
+            test, "Corners", (), (corner_table(test, path),), lambda: (corner_drawing(test, path),)
+        )
+    if path.legs:
+        yield _section(test, "Speed", (), (leg_table(test, path),), lambda: (speed_figure(path),))
+
+
+def _path_blocks(test: IsoTest, path: CutPath) -> Iterator[Block]:
+    """Yield what a page shows of a path; of one without a leg that is judged its speed, too."""
+    yield path_figure(path)
+    yield deviation_figure(test, path)
+    if not path.legs:
+        yield speed_figure(path)
+    yield plane_table(test, path)
+
+
+def _section(
+    test: IsoTest,
+    part: str,
+    facts: tuple[Fact, ...],
+    tables: Iterable[Table],
+    blocks: Callable[[], Iterable[Block]],
+) -> Section:
+    """Return the section about a part of a test."""
+    criteria = overall_of(test, part)
+    decided = decisive(test, part)
+    first = () if decided is None else (
+        Fact(decided.name, value_of(decided), meaning(decided.name), brief=False),
+        Fact("Where", where(test, decided), brief=False),
+    )  # fmt: skip
+    return Section(
+        part,
+        _verdict(criteria),
+        (*first, *facts),
+        tuple(tables),
+        blocks=blocks,
+        checks=tuple(_checks(test, criteria)),
+        properties={one.name: one.value for one in criteria if one.value is not None},
+    )
+
+
+def _verdict(criteria: Iterable[Criterion]) -> Verdict | None:
+    """Return fail if one of some criteria fails, pass if one is judged, else None."""
+    verdicts = {one.verdict for one in criteria} - {None}
+    return None if not verdicts else "fail" if "fail" in verdicts else "pass"
+
+
+def _checks(test: IsoTest, criteria: Iterable[Criterion]) -> Iterator[Check]:
+    """Yield a check for each criterion that has a tolerance."""
+    for one in criteria:
+        if one.verdict is not None:
+            yield Check(one.name, one.verdict, check_words(test, one) if one.verdict == "fail" else "")
+
+
+def _against_baseline(found: BaselineComparison, rank: int) -> Section:
+    """Return what changed since an earlier comparison, with its checks: no section of a cycle holds them."""
+    return replace(baseline_section(found, rank), checks=tuple(criterion_checks(found)))
+
+
+def _line(result: Comparison, test: IsoTest) -> Mapping[str, Cell]:
+    """Return the line of a test among several."""
+    return {
+        "Test": Ref(f"Test {result.name}"),
+        "Recording": str(result.recording or ""),
+        "Made": minute(result.provenance),
+        "Reference": result.reference.name,
+        "Verdict": Judged(result.verdict),
+        "Cycles": Value(len(test.cycles)),
+        "Assuming": "; ".join(result.assumptions),
+        **{one.name: value_of(one) for one in test.overall},
+    }
