@@ -189,7 +189,7 @@ KINDS = {
     "output": PATH,
     "path": PATH,
     "plan.path": PLANNED,
-    "planes": COUNT,
+    "planes": Kind(lambda value: _is_count(value) and value > 0, "a whole number, 1 or more"),
     "platforms": Kind(_one_or_many(_is_text), "linux64, win64 or a list of both"),
     "progress": PROGRESS,
     "restarts": COUNT,

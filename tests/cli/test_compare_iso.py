@@ -137,7 +137,7 @@ def test_given_cycles_are_taken_as_they_are(capsys: Captured) -> None:
         (["--iso", "--align", "rigid"], "--align: found rigid, allowed: none with iso"),
         (["--iso", "--diagnose"], "--diagnose: found with iso, allowed: one of the two"),
         (["--iso", "--cycles", "1:601"], "--cycles: found rows of cycles and 4 logs"),
-        (["--iso", "--planes", "0"], "--planes: found 0, allowed: 1 or more"),
+        (["--iso", "--planes", "0"], "--planes: found 0, allowed: a whole number, 1 or more"),
         (["--iso", "--band", "0"], "--band: found '0', allowed: a positive length in m"),
         (["--iso", "--band", "-1mm"], "--band: found '-1mm', allowed: a positive length in m"),
         (["--iso", "--tolerance", "axis=1mm"], "--tolerance: found axis=0.001, allowed: criteria"),
@@ -358,3 +358,49 @@ def test_repeated_logs_of_simulate_come_through() -> None:
     assert len(test.cycles) == 3
     assert told["AT"] == pytest.approx(0.0, abs=1e-12)  # one simulation, three times: rounding
     assert told["RT"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_robot_that_overshoots_a_stop_of_a_plan_is_taken_where_it_rests() -> None:
+    Path("rows.csv").write_text("x,y,z,r\n0.3,-0.2,0.3,0\n0.5,-0.2,0.3,0\n0.5,0,0.3,0\n", encoding="utf-8")
+    plan = urmpipe.plan("rows.csv", velocity=0.2, acceleration=2.0)
+    beyond = plan.position.copy()
+    swing = 5e-4 * np.exp(-np.arange(400) / 20.0) * np.sin(np.arange(400) / 6.0)
+    stop = int(np.argmin(np.linalg.norm(beyond - plan.stops[1], axis=1)))
+    rest = np.repeat(plan.stops[1][np.newaxis], 400, axis=0)
+    rest[:, 0] += swing
+    log = np.vstack([beyond[:stop], rest, beyond[stop:]])
+    written(Path("overshoots.csv"), log)
+    test = judged(urmpipe.compare(plan, "overshoots.csv", iso=True))
+    # What swings is down to exp(-10) of 0.5 mm in the second half of the rest of 2 s.
+    assert value(test, "AP", "pose 2") == pytest.approx(0.0, abs=3e-8)
+
+
+def test_cycles_that_never_rest_are_judged_by_their_path(capsys: Captured) -> None:
+    square = along(SQUARE, 0.2, rest=0.0)
+    written(Path("whole.csv"), np.vstack([square[:-1]] * 5))
+    told = answer(capsys, "whole.csv")
+    found = told["iso"]
+    assert isinstance(found, dict)
+    warnings = told["warnings"]
+    assert isinstance(warnings, list)
+    assert found["poses"] == 0
+    assert len(found["cycles"]) == 5
+    assert "no-rests" in [one["kind"] for one in warnings]
+    (at,) = [one["value"] for one in found["criteria"] if (one["name"], one["at"]) == ("AT", None)]
+    assert at == pytest.approx(0.0, abs=1e-12)  # the very places
+
+
+def test_noise_that_is_most_of_fv_is_told(capsys: Captured) -> None:
+    told = answer(capsys, *FILES)["warnings"]
+    assert isinstance(told, list)
+    said = [one["message"] for one in told if one["kind"] == "noisy-speed"]
+    assert len(said) == 1
+    assert said[0].startswith("FV is what noise makes of it: 0.0")
+
+
+@pytest.mark.parametrize("tolerance", ["FOO=1mm", "AV=5mm", "AP=-1mm"])
+def test_a_tolerance_that_is_none_names_the_criteria(tolerance: str, capsys: Captured) -> None:
+    assert iso(*FILES, "--tolerance", tolerance) == 2
+    assert f"--tolerance: found '{tolerance}', allowed: criteria: AP=, RP=" in capsys.readouterr().err
+    assert run(["compare", "square.csv", *FILES, "--tolerance", "FOO=1mm", "-q"]) == 2
+    assert "allowed: a length in m, or axis=" in capsys.readouterr().err

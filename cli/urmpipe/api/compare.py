@@ -181,7 +181,7 @@ def _allowed(tolerance: float | str | Mapping[str, float] | None, *, iso: bool) 
     if tolerance is None:
         return {} if iso else {"axis": DEFAULT_TOLERANCE}
     if isinstance(tolerance, str):
-        return parse_tolerance(tolerance)
+        return parse_tolerance(tolerance, iso=iso)
     return tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
 
 

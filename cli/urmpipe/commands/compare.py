@@ -63,6 +63,7 @@ def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command]
 @click.option(
     "--iso",
     is_flag=True,
+    is_eager=True,  # what a tolerance is of depends on it
     help="The logs are the cycles of a test after ISO 9283, or one log in which the motion repeats: accuracy"
     " and repeatability of poses, paths and speed (docs/iso.md). --tolerance is of criteria then, as"
     " AP=0.4mm,RP=0.1mm,AT=1mm,AV=5%, and has no default.",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import click
 
@@ -32,7 +33,7 @@ def _tolerance(ctx: click.Context, param: click.Parameter, values: tuple[str, ..
     from urmpipe_pipeline.comparison.tolerance import parse_tolerance
 
     text = ",".join(values)
-    parsed(parse_tolerance, text, ctx, param)
+    parsed(partial(parse_tolerance, iso=bool(ctx.params.get("iso"))), text, ctx, param)
     return text
 
 

@@ -34,6 +34,10 @@ FEW = "few-cycles"
 
 TREMBLING = "noise-beyond-band"
 
+NOISY = "noisy-speed"
+
+NO_RESTS = "no-rests"
+
 ENOUGH = {"poses": 30, "paths": 10}
 """Cycles that the standard takes."""
 
@@ -117,6 +121,12 @@ def judge_cycles(
     candidates, told = _candidates(command, done, options)
     marks = marks_of(Command(command, options.targets, options.bends, options.stops, options.planes))
     kept, left_out = _followed(command, marks, candidates, asked.run.name)
+    if not kept and marks.path is not None and len(marks.poses) and options.targets is None:
+        marks = replace(marks, poses=Poses(np.empty((0, 3)), None))
+        kept, others = _followed(command, marks, candidates, asked.run.name)
+        if kept:
+            said = f"no cycle rests where {asked.run.name} does: poses are not judged"
+            left_out = [*others, LogWarning(NO_RESTS, said)]
     if not kept:
         raise LogError(*(one.as_finding() for one in (*told, *left_out)))
     found = measure_criteria(marks, [one for _, one in kept], options.band, tolerance)
@@ -170,6 +180,9 @@ def _candidates(
         rows = [(first - 1, last - 1) for first, last in options.cycles]
         return [_part(side, *one, number) for number, one in enumerate(rows, 1)], []
     seen = find_cycles(command, whole)
+    if not seen.rows and not whole.timed:
+        said = f"found {len(whole)} rows, allowed: {len(command)} for each cycle, as {command.name} has poses"
+        raise LogError(lacking(side.run, said))
     if not seen.rows:
         said = f"found no motion as in {command.name} that returns to its start, allowed: one that repeats it"
         raise LogError(lacking(side.run, said))
@@ -271,9 +284,16 @@ def _few(test: IsoTest) -> Iterator[LogWarning]:
 
 
 def _trembling(cycles: Sequence[_Candidate], test: IsoTest) -> Iterator[LogWarning]:
-    """Yield a warning if the noise of the cycles leaves the band about final poses."""
+    """Yield warnings if noise of the cycles leaves the band about final poses, or is most of FV."""
     noise = float(np.median([one.motion.noise for one in cycles]))
     if any(one.value is not None for one in test.overall if one.name == "PSt") and 3.0 * noise > test.band:
         said = f"PSt and OV are what noise makes of them: {text.quantity(3.0 * noise, 'm')} (three standard"
         said += f" deviations) leaves the band of {text.allowed(test.band)}"
         yield LogWarning(TREMBLING, said, parameter="band")
+    steps = [np.median(np.diff(one.motion.t)) for one in cycles if len(one.motion) > 1]
+    shaken = 6.0 * np.sqrt(2.0) * noise / float(np.median(steps)) if steps else 0.0
+    (spread,) = [one.value for one in test.overall if one.name == "FV"] or [None]
+    if spread is not None and 2.0 * shaken > spread:
+        makes = f"{text.quantity(noise, 'm')} from row to row make about {shaken:.2g} m/s"
+        said = f"FV is what noise makes of it: {makes}"
+        yield LogWarning(NOISY, said)

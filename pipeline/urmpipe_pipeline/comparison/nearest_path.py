@@ -2,70 +2,80 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.row_blocks import row_blocks, side_by_side
+from urmpipe_models.arrays import FloatArray, IndexArray
+from urmpipe_models.row_blocks import THREADS, row_blocks, side_by_side
 
 ACCURACY = (1e-9, 1e-6)
 """What a distance may be too large by: in [m], and as a share of itself. A nanometre beside the path; a log
 a metre away is not judged to less than a micrometre."""
 
-BRANCHES = 8
-"""A run of points or pieces consists of so many shorter ones."""
+BRANCHES = 4
+"""A group of points or pieces consists of so many smaller ones."""
 
 BLOCK = 1 << 12
-"""Points that are worked on together."""
+"""Points that are searched for together."""
 
-PAIRS = 1 << 17
-"""Pairs of runs that are worked on at once: some tens of MB."""
+GROWN = 1 << 15
+"""Points or pieces that are grouped together: what a core's cache holds."""
 
-ENOUGH = 256
-"""Pairs a point, on average over a block, after which the accuracy is let go by a factor of 2, and so on.
+PAIRS = 1 << 16
+"""Pairs of groups that are looked at at once: some MB."""
 
-Only points amid many pieces that are equally near need more, as where a path stands and trembles."""
+GUESS = 0.01
+"""What the first guess may be too large by, as a share: in the middle of a circle the best takes forever."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Runs:
-    """Runs of what follows one another, each as a straight piece and how far it leaves that.
+class _Groups:
+    """Groups of what is near one another in space, each as a straight piece and how far it leaves that.
 
-    The first ones are the points or pieces themselves, then come runs of 8 of them, runs of 64, and so on.
+    The widest groups come first, then those that they consist of, 4 each, and so on; the points or pieces
+    themselves come last. Some stand there twice, so that all groups of a level have equally many.
 
     Attributes:
+        widest: How many groups there are on the first level. Those that group k consists of begin at
+            `widest + BRANCHES * k`.
+        row: Which point or piece each of the last level is.
         start: Where the piece begins in [m], shape (n, 3).
         step: From there to its end in [m], shape (n, 3).
-        spread: No part of the run is further than this from the piece, in [m], shape (n,).
-        slack: Any point of the piece has a part of the run within this, in [m], shape (n,).
-        child: The first of the shorter runs that it consists of, shape (n,).
-        children: How many these are, shape (n,); 0 of a point or piece itself.
-        levels: Where the runs of each length begin, and how many runs there are.
+        spread: No part of the group is further than this from the piece, in [m], shape (n,).
     """
 
+    widest: int
+    row: IndexArray
     start: FloatArray
     step: FloatArray
     spread: FloatArray
-    slack: FloatArray
-    child: NDArray[np.intp]
-    children: NDArray[np.intp]
-    levels: tuple[int, ...]
+
+    @property
+    def single(self) -> int:
+        """Where the points or pieces themselves begin."""
+        return len(self.spread) - len(self.row)
+
+    def parts(self, group: IndexArray) -> IndexArray:
+        """Return what groups consist of, shape (n, 4)."""
+        return self.widest + BRANCHES * group[:, np.newaxis] + np.arange(BRANCHES)
+
+
+_Shape = Callable[[IndexArray], tuple[FloatArray, FloatArray, FloatArray]]
+"""Gives the start, step and spread of groups from the rows in them, shape (groups, rows a group)."""
 
 
 def distance_from_path(points: FloatArray, path: FloatArray, joined: NDArray[np.bool_]) -> FloatArray:
     """Return the distance of points from the nearest point of a path of straight pieces.
 
-    Runs of points, each in a ball, are held against runs of pieces, each about a chord that it leaves by no
-    more than its spread. A pair of them is dropped once it cannot bring a point nearer than what is known of
-    it already, else the longer run is split: branch and bound. Points that follow one another share the work
-    far from the path; a run that is nearly straight, or a ball that is small, is never looked into.
+    Groups of points, each in a ball, are held against groups of pieces, each about a chord that it leaves by
+    no more than its spread. A pair of them is dropped if it cannot bring a point nearer than the first guess,
+    else the wider group is split: branch and bound. Groups are near in space, not in time, so a path that
+    comes by the same place again and again is looked at once there, whole.
 
-    A distance is never too small, and too large by no more than 1 nm and a millionth of itself; where very
-    many pieces are equally near, by a small multiple of that, or by what the path trembles there.
+    A distance is never too small, and too large by no more than 1 nm and a millionth of itself.
 
     Args:
         points: In [m], shape (n, 3), without NaN.
@@ -75,106 +85,158 @@ def distance_from_path(points: FloatArray, path: FloatArray, joined: NDArray[np.
     Returns:
         In [m], shape (n,).
     """
-    pieces = _of_path(path, joined)
-    blocks = row_blocks(len(points), BLOCK)
-    found = side_by_side(lambda rows: _search(_of_points(points[rows]), pieces), blocks)
-    return np.concatenate(found) if found else np.empty(0)
+    return _distances(points, path, joined)[0]
 
 
-def _search(balls: _Runs, pieces: _Runs) -> FloatArray:
-    """Return the distances of the points in some balls from the nearest of some pieces, shape (n,)."""
-    best = np.full(len(balls.spread), np.inf)  # what no point of a ball is further away than
-    ball, piece = (np.arange(*runs.levels[-2:]) for runs in (balls, pieces))
-    waiting = deque([(np.repeat(ball, len(piece)), np.tile(piece, len(ball)))])
-    done, share = 0, ENOUGH * balls.levels[1]
+def _distances(points: FloatArray, path: FloatArray, joined: NDArray[np.bool_]) -> tuple[FloatArray, int]:
+    """Return the distances of points from a path, and how many pairs of groups were looked at for them."""
+    found = np.empty(len(points))
+    if not len(points):
+        return found, 0
+    pieces, balls = _of_path(path, joined), _of_points(points)
+    best = _guess(balls, pieces)
+    blocks = row_blocks(balls.widest, max(1, BLOCK * balls.widest // len(balls.row)))
+    looked = side_by_side(lambda some: _search(balls, pieces, np.arange(some.start, some.stop), best), blocks)
+    found[balls.row] = best[balls.single :]
+    return found, sum(looked)
+
+
+def _guess(balls: _Groups, pieces: _Groups) -> FloatArray:
+    """Return how far each point is from the pieces at the nearest vertex, and the most of each ball."""
+    from scipy.spatial import cKDTree
+
+    start, step = pieces.start[pieces.single :], pieces.step[pieces.single :]
+    once = np.flatnonzero(np.append(True, (start[1:] != start[:-1]).any(axis=1)))  # else rests take forever
+    tree = cKDTree(start[once], balanced_tree=False, compact_nodes=False)
+    points = balls.start[balls.single :]
+    after = once[tree.query(points, eps=GUESS, workers=THREADS)[1]]
+    place = np.empty(len(start), np.intp)
+    place[pieces.row] = np.arange(len(start))
+    before = place[np.maximum(pieces.row[after] - 1, 0)]
+    levels = [np.minimum(*(_distance(points, start[one], step[one]) for one in (after, before)))]
+    while len(levels[-1]) > balls.widest:
+        levels.append(levels[-1].reshape(-1, BRANCHES).max(axis=1))
+    return np.concatenate(levels[::-1])
+
+
+def _search(balls: _Groups, pieces: _Groups, widest: IndexArray, best: FloatArray) -> int:
+    """Lessen the best of the points in some of the widest balls; return how many pairs were looked at."""
+    looked = 0
+    waiting = [(np.repeat(widest, pieces.widest), np.tile(np.arange(pieces.widest), len(widest)))]
     while waiting:
-        ball, piece = waiting.popleft()  # the widest first: they tell most
-        done += len(ball)
-        distance = _distance(balls.start[ball], pieces.start[piece], pieces.step[piece])
-        np.minimum.at(best, ball, distance + pieces.slack[piece] + balls.spread[ball])
-        most = best[ball]
-        accuracy = (ACCURACY[0] + ACCURACY[1] * most) * 2.0 ** (done // share)
-        open_ = distance - pieces.spread[piece] - balls.spread[ball] < most - accuracy
-        waiting += _split(balls, pieces, ball[open_], piece[open_], best)
-    for k in range(len(balls.levels) - 2, 0, -1):  # what holds for a ball holds for the points in it
-        low, high, top = balls.levels[k - 1 : k + 2]
-        best[low:high] = np.minimum(best[low:high], np.repeat(best[high:top], BRANCHES)[: high - low])
-    return best[: balls.levels[1]]
+        ball, piece = waiting.pop()  # the narrowest first: few wait then
+        looked += len(ball)
+        points = balls.start.take(ball, axis=0)  # take: several times as fast as [...]
+        distance = _distance(points, pieces.start.take(piece, axis=0), pieces.step.take(piece, axis=0))
+        single = np.flatnonzero((ball >= balls.single) & (piece >= pieces.single))
+        np.minimum.at(best, ball[single], distance[single])
+        around, beside = balls.spread.take(ball), pieces.spread.take(piece)
+        least, most = distance - beside - around, best.take(ball)
+        open_ = np.flatnonzero(least < most - (ACCURACY[0] + ACCURACY[1] * most))
+        waiting += _split(balls, pieces, ball.take(open_), piece.take(open_))
+    return looked
 
 
 def _split(
-    balls: _Runs, pieces: _Runs, ball: NDArray[np.intp], piece: NDArray[np.intp], best: FloatArray
-) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Return pairs with the wider run of each split, some at a time; parts of a ball begin with its best."""
-    of_piece = (pieces.spread[piece] >= balls.spread[ball]) | (balls.children[ball] == 0)
-    of_piece &= pieces.children[piece] > 0
-    parts = np.where(of_piece, pieces.children[piece], balls.children[ball])
-    first = np.where(of_piece, pieces.child[piece], balls.child[ball])
-    part = np.arange(parts.sum()) + np.repeat(first - np.cumsum(parts) + parts, parts)
-    of_piece, ball, piece = (np.repeat(one, parts) for one in (of_piece, ball, piece))
-    of_ball = ~of_piece
-    np.minimum.at(best, part[of_ball], best[ball[of_ball]])
-    ball, piece = np.where(of_piece, ball, part), np.where(of_piece, part, piece)
-    return [
-        (ball[start : start + PAIRS], piece[start : start + PAIRS]) for start in range(0, len(ball), PAIRS)
-    ]
+    balls: _Groups, pieces: _Groups, ball: IndexArray, piece: IndexArray
+) -> list[tuple[IndexArray, IndexArray]]:
+    """Return pairs with the wider group of each split, some at a time; pairs of single ones are done with."""
+    of_piece = (pieces.spread[piece] >= balls.spread[ball]) | (ball >= balls.single)
+    of_piece &= piece < pieces.single
+    of_ball = ~of_piece & (ball < balls.single)
+    parts, whole = pieces.parts(piece[of_piece]), balls.parts(ball[of_ball])
+    ball = np.append(np.repeat(ball[of_piece], BRANCHES), whole)
+    piece = np.append(parts, np.repeat(piece[of_ball], BRANCHES))
+    return [(ball[some], piece[some]) for some in row_blocks(len(ball), PAIRS)]
 
 
-def _of_points(points: FloatArray) -> _Runs:
-    """Return runs of points: each a ball about the middle of what it spans."""
-    levels = []
-    for first, run in _levels(len(points)):
-        middle = (np.minimum.reduceat(points, first) + np.maximum.reduceat(points, first)) / 2.0
-        spread = np.maximum.reduceat(np.linalg.norm(points - middle[run], axis=1), first)
-        levels.append((middle, np.zeros_like(middle), spread, spread))
-    return _runs(levels)
+def _of_points(points: FloatArray) -> _Groups:
+    """Return groups of points: each a ball about their mean."""
+
+    def ball(rows: IndexArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        middle, out = _centred(points.take(rows, axis=0))
+        return middle, np.zeros_like(middle), _farthest(out)
+
+    return _grouped(points, ball)
 
 
-def _of_path(path: FloatArray, joined: NDArray[np.bool_]) -> _Runs:
-    """Return runs of the pieces of a path; a vertex that is not joined to the next is a piece without length.
+def _of_path(path: FloatArray, joined: NDArray[np.bool_]) -> _Groups:
+    """Return groups of the pieces of a path; a vertex that is not joined to the next is one without length.
 
-    A run of joined pieces crosses every plane across its chord: no point of that is further from the run than
-    its spread. Where a joint is missing, the vertex that the run begins with is as near as the chord is long.
+    The chord of a group is along what its ends spread most; the distance from a chord is convex, so no part
+    of a piece is further from it than one of its ends.
     """
     known: NDArray[np.bool_] = np.asarray(np.isfinite(path).all(axis=1))
-    vertex, linked = path[known], np.append(joined & known[1:] & known[:-1], False)[known]
-    end = len(vertex) - 1
-    inner = np.append(linked[:-1], True)
-    levels = []
-    for first, run in _levels(len(vertex)):
-        single = len(first) == len(vertex)
-        last = np.where(linked, first + 1, first) if single else np.append(first[1:], end)
-        start, step = vertex[first], vertex[last] - vertex[first]
-        spread = np.maximum.reduceat(_distance(vertex, start[run], step[run]), first)
-        whole = np.logical_and.reduceat(inner, first) | single
-        levels.append((start, step, spread, np.where(whole, spread, np.linalg.norm(step, axis=1))))
-    return _runs(levels)
+    start, linked = path[known], np.append(joined & known[1:] & known[:-1], False)[known]
+    step = np.zeros_like(start)
+    np.subtract(start[1:], start[:-1], out=step[:-1], where=linked[:-1, np.newaxis])
+
+    def chord(rows: IndexArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        if rows.shape[1] == 1:
+            return start[rows[:, 0]], step[rows[:, 0]], np.zeros(len(rows))
+        first = start.take(rows, axis=0)
+        middle, out = _centred(np.concatenate((first, first + step.take(rows, axis=0)), axis=1))
+        axis = _main_axis(out)
+        along = out @ axis
+        low, high = (axis[:, :, 0] * end(along, axis=1) for end in (np.min, np.max))
+        out -= along * axis.transpose(0, 2, 1)
+        return middle + low, high - low, _farthest(out)
+
+    return _grouped(start + step / 2.0, chord)
 
 
-def _levels(count: int) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    """Yield where runs of 1, 8, 64, ... of so many begin and which run each belongs to, up to a few runs."""
-    row: NDArray[np.intp] = np.arange(count)
-    length = 1
-    while True:
-        yield row[::length], row // length
-        if -(-count // length) <= BRANCHES:
-            return
-        length *= BRANCHES
-
-
-def _runs(levels: Sequence[tuple[FloatArray, FloatArray, FloatArray, FloatArray]]) -> _Runs:
-    """Return the runs of all lengths, the shortest first, each with where its parts stand."""
-    sizes = [len(level[0]) for level in levels]
-    begins = np.concatenate(([0], np.cumsum(sizes)))
-    child, children = [np.zeros(sizes[0], np.intp)], [np.zeros(sizes[0], np.intp)]
-    for begin, size, shorter in zip(begins, sizes[1:], sizes, strict=False):
-        parts = np.arange(size) * BRANCHES
-        child.append(begin + parts)
-        children.append(np.minimum(BRANCHES, shorter - parts))
-    start, step, spread, slack = (np.concatenate(parts) for parts in zip(*levels, strict=True))
-    return _Runs(
-        start, step, spread, slack, np.concatenate(child), np.concatenate(children), tuple(begins.tolist())
+def _grouped(middle: FloatArray, shape: _Shape) -> _Groups:
+    """Return groups of what has its middles there, shape (n, 3): the widest split in 4 again and again."""
+    size = 1
+    while -(-len(middle) // size) > BRANCHES**2:
+        size *= BRANCHES
+    widest = -(-len(middle) // size)
+    rows = _apart(middle, np.resize(np.arange(len(middle)), (1, widest * size)), widest)
+    count = widest * (size * BRANCHES - 1) // (BRANCHES - 1)
+    groups = _Groups(
+        widest, np.empty(rows.size, np.intp), np.empty((count, 3)), np.empty((count, 3)), np.empty(count)
     )
+
+    def grow(some: slice) -> None:
+        level, first = rows[some], some.start
+        while True:
+            at = slice(first, first + len(level))
+            groups.start[at], groups.step[at], groups.spread[at] = shape(level)
+            if level.shape[1] == 1:
+                groups.row[first - groups.single :][: len(level)] = level[:, 0]
+                return
+            level, first = _apart(middle, level, BRANCHES), widest + BRANCHES * first
+
+    side_by_side(grow, row_blocks(widest, max(1, GROWN // size)))
+    return groups
+
+
+def _apart(middle: FloatArray, rows: IndexArray, parts: int) -> IndexArray:
+    """Return the rows of groups, shape (k, n), in so many equal parts each, across what they spread most."""
+    size = rows.shape[1] // parts
+    if size > 1:
+        out = _centred(middle.take(rows, axis=0))[1]
+        along = (out @ _main_axis(out))[:, :, 0]
+        order = np.argpartition(along, np.arange(1, parts) * size, axis=1)
+        rows = np.take_along_axis(rows, order, axis=1)
+    return rows.reshape(-1, size)
+
+
+def _centred(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the mean of the points in each group, and them seen from there, in place; shape (k, n, 3)."""
+    mean = np.einsum("kni->ki", points) / points.shape[1]  # several times as fast as np.mean
+    points -= mean[:, np.newaxis]
+    return mean, points
+
+
+def _main_axis(out: FloatArray) -> FloatArray:
+    """Return the direction in which points spread most, shape (k, 3, 1); they are of shape (k, n, 3)."""
+    return np.asarray(np.linalg.eigh(out.transpose(0, 2, 1) @ out)[1][:, :, -1:])
+
+
+def _farthest(out: FloatArray) -> FloatArray:
+    """Return the greatest length in each group of vectors, shape (k,); they are of shape (k, n, 3)."""
+    return np.asarray(np.sqrt(np.einsum("kni,kni->kn", out, out).max(axis=1)))
 
 
 def _distance(points: FloatArray, start: FloatArray, step: FloatArray) -> FloatArray:

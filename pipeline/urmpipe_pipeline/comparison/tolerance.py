@@ -57,7 +57,12 @@ DECIMAL_COMMA = re.compile(r"\s*[0-9]+,[0-9]+\s*[a-z]*\s*")
 
 
 def parse_tolerance(
-    text: str, parameter: str = "tolerance", bare: Sequence[str] = ("axis",), *, zero: bool = False
+    text: str,
+    parameter: str = "tolerance",
+    bare: Sequence[str] = ("axis",),
+    *,
+    zero: bool = False,
+    iso: bool = False,
 ) -> dict[str, float]:
     """Return what is allowed in [m] and [rad] by kind, from "0.0035", "3.5mm" or "axis=3.5mm,angle=0.5deg".
 
@@ -66,6 +71,7 @@ def parse_tolerance(
         parameter: The keyword that gave it, for messages.
         bare: The kinds that a length without a name is for.
         zero: Whether 0 is allowed.
+        iso: Whether criteria after ISO 9283 are judged: messages name them.
 
     Raises:
         OptionError: With everything that is wrong.
@@ -85,7 +91,8 @@ def parse_tolerance(
             of_what = ("angle", "joint") if angle else ()
             hints = tuple(Hint(parameter, f"{one}={part.strip()}", "says of what") for one in of_what)
             said = f"{shown(part.strip())}{twice}"
-            faults.append(Finding(parameter=parameter, found=said, allowed=ALLOWED, hints=hints))
+            allowed = ALLOWED_CRITERIA if iso else ALLOWED
+            faults.append(Finding(parameter=parameter, found=said, allowed=allowed, hints=hints))
             continue
         named.update(kinds)
         found |= dict.fromkeys(kinds, number)

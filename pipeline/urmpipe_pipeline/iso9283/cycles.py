@@ -13,7 +13,7 @@ from urmpipe_models.errors import Finding, OptionError
 from urmpipe_pipeline.iso9283.likeness import ALIKE, apart, outline
 from urmpipe_pipeline.iso9283.motion import Motion
 
-AT_START = 0.05
+AT_START = 0.1
 """A motion is at the start of a command within this share of its extent ..."""
 
 AWAY = 2.0

@@ -168,11 +168,16 @@ def measure(
 def _every(found: Sequence[Found], cycles: int, tolerance: Mapping[str, float]) -> Iterator[Criterion]:
     """Yield each criterion over all, then where it is."""
     for name in UNITS:
-        own = [(at, value) for other, at, value in found if other == name]
+        own = [(at, _finite(value)) for other, at, value in found if other == name]
         known = [value for _, value in own if value is not None]
         if own:
             yield judged(name, None, max(known, key=abs, default=None), cycles, tolerance)
             yield from (judged(name, at, value, cycles, tolerance) for at, value in own)
+
+
+def _finite(value: float | None) -> float | None:
+    """Return a value; None for one that is none: a still pose without a command."""
+    return value if value is not None and np.isfinite(value) else None
 
 
 def _attained(marks: Marks, cycles: Sequence[Followed]) -> AttainedPoses:

