@@ -15,13 +15,14 @@ import urmpipe
 from driven_paths import joint_log
 from panda_log import panda
 from rail_arm import rail_arm
-from repeated import along, judged, logs, overall, value, written
+from repeated import PLACE, along, judged, logs, overall, value, written
 from repeated import told as told_by
 from urmpipe.main import run
 from urmpipe_fmus.native import native_missing
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.orientation import quaternions
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.results import read_recording
@@ -404,3 +405,34 @@ def test_a_tolerance_that_is_none_names_the_criteria(tolerance: str, capsys: Cap
     assert f"--tolerance: found '{tolerance}', allowed: criteria: AP=, RP=" in capsys.readouterr().err
     assert run(["compare", "square.csv", *FILES, "--tolerance", "FOO=1mm", "-q"]) == 2
     assert "allowed: a length in m, or axis=" in capsys.readouterr().err
+
+
+TURNED = (*PLACE, "qx", "qy", "qz", "qw")
+
+
+def turned_square(ry: float) -> FloatArray:
+    """Return the square with a tool that is turned by ry in [rad], shape (n, 7)."""
+    square = along(SQUARE, 0.2)
+    quat = quaternions(np.array([[0.2, ry, 0.1]]), "zyx")
+    return np.column_stack([square, np.tile(quat, (len(square), 1))])
+
+
+@pytest.mark.parametrize(("ry", "kinds"), [(1.0, []), (1.55, ["euler-singular"])])
+def test_angles_that_are_not_separately_defined_are_told(
+    ry: float, kinds: list[str], capsys: Captured
+) -> None:
+    written(Path("square.csv"), turned_square(ry), names=TURNED)
+    logs(Path(), [turned_square(ry)] * 2, TURNED)
+    told = answer(capsys, "cycle1.csv", "cycle2.csv")["warnings"]
+    assert isinstance(told, list)
+    assert [one["kind"] for one in told if one["kind"] != "few-cycles"] == kinds
+
+
+def test_a_cycle_without_orientation_is_told(capsys: Captured) -> None:
+    written(Path("square.csv"), turned_square(1.0), names=TURNED)
+    logs(Path(), [turned_square(1.0)] * 2, TURNED)
+    told = answer(capsys, "cycle1.csv", "cycle2.csv", "cycle3.csv")
+    warnings = told["warnings"]
+    assert isinstance(warnings, list)
+    said = [one["message"] for one in warnings if one["kind"] == "no-orientation"]
+    assert said == ["no angle is judged: cycle3 has no orientation"]

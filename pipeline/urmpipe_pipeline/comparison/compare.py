@@ -180,7 +180,8 @@ def _test(asked: Side, done: Sequence[Side], options: CompareOptions) -> Compari
         told = [*(one.of(runs[0].name) for one in runs[0].warnings), *told]
     assumed = _taken_for_granted(reference, runs, options)
     made = _comparison(found.command, found.deviations, options, told, assumed)
-    return replace(made, name=f"{runs[0].name}-against-{reference.name}", iso=found.test)
+    log = f"{runs[0].name}-" if len(runs) == 1 else ""
+    return replace(made, name=f"{log}against-{reference.name}", iso=found.test)
 
 
 def _side(run: Run, tcp: Tcp, *, alone: bool) -> Side:

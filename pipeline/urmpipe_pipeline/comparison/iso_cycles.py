@@ -23,7 +23,9 @@ from urmpipe_pipeline.iso9283.measure import measure as measure_criteria
 from urmpipe_pipeline.iso9283.motion import Motion, motion_of
 from urmpipe_pipeline.iso9283.poses import Poses
 from urmpipe_pipeline.iso9283.result import Cycle, IsoTest
+from urmpipe_pipeline.iso9283.spread import angles
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.runs.ingest import EULER_SINGULAR
 from urmpipe_pipeline.runs.part import part_of
 
 UNLIKE = "sync-unlike"
@@ -37,6 +39,9 @@ TREMBLING = "noise-beyond-band"
 NOISY = "noisy-speed"
 
 NO_RESTS = "no-rests"
+
+UPRIGHT = np.radians(85.0)
+"""Where ry goes beyond this in [rad], rz and rx are known twelve times worse than the orientation."""
 
 ENOUGH = {"poses": 30, "paths": 10}
 """Cycles that the standard takes."""
@@ -140,7 +145,8 @@ def judge_cycles(
     deviations = tuple(
         _deviation(asked, one.side, clock) for (one, _), clock in zip(kept, clocks, strict=True)
     )
-    doubts = [*_few(test), *_trembling([one for one, _ in kept], test)]
+    motions = [one.motion for one, _ in kept]
+    doubts = [*_few(test), *_trembling(motions, test), *_angles(command, motions, test)]
     return JudgedCycles(asked.trajectory, deviations, test, (*told, *left_out, *doubts))
 
 
@@ -283,14 +289,28 @@ def _few(test: IsoTest) -> Iterator[LogWarning]:
         yield LogWarning(FEW, f"{text.counted(count, 'cycle')}; ISO 9283 takes {' and '.join(few)}")
 
 
-def _trembling(cycles: Sequence[_Candidate], test: IsoTest) -> Iterator[LogWarning]:
+def _angles(command: Motion, cycles: Sequence[Motion], test: IsoTest) -> Iterator[LogWarning]:
+    """Yield warnings if angles are not told, or not separately defined."""
+    lacks = [one.name for one in cycles if one.quat_xyzw is None]
+    if command.quat_xyzw is None:
+        return
+    if 0 < len(lacks) < len(cycles):
+        said = f"no angle is judged: {lacks[0]} has no orientation"
+        yield LogWarning("no-orientation", said)
+    told = any(one.name in ("AP_rz", "AT_rz") for one in test.overall)
+    if told and float(np.abs(angles(command.quat_xyzw)[:, 1]).max()) > UPRIGHT:
+        said = "ry of the reference is near +-90 deg: rz and rx are not separately defined there"
+        yield LogWarning(EULER_SINGULAR, f"{said}, and their criteria grow")
+
+
+def _trembling(cycles: Sequence[Motion], test: IsoTest) -> Iterator[LogWarning]:
     """Yield warnings if noise of the cycles leaves the band about final poses, or is most of FV."""
-    noise = float(np.median([one.motion.noise for one in cycles]))
+    noise = float(np.median([one.noise for one in cycles]))
     if any(one.value is not None for one in test.overall if one.name == "PSt") and 3.0 * noise > test.band:
         said = f"PSt and OV are what noise makes of them: {text.quantity(3.0 * noise, 'm')} (three standard"
         said += f" deviations) leaves the band of {text.allowed(test.band)}"
         yield LogWarning(TREMBLING, said, parameter="band")
-    steps = [np.median(np.diff(one.motion.t)) for one in cycles if len(one.motion) > 1]
+    steps = [np.median(np.diff(one.t)) for one in cycles if len(one) > 1]
     shaken = 6.0 * np.sqrt(2.0) * noise / float(np.median(steps)) if steps else 0.0
     (spread,) = [one.value for one in test.overall if one.name == "FV"] or [None]
     if spread is not None and 2.0 * shaken > spread:
