@@ -436,3 +436,10 @@ def test_a_cycle_without_orientation_is_told(capsys: Captured) -> None:
     assert isinstance(warnings, list)
     said = [one["message"] for one in warnings if one["kind"] == "no-orientation"]
     assert said == ["no angle is judged: cycle3 has no orientation"]
+
+
+def test_where_a_closed_cycle_starts_it_attains_nothing() -> None:
+    done = along(SQUARE, 0.2)
+    done[-100:, 2] += 3e-4  # it starts in the pose, and comes back beside it
+    written(Path("back.csv"), done)
+    assert value(told_by(Path("square.csv"), Path("back.csv")), "AP") == pytest.approx(3e-4, abs=1e-12)
