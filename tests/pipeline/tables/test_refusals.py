@@ -34,7 +34,7 @@ def said(kind: type[UrmpipeError], work: Callable[[], Any]) -> str:
 def test_options_that_make_no_sense() -> None:
     options: Any = ExportOptions
     assert said(OptionError, lambda: options("xlsx")) == "--to: found xlsx, allowed: csv, parquet, mat, tum"
-    rows = "grid, file, velocities, samples"
+    rows = "grid, file, velocities, samples, criteria"
     assert said(OptionError, lambda: options("csv", "own")) == f"--rows: found own, allowed: {rows}"
     assert said(OptionError, lambda: options("tum", None, "ik")) == "--tcp: found ik, allowed: fk, recorded"
     assert said(OptionError, lambda: options("csv", tcp="fk")) == (
