@@ -95,7 +95,9 @@ class _View:
         """Return the round values that have a number, in [mm], on an axis with its zero at a share of it."""
         least = 1e3 * TICKS_PX / self.pixels
         power = 10.0 ** math.floor(math.log10(least))
-        step = next(digit * power for digit in (1.0, 2.0, 5.0, 10.0) if digit * power >= least * (1.0 - 1e-9))
+        step = next(
+            digit * power for digit in (1.0, 2.0, 2.5, 5.0, 10.0) if digit * power >= least * (1.0 - 1e-9)
+        )
         low, high = (
             math.floor(2e3 * self.half * share / step * (1.0 - 1e-9)) for share in (origin, 1.0 - origin)
         )
