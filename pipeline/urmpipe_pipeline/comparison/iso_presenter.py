@@ -11,9 +11,8 @@ from urmpipe_pipeline.assumptions import assuming
 from urmpipe_pipeline.comparison.baseline_section import baseline_section, criterion_checks, worse_facts
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.comparison.iso_scene import iso_scene
-from urmpipe_pipeline.iso9283.criteria import Criterion
+from urmpipe_pipeline.iso9283.criteria import Criterion, overall_verdict
 from urmpipe_pipeline.iso9283.drawings import corner_drawing, pose_drawing
 from urmpipe_pipeline.iso9283.figures import deviation_figure, path_figure, speed_figure
 from urmpipe_pipeline.iso9283.result import CutPath, IsoTest
@@ -199,19 +198,13 @@ def _section(
     )  # fmt: skip
     return Section(
         part,
-        _verdict(criteria),
+        overall_verdict(one.verdict for one in criteria),
         (*first, *facts),
         tuple(tables),
         blocks=blocks,
         checks=tuple(_checks(test, criteria)),
         properties={one.name: one.value for one in criteria if one.value is not None},
     )
-
-
-def _verdict(criteria: Iterable[Criterion]) -> Verdict | None:
-    """Return fail if one of some criteria fails, pass if one is judged, else None."""
-    verdicts = {one.verdict for one in criteria} - {None}
-    return None if not verdicts else "fail" if "fail" in verdicts else "pass"
 
 
 def _checks(test: IsoTest, criteria: Iterable[Criterion]) -> Iterator[Check]:

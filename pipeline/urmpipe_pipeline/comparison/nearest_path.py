@@ -154,6 +154,7 @@ def _of_points(points: FloatArray) -> _Groups:
     """Return groups of points: each a ball about their mean."""
 
     def ball(rows: IndexArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the balls about the points in each group."""
         middle, out = _centred(points.take(rows, axis=0))
         return middle, np.zeros_like(middle), _farthest(out)
 
@@ -172,6 +173,7 @@ def _of_path(path: FloatArray, joined: NDArray[np.bool_]) -> _Groups:
     np.subtract(start[1:], start[:-1], out=step[:-1], where=linked[:-1, np.newaxis])
 
     def chord(rows: IndexArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the chords of the pieces in each group."""
         if rows.shape[1] == 1:
             return start[rows[:, 0]], step[rows[:, 0]], np.zeros(len(rows))
         first = start.take(rows, axis=0)
@@ -198,6 +200,7 @@ def _grouped(middle: FloatArray, shape: _Shape) -> _Groups:
     )
 
     def grow(some: slice) -> None:
+        """Split some of the widest groups, down to what they consist of."""
         level, first = rows[some], some.start
         while True:
             at = slice(first, first + len(level))

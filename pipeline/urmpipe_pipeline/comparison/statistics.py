@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline.comparison.deviation import Kind, Statistics, Verdict
 from urmpipe_pipeline.comparison.tolerance import allowed_for
+from urmpipe_pipeline.iso9283.criteria import overall_verdict
 
 UNCHANGING = 1e-9
 """A quantity with a smaller standard deviation, in [m] or [m/s], does not change: logs print nothing finer
@@ -81,8 +82,7 @@ def describe(
 
 def overall(statistics: Iterable[Statistics]) -> Verdict | None:
     """Return fail if any quantity fails; None if none has a tolerance."""
-    verdicts = {one.verdict for one in statistics} - {None}
-    return None if not verdicts else "fail" if "fail" in verdicts else "pass"
+    return overall_verdict(one.verdict for one in statistics)
 
 
 def correlation(first: FloatArray, second: FloatArray) -> float | None:

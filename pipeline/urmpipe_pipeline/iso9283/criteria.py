@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -60,6 +60,14 @@ class Criterion:
         if self.tolerance is None or self.value is None:
             return None
         return abs(self.value) / self.tolerance
+
+
+def overall_verdict(
+    verdicts: Iterable[Literal["pass", "fail"] | None],
+) -> Literal["pass", "fail"] | None:
+    """Return fail if one of some verdicts is, else pass if there is one; None if nothing was judged."""
+    known = set(verdicts) - {None}
+    return None if not known else "fail" if "fail" in known else "pass"
 
 
 def judged(

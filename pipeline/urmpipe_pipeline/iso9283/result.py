@@ -10,7 +10,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.iso9283.corners import CornerPath
-from urmpipe_pipeline.iso9283.criteria import Criterion
+from urmpipe_pipeline.iso9283.criteria import Criterion, overall_verdict
 from urmpipe_pipeline.iso9283.speeds import LegSpeed
 
 
@@ -127,8 +127,7 @@ class IsoTest:
     @property
     def verdict(self) -> Literal["pass", "fail"] | None:
         """Fail if a criterion is out of its tolerance; None if none has one."""
-        verdicts = {one.verdict for one in self.overall} - {None}
-        return None if not verdicts else "fail" if "fail" in verdicts else "pass"
+        return overall_verdict(one.verdict for one in self.overall)
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield one row a criterion and place, as JSON has it."""
