@@ -1,0 +1,1 @@
+"""Kinematic networks: bodies, joints, constraint elements and controls; graph, assembly, mobility."""
