@@ -1,0 +1,158 @@
+"""What was found of a network: how it hangs together, its assemblies, what does not close, what moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from urmpipe_models.display import line_of, number_of
+from urmpipe_models.networks.findings import Assembly, Gap, Mobility
+from urmpipe_models.networks.graph import Structure
+from urmpipe_models.networks.network import Network
+from urmpipe_models.spelling import Voice
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.presentation.result import Result
+from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.runs.results import SCHEMA
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class NetworkResult(Result):
+    """What was found of a network.
+
+    Attributes:
+        name: What the network is called.
+        network: The network.
+        command: Whether it was checked or solved: what `to_dict` tells.
+        structure: tree, loops or closed chain.
+        loops: Names of the joints and elements of each loop.
+        clusters: Names of the bodies of each part that joints hold together.
+        assemblies: Where everything closes, the nearest to the start first; none if nothing was found.
+        nearest: The configuration that comes nearest to closing where nothing closes; else None.
+        gaps: What does not close there, the largest first.
+        mobility: Of the first assembly; None without.
+        every: Whether all assemblies were requested.
+        tried: How many starts were tried.
+        reason: Why the search ended.
+        warnings: What a person should know.
+        provenance: How to repeat it.
+        recording: Where it was written.
+    """
+
+    name: str
+    network: Network
+    command: Literal["check", "solve"]
+    structure: Structure
+    loops: tuple[tuple[str, ...], ...]
+    clusters: tuple[tuple[str, ...], ...]
+    assemblies: tuple[Assembly, ...]
+    nearest: Assembly | None
+    gaps: tuple[Gap, ...]
+    mobility: Mobility | None
+    every: bool
+    tried: int
+    reason: str
+    warnings: tuple[LogWarning, ...]
+    provenance: Provenance
+    recording: Path | None = field(default=None, metadata={"stored": False})
+
+    @property
+    def verdict(self) -> Literal["pass", "fail"]:
+        """Pass if it was assembled."""
+        return "pass" if self.assemblies else "fail"
+
+    @property
+    def residual(self) -> float:
+        """The largest gap of the first assembly, or of what comes nearest, in [m] and [rad]."""
+        shown = self.assemblies[0] if self.assemblies else self.nearest
+        return 0.0 if shown is None else shown.residual
+
+    def _headline(self) -> str:
+        """Return its verdict, what it is and how much of it moves, and how many assemblies there are."""
+        found = number_of(len(self.assemblies), "assembly").replace("assemblys", "assemblies")
+        moves = self.mobility and f"{self.mobility.kind} of mobility {self.mobility.mobility}"
+        return line_of(self.name, self.verdict, self.structure, moves, found)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return one row an assembly: its variables in [m] and [rad], residual and mobility.
+
+        A variable of several values has a column for each, numbered from 1.
+        """
+        import pandas as pd
+
+        rows = [
+            {"assembly": number, **_flat(one.values), "residual": one.residual, "mobility": one.mobility}
+            for number, one in enumerate(self.assemblies, 1)
+        ]
+        return pd.DataFrame(rows, columns=None if rows else ["assembly", "residual", "mobility"])
+
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+        """Return the object that `urmpipe network check --json` or `network solve --json` prints."""
+        return self._checked(voice) if self.command == "check" else self._solved(voice)
+
+    def _checked(self, voice: Voice) -> dict[str, Any]:
+        """Return what a check found; what only an assembly has is None without one."""
+        moves = self.mobility
+        return {
+            "schema": SCHEMA,
+            "name": self.name,
+            "kind": moves and moves.kind,
+            "structure": self.structure,
+            "bodies": len(self.network.body_names),
+            "variables": moves and moves.variables,
+            "mobility": moves and moves.mobility,
+            "kutzbach": moves and moves.kutzbach,
+            "loops": [list(loop) for loop in self.loops],
+            "clusters": [list(cluster) for cluster in self.clusters],
+            "redundant": [
+                {"joint": one.joint, "constraint": one.constraint} for one in (moves.redundant if moves else ())
+            ],
+            "idle": list(moves.idle) if moves else [],
+            "special": moves and moves.special,
+            "residual": self.residual,
+            "gaps": [
+                {"name": one.name, "loop": list(one.loop), "m": one.metres, "rad": one.radians}
+                for one in self.gaps
+            ],
+            "warnings": [one.to_dict(voice) for one in self.warnings],
+            "output": str(self.recording) if self.recording else None,
+        }
+
+    def _solved(self, voice: Voice) -> dict[str, Any]:
+        """Return the assemblies, or how far from closing it is."""
+        return {
+            "schema": SCHEMA,
+            "name": self.name,
+            "assemblies": [
+                {
+                    "variables": {
+                        name: values[0] if len(values) == 1 else list(values)
+                        for name, values in one.values.items()
+                    },
+                    "residual": one.residual,
+                    "mobility": one.mobility,
+                }
+                for one in self.assemblies
+            ],
+            "restarts": max(self.tried - 1, 0),
+            "reason": self.reason,
+            "gaps": [
+                {"name": one.name, "loop": list(one.loop), "m": one.metres, "rad": one.radians}
+                for one in self.gaps
+            ],
+            "warnings": [one.to_dict(voice) for one in self.warnings],
+            "output": str(self.recording) if self.recording else None,
+        }
+
+
+def _flat(values: dict[str, tuple[float, ...]]) -> dict[str, float]:
+    """Return a value a name: of several of one owner numbered from 1."""
+    return {
+        name if len(some) == 1 else f"{name}_{k}": value
+        for name, some in values.items()
+        for k, value in enumerate(some, 1)
+    }
