@@ -101,7 +101,9 @@ def _refuse(node: ast.expr, text: str, depth: int) -> None:
             parts = args
         case _:
             found = ast.get_source_segment(text.strip(), node) or text
-            hint = "; a power is **" if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor) else ""
+            hint = (
+                "; a power is **" if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor) else ""
+            )
             raise ValueError(f"found {shown(found)}, no arithmetic; allowed: {ALLOWED}{hint}")
     for part in parts:
         _refuse(part, text, depth + 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TypeAlias
 
 from urmpipe_models.elementwise import ZERO, Element, Vector, add, cross, scale
@@ -12,6 +12,13 @@ from urmpipe_models.transform import Transform, rotation_y, translation
 
 Screws: TypeAlias = list[tuple[Vector, Vector]]
 """Of each value the angular velocity [rad] and the velocity [m] of the point at the ground's origin a unit of it."""
+
+
+AXES = ("m", "n", "m x n")
+"""What the directions of a joint's frame are called."""
+
+TURNING, SLIDING = ("revolute", "cylindrical", "helical"), ("prismatic", "cylindrical")
+"""The kinds that turn about n, and those that slide along it, whatever else they do."""
 
 
 def joint_frame(joint: Joint, values: Sequence[Element]) -> Transform:
@@ -62,6 +69,31 @@ def joint_screws(joint: Joint, values: Sequence[Element], at: Transform) -> Scre
     return _user_screws(values, at)
 
 
+def forbidden(
+    joint: Joint, values: Sequence[Element], at: Transform
+) -> Iterator[tuple[str, tuple[Vector, Vector]]]:
+    """Yield what a joint does not let its bodies do: in words, and as a twist in the ground.
+
+    Turns about and shifts along the axes m, n and m x n of its frame that none of its variables makes, and
+    what its driven variables would do.
+
+    Args:
+        joint: The joint.
+        values: As in `joint_frame`.
+        at: The frame a of the first body in the ground.
+    """
+    origin = (at @ joint_frame(joint, values)).translation
+    for k, name in enumerate(AXES):
+        axis = at.columns[k]
+        if not (joint.kind == "global" or (k == 1 and joint.kind in TURNING)):
+            yield f"rotation about {name}", (axis, cross(origin, axis))
+        if not (k == 1 and joint.kind in SLIDING):
+            yield f"translation along {name}", (ZERO, axis)
+    for drive, screw in zip(joint.drives, joint_screws(joint, values, at), strict=False):
+        if drive is not None:
+            yield "drive", screw
+
+
 def _user_screws(values: Sequence[Element], at: Transform) -> Screws:
     """Return the twists of the nine entries of a user joint.
 
@@ -88,5 +120,3 @@ _AXES: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 
 
 def _three(values: Sequence[Element], first: int) -> Vector:
     return values[first], values[first + 1], values[first + 2]
-
-

@@ -14,7 +14,7 @@ from urmpipe_models.arrays import FloatArray, IndexArray
 from urmpipe_models.elementwise import Element, Vector, add, cross, dot, scale, subtract
 from urmpipe_models.networks.expressions import Expression, Slopes
 from urmpipe_models.networks.graph import Branch, Graph, graph_of
-from urmpipe_models.networks.joint_motion import Screws, joint_frame, joint_screws
+from urmpipe_models.networks.joint_motion import Screws, forbidden, joint_frame, joint_screws
 from urmpipe_models.networks.network import (
     POSE_UNITS,
     ConstraintElement,
@@ -25,6 +25,10 @@ from urmpipe_models.networks.network import (
 from urmpipe_models.networks.rotations import rotation_of, turning_of, untwisted
 from urmpipe_models.orientation import quaternions, rotation_vectors
 from urmpipe_models.transform import Transform
+
+
+MEASURES = {"gg": "length", "eg": "height", "crc": "distance", "gc": "radius"}
+"""What an element of a kind holds."""
 
 
 class Variable(NamedTuple):
@@ -84,6 +88,25 @@ class Closure:
     jacobian: FloatArray
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Equation:
+    """Rows of a closure.
+
+    Attributes:
+        rows: Which they are.
+        residual: What does not close in [m] and [rad], shape (k, n).
+        carrier: What turns a twist in the ground into the rates of that, shape (k, 6, n).
+        movers: The sign with which each mover's twist counts.
+        slopes: What the rows fall by a unit of variables.
+    """
+
+    rows: slice
+    residual: FloatArray
+    carrier: FloatArray
+    movers: dict[str, int]
+    slopes: dict[int, Element]
+
+
 @dataclass(frozen=True)
 class Mechanism:
     """A network whose loops are cut, ready to be computed.
@@ -99,7 +122,9 @@ class Mechanism:
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
         """Controls that can be set, the free variables of joints, and the poses of bodies that none ties."""
-        controls = [Variable(one.name, "control", 0, "") for one in self.network.controls if one.value is None]
+        controls = [
+            Variable(one.name, "control", 0, "") for one in self.network.controls if one.value is None
+        ]
         joints = [
             Variable(joint.name, "joint", k, unit)
             for joint in self.network.joints
@@ -107,7 +132,9 @@ class Mechanism:
             if drive is None
         ]
         bodies = [
-            Variable(name, "body", k, unit) for name in self.graph.roots[1:] for k, unit in enumerate(POSE_UNITS)
+            Variable(name, "body", k, unit)
+            for name in self.graph.roots[1:]
+            for k, unit in enumerate(POSE_UNITS)
         ]
         return (*controls, *joints, *bodies)
 
@@ -136,6 +163,18 @@ class Mechanism:
         ]
         return tuple(slice(k, k + 3) for k in firsts)
 
+    @cached_property
+    def angles(self) -> IndexArray:
+        """The numbers of the free variables that are the same after a full turn: not those of a helix."""
+        kinds = {one.name: one.kind for one in self.network.joints}
+        turning = ("revolute", "cylindrical")
+        found = [
+            k
+            for k in self.free
+            if self.variables[k].unit == "rad" and kinds.get(self.variables[k].owner) in turning
+        ]
+        return np.array(found, dtype=np.intp)
+
     def _is_global(self, one: Variable) -> bool:
         joints = {joint.name: joint for joint in self.network.joints}
         joint = joints.get(one.owner) if one.kind == "joint" else None
@@ -146,7 +185,9 @@ class Mechanism:
         """The values from where assembly starts, in [m], [rad] and as controls are given, shape (variables,)."""
         given: dict[str, Sequence[float]] = {one.name: (one.start,) for one in self.network.controls}
         given |= {one.name: one.start or (0.0,) * len(one.units) for one in self.network.joints}
-        given |= {one.name: one.start or (0.0,) * 6 for one in self.network.bodies if one.name in self.graph.roots}
+        given |= {
+            one.name: one.start or (0.0,) * 6 for one in self.network.bodies if one.name in self.graph.roots
+        }
         return np.array([given[one.owner][one.index] for one in self.variables], dtype=np.float64)
 
     @property
@@ -247,7 +288,10 @@ class Mechanism:
         posed = {self.network.ground: Pose(Transform(), {})}
         for name in self.graph.roots[1:]:
             first = self.places[name, 0]
-            position, vector = (x[first], x[first + 1], x[first + 2]), (x[first + 3], x[first + 4], x[first + 5])
+            position, vector = (
+                (x[first], x[first + 1], x[first + 2]),
+                (x[first + 3], x[first + 4], x[first + 5]),
+            )
             posed[name] = Pose(Transform(rotation_of(vector).rotation, position), {name: 1})
         for branch in self.graph.branches:
             joint, parent = self.network.joints[branch.joint], posed[branch.parent]
@@ -273,27 +317,59 @@ class Mechanism:
         screws = self._screws(x, posed, controls)
         residual = np.zeros((self.rows, n))
         jacobian = np.zeros((self.rows, len(self.variables), n))
+        for equation in self._equations(x, posed, controls):
+            residual[equation.rows] = equation.residual
+            for mover, sign in equation.movers.items():
+                places, twists = screws[mover]
+                jacobian[equation.rows, places] += sign * np.einsum("ijn,jkn->ikn", equation.carrier, twists)
+            for place, slope in equation.slopes.items():
+                jacobian[equation.rows, place] -= slope
+        return Closure(residual, jacobian)
+
+    def released(self, x: FloatArray) -> Iterator[tuple[str, str, FloatArray]]:
+        """Yield what each constraint forbids: its joint or element, its name, and what it would add to J.
+
+        That is a column in [m] and [rad], shape (rows,), of a joint in [m] along or [rad] about an axis of its
+        frame, of a driven variable in its unit, of an element in [m].
+
+        Args:
+            x: The variables, shape (variables,), in [m], [rad] and as controls are given.
+        """
+        at = x[:, np.newaxis]
+        posed, controls = self._posed(at), self.control_slopes(at)
+        equations = list(self._equations(at, posed, controls))
+        for joint in self.network.joints:
+            values = [one.value for one in self._values(joint, at, controls)]
+            frame = posed[joint.bodies[0]].frame @ joint.frames[0]
+            for constraint, (w, v) in forbidden(joint, values, frame):
+                twist = _stacked((*w, *v), 1)[:, 0]
+                column = np.zeros(self.rows)
+                for one in equations:
+                    column[one.rows] += one.movers.get(joint.name, 0) * (one.carrier[:, :, 0] @ twist)
+                yield joint.name, constraint, column
+        for row, element in enumerate(self.network.elements, 6 * len(self.graph.cuts)):
+            yield element.name, MEASURES[element.kind], np.eye(self.rows)[row]
+
+    def _equations(
+        self, x: FloatArray, posed: dict[str, Pose], controls: dict[str, Given]
+    ) -> Iterator[_Equation]:
+        """Yield what closes each loop, and what holds each element."""
+        n = x.shape[1]
         for k, cut in enumerate(self.graph.cuts):
-            joint, rows = self.network.joints[cut], slice(6 * k, 6 * k + 6)
+            joint = self.network.joints[cut]
             moved = joint_frame(joint, [one.value for one in self._values(joint, x, controls)])
             here = posed[joint.bodies[0]].frame @ joint.frames[0] @ moved
-            there = posed[joint.bodies[1]].frame @ joint.frames[1]
-            residual[rows] = gap_of(here.inverse() @ there, n)
-            carried = _carrier(here, residual[rows])
-            for mover, sign in _between(posed, joint.bodies, joint.name).items():
-                places, twists = screws[mover]
-                jacobian[rows, places] += sign * np.einsum("ijn,jkn->ikn", carried, twists)
+            gap = gap_of(here.inverse() @ posed[joint.bodies[1]].frame @ joint.frames[1], n)
+            movers = _between(posed, joint.bodies, joint.name)
+            yield _Equation(slice(6 * k, 6 * k + 6), gap, _carrier(here, gap), movers, {})
         first = 6 * len(self.graph.cuts)
-        for row, (element, length) in enumerate(zip(self.network.elements, self.lengths(x), strict=True), first):
+        for row, element in enumerate(self.network.elements, first):
+            length = _of_controls(element.length, controls)
             measured = measure(element, *(posed[name].frame for name in element.bodies))
-            residual[row] = measured.distance - length.value
-            wrench = _stacked((*measured.moment, *measured.force), n)
-            for mover, sign in _between(posed, element.bodies).items():
-                places, twists = screws[mover]
-                jacobian[row, places] += sign * np.einsum("jn,jkn->kn", wrench, twists)
-            for place, slope in length.slopes.items():
-                jacobian[row, place] -= slope
-        return Closure(residual, jacobian)
+            wrench = _stacked((*measured.moment, *measured.force), n)[np.newaxis]
+            excess = _stacked((measured.distance - length.value,), n)
+            movers = _between(posed, element.bodies)
+            yield _Equation(slice(row, row + 1), excess, wrench, movers, length.slopes)
 
     def _screws(
         self, x: FloatArray, posed: dict[str, Pose], controls: dict[str, Given]
@@ -374,7 +450,9 @@ def measure(element: ConstraintElement, first: Transform, second: Transform) -> 
     return _between_lines(element, p, apart, n, second.rotate(element.normals[1]))
 
 
-def _between_lines(element: ConstraintElement, p: Vector, apart: Vector, n: Vector, other: Vector) -> Measured:
+def _between_lines(
+    element: ConstraintElement, p: Vector, apart: Vector, n: Vector, other: Vector
+) -> Measured:
     """Return the distance of two lines: p + n a, and the line through p + apart along other."""
     sine, u = _length_and_unit(cross(n, other))
     distance = dot(apart, u)

@@ -109,7 +109,9 @@ class ConstraintElement:
     kind: ElementKind
     bodies: tuple[str, str]
     length: Expression
-    points: tuple[Vector, Vector] = field(default=(ZERO, ZERO), metadata={"stored": tuple[_NUMBERS, _NUMBERS]})
+    points: tuple[Vector, Vector] = field(
+        default=(ZERO, ZERO), metadata={"stored": tuple[_NUMBERS, _NUMBERS]}
+    )
     normals: tuple[Vector, Vector] = field(
         default=((0.0, 1.0, 0.0), (0.0, 1.0, 0.0)), metadata={"stored": tuple[_NUMBERS, _NUMBERS]}
     )

@@ -1,0 +1,302 @@
+"""Assembly: the configurations in which a network closes, from a rough start and from random ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.errors import Finding, NetworkError
+from urmpipe_models.names import not_among
+from urmpipe_models.networks.descent import Reached, descend
+from urmpipe_models.networks.findings import Assembly, Gap
+from urmpipe_models.networks.idle_spins import idle_spins, unspun
+from urmpipe_models.networks.mechanism import Mechanism
+from urmpipe_models.networks.mobility import mobility_at
+from urmpipe_models.networks.network import POSE_UNITS
+
+CLOSED = 1e-9
+"""A gap of less, in lengths of the mechanism and in [rad], is rounding."""
+
+SAME = 1e-6
+"""Assemblies whose bodies are nearer to each other, in lengths of the mechanism and in entries of their
+rotations, are one."""
+
+RESTARTS = 2000
+"""So many starts in a row that find nothing new end a search."""
+
+BATCH = 500
+"""Starts that are followed side by side."""
+
+MOST = 200_000
+"""Starts of a search at most, and assemblies that it may find: more are a continuum."""
+
+MANY = 1000
+"""Assemblies that are listed at most."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Assembled:
+    """What assembly came to.
+
+    Attributes:
+        x: The variables of each assembly, the nearest to the start first, shape (variables, n).
+        assemblies: The assemblies; none if nothing closes.
+        nearest: What comes nearest to closing where nothing closes.
+        x_nearest: Its variables, shape (variables,); those of the first assembly if there is one.
+        gaps: What does not close there, the largest first.
+        tried: How many starts were tried, the network's own counted.
+        reason: Why the search ended.
+        elsewhere: Whether only a random start closed, not the network's own.
+        continuum: Of how many dimensions the assemblies are where controls and idle spins are held; 0: apart.
+    """
+
+    x: FloatArray
+    assemblies: tuple[Assembly, ...]
+    nearest: Assembly | None
+    x_nearest: FloatArray
+    gaps: tuple[Gap, ...]
+    tried: int
+    reason: str
+    elsewhere: bool
+    continuum: int
+
+
+def assemble(
+    mechanism: Mechanism,
+    controls: Mapping[str, float] | None = None,
+    *,
+    every: bool = False,
+    restarts: int = RESTARTS,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> Assembled:
+    """Return the assembly nearest to the start, or every one, with controls and idle spins held.
+
+    Every one is sought from random starts, until `restarts` of them in a row find nothing new. Where the
+    network's own start does not close, random ones are tried, too.
+
+    Args:
+        mechanism: The network.
+        controls: Values to hold controls at instead of their starts.
+        every: Whether all assemblies are sought.
+        restarts: Random starts in a row without anything new that end the search.
+        seed: Of the random starts.
+        progress: Called with the share that is done, 0..1.
+
+    Raises:
+        NetworkError: If a control is not of the network, or its value out of its range.
+    """
+    start = start_with(mechanism, controls or {})
+    own = descend(mechanism, start[:, np.newaxis], mechanism.free)
+    found = _Found(mechanism, start)
+    closed = any(found.add(own))
+    continuum = _continuum(mechanism, own.x[:, 0]) if closed else 0
+    tried, reason = 1, "the start closes" if closed else "found one"
+    if (every and not continuum) or not closed:
+        tried, reason = _search(found, every, restarts, seed, progress)
+        if found.kept and not closed:
+            continuum = _continuum(mechanism, found.kept[0])
+    if continuum and every:
+        reason = (
+            f"with its controls held the network still moves in {continuum} ways:"
+            " its assemblies are no list, one of them is shown"
+        )
+    return found.result(tried, reason, elsewhere=not closed and bool(found.kept), continuum=continuum)
+
+
+def start_with(mechanism: Mechanism, controls: Mapping[str, float]) -> FloatArray:
+    """Return where assembly starts with some controls set, shape (variables,).
+
+    Raises:
+        NetworkError: With every control that is not of the network or cannot be set, and every value out of
+            the control's range.
+    """
+    own = {one.name: one for one in mechanism.network.controls if one.value is None}
+    faults = []
+    start = np.array(mechanism.start)
+    for name, value in controls.items():
+        if name not in own:
+            faults.append(Finding(f"control {not_among(name, own)}", parameter="set"))
+        elif not own[name].lower <= value <= own[name].upper:
+            allowed = f"{own[name].lower:g} to {own[name].upper:g}"
+            faults.append(Finding(found=f"{name} = {value:g}", allowed=allowed, parameter="set"))
+        else:
+            start[mechanism.places[name, 0]] = value
+    if faults:
+        raise NetworkError(*faults)
+    return start
+
+
+def _search(
+    found: _Found, every: bool, restarts: int, seed: int, progress: Callable[[float], None] | None
+) -> tuple[int, str]:
+    """Try random starts, and return how many starts were tried, and why the search ended."""
+    mechanism, rng = found.mechanism, np.random.default_rng(seed)
+    tried = in_vain = 0
+    while in_vain < restarts and tried < MOST and len(found.kept) < MANY:
+        count = min(BATCH, restarts - in_vain)
+        ends = descend(mechanism, _random_starts(mechanism, found.start, count, rng), mechanism.free)
+        for new in found.add(ends):
+            tried, in_vain = tried + 1, 0 if new else in_vain + 1
+            if new and not every:
+                return tried + 1, "a random start closed"
+            if in_vain >= restarts:
+                break
+        if progress is not None:
+            progress(min(in_vain / max(restarts, 1), 1.0))
+    if in_vain >= restarts:
+        return tried + 1, f"{in_vain} random starts in a row found nothing new"
+    return tried + 1, f"{len(found.kept)} assemblies of {tried} random starts: the search was cut off"
+
+
+def _random_starts(
+    mechanism: Mechanism, start: FloatArray, count: int, rng: np.random.Generator
+) -> FloatArray:
+    """Return configurations: angles and orientations of any size, lengths about the start, shape (variables, n)."""
+    x = np.repeat(start[:, np.newaxis], count, axis=1)
+    for k in mechanism.free:
+        if mechanism.variables[k].unit == "m":
+            x[k] += mechanism.length * rng.normal(size=count)
+        else:
+            x[k] = rng.uniform(-np.pi, np.pi, count)
+    for some in mechanism.rotations:
+        quat = rng.normal(size=(4, count))
+        quat /= np.linalg.norm(quat, axis=0)
+        axis = quat[:3] / np.linalg.norm(quat[:3], axis=0)
+        x[some] = 2.0 * np.arccos(np.clip(np.abs(quat[3]), 0.0, 1.0)) * np.where(quat[3] < 0.0, -axis, axis)
+    return x
+
+
+def _closes(mechanism: Mechanism, gap: FloatArray) -> FloatArray:
+    """Return which gaps in [m] and [rad] are rounding."""
+    return np.asarray(gap <= CLOSED * max(1.0, mechanism.length))
+
+
+def _continuum(mechanism: Mechanism, x: FloatArray) -> int:
+    """Return how many ways there are to move with controls and idle spins held."""
+    held = mobility_at(mechanism, x, mechanism.free)
+    return max(0, held - len(idle_spins(mechanism)))
+
+
+class _Found:
+    """The assemblies that were found, each once, and what came nearest to closing."""
+
+    def __init__(self, mechanism: Mechanism, start: FloatArray) -> None:
+        self.mechanism, self.start = mechanism, start
+        self.kept: list[FloatArray] = []
+        self._places: list[FloatArray] = []
+        self._spins = idle_spins(mechanism)
+        self._nearest, self._gap = start, np.inf
+
+    def add(self, ends: Reached) -> Iterator[bool]:
+        """Yield of each configuration, in turn, whether it closes and is new: then it is kept."""
+        known = np.where(np.isnan(ends.gap), np.inf, ends.gap)
+        best = int(np.argmin(known))
+        if known[best] < self._gap:
+            self._nearest, self._gap = ends.x[:, best], float(known[best])
+        closed = _closes(self.mechanism, known)
+        held = unspun(self.mechanism, self._spins, self._turned(ends.x[:, closed]), self.start)
+        places = iter(zip(held.T, self._places_of(held), strict=True))
+        for one in closed:
+            yield bool(one) and self._keep(*next(places))
+
+    def _keep(self, x: FloatArray, place: FloatArray) -> bool:
+        """Keep a configuration whose bodies are elsewhere than those of all others; return whether it is so."""
+        if self.kept and (np.abs(np.array(self._places) - place).max(axis=1) <= SAME).any():
+            return False
+        self.kept.append(x)
+        self._places.append(place)
+        return True
+
+    def result(self, tried: int, reason: str, *, elsewhere: bool, continuum: int) -> Assembled:
+        """Return what was found, sorted by the distance from the start."""
+        scales = self.mechanism.column_scales
+        order = sorted(
+            self.kept, key=lambda x: (round(float(np.linalg.norm((x - self.start) / scales)), 6), *x)
+        )
+        nearest = order[0] if order else self._turned(self._nearest[:, np.newaxis])[:, 0]
+        every = np.array(order).T.reshape(len(self.start), -1)
+        return Assembled(
+            every,
+            tuple(assembly_at(self.mechanism, x) for x in order),
+            None if order else assembly_at(self.mechanism, nearest),
+            nearest,
+            () if order else gaps_at(self.mechanism, nearest),
+            tried,
+            reason,
+            elsewhere,
+            continuum,
+        )
+
+    def _turned(self, x: FloatArray) -> FloatArray:
+        """Return the same configurations with angles within -pi and pi; helices stay."""
+        angles, turned = self.mechanism.angles, np.array(x)
+        turned[angles] -= 2.0 * np.pi * np.round(turned[angles] / (2.0 * np.pi))
+        return turned
+
+    def _places_of(self, x: FloatArray) -> FloatArray:
+        """Return where the bodies are: positions in lengths of the mechanism, entries of rotations, a row each."""
+        places = []
+        for frame in self.mechanism.poses(x).values():
+            places += [entry for row in frame.rotation for entry in row]
+            places += [entry / self.mechanism.length for entry in frame.translation]
+        return np.stack([np.broadcast_to(one, x.shape[1:]) for one in places], axis=1)
+
+
+def poses_at(mechanism: Mechanism, x: FloatArray) -> FloatArray:
+    """Return the poses of the bodies, the ground first, as matrices [-] and [m], shape (bodies, 4, 4).
+
+    Args:
+        mechanism: The network.
+        x: The variables, shape (variables,).
+    """
+    frames = mechanism.poses([float(value) for value in x])
+    poses = np.tile(np.eye(4), (len(frames), 1, 1))
+    for pose, name in zip(poses, mechanism.network.body_names, strict=True):
+        pose[:3, :3], pose[:3, 3] = frames[name].rotation, frames[name].translation
+    return poses
+
+
+def assembly_at(mechanism: Mechanism, x: FloatArray) -> Assembly:
+    """Return a configuration, its variables in [m], [rad] and as controls are given, shape (variables,)."""
+    controls = mechanism.control_slopes(x)
+    values = {name: (float(one.value),) for name, one in controls.items()}
+    for joint in mechanism.network.joints:
+        if joint.units:
+            values[joint.name] = tuple(float(one.value) for one in mechanism.joint_values(joint, x))
+    for name in mechanism.graph.roots[1:]:
+        first = mechanism.places[name, 0]
+        values[name] = tuple(x[first : first + len(POSE_UNITS)].tolist())
+    residual = mechanism.closure(x[:, np.newaxis]).residual
+    return Assembly(
+        values,
+        poses_at(mechanism, x),
+        float(np.abs(residual).max(initial=0.0)),
+        mobility_at(mechanism, x, np.arange(len(x))),
+    )
+
+
+def gaps_at(mechanism: Mechanism, x: FloatArray) -> tuple[Gap, ...]:
+    """Return what does not close at a configuration, the largest first.
+
+    Args:
+        mechanism: The network.
+        x: The variables, shape (variables,).
+    """
+    residual = mechanism.closure(x[:, np.newaxis]).residual[:, 0]
+    gaps = []
+    for k, cut in enumerate(mechanism.graph.cuts):
+        gap = residual[6 * k : 6 * k + 6]
+        name = mechanism.network.joints[cut].name
+        gaps.append(
+            Gap(
+                name, mechanism.graph.loops[k], float(np.linalg.norm(gap[:3])), float(np.linalg.norm(gap[3:]))
+            )
+        )
+    elements = zip(mechanism.network.elements, residual[6 * len(mechanism.graph.cuts) :], strict=True)
+    gaps += [Gap(one.name, (one.name,), abs(float(gap)), 0.0) for one, gap in elements]
+    open_ones = [one for one in gaps if max(one.metres, one.radians) > CLOSED * max(1.0, mechanism.length)]
+    return tuple(sorted(open_ones, key=lambda one: -max(one.metres / mechanism.length, one.radians)))

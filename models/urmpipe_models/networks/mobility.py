@@ -1,0 +1,131 @@
+"""Mobility: how many ways a network moves, which constraints are redundant, and whether that is so only here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IndexArray
+from urmpipe_models.networks.descent import descend
+from urmpipe_models.networks.findings import Mobility, Redundant
+from urmpipe_models.networks.idle_spins import idle_spins
+from urmpipe_models.networks.mechanism import Mechanism
+
+RANK = 1e-7
+"""Singular values below this part of the largest count as 0: a configuration closes to about 1e-13, one at
+which the rank falls to the root of that."""
+
+NEARBY = 1e-2
+"""How far configurations nearby are, in lengths of the mechanism and [rad]."""
+
+PROBES = 8
+"""How many of them are looked at."""
+
+MOVED = 0.3
+"""Share of `NEARBY` that a configuration nearby must be away: of a structure that only seems to move each
+comes back."""
+
+ALIKE = 0.999
+"""Redundant constraints that raise the rank this much as clearly as the clearest are equal."""
+
+
+def mobility_at(mechanism: Mechanism, x: FloatArray, columns: IndexArray) -> int:
+    """Return how many of some variables are left over by the rank of the Jacobian.
+
+    Args:
+        mechanism: The network.
+        x: The variables, shape (variables,).
+        columns: The numbers of those that may change.
+    """
+    return len(columns) - _rank(_scaled(mechanism, x[:, np.newaxis])[:, columns, 0])
+
+
+def mobility_of(mechanism: Mechanism, x: FloatArray) -> Mobility:
+    """Return how an assembled network moves; controls are variables.
+
+    Args:
+        mechanism: The network.
+        x: The variables of an assembly, shape (variables,).
+    """
+    variables = len(mechanism.variables)
+    jacobian = _scaled(mechanism, x[:, np.newaxis])[:, :, 0]
+    rank = _rank(jacobian)
+    return Mobility(
+        variables,
+        rank,
+        variables - mechanism.rows,
+        tuple(_redundant(mechanism, x, jacobian, mechanism.rows - rank)),
+        tuple(spin.name for spin in idle_spins(mechanism)),
+        _nearby(mechanism, x, jacobian, variables - rank),
+    )
+
+
+def stuck_controls(mechanism: Mechanism, x: FloatArray) -> tuple[str, ...]:
+    """Return the controls that cannot be moved at an assembly, each with those before it held.
+
+    Args:
+        mechanism: The network.
+        x: The variables of an assembly, shape (variables,).
+    """
+    ways = _null_space(_scaled(mechanism, x[:, np.newaxis])[:, :, 0])[mechanism.controls]
+    stuck = []
+    for k, row in enumerate(mechanism.controls):
+        if _rank(ways[: k + 1], least=RANK) == _rank(ways[:k], least=RANK):
+            stuck.append(mechanism.variables[row].owner)
+    return tuple(stuck)
+
+
+def _scaled(mechanism: Mechanism, x: FloatArray) -> FloatArray:
+    """Return Jacobians in lengths of the mechanism and [rad], shape (rows, variables, n)."""
+    scales = mechanism.row_scales[:, np.newaxis] * mechanism.column_scales
+    return np.asarray(mechanism.closure(x).jacobian * scales[:, :, np.newaxis])
+
+
+def _rank(jacobian: FloatArray, least: float = 0.0) -> int:
+    """Return the rank of a scaled Jacobian; singular values of `least` or less count as 0, too."""
+    if not jacobian.size:
+        return 0
+    values = np.linalg.svd(jacobian, compute_uv=False)
+    return int((values > max(RANK * values[0], least)).sum()) if values[0] > 0.0 else 0
+
+
+def _null_space(jacobian: FloatArray) -> FloatArray:
+    """Return an orthonormal basis of what a scaled Jacobian [-] maps to 0, shape (variables, mobility)."""
+    if not len(jacobian):
+        return np.eye(jacobian.shape[1])
+    return np.asarray(np.linalg.svd(jacobian)[2][_rank(jacobian) :].T)
+
+
+def _nearby(mechanism: Mechanism, x: FloatArray, jacobian: FloatArray, mobility: int) -> int:
+    """Return the mobility at assembled configurations nearby; 0 if there are none, of a special structure."""
+    if mobility == 0:
+        return 0
+    ways = _null_space(jacobian)
+    rng = np.random.default_rng(0)
+    steps = rng.normal(size=(mobility, PROBES))
+    steps = NEARBY * (ways @ (steps / np.linalg.norm(steps, axis=0)))
+    scales = mechanism.column_scales[:, np.newaxis]
+    near = descend(mechanism, x[:, np.newaxis] + scales * steps, np.arange(len(x)))
+    away = np.linalg.norm((near.x - x[:, np.newaxis]) / scales, axis=0)
+    there = np.flatnonzero((away > MOVED * NEARBY) & (near.gap < RANK * max(1.0, mechanism.length)))
+    ranks = [_rank(one) for one in _scaled(mechanism, near.x[:, there]).transpose(2, 0, 1)]
+    return min((len(x) - rank for rank in ranks), default=0)
+
+
+def _redundant(mechanism: Mechanism, x: FloatArray, jacobian: FloatArray, count: int) -> Iterator[Redundant]:
+    """Yield redundant constraints, `count` of them: set free one after the other, each raises the rank.
+
+    The one is taken that does so most clearly; of equal ones the last in the file.
+    """
+    if count <= 0:
+        return
+    unreached = np.linalg.svd(jacobian)[0][:, mechanism.rows - count :]
+    released = list(mechanism.released(x))
+    reach = np.array([(column * mechanism.row_scales) @ unreached for _, _, column in released])
+    for _ in range(count):
+        size = np.linalg.norm(reach, axis=1)
+        best = int(np.flatnonzero(size >= ALIKE * size.max())[-1])
+        yield Redundant(*released[best][:2])
+        along = reach[best] / size[best]
+        reach = reach - np.outer(reach @ along, along)
