@@ -10,6 +10,7 @@
     urmpipe.ik("targets.csv", robot="arm6").to_frame()
     urmpipe.plan("contour.csv", robot="ur5e", output="plan.csv")
     urmpipe.accuracy("contour.csv", "irb60", limit=0.4e-3).running_speed
+    urmpipe.network_check("bennett").mobility
     urmpipe.build_fmu("kinematic_chain", robot="urm6")
 
 The functions are loaded when they are first used.
@@ -32,6 +33,9 @@ if TYPE_CHECKING:
     from urmpipe.api.ik import ik as ik
     from urmpipe.api.ingest import ingest as ingest
     from urmpipe.api.load_robot import load_robot as load_robot
+    from urmpipe.api.network import load_network as load_network
+    from urmpipe.api.network import network_check as network_check
+    from urmpipe.api.network import network_solve as network_solve
     from urmpipe.api.plan import plan as plan
     from urmpipe.api.read_map import read_map as read_map
     from urmpipe.api.recordings import read_recording as read_recording
@@ -50,6 +54,7 @@ if TYPE_CHECKING:
     from urmpipe_models.errors import CosimulationError as CosimulationError
     from urmpipe_models.errors import FmuError as FmuError
     from urmpipe_models.errors import LogError as LogError
+    from urmpipe_models.errors import NetworkError as NetworkError
     from urmpipe_models.errors import OptionError as OptionError
     from urmpipe_models.errors import OutputError as OutputError
     from urmpipe_models.errors import PathError as PathError
@@ -59,6 +64,8 @@ if TYPE_CHECKING:
     from urmpipe_models.errors import UrmpipeError as UrmpipeError
     from urmpipe_models.errors import ViewerError as ViewerError
     from urmpipe_models.inverse.targets import Targets as Targets
+    from urmpipe_models.networks.network import Network as Network
+    from urmpipe_models.networks.network_file import network_names as network_names
     from urmpipe_models.planning.rows import PathRows as PathRows
     from urmpipe_models.robots.catalogue import robot_names as robot_names
     from urmpipe_models.transform import Transform as Transform
@@ -67,6 +74,7 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.comparison.deviation import Deviation as Deviation
     from urmpipe_pipeline.diagnosis.result import Diagnosis as Diagnosis
     from urmpipe_pipeline.joint_log import JointLog as JointLog
+    from urmpipe_pipeline.networks.result import NetworkResult as NetworkResult
     from urmpipe_pipeline.planned_paths.result import PlannedPath as PlannedPath
     from urmpipe_pipeline.runs.results import Run as Run
     from urmpipe_pipeline.simulations.simulation import Simulation as Simulation
@@ -93,6 +101,9 @@ _HOME = {
     "LogError": "urmpipe_models.errors",
     "LogReading": "urmpipe.reading",
     "LogMap": "urmpipe_pipeline.sources",
+    "Network": "urmpipe_models.networks.network",
+    "NetworkError": "urmpipe_models.errors",
+    "NetworkResult": "urmpipe_pipeline.networks.result",
     "OptionError": "urmpipe_models.errors",
     "OutputError": "urmpipe_models.errors",
     "Reading": "urmpipe.reading",
@@ -120,7 +131,11 @@ _HOME = {
     "export": "urmpipe.api.export",
     "ik": "urmpipe.api.ik",
     "ingest": "urmpipe.api.ingest",
+    "load_network": "urmpipe.api.network",
     "load_robot": "urmpipe.api.load_robot",
+    "network_check": "urmpipe.api.network",
+    "network_names": "urmpipe_models.networks.network_file",
+    "network_solve": "urmpipe.api.network",
     "plan": "urmpipe.api.plan",
     "read_map": "urmpipe.api.read_map",
     "read_recording": "urmpipe.api.recordings",

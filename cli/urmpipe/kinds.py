@@ -88,6 +88,16 @@ def _is_unit(value: Any) -> bool:
     return isinstance(value, Unit) or _is_path(value)
 
 
+def _is_network(value: Any) -> bool:
+    from urmpipe_models.networks.network import Network
+
+    return isinstance(value, Network) or _is_path(value)
+
+
+def _are_controls(value: Any) -> bool:
+    return isinstance(value, Mapping) and all(map(_is_text, value)) and all(map(_is_number, value.values()))
+
+
 def _is_table(value: Any) -> bool:
     from urmpipe.log_table import LogTable
 
@@ -157,6 +167,7 @@ KINDS = {
     "backend": _one_of("native", "python"),
     "base_link": LINK,
     "band": Kind(_is_number, "a number, in m"),
+    "controls": Kind(_are_controls, 'a mapping of names to numbers, such as {"crank": 0.9}'),
     "csv": PATH,
     "cycles": Kind(_are_cycles, 'a text such as "1:1477,1478:2955", or pairs of rows, such as [(1, 1477)]'),
     "baseline": Kind(_is_baseline, "a recording, or what `compare` returned"),
@@ -173,6 +184,7 @@ KINDS = {
     "formats": Kind(
         _one_or_many(lambda one: isinstance(one, str) and one in ("svg", "png")), "svg, png or a list of both"
     ),
+    "load_network.network": Kind(_is_path, "a name, or a TOML file"),
     "ik.tolerance": Kind(_is_number, "a number, in m"),
     "inputs": PATHS,
     "iso": FLAG,
@@ -184,6 +196,7 @@ KINDS = {
     "log_map": Kind(_is_map, "a map (TOML), or what `read_map` returned"),
     "method": _one_of("auto", "closed", "iterative"),
     "name_or_path": ROBOT_FILE,
+    "network": Kind(_is_network, "a name, a TOML file, or a Network"),
     "noise": KIND_OF_LIMIT,
     "options": Kind(lambda value: isinstance(value, Mapping), 'a mapping, such as {"joints": 6}'),
     "output": PATH,

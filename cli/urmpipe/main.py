@@ -40,6 +40,7 @@ COMMANDS = {
     "ik": "Find joint values for poses of the tool.",
     "plan": "Plan a path of lines and arcs, and its time.",
     "accuracy": "Measure how far a driven arm is from its path.",
+    "network": "Assemble kinematic networks, and count how they move.",
     "fmu": "List units, build and check FMUs.",
     "simulate": "Run a system of blocks.",
 }
@@ -108,9 +109,10 @@ def cli() -> None:
       urmpipe ik path.csv --robot urm6 -o joints.csv
       urmpipe plan contour.csv --robot ur5e -o plan.csv
       urmpipe accuracy --robot irb60 --path contour.csv --limit 0.4mm
+      urmpipe network check four-bar
 
     Exit codes: 0 within tolerance, 1 out of tolerance (ik: a target not reached, a jump, or a joint too
-    fast; plan: the arm cannot move so; accuracy: an error above the limit; fmu check: a problem), 2 bad
+    fast; plan: the arm cannot move so; accuracy: an error above the limit; network: it does not close; fmu check: a problem), 2 bad
     input or usage.
     """
 

@@ -77,6 +77,10 @@ class FmuError(UrmpipeError):
     """An FMU cannot be built, read, loaded or run, or reports an error of its own."""
 
 
+class NetworkError(UrmpipeError):
+    """A network cannot be found, read or put together."""
+
+
 class CosimulationError(UrmpipeError):
     """A system of blocks cannot be put together: its file, its connections, an algebraic loop."""
 

@@ -52,6 +52,14 @@ def option_names(ctx: click.Context) -> Iterable[str]:
     return [name for name in options_of(unit) if name not in ("robot", "log")] if unit else ()
 
 
+def control_names(ctx: click.Context) -> Iterable[str]:
+    """Return the controls of the network on the line that can be set."""
+    from urmpipe_models.networks.network_file import load_network
+
+    network = _operand(ctx, "name")
+    return [one.name for one in load_network(network).controls if one.value is None] if network else ()
+
+
 def _operand(ctx: click.Context, name: str) -> str | None:
     """Return an argument of a line that is not finished: click leaves it unnamed then."""
     return ctx.params.get(name) or next(iter(ctx.args), None)
@@ -78,4 +86,19 @@ def named_values(ctx: click.Context, param: click.Parameter, values: tuple[str, 
         if not sign or not name.strip() or name.strip() in found:
             raise click.BadParameter(f"found {shown(value)}, allowed: NAME=VALUE, each name once")
         found[name.strip()] = text
+    return found
+
+
+def named_numbers(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, float]:
+    """Return NAME=NUMBER options as a mapping.
+
+    Raises:
+        BadParameter: If one has no name, one name stands twice, or a value is no finite number.
+    """
+    found = {}
+    for name, text in named_values(ctx, param, values).items():
+        try:
+            found[name] = float(text)
+        except ValueError:
+            raise click.BadParameter(f"{name}: found {shown(text)}, allowed: a number") from None
     return found

@@ -55,6 +55,13 @@ def _systems() -> Iterable[str]:
     return system_names()
 
 
+def _networks() -> Iterable[str]:
+    """Return the names of the networks."""
+    from urmpipe_models.networks.network_file import network_names
+
+    return network_names()
+
+
 ROBOT = CatalogueType("NAME|FILE", _robots)
 """A robot's name, or a TOML or URDF file."""
 
@@ -63,6 +70,9 @@ UNIT = CatalogueType("UNIT|FILE", _units)
 
 SYSTEM = CatalogueType("SYSTEM|FILE", _systems)
 """A shipped system's name, or a system file."""
+
+NETWORK = CatalogueType("NAME|FILE", _networks)
+"""A shipped network's name, or a network file."""
 
 
 class OneOf(click.Choice[str]):

@@ -1,4 +1,4 @@
-"""Where in a system file a thing stands that is told by its name: `blocks.load.file` in line 12."""
+"""Where in a TOML file a table or key stands: `blocks.load.file` in line 12."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _plain(name: str) -> str:
 
 
 def _line_of(lines: dict[str, int], name: str) -> int | None:
-    """Return the line of a table or key, else that of the table that it stands in."""
+    """Return the line of a table or key, or of the list of `start[2]`, else of the table that it stands in."""
     while name not in lines and "." in name:
-        name = name.rpartition(".")[0]
+        name = name.rpartition("[" if name.endswith("]") else ".")[0]
     return lines.get(name)

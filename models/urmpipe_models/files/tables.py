@@ -22,25 +22,41 @@ class Table:
     Attributes:
         faults: What was found to be wrong, shared with all tables within.
         place: Where the table stands, such as `joints[2].` (empty for the outermost one).
+        apart: Whether a fault has its key in `about`, from where `placed` finds its line, not in its message.
     """
 
     def __init__(
-        self, data: Mapping[str, Any], faults: list[Finding], file: str | None, place: str = ""
+        self,
+        data: Mapping[str, Any],
+        faults: list[Finding],
+        file: str | None,
+        place: str = "",
+        *,
+        apart: bool = False,
     ) -> None:
         self.faults = faults
         self.place = place
+        self.apart = apart
         self._data = data
         self._file = file
         self._known: list[str] = []
 
     def fault(self, key: str, message: str) -> None:
         """Note that something is wrong with a key."""
-        self.faults.append(Finding(f"key {self.place}{key}: {message}", self._file))
+        where = f"{self.place}{key}"
+        if self.apart:
+            self.faults.append(Finding(message, self._file, about=where))
+        else:
+            self.faults.append(Finding(f"key {where}: {message}", self._file))
 
     def has(self, key: str) -> bool:
         """Tell whether the key is there and not null."""
         self._known.append(key)
         return self._data.get(key) is not None
+
+    def value(self, key: str) -> Any:
+        """Return whatever the key holds, None where it is missing: the caller checks it."""
+        return self._data[key] if self.has(key) else None
 
     def text(self, key: str, default: str | None = None) -> str:
         """Return a string; without a default the key is required."""
@@ -64,7 +80,7 @@ class Table:
             return default
         allowed = "a number" if infinite else "a finite number"
         value = self._get(key)
-        if _is_number(value, infinite):
+        if is_number(value, infinite):
             return float(value)
         self._refuse(key, value, allowed)
         return default if default is not None else 0.0
@@ -76,10 +92,10 @@ class Table:
         allowed = "a list of finite numbers" if count is None else f"{count} finite numbers"
         value = self._get(key, default)
         if isinstance(value, (list, tuple)) and count in {None, len(value)}:
-            if all(_is_number(item) for item in value):
+            if all(is_number(item) for item in value):
                 return tuple(float(item) for item in value)
             for index, item in enumerate(value):
-                if not _is_number(item):
+                if not is_number(item):
                     self._refuse(f"{key}[{index}]", item, "a finite number")
         else:
             self._refuse(key, value, allowed)
@@ -111,9 +127,9 @@ class Table:
     def spread(self, key: str, count: int, default: float) -> tuple[float, ...]:
         """Return `count` numbers, infinities included; one number in the file stands for all of them."""
         value = self._get(key, default)
-        if _is_number(value, infinite=True):
+        if is_number(value, infinite=True):
             return (float(value),) * count
-        if _are_numbers(value, count, infinite=True):
+        if are_numbers(value, count, infinite=True):
             return tuple(float(item) for item in value)
         self._refuse(key, value, f"a number, or {count} numbers, one a joint")
         return (default,) * count
@@ -122,7 +138,7 @@ class Table:
         """Return the three rows of a 3x3 matrix; the key is required."""
         value = self._get(key)
         rows = value if isinstance(value, (list, tuple)) else ()
-        if len(rows) == 3 and all(_are_numbers(row, 3) for row in rows):
+        if len(rows) == 3 and all(are_numbers(row, 3) for row in rows):
             return tuple(tuple(float(item) for item in row) for row in rows)
         self._refuse(key, value, "three rows of three finite numbers")
         return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -133,7 +149,7 @@ class Table:
         if not isinstance(value, Mapping):
             self._refuse(key, value, "a table")
             value = {}
-        return Table(value, self.faults, self._file, f"{self.place}{key}.")
+        return self._within(value, f"{self.place}{key}.")
 
     def named_tables(self, key: str) -> dict[str, Table]:
         """Return the tables in the table under a key, by their names; none where it is missing."""
@@ -149,9 +165,7 @@ class Table:
             self._refuse(key, value, "a list of tables")
             return []
         places = (f"{self.place}{key}[{index}]." for index in range(len(value)))
-        return [
-            Table(item, self.faults, self._file, place) for item, place in zip(value, places, strict=True)
-        ]
+        return [self._within(item, place) for item, place in zip(value, places, strict=True)]
 
     def close(self) -> None:
         """Note every key that was not asked for, with the nearest one that was."""
@@ -160,6 +174,10 @@ class Table:
                 hint = did_you_mean(key, self._known)
                 allowed = ", ".join(dict.fromkeys(self._known))
                 self.fault(key, f"unknown{hint}; allowed: {allowed}")
+
+    def _within(self, data: Mapping[str, Any], place: str) -> Table:
+        """Return a table within this one, whose faults are noted in the same way."""
+        return Table(data, self.faults, self._file, place, apart=self.apart)
 
     def _get(self, key: str, default: Any = None) -> Any:
         """Return what a key holds, its default, or that it is missing."""
@@ -178,7 +196,7 @@ class _Missing:
     """Stands for a required key that is not there."""
 
 
-def _is_number(value: Any, infinite: bool = False) -> bool:
+def is_number(value: Any, infinite: bool = False) -> bool:
     """Tell whether a value is a number that a float holds."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return False
@@ -188,10 +206,10 @@ def _is_number(value: Any, infinite: bool = False) -> bool:
         return False
 
 
-def _are_numbers(value: Any, count: int, infinite: bool = False) -> bool:
+def are_numbers(value: Any, count: int, infinite: bool = False) -> bool:
     """Tell whether a value is a list of so many numbers."""
     given = isinstance(value, (list, tuple)) and len(value) == count
-    return given and all(_is_number(item, infinite) for item in value)
+    return given and all(is_number(item, infinite) for item in value)
 
 
 def _one_of(allowed: Sequence[str]) -> str:

@@ -119,10 +119,10 @@ def start_with(mechanism: Mechanism, controls: Mapping[str, float]) -> FloatArra
     start = np.array(mechanism.start)
     for name, value in controls.items():
         if name not in own:
-            faults.append(Finding(f"control {not_among(name, own)}", parameter="set"))
+            faults.append(Finding(f"control {not_among(name, own)}", parameter="controls"))
         elif not own[name].lower <= value <= own[name].upper:
             allowed = f"{own[name].lower:g} to {own[name].upper:g}"
-            faults.append(Finding(found=f"{name} = {value:g}", allowed=allowed, parameter="set"))
+            faults.append(Finding(found=f"{name} = {value:g}", allowed=allowed, parameter="controls"))
         else:
             start[mechanism.places[name, 0]] = value
     if faults:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from urmpipe_models.display import line_of, number_of
 from urmpipe_models.networks.findings import Assembly, Gap, Mobility
 from urmpipe_models.networks.graph import Structure
+from urmpipe_models.networks.mechanism import mechanism_of
 from urmpipe_models.networks.network import Network
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import LogWarning
@@ -18,6 +19,9 @@ from urmpipe_pipeline.runs.results import SCHEMA
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+Command = Literal["check", "solve"]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -45,7 +49,7 @@ class NetworkResult(Result):
 
     name: str
     network: Network
-    command: Literal["check", "solve"]
+    command: Command
     structure: Structure
     loops: tuple[tuple[str, ...], ...]
     clusters: tuple[tuple[str, ...], ...]
@@ -70,6 +74,16 @@ class NetworkResult(Result):
         """The largest gap of the first assembly, or of what comes nearest, in [m] and [rad]."""
         shown = self.assemblies[0] if self.assemblies else self.nearest
         return 0.0 if shown is None else shown.residual
+
+    @property
+    def variables(self) -> int:
+        """How many variables there are: controls that can be set, free variables of joints, floating bodies."""
+        return len(mechanism_of(self.network).variables)
+
+    @property
+    def kutzbach(self) -> int:
+        """6 (bodies - 1) - sum of (6 - f) - elements - what controls take: variables less equations."""
+        return self.variables - mechanism_of(self.network).rows
 
     def _headline(self) -> str:
         """Return its verdict, what it is and how much of it moves, and how many assemblies there are."""
@@ -103,21 +117,19 @@ class NetworkResult(Result):
             "kind": moves and moves.kind,
             "structure": self.structure,
             "bodies": len(self.network.body_names),
-            "variables": moves and moves.variables,
+            "variables": self.variables,
             "mobility": moves and moves.mobility,
-            "kutzbach": moves and moves.kutzbach,
+            "kutzbach": self.kutzbach,
             "loops": [list(loop) for loop in self.loops],
             "clusters": [list(cluster) for cluster in self.clusters],
             "redundant": [
-                {"joint": one.joint, "constraint": one.constraint} for one in (moves.redundant if moves else ())
+                {"joint": one.joint, "constraint": one.constraint}
+                for one in (moves.redundant if moves else ())
             ],
             "idle": list(moves.idle) if moves else [],
             "special": moves and moves.special,
             "residual": self.residual,
-            "gaps": [
-                {"name": one.name, "loop": list(one.loop), "m": one.metres, "rad": one.radians}
-                for one in self.gaps
-            ],
+            "gaps": self._gaps(),
             "warnings": [one.to_dict(voice) for one in self.warnings],
             "output": str(self.recording) if self.recording else None,
         }
@@ -140,13 +152,17 @@ class NetworkResult(Result):
             ],
             "restarts": max(self.tried - 1, 0),
             "reason": self.reason,
-            "gaps": [
-                {"name": one.name, "loop": list(one.loop), "m": one.metres, "rad": one.radians}
-                for one in self.gaps
-            ],
+            "gaps": self._gaps(),
             "warnings": [one.to_dict(voice) for one in self.warnings],
             "output": str(self.recording) if self.recording else None,
         }
+
+    def _gaps(self) -> list[dict[str, Any]]:
+        """Return what does not close."""
+        return [
+            {"name": one.name, "loop": list(one.loop), "m": one.metres, "rad": one.radians}
+            for one in self.gaps
+        ]
 
 
 def _flat(values: dict[str, tuple[float, ...]]) -> dict[str, float]:

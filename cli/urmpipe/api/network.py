@@ -1,0 +1,130 @@
+"""`urmpipe.load_network`, `network_check` and `network_solve`: kinematic networks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from urmpipe import __version__
+from urmpipe.keyword_checks import PathLike, public, refuse_warnings
+from urmpipe.output_files import guarded_outputs, recorded
+from urmpipe_models.networks import network_file
+from urmpipe_models.networks.assembly import RESTARTS
+from urmpipe_models.networks.network import Network
+from urmpipe_pipeline.networks.drawing import network_svg
+from urmpipe_pipeline.networks.finding import Search, find_network
+from urmpipe_pipeline.networks.result import Command, NetworkResult
+from urmpipe_pipeline.outputs import DRAWING_HEADER
+from urmpipe_pipeline.sources.tables.text import fingerprint
+
+SEARCHING = 0.9
+"""Share of the work that assembly is where something is written, too."""
+
+
+@public
+def load_network(network: PathLike) -> Network:
+    """Return a network that urmpipe brings along, or of a .toml file. See docs/networks.md.
+
+    Args:
+        network: The network's name, or its file.
+
+    Raises:
+        NetworkError: If there is no such network, or with everything that is wrong with its file.
+    """
+    return network_file.load_network(network)
+
+
+@public
+def network_check(
+    network: PathLike | Network,
+    *,
+    controls: Mapping[str, float] | None = None,
+    restarts: int = RESTARTS,
+    seed: int = 0,
+    strict: bool = False,
+    draw: PathLike | None = None,
+    output: PathLike | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> NetworkResult:
+    """Assemble a network and find how it moves: its graph, its mobility, and which constraints are redundant.
+
+    Args:
+        network: A name, a file, or a `Network`.
+        controls: Values of controls instead of their starts, by name.
+        restarts: Random starts that are tried in vain where the network's own start does not close.
+        seed: Of the random starts.
+        strict: Whether a warning is an error.
+        draw: An SVG file to draw the graph and the mechanism to.
+        output: The recording (.rrd) to write.
+        progress: Called with the share that is done, 0..1.
+
+    Returns:
+        `mobility` (None if it does not close: then `gaps`), `assemblies`, `loops`, `clusters`, `warnings`.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the network, an option or an output.
+
+    Source: [KinematicSystems]_ section 3.
+    """
+    return _found(network, "check", Search(controls or {}, False, restarts, seed), strict, draw, output, progress)
+
+
+@public
+def network_solve(
+    network: PathLike | Network,
+    *,
+    controls: Mapping[str, float] | None = None,
+    every: bool = False,
+    restarts: int = RESTARTS,
+    seed: int = 0,
+    strict: bool = False,
+    draw: PathLike | None = None,
+    output: PathLike | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> NetworkResult:
+    """Assemble a network with its controls held: near its start, or in every way there is.
+
+    Args:
+        network: A name, a file, or a `Network`.
+        controls: Values of controls instead of their starts, by name.
+        every: Find all assemblies, by random starts.
+        restarts: Random starts in a row without anything new that end the search.
+        seed: Of the random starts: the same seed, the same assemblies.
+        strict: Whether a warning is an error.
+        draw: An SVG file to draw the graph and the assemblies to.
+        output: The recording (.rrd) to write; further assemblies are ghosts in it.
+        progress: Called with the share that is done, 0..1.
+
+    Returns:
+        `assemblies`, each with its `values` by name in [m] and [rad], `residual` and `mobility`; `reason`;
+        `gaps` where nothing closes.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the network, an option or an output.
+
+    Source: [KinematicSystems]_ section 3.
+    """
+    return _found(network, "solve", Search(controls or {}, every, restarts, seed), strict, draw, output, progress)
+
+
+def _found(
+    network: PathLike | Network,
+    command: Command,
+    search: Search,
+    strict: bool,
+    draw: PathLike | None,
+    output: PathLike | None,
+    progress: Callable[[float], None] | None,
+) -> NetworkResult:
+    """Return what is found of a network, and write what was requested."""
+    loaded = network if isinstance(network, Network) else network_file.load_network(network)
+    files = [] if isinstance(network, Network) or not Path(network).is_file() else [Path(network)]
+    tell = progress or (lambda share: None)
+    with guarded_outputs({"recording": output, "drawing": draw}, files) as parts:
+        inputs = [fingerprint(path) for path in files]
+        found = find_network(loaded, command, search, inputs, lambda share: tell(SEARCHING * share))
+        refuse_warnings(strict, found.warnings)
+        if draw is not None:
+            header = f"{DRAWING_HEADER}{__version__} -->\n"
+            parts["drawing"].write_text(header + network_svg(found), encoding="utf-8", newline="\n")
+        return recorded(found, output, files, lambda share: tell(SEARCHING + (1.0 - SEARCHING) * share))

@@ -1,0 +1,148 @@
+"""`urmpipe network list|check|solve`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+import urmpipe
+from urmpipe.options.grouped import Command, with_options
+from urmpipe.options.named import NamedType, control_names, named_numbers
+from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.reading import STRICT_OPTION
+from urmpipe.options.types import NETWORK, WholeType
+from urmpipe.usage import Group
+
+if TYPE_CHECKING:
+    from urmpipe_pipeline.networks.result import NetworkResult
+
+
+@click.group(cls=Group, short_help="Assemble kinematic networks, and count how they move.")
+def network() -> None:
+    """Assemble kinematic networks of joints, constraint elements and controls, and count how they move.
+
+    A network is a name of the list, or a TOML file of bodies, joints, elements and controls;
+    docs/networks.md has every key of it.
+    """
+
+
+@network.command("list", short_help="List the networks that urmpipe brings along.")
+@output_options
+def list_(terminal: Terminal) -> int:
+    """List the networks that urmpipe brings along.
+
+    \b
+    Examples:
+      urmpipe network list
+      urmpipe network list --json
+    """
+    from urmpipe.printing.network import networks_dict, print_networks
+    from urmpipe_models.networks.network_file import load_network, network_names
+
+    networks = [load_network(name) for name in network_names()]
+    terminal.answer(lambda: networks_dict(networks), lambda: print_networks(networks))
+    return 0
+
+
+def _search_options(command: Command) -> Command:
+    """Add how a network is assembled, and what is written of it."""
+    return with_options(
+        command,
+        click.option(
+            "--controls",
+            "--set",
+            type=NamedType(control_names),
+            multiple=True,
+            callback=named_numbers,
+            metavar="CONTROL=VALUE",
+            help="A value of a control, in the units of the network's file [default: its start].",
+        ),
+        click.option(
+            "--restarts",
+            type=WholeType(),
+            default=2000,
+            show_default=True,
+            help="Random starts in a row that find nothing new before the search ends.",
+        ),
+        click.option("--seed", type=WholeType(), default=0, show_default=True, help="Of the random starts."),
+        click.option(
+            "--draw",
+            metavar="FILE.svg",
+            type=click.Path(path_type=Path),
+            help="Draw the graph and the mechanism into a file.",
+        ),
+        output_option("RUN.rrd", "Write a recording."),
+        STRICT_OPTION,
+    )
+
+
+@network.command(short_help="Assemble a network, and count how it moves.")
+@click.argument("name", metavar="NAME|FILE", type=NETWORK)
+@_search_options
+@output_options
+def check(name: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
+    """Assemble a network from its start, and count how it moves.
+
+    Prints its loops and clusters, its mobility by the rank of the Jacobian and by Kutzbach's formula, and
+    why the two differ: redundant constraints. Idle spins and special configurations are named. What does
+    not close is told with its loop and its gap.
+
+    \b
+    Examples:
+      urmpipe network check four-bar
+      urmpipe network check bennett --set turn=0.7 --json
+      urmpipe network check my-linkage.toml --draw my-linkage.svg
+
+    Exit codes: 0 assembled, 1 not, 2 bad file or usage.
+    """
+    replaces = output is not None and output.exists()
+    with terminal.progress(f"Assembling {name}") as progress:
+        result = urmpipe.network_check(name, output=output, progress=progress, **options)
+    return _answered(result, terminal, replaces)
+
+
+@network.command(short_help="Find the configurations in which a network closes.")
+@click.argument("name", metavar="NAME|FILE", type=NETWORK)
+@click.option(
+    "--every", "--all", is_flag=True, help="Find all assemblies, and record them beside each other as ghosts."
+)
+@_search_options
+@output_options
+def solve(name: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
+    """Find the configuration near its start in which a network closes, with its controls held; or every one.
+
+    Random starts are tried where the start does not close, and with --all until so many in a row find
+    nothing new.
+
+    \b
+    Examples:
+      urmpipe network solve four-bar --set crank=1.2
+      urmpipe network solve four-bar --all --json
+      urmpipe network solve stewart-gough --all --draw assemblies.svg -o assemblies.rrd
+
+    Exit codes: 0 an assembly was found, 1 none, 2 bad file or usage.
+    """
+    replaces = output is not None and output.exists()
+    with terminal.progress(f"Assembling {name}") as progress:
+        result = urmpipe.network_solve(name, output=output, progress=progress, **options)
+    return _answered(result, terminal, replaces)
+
+
+def _answered(result: NetworkResult, terminal: Terminal, replaces: bool) -> int:
+    """Print what was found, and return the exit code."""
+    terminal.warn(result.warnings)
+    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces))
+    return 0 if result.verdict == "pass" else 1
+
+
+def _print(result: NetworkResult, replaces: bool) -> None:
+    """Print what was found, and what was written."""
+    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.terminal import print_recording
+    from urmpipe_pipeline.results import present
+
+    print_presentation(present(result))
+    if result.recording is not None:
+        print_recording(result.recording, replaced=replaces)

@@ -1,0 +1,131 @@
+"""From a network to what is found of it: assembled, its mobility, and what a person should know."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from numbers import Integral, Real
+
+from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.networks.assembly import RESTARTS, Assembled, assemble
+from urmpipe_models.networks.findings import Mobility
+from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mobility import mobility_of, stuck_controls
+from urmpipe_models.networks.network import Network
+from urmpipe_pipeline.joint_log import LogWarning, SourceFile
+from urmpipe_pipeline.networks.result import Command, NetworkResult
+from urmpipe_pipeline.provenance import provenance
+
+ROUNDED = 1e-4
+"""A gap of less, in lengths of the mechanism and [rad], may come of figures with few digits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """How a network is assembled.
+
+    Attributes:
+        controls: Values of controls instead of their starts, as they are given.
+        every: Whether all assemblies are sought.
+        restarts: Random starts in a row without anything new that end the search.
+        seed: Of the random starts.
+    """
+
+    controls: Mapping[str, float]
+    every: bool = False
+    restarts: int = RESTARTS
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        faults = [*self._faults()]
+        if faults:
+            raise OptionError(*faults)
+
+    def _faults(self) -> Iterator[Finding]:
+        """Yield which of the values make no sense."""
+        for name, value in self.controls.items():
+            if isinstance(value, bool) or not isinstance(value, Real) or not abs(float(value)) < float("inf"):
+                yield Finding(
+                    parameter="controls", found=f"{name} = {shown(value)}", allowed="a finite number"
+                )
+        for key, count in (("restarts", self.restarts), ("seed", self.seed)):
+            if not isinstance(count, Integral) or count < 0:
+                yield Finding(parameter=key, found=shown(count), allowed="a whole number, 0 or more")
+
+
+def find_network(
+    network: Network,
+    command: Command,
+    search: Search,
+    inputs: Sequence[SourceFile] = (),
+    progress: Callable[[float], None] | None = None,
+) -> NetworkResult:
+    """Return what is found of a network.
+
+    Args:
+        network: The network.
+        command: check or solve.
+        search: How it is assembled.
+        inputs: The files that it is from.
+        progress: Called with the share that is done, 0..1.
+
+    Raises:
+        NetworkError: If a control is not of the network, or its value out of its range.
+    """
+    mechanism = mechanism_of(network)
+    found = assemble(
+        mechanism, search.controls, every=search.every, restarts=search.restarts, seed=search.seed,
+        progress=progress,
+    )  # fmt: skip
+    mobility = mobility_of(mechanism, found.x_nearest) if found.assemblies else None
+    graph = mechanism.graph
+    options = {
+        "network": network.name, "controls": dict(search.controls), "every": search.every,
+        "restarts": search.restarts, "seed": search.seed,
+    }  # fmt: skip
+    return NetworkResult(
+        name=network.name,
+        network=network,
+        command=command,
+        structure=graph.structure,
+        loops=graph.loops,
+        clusters=graph.clusters,
+        assemblies=found.assemblies,
+        nearest=found.nearest,
+        gaps=found.gaps,
+        mobility=mobility,
+        every=search.every,
+        tried=found.tried,
+        reason=found.reason,
+        warnings=tuple(_warnings(mechanism, found, mobility, every=search.every)),
+        provenance=provenance(f"network {command}", options, inputs),
+    )
+
+
+def _warnings(
+    mechanism: Mechanism, found: Assembled, mobility: Mobility | None, *, every: bool
+) -> Iterator[LogWarning]:
+    """Yield what a person should know of an assembly."""
+    if found.elsewhere:
+        said = "the start does not close; the assembly nearest to it was found from a random start"
+        yield LogWarning("assembled-elsewhere", said)
+    if found.gaps and all(max(one.metres / mechanism.length, one.radians) < ROUNDED for one in found.gaps):
+        said = "the gap is so small that the network may close if its lengths and directions have more digits"
+        yield LogWarning("rounded-figures", said)
+    if every and found.continuum:
+        said = (
+            f"with its controls held the network moves in {found.continuum} ways: its assemblies are no list;"
+            " a control for each way would make them one"
+        )
+        yield LogWarning("continuum", said)
+    if mobility is None:
+        return
+    if mobility.special:
+        said = (
+            f"a special configuration: the mobility is {mobility.mobility} here, and {mobility.nearby} at"
+            " configurations nearby"
+        )
+        yield LogWarning("special-configuration", said)
+    for name in stuck_controls(mechanism, found.x_nearest):
+        said = f"control {name} cannot be moved: the network is over-driven, or locked here"
+        yield LogWarning("stuck-control", said)
