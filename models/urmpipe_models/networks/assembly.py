@@ -10,6 +10,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import Finding, NetworkError
 from urmpipe_models.names import not_among
+from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.descent import Reached, descend
 from urmpipe_models.networks.findings import Assembly, Gap
 from urmpipe_models.networks.idle_spins import idle_spins, unspun
@@ -155,7 +156,7 @@ def _search(
 def _random_starts(
     mechanism: Mechanism, start: FloatArray, count: int, rng: np.random.Generator
 ) -> FloatArray:
-    """Return configurations: angles and orientations of any size, lengths about the start, shape (variables, n)."""
+    """Return configurations, shape (variables, n): angles and orientations at random, lengths about the start."""
     x = np.repeat(start[:, np.newaxis], count, axis=1)
     for k in mechanism.free:
         if mechanism.variables[k].unit == "m":
@@ -168,11 +169,6 @@ def _random_starts(
         axis = quat[:3] / np.linalg.norm(quat[:3], axis=0)
         x[some] = 2.0 * np.arccos(np.clip(np.abs(quat[3]), 0.0, 1.0)) * np.where(quat[3] < 0.0, -axis, axis)
     return x
-
-
-def _closes(mechanism: Mechanism, gap: FloatArray) -> FloatArray:
-    """Return which gaps in [m] and [rad] are rounding."""
-    return np.asarray(gap <= CLOSED * max(1.0, mechanism.length))
 
 
 def _continuum(mechanism: Mechanism, x: FloatArray) -> int:
@@ -197,14 +193,14 @@ class _Found:
         best = int(np.argmin(known))
         if known[best] < self._gap:
             self._nearest, self._gap = ends.x[:, best], float(known[best])
-        closed = _closes(self.mechanism, known)
+        closed = known <= CLOSED
         held = unspun(self.mechanism, self._spins, self._turned(ends.x[:, closed]), self.start)
         places = iter(zip(held.T, self._places_of(held), strict=True))
         for one in closed:
             yield bool(one) and self._keep(*next(places))
 
     def _keep(self, x: FloatArray, place: FloatArray) -> bool:
-        """Keep a configuration whose bodies are elsewhere than those of all others; return whether it is so."""
+        """Keep a configuration that is none of those kept already; return whether it is kept."""
         if self.kept and (np.abs(np.array(self._places) - place).max(axis=1) <= SAME).any():
             return False
         self.kept.append(x)
@@ -238,7 +234,7 @@ class _Found:
         return turned
 
     def _places_of(self, x: FloatArray) -> FloatArray:
-        """Return where the bodies are: positions in lengths of the mechanism, entries of rotations, a row each."""
+        """Return where the bodies are, shape (n, k): entries of rotations, positions in lengths of the mechanism."""
         places = []
         for frame in self.mechanism.poses(x).values():
             places += [entry for row in frame.rotation for entry in row]
@@ -270,7 +266,7 @@ def assembly_at(mechanism: Mechanism, x: FloatArray) -> Assembly:
     for name in mechanism.graph.roots[1:]:
         first = mechanism.places[name, 0]
         values[name] = tuple(x[first : first + len(POSE_UNITS)].tolist())
-    residual = mechanism.closure(x[:, np.newaxis]).residual
+    residual = closure_of(mechanism, x[:, np.newaxis]).residual
     return Assembly(
         values,
         poses_at(mechanism, x),
@@ -286,7 +282,7 @@ def gaps_at(mechanism: Mechanism, x: FloatArray) -> tuple[Gap, ...]:
         mechanism: The network.
         x: The variables, shape (variables,).
     """
-    residual = mechanism.closure(x[:, np.newaxis]).residual[:, 0]
+    residual = closure_of(mechanism, x[:, np.newaxis]).residual[:, 0]
     gaps = []
     for k, cut in enumerate(mechanism.graph.cuts):
         gap = residual[6 * k : 6 * k + 6]
@@ -298,5 +294,6 @@ def gaps_at(mechanism: Mechanism, x: FloatArray) -> tuple[Gap, ...]:
         )
     elements = zip(mechanism.network.elements, residual[6 * len(mechanism.graph.cuts) :], strict=True)
     gaps += [Gap(one.name, (one.name,), abs(float(gap)), 0.0) for one, gap in elements]
-    open_ones = [one for one in gaps if max(one.metres, one.radians) > CLOSED * max(1.0, mechanism.length)]
-    return tuple(sorted(open_ones, key=lambda one: -max(one.metres / mechanism.length, one.radians)))
+    sizes = [max(one.metres / mechanism.length, one.radians) for one in gaps]
+    worst_first = sorted(zip(sizes, gaps, strict=True), key=lambda pair: -pair[0])
+    return tuple(gap for size, gap in worst_first if size > CLOSED)

@@ -14,6 +14,7 @@ from urmpipe_models.inverse.iterative.small_systems import (
     product,
     transposed_product,
 )
+from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.rotations import wrapped
 
@@ -33,7 +34,8 @@ class Reached:
 
     Attributes:
         x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
-        gap: The largest entry of the residual in [m] and [rad], shape (n,); NaN where x is no configuration.
+        gap: The largest entry of the residual, in lengths of the mechanism and [rad], shape (n,); NaN where x
+            is no configuration.
     """
 
     x: FloatArray
@@ -76,7 +78,8 @@ def descend(mechanism: Mechanism, x: FloatArray, free: IndexArray) -> Reached:
         gain = np.clip(gain * np.where(good, 0.125, np.where(poor, 4.0, 1.0)), *GAINS)
         found[:, rows[taken]] = moved[:, taken]
         now = new.or_else(taken, now)
-    return Reached(found, np.abs(mechanism.closure(found).residual).max(axis=0, initial=0.0))
+    left_over = closure_of(mechanism, found).residual * mechanism.row_scales[:, np.newaxis]
+    return Reached(found, np.abs(left_over).max(axis=0, initial=0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,7 +102,7 @@ class _Scaled:
 
 def _scaled(mechanism: Mechanism, x: FloatArray, free: IndexArray) -> _Scaled:
     """Return residual and Jacobian at configurations, scaled."""
-    closure = mechanism.closure(x)
+    closure = closure_of(mechanism, x)
     rows = mechanism.row_scales[:, np.newaxis]
     columns = mechanism.column_scales[free]
     jacobian = closure.jacobian[:, free] * (rows * columns)[:, :, np.newaxis]
@@ -107,7 +110,7 @@ def _scaled(mechanism: Mechanism, x: FloatArray, free: IndexArray) -> _Scaled:
 
 
 def _going(now: _Scaled, gain: FloatArray) -> FloatArray:
-    """Return which starts are under way: neither closed, nor no number, nor where no variable makes it less."""
+    """Return which starts are under way: finite, not closed, and not where no variable lessens the residual."""
     square = dot_product(now.error, now.error)
     slope = transposed_product(now.jacobian, now.error)
     moves = slope * slope > STATIONARY**2 * square * column_squares(now.jacobian)

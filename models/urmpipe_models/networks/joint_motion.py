@@ -11,7 +11,7 @@ from urmpipe_models.networks.rotations import rotation_of, turning_of
 from urmpipe_models.transform import Transform, rotation_y, translation
 
 Screws: TypeAlias = list[tuple[Vector, Vector]]
-"""Of each value the angular velocity [rad] and the velocity [m] of the point at the ground's origin a unit of it."""
+"""Angular velocity [rad] and velocity [m] of the point at the ground's origin, a unit of each value."""
 
 
 AXES = ("m", "n", "m x n")

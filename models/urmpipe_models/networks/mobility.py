@@ -1,4 +1,4 @@
-"""Mobility: how many ways a network moves, which constraints are redundant, and whether that is so only here."""
+"""Mobility: how many ways a network moves, which constraints are redundant, and whether only here."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IndexArray
+from urmpipe_models.networks.closure import closure_of, released
 from urmpipe_models.networks.descent import descend
 from urmpipe_models.networks.findings import Mobility, Redundant
 from urmpipe_models.networks.idle_spins import idle_spins
@@ -79,7 +80,7 @@ def stuck_controls(mechanism: Mechanism, x: FloatArray) -> tuple[str, ...]:
 def _scaled(mechanism: Mechanism, x: FloatArray) -> FloatArray:
     """Return Jacobians in lengths of the mechanism and [rad], shape (rows, variables, n)."""
     scales = mechanism.row_scales[:, np.newaxis] * mechanism.column_scales
-    return np.asarray(mechanism.closure(x).jacobian * scales[:, :, np.newaxis])
+    return np.asarray(closure_of(mechanism, x).jacobian * scales[:, :, np.newaxis])
 
 
 def _rank(jacobian: FloatArray, least: float = 0.0) -> int:
@@ -108,7 +109,7 @@ def _nearby(mechanism: Mechanism, x: FloatArray, jacobian: FloatArray, mobility:
     scales = mechanism.column_scales[:, np.newaxis]
     near = descend(mechanism, x[:, np.newaxis] + scales * steps, np.arange(len(x)))
     away = np.linalg.norm((near.x - x[:, np.newaxis]) / scales, axis=0)
-    there = np.flatnonzero((away > MOVED * NEARBY) & (near.gap < RANK * max(1.0, mechanism.length)))
+    there = np.flatnonzero((away > MOVED * NEARBY) & (near.gap < RANK))
     ranks = [_rank(one) for one in _scaled(mechanism, near.x[:, there]).transpose(2, 0, 1)]
     return min((len(x) - rank for rank in ranks), default=0)
 
@@ -121,11 +122,11 @@ def _redundant(mechanism: Mechanism, x: FloatArray, jacobian: FloatArray, count:
     if count <= 0:
         return
     unreached = np.linalg.svd(jacobian)[0][:, mechanism.rows - count :]
-    released = list(mechanism.released(x))
-    reach = np.array([(column * mechanism.row_scales) @ unreached for _, _, column in released])
+    constraints = list(released(mechanism, x))
+    reach = np.array([(column * mechanism.row_scales) @ unreached for _, _, column in constraints])
     for _ in range(count):
         size = np.linalg.norm(reach, axis=1)
         best = int(np.flatnonzero(size >= ALIKE * size.max())[-1])
-        yield Redundant(*released[best][:2])
+        yield Redundant(*constraints[best][:2])
         along = reach[best] / size[best]
         reach = reach - np.outer(reach @ along, along)

@@ -32,7 +32,7 @@ def rotation_of(q: Vector) -> Transform:
 
 
 def turning_of(q: Vector) -> tuple[Vector, Vector, Vector]:
-    """Return the angular velocities w with which exp([q]x) turns as q_1, q_2 and q_3 change, in the outer frame.
+    """Return the angular velocities in the outer frame with which exp([q]x) turns as q_1, q_2, q_3 change.
 
     The columns of I + ((1 - cos(a)) / a^2) [q]x + ((a - sin(a)) / a^3) [q]x^2, a = |q|.
 
@@ -68,7 +68,7 @@ def _quotients(square: Element) -> tuple[Element, Element, Element, Element]:
 
 
 def untwisted(vector: FloatArray) -> FloatArray:
-    """Return the matrices that turn an angular velocity in the outer frame into the rate of a rotation vector.
+    """Return what makes the rate of a rotation vector of an angular velocity in the outer frame.
 
     I - [v]x / 2 + ((1 - (a / 2) cot(a / 2)) / a^2) [v]x^2, a = |v|: the inverse of `turning_of`.
 
