@@ -184,7 +184,10 @@ KINDS = {
     "formats": Kind(
         _one_or_many(lambda one: isinstance(one, str) and one in ("svg", "png")), "svg, png or a list of both"
     ),
-    "load_network.network": Kind(_is_path, "a name, or a TOML file"),
+    "load_network.network": Kind(
+        lambda value: isinstance(value, Mapping) or _is_path(value),
+        "a name, a TOML file, or the tables of one",
+    ),
     "ik.tolerance": Kind(_is_number, "a number, in m"),
     "inputs": PATHS,
     "iso": FLAG,

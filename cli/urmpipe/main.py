@@ -112,8 +112,8 @@ def cli() -> None:
       urmpipe network check four-bar
 
     Exit codes: 0 within tolerance, 1 out of tolerance (ik: a target not reached, a jump, or a joint too
-    fast; plan: the arm cannot move so; accuracy: an error above the limit; network: it does not close; fmu check: a problem), 2 bad
-    input or usage.
+    fast; plan: the arm cannot move so; accuracy: an error above the limit; network: it does not close; fmu
+    check: a problem), 2 bad input or usage.
     """
 
 

@@ -17,6 +17,7 @@ from urmpipe.commands.export import export
 from urmpipe.commands.fmu import fmu
 from urmpipe.commands.ik import ik
 from urmpipe.commands.ingest import ingest
+from urmpipe.commands.network import network
 from urmpipe.commands.plan import plan
 from urmpipe.commands.report import report
 from urmpipe.commands.robot import robot
@@ -33,6 +34,8 @@ COMMANDS: dict[str, tuple[click.Command, Callable[..., Any]]] = {
     "export": (export, urmpipe.export),
     "ik": (ik, urmpipe.ik),
     "ingest": (ingest, urmpipe.ingest),
+    "network_check": (network.commands["check"], urmpipe.network_check),
+    "network_solve": (network.commands["solve"], urmpipe.network_solve),
     "plan": (plan, urmpipe.plan),
     "report": (report, urmpipe.report),
     "simulate": (simulate, urmpipe.simulate),
@@ -48,6 +51,8 @@ OPERANDS: dict[str, set[str]] = {
     "export": {"result"},
     "ik": {"targets"},
     "ingest": {"log"},
+    "network_check": {"network"},
+    "network_solve": {"network"},
     "plan": {"path"},
     "report": {"results"},
     "simulate": {"system"},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 from urmpipe import __version__
 from urmpipe.keyword_checks import PathLike, public, refuse_warnings
@@ -22,14 +23,15 @@ SEARCHING = 0.9
 
 
 @public
-def load_network(network: PathLike) -> Network:
-    """Return a network that urmpipe brings along, or of a .toml file. See docs/networks.md.
+def load_network(network: PathLike | Mapping[str, Any]) -> Network:
+    """Return a network that urmpipe brings along, of a .toml file, or of such tables. See docs/networks.md.
 
     Args:
-        network: The network's name, or its file.
+        network: The network's name, its file, or the tables of one, such as {"joints": {"A": {"kind":
+            "revolute", "bodies": ["ground", "crank"]}}, "bodies": {"crank": {}}}.
 
     Raises:
-        NetworkError: If there is no such network, or with everything that is wrong with its file.
+        NetworkError: If there is no such network, or with everything that is wrong with its tables.
     """
     return network_file.load_network(network)
 
@@ -66,7 +68,8 @@ def network_check(
 
     Source: [KinematicSystems]_ section 3.
     """
-    return _found(network, "check", Search(controls or {}, False, restarts, seed), strict, draw, output, progress)
+    search = Search(controls or {}, False, restarts, seed)
+    return _found(network, "check", search, strict, draw, output, progress)
 
 
 @public
@@ -104,7 +107,8 @@ def network_solve(
 
     Source: [KinematicSystems]_ section 3.
     """
-    return _found(network, "solve", Search(controls or {}, every, restarts, seed), strict, draw, output, progress)
+    search = Search(controls or {}, every, restarts, seed)
+    return _found(network, "solve", search, strict, draw, output, progress)
 
 
 def _found(

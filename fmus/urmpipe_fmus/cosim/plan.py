@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from urmpipe_fmus.cosim.checks import Link, Start, Wiring
 from urmpipe_fmus.cosim.interface import Interface, Variable, read_interface
 from urmpipe_fmus.cosim.order import Exchange, Loop, Order
-from urmpipe_fmus.cosim.places import placed
 from urmpipe_fmus.cosim.system import STEP, SYSTEMS, Block, LogInput, Port, System
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.errors import CosimulationError, Finding, UrmpipeError
+from urmpipe_models.files.places import placed
 from urmpipe_models.messages import Hint
 
 Make = Callable[[Block], Unit | Path]

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from urmpipe_fmus.cosim.arguments import beside, given, replaced, unknown
-from urmpipe_fmus.cosim.places import placed
 from urmpipe_fmus.cosim.system import SYSTEMS, TOLERANCE, Block, Connection, LogInput, Port, System
 from urmpipe_fmus.units import unit_name
 from urmpipe_models.errors import CosimulationError, Finding, shown
 from urmpipe_models.files.missing import meant_by
+from urmpipe_models.files.places import placed
 from urmpipe_models.files.toml_text import parse_toml
 from urmpipe_models.names import did_you_mean, not_among
 

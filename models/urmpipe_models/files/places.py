@@ -50,7 +50,7 @@ def _plain(name: str) -> str:
 
 
 def _line_of(lines: dict[str, int], name: str) -> int | None:
-    """Return the line of a table or key, or of the list of `start[2]`, else of the table that it stands in."""
+    """Return the line of a table or key, of an item that of its list; else that of the table around."""
     while name not in lines and "." in name:
         name = name.rpartition("[" if name.endswith("]") else ".")[0]
     return lines.get(name)

@@ -15,8 +15,8 @@ from urmpipe_models.networks.descent import Reached, descend
 from urmpipe_models.networks.findings import Assembly, Gap
 from urmpipe_models.networks.idle_spins import idle_spins, unspun
 from urmpipe_models.networks.mechanism import Mechanism
-from urmpipe_models.networks.mobility import mobility_at
-from urmpipe_models.networks.network import POSE_UNITS
+from urmpipe_models.networks.mobility import mobility_at, mobility_nearby
+from urmpipe_models.networks.parts import POSE_UNITS
 
 CLOSED = 1e-9
 """A gap of less, in lengths of the mechanism and in [rad], is rounding."""
@@ -102,8 +102,8 @@ def assemble(
             continuum = _continuum(mechanism, found.kept[0])
     if continuum and every:
         reason = (
-            f"with its controls held the network still moves in {continuum} ways:"
-            " its assemblies are no list, one of them is shown"
+            f"with its controls held the network has mobility {continuum}: its assemblies are no list, the"
+            " nearest to the start is shown"
         )
     return found.result(tried, reason, elsewhere=not closed and bool(found.kept), continuum=continuum)
 
@@ -148,15 +148,17 @@ def _search(
                 break
         if progress is not None:
             progress(min(in_vain / max(restarts, 1), 1.0))
-    if in_vain >= restarts:
-        return tried + 1, f"{in_vain} random starts in a row found nothing new"
-    return tried + 1, f"{len(found.kept)} assemblies of {tried} random starts: the search was cut off"
+    if in_vain < restarts:
+        return tried + 1, f"at least {len(found.kept)}: the search was cut off"
+    if not found.kept:
+        return tried + 1, f"none of {in_vain} random starts closed"
+    return tried + 1, f"at least {len(found.kept)}: {in_vain} random starts in a row found nothing new"
 
 
 def _random_starts(
     mechanism: Mechanism, start: FloatArray, count: int, rng: np.random.Generator
 ) -> FloatArray:
-    """Return configurations, shape (variables, n): angles and orientations at random, lengths about the start."""
+    """Return random angles and orientations, and lengths near the start, shape (variables, n)."""
     x = np.repeat(start[:, np.newaxis], count, axis=1)
     for k in mechanism.free:
         if mechanism.variables[k].unit == "m":
@@ -173,8 +175,7 @@ def _random_starts(
 
 def _continuum(mechanism: Mechanism, x: FloatArray) -> int:
     """Return how many ways there are to move with controls and idle spins held."""
-    held = mobility_at(mechanism, x, mechanism.free)
-    return max(0, held - len(idle_spins(mechanism)))
+    return max(0, mobility_nearby(mechanism, x, mechanism.free) - len(idle_spins(mechanism)))
 
 
 class _Found:
@@ -234,7 +235,7 @@ class _Found:
         return turned
 
     def _places_of(self, x: FloatArray) -> FloatArray:
-        """Return where the bodies are, shape (n, k): entries of rotations, positions in lengths of the mechanism."""
+        """Return rotations and positions of the bodies, in lengths of the mechanism, shape (n, k)."""
         places = []
         for frame in self.mechanism.poses(x).values():
             places += [entry for row in frame.rotation for entry in row]

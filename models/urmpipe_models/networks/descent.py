@@ -110,7 +110,7 @@ def _scaled(mechanism: Mechanism, x: FloatArray, free: IndexArray) -> _Scaled:
 
 
 def _going(now: _Scaled, gain: FloatArray) -> FloatArray:
-    """Return which starts are under way: finite, not closed, and not where no variable lessens the residual."""
+    """Return which starts go on: those that are finite, not closed, and not at a least residual."""
     square = dot_product(now.error, now.error)
     slope = transposed_product(now.jacobian, now.error)
     moves = slope * slope > STATIONARY**2 * square * column_squares(now.jacobian)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from urmpipe_models.elementwise import Element, Vector, add, cross, dot, scale, subtract
-from urmpipe_models.networks.network import ConstraintElement
+from urmpipe_models.networks.parts import ConstraintElement
 from urmpipe_models.transform import Transform
 
 MEASURES = {"gg": "length", "eg": "height", "crc": "distance", "gc": "radius"}

@@ -1,5 +1,172 @@
-from urmpipe_models.networks.network import Network
+"""What is wrong with the parts of a network: names, bodies, joints, elements and controls."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, get_args
+
+from urmpipe_models.elementwise import Vector, cross, dot, subtract
+from urmpipe_models.errors import Finding
+from urmpipe_models.names import nearest, not_among
+from urmpipe_models.networks.control_faults import control_faults
+from urmpipe_models.networks.graph import graph_of
+from urmpipe_models.networks.parts import FREEDOMS, POSE_UNITS, ConstraintElement, ElementKind, Joint, Parts
+from urmpipe_models.networks.value_faults import ORTHONORMAL, lines_faults, not_orthonormal, value_faults
+
+if TYPE_CHECKING:
+    from urmpipe_models.transform import Transform
 
 
-def refuse_faults(network):
-    pass
+def faults_of(parts: Parts) -> Iterator[Finding]:
+    """Yield what is wrong with the parts of a network.
+
+    What may follow from something that could not be read has a kind: "untied", a body that nothing ties,
+    "idle", a control that drives nothing, and "parallel", two lines.
+    """
+    found = [*_structure_faults(parts), *value_faults(parts)]
+    yield from found or lines_faults(parts)
+
+
+def _structure_faults(parts: Parts) -> Iterator[Finding]:
+    """Yield what is wrong whatever the values of controls are."""
+    if not parts.ties:
+        message = "found none, and no elements; allowed: at least one of them"
+        yield Finding(message, about="joints", kind="untied")
+    yield from _name_faults(parts)
+    yield from _body_faults(parts)
+    for where, tie in parts.ties:
+        yield from _tie_faults(where, tie, parts.body_names)
+    for joint in parts.joints:
+        yield from _joint_faults(f"joints.{joint.name}", joint)
+    for element in parts.elements:
+        yield from _element_faults(f"elements.{element.name}", element)
+    yield from control_faults(parts)
+
+
+def _name_faults(parts: Parts) -> Iterator[Finding]:
+    """Yield names that stand for two things.
+
+    A body may have the name of the joint that carries it, as those of a chain, unless it has freedoms of its
+    own: these would be called like the joint's.
+    """
+    known, free = set(parts.body_names), set(graph_of(parts).roots)
+    carriers = (one for one in parts.joints if one.name == one.bodies[1])
+    carried = {one.name for one in carriers if one.name not in free or one.bodies[0] not in known}
+    named = [("bodies", name) for name in parts.body_names if name not in carried]
+    named += [("joints", one.name) for one in parts.joints]
+    named += [("elements", one.name) for one in parts.elements]
+    named += [("controls", one.name) for one in parts.controls]
+    first: dict[str, str] = {}
+    for table, name in named:
+        where = f"{table}.{name}"
+        if name in first:
+            yield Finding(f"{first[name]} has this name, too; allowed: each name once", about=where)
+        first.setdefault(name, where)
+
+
+def _body_faults(parts: Parts) -> Iterator[Finding]:
+    """Yield bodies that nothing ties, and starts that are not allowed."""
+    tied = {name for _, tie in parts.ties for name in tie.bodies}
+    tied |= {nearest(name, parts.body_names) or "" for name in tied - set(parts.body_names)}
+    for body in parts.bodies:
+        where = f"bodies.{body.name}"
+        if body.name not in tied:
+            message = "nothing is tied to it; allowed: bodies with a joint or an element"
+            yield Finding(message, about=where, kind="untied")
+        if body.start and len(body.start) != len(POSE_UNITS):
+            count = f"{len(body.start)} numbers, allowed: 6: x, y, z and a rotation vector"
+            yield Finding(f"found {count}", about=f"{where}.start")
+        yield from _finite_faults(f"{where}.start", body.start)
+    yield from _start_faults(parts)
+
+
+def _start_faults(parts: Parts) -> Iterator[Finding]:
+    """Yield starts of bodies whose pose joints give."""
+    started = {one.name for one in parts.bodies if one.start}
+    for cluster in graph_of(parts).clusters:
+        if cluster[0] == parts.ground:
+            reason, others = f"joints tie it to {parts.ground}", started.intersection(cluster)
+        else:  # a root is a body with a start, if there is one
+            reason, others = (
+                f"joints tie it to {cluster[0]}, which has one",
+                started.intersection(cluster[1:]),
+            )
+        for name in sorted(others):
+            allowed = "one for all bodies that joints tie together, none for those tied to the ground"
+            yield Finding(f"found a start, but {reason}; allowed: {allowed}", about=f"bodies.{name}.start")
+
+
+def _tie_faults(where: str, tie: Joint | ConstraintElement, names: tuple[str, ...]) -> Iterator[Finding]:
+    """Yield what is wrong with the bodies of a joint or an element."""
+    for name in tie.bodies:
+        if name not in names:
+            yield Finding(f"body {not_among(name, names)}", about=f"{where}.bodies")
+    if tie.bodies[0] == tie.bodies[1]:
+        yield Finding(f"found {tie.bodies[0]} twice, allowed: two bodies", about=f"{where}.bodies")
+
+
+def _joint_faults(where: str, joint: Joint) -> Iterator[Finding]:
+    """Yield what is wrong with a joint by itself."""
+    if joint.kind not in FREEDOMS:
+        yield Finding(not_among(joint.kind, FREEDOMS), about=f"{where}.kind")
+        return
+    if joint.kind == "user":
+        yield from _user_faults(where, joint)
+        return
+    count = len(joint.units)
+    for key, given in (("start", joint.start), ("value", joint.values)):
+        if len(given) not in {0, count}:
+            yield Finding(f"found {len(given)} of them, allowed: {count}", about=f"{where}.{key}")
+    yield from _finite_faults(f"{where}.start", joint.start)
+    yield from _finite_faults(f"{where}.pitch", (joint.pitch,))
+    yield from _frame_faults(where, joint.frames)
+
+
+def _user_faults(where: str, joint: Joint) -> Iterator[Finding]:
+    """Yield what a user joint has and may not have, or the other way round."""
+    for key, given in (("start", joint.start), ("value", joint.values)):
+        if given:
+            yield Finding(
+                "found some, allowed: none of a user joint: m, n and a move it", about=f"{where}.{key}"
+            )
+    if len(joint.motion) != 9:
+        allowed = "9: of m, n and a three each"
+        yield Finding(f"found {len(joint.motion)} functions, allowed: {allowed}", about=where)
+    yield from _frame_faults(where, joint.frames)
+
+
+def _frame_faults(where: str, frames: tuple[Transform, Transform]) -> Iterator[Finding]:
+    """Yield the frames of a joint whose axes are not orthonormal, one finding if both are the same."""
+    for frame, body in zip(frames[: 1 + (frames[0] != frames[1])], ("first", "second"), strict=False):
+        m, n, k = frame.columns
+        off = math.sqrt(dot(m, m)) - 1.0, math.sqrt(dot(n, n)) - 1.0, dot(m, n)
+        of = f" in the {body} body" if frames[0] != frames[1] else ""
+        if not all(abs(one) <= ORTHONORMAL for one in off):
+            key = "m" if all(abs(one) <= ORTHONORMAL for one in off[1:]) else "n"
+            yield Finding(not_orthonormal(off, of), about=f"{where}.{key}")
+        elif not all(abs(one) <= ORTHONORMAL for one in subtract(cross(m, n), k)):
+            yield Finding(f"the third axis{of} is not m x n", about=where)
+        yield from _finite_faults(f"{where}.a", frame.translation)
+
+
+def _element_faults(where: str, element: ConstraintElement) -> Iterator[Finding]:
+    """Yield what is wrong with an element by itself."""
+    kinds = get_args(ElementKind)
+    if element.kind not in kinds:
+        yield Finding(not_among(element.kind, kinds), about=f"{where}.kind")
+        return
+    normals: tuple[Vector, ...] = {"gg": (), "crc": element.normals}.get(element.kind, element.normals[:1])
+    for n in dict.fromkeys(normals):
+        off = math.sqrt(dot(n, n)) - 1.0
+        if not abs(off) <= ORTHONORMAL:
+            message = f"is no unit vector: |n| - 1 = {off:.3g}; allowed: {ORTHONORMAL:g} at most"
+            yield Finding(message, about=f"{where}.n")
+    for point in element.points[element.kind == "eg" :]:
+        yield from _finite_faults(f"{where}.a", point)
+
+
+def _finite_faults(where: str, numbers: tuple[float, ...]) -> Iterator[Finding]:
+    """Yield the first number that is none, or infinite."""
+    if wrong := [one for one in numbers if not math.isfinite(one)]:
+        yield Finding(f"found {wrong[0]:g}, allowed: a finite number", about=where)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
-from urmpipe_models.networks.network import Network
+from urmpipe_models.networks.parts import Parts
 
 Structure = Literal["tree", "loops", "closed chain"]
 
@@ -41,7 +41,7 @@ class Graph:
         clusters: Names of the bodies of each part that joints hold together, that of the ground first.
     """
 
-    network: Network
+    network: Parts
     roots: tuple[str, ...]
     branches: tuple[Branch, ...]
     cuts: tuple[int, ...]
@@ -74,7 +74,7 @@ class Graph:
         return "closed chain" if least >= 2 else "loops"
 
 
-def graph_of(network: Network) -> Graph:
+def graph_of(network: Parts) -> Graph:
     """Return the graph of a network, its spanning forest grown joint by joint in breadth."""
     placed = [one.name for one in network.bodies if one.start]
     roots: list[str] = []
@@ -92,7 +92,7 @@ def graph_of(network: Network) -> Graph:
     return Graph(network, tuple(roots), tuple(branches), cuts, tuple(clusters))
 
 
-def _grown(network: Network, root: str, seen: set[str]) -> list[Branch]:
+def _grown(network: Parts, root: str, seen: set[str]) -> list[Branch]:
     """Return the branches of the part that a body is in; its bodies become seen."""
     branches: list[Branch] = []
     seen.add(root)
@@ -122,7 +122,7 @@ def _way(tree: Sequence[tuple[str, str, str]], start: str, end: str) -> tuple[st
     return ways.get(end, ())
 
 
-def parts_without(network: Network, left_out: Iterable[str]) -> list[set[str]]:
+def parts_without(network: Parts, left_out: Iterable[str]) -> list[set[str]]:
     """Return the sets of bodies that hang together by joints and elements without some of these, by name."""
     out = set(left_out)
     edges = [one.bodies for one in (*network.joints, *network.elements) if one.name not in out]

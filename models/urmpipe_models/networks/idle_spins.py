@@ -1,4 +1,4 @@
-"""Idle spins: a part that hangs on the rest by two global joints spins about the line through their centres."""
+"""Idle spins: a part that only two global joints hold spins about the line through their centres."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from urmpipe_models.networks.closure import gap_of
 from urmpipe_models.networks.graph import parts_without
 from urmpipe_models.networks.joint_motion import joint_frame
 from urmpipe_models.networks.mechanism import Mechanism
-from urmpipe_models.networks.network import Joint
+from urmpipe_models.networks.parts import Joint
 from urmpipe_models.networks.rotations import rotation_of
 from urmpipe_models.orientation import quaternions
 from urmpipe_models.transform import Transform

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import TypeAlias
 
 from urmpipe_models.elementwise import ZERO, Element, Vector, add, cross, scale
-from urmpipe_models.networks.network import Joint, frame_of
+from urmpipe_models.networks.parts import Joint, frame_of
 from urmpipe_models.networks.rotations import rotation_of, turning_of
 from urmpipe_models.transform import Transform, rotation_y, translation
 

@@ -15,7 +15,7 @@ from urmpipe_models.elementwise import Element, Vector, subtract
 from urmpipe_models.networks.expressions import Expression, Slopes
 from urmpipe_models.networks.graph import Branch, Graph, graph_of
 from urmpipe_models.networks.joint_motion import joint_frame
-from urmpipe_models.networks.network import POSE_UNITS, Joint, Network, ordered_controls
+from urmpipe_models.networks.parts import POSE_UNITS, Joint, Parts, ordered_controls
 from urmpipe_models.networks.rotations import rotation_of
 from urmpipe_models.transform import Transform
 
@@ -70,7 +70,7 @@ class Mechanism:
         graph: Its graph.
     """
 
-    network: Network
+    network: Parts
     graph: Graph
 
     @cached_property
@@ -258,7 +258,7 @@ class Mechanism:
         return posed
 
 
-def mechanism_of(network: Network) -> Mechanism:
+def mechanism_of(network: Parts) -> Mechanism:
     """Return a network in numbers."""
     return Mechanism(network, graph_of(network))
 

@@ -58,7 +58,7 @@ def mobility_of(mechanism: Mechanism, x: FloatArray) -> Mobility:
         variables - mechanism.rows,
         tuple(_redundant(mechanism, x, jacobian, mechanism.rows - rank)),
         tuple(spin.name for spin in idle_spins(mechanism)),
-        _nearby(mechanism, x, jacobian, variables - rank),
+        mobility_nearby(mechanism, x, np.arange(variables)),
     )
 
 
@@ -98,20 +98,28 @@ def _null_space(jacobian: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.svd(jacobian)[2][_rank(jacobian) :].T)
 
 
-def _nearby(mechanism: Mechanism, x: FloatArray, jacobian: FloatArray, mobility: int) -> int:
-    """Return the mobility at assembled configurations nearby; 0 if there are none, of a special structure."""
-    if mobility == 0:
+def mobility_nearby(mechanism: Mechanism, x: FloatArray, columns: IndexArray) -> int:
+    """Return the mobility at assembled configurations near one; 0 if there are none.
+
+    They are looked for along ways in which the Jacobian lets it move: without one it only seems to move.
+
+    Args:
+        mechanism: The network.
+        x: The variables of an assembly, shape (variables,).
+        columns: The numbers of those that may change.
+    """
+    ways = _null_space(_scaled(mechanism, x[:, np.newaxis])[:, columns, 0])
+    if not ways.size:
         return 0
-    ways = _null_space(jacobian)
-    rng = np.random.default_rng(0)
-    steps = rng.normal(size=(mobility, PROBES))
-    steps = NEARBY * (ways @ (steps / np.linalg.norm(steps, axis=0)))
-    scales = mechanism.column_scales[:, np.newaxis]
-    near = descend(mechanism, x[:, np.newaxis] + scales * steps, np.arange(len(x)))
-    away = np.linalg.norm((near.x - x[:, np.newaxis]) / scales, axis=0)
+    steps = np.random.default_rng(0).normal(size=(ways.shape[1], PROBES))
+    scales = mechanism.column_scales[columns, np.newaxis]
+    starts = np.repeat(x[:, np.newaxis], PROBES, axis=1)
+    starts[columns] += scales * NEARBY * (ways @ (steps / np.linalg.norm(steps, axis=0)))
+    near = descend(mechanism, starts, columns)
+    away = np.linalg.norm((near.x[columns] - x[columns, np.newaxis]) / scales, axis=0)
     there = np.flatnonzero((away > MOVED * NEARBY) & (near.gap < RANK))
-    ranks = [_rank(one) for one in _scaled(mechanism, near.x[:, there]).transpose(2, 0, 1)]
-    return min((len(x) - rank for rank in ranks), default=0)
+    ranks = [_rank(one) for one in _scaled(mechanism, near.x[:, there])[:, columns].transpose(2, 0, 1)]
+    return min((len(columns) - rank for rank in ranks), default=0)
 
 
 def _redundant(mechanism: Mechanism, x: FloatArray, jacobian: FloatArray, count: int) -> Iterator[Redundant]:

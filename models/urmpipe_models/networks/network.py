@@ -1,161 +1,34 @@
-"""A network: bodies, the joints and constraint elements between them, and the controls that drive these."""
+"""A network: parts with which nothing is wrong."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any, Literal
+from dataclasses import dataclass
+from html import escape
 
 from urmpipe_models.display import Shown, line_of, number_of
-from urmpipe_models.elementwise import ZERO, Vector, cross
-from urmpipe_models.networks.expressions import Expression
-from urmpipe_models.transform import Transform
-
-GROUND = "ground"
-"""What the body that stands still is called by default."""
-
-JointKind = Literal["revolute", "prismatic", "cylindrical", "helical", "global", "user"]
-ElementKind = Literal["gg", "eg", "crc", "gc"]
-
-FREEDOMS: dict[JointKind, tuple[str, ...]] = {
-    "revolute": ("rad",),
-    "prismatic": ("m",),
-    "cylindrical": ("rad", "m"),
-    "helical": ("rad",),
-    "global": ("rad", "rad", "rad"),
-    "user": (),
-}
-"""The unit of each variable of a joint of a kind: theta, s, theta and s, theta, the rotation vector q."""
-
-POSE_UNITS = ("m", "m", "m", "rad", "rad", "rad")
-"""Those of a body that no joint ties to the ground: x, y, z and a rotation vector."""
-
-_NUMBERS = tuple[float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Body:
-    """A rigid body.
-
-    Attributes:
-        name: Its name.
-        start: Of a body that no joint ties to the ground: x, y, z in [m] and its rotation vector in [rad],
-            from where assembly starts; empty where that is not given.
-    """
-
-    name: str
-    start: tuple[float, ...] = ()
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A joint between two bodies: R = A_1 T(q) A_2^-1 is the second body seen from the first.
-
-    Attributes:
-        name: Its name.
-        kind: revolute: T turns by theta about n; prismatic: it slides by s along n; cylindrical: both;
-            helical: it turns by theta and slides by pitch theta; global: it turns by the rotation vector q;
-            user: T is any function of controls.
-        bodies: The first and the second body.
-        frames: A_1 and A_2: the columns of their rotations are m, n and m x n, their translations are a.
-        start: The variables from where assembly starts, in [rad] and [m] by `FREEDOMS`.
-        values: What drives each variable, in [rad] and [m]; None where it is free; empty: all are.
-        pitch: Of a helical joint in [m/rad].
-        motion: Of a user joint: m, n (unit vectors) and a in [m], each three functions of controls.
-
-    Source: [KinematicSystems]_ eq. 3-2 to 3-4 and section 3.2.2, with its errata.
-    """
-
-    name: str
-    kind: JointKind
-    bodies: tuple[str, str]
-    frames: tuple[Transform, Transform] = (Transform(), Transform())
-    start: tuple[float, ...] = ()
-    values: tuple[Expression | None, ...] = ()
-    pitch: float = 0.0
-    motion: tuple[Expression, ...] = ()
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """The unit of each of its variables, rad or m."""
-        return FREEDOMS[self.kind]
-
-    @property
-    def drives(self) -> tuple[Expression | None, ...]:
-        """What drives each of its variables; None where it is free."""
-        return self.values or (None,) * len(self.units)
-
-
-@dataclass(frozen=True)
-class ConstraintElement:
-    """One constraint between two bodies.
-
-    Attributes:
-        name: Its name.
-        kind: gg: the two points are at a distance d; eg: the second point is in a plane of the first body
-            with normal n, at h from its origin; crc: two lines, through the points along n, are at a distance
-            d; gc: the second point is at a distance d from a line of the first body.
-        bodies: The first and the second body.
-        points: a of each in [m]; of eg that of the first means nothing.
-        normals: n of each, unit vectors [-]; of gg both, of eg and gc the second mean nothing.
-        length: d or h in [m].
-
-    Source: [KinematicSystems]_ section 3.2.3, with its errata.
-    """
-
-    name: str
-    kind: ElementKind
-    bodies: tuple[str, str]
-    length: Expression
-    points: tuple[Vector, Vector] = field(
-        default=(ZERO, ZERO), metadata={"stored": tuple[_NUMBERS, _NUMBERS]}
-    )
-    normals: tuple[Vector, Vector] = field(
-        default=((0.0, 1.0, 0.0), (0.0, 1.0, 0.0)), metadata={"stored": tuple[_NUMBERS, _NUMBERS]}
-    )
-
-    @cached_property
-    def meeting(self) -> bool:
-        """Whether its length is the constant 0: two lines that meet have a distance with a sign."""
-        return not self.length.names and float(self.length.value({})) == 0.0
-
-
-@dataclass(frozen=True)
-class Control:
-    """A common parameter that drives joints and lengths through functions.
-
-    Attributes:
-        name: Its name in expressions.
-        start: Its value where none is set, in the units that the expressions mean.
-        lower: Its least value.
-        upper: Its largest value.
-        value: Its function of other controls; None if it can be set.
-
-    Source: [KinematicSystems]_ section 3.2.4.
-    """
-
-    name: str
-    start: float = 0.0
-    lower: float = -math.inf
-    upper: float = math.inf
-    value: Expression | None = None
+from urmpipe_models.errors import NetworkError
+from urmpipe_models.networks.faults import faults_of
+from urmpipe_models.networks.parts import FREEDOMS as FREEDOMS
+from urmpipe_models.networks.parts import GROUND as GROUND
+from urmpipe_models.networks.parts import POSE_UNITS as POSE_UNITS
+from urmpipe_models.networks.parts import Body as Body
+from urmpipe_models.networks.parts import ConstraintElement as ConstraintElement
+from urmpipe_models.networks.parts import Control as Control
+from urmpipe_models.networks.parts import ElementKind as ElementKind
+from urmpipe_models.networks.parts import Joint as Joint
+from urmpipe_models.networks.parts import JointKind as JointKind
+from urmpipe_models.networks.parts import Parts as Parts
+from urmpipe_models.networks.parts import frame_of as frame_of
+from urmpipe_models.networks.parts import ordered_controls as ordered_controls
 
 
 @dataclass(frozen=True, repr=False)
-class Network(Shown):
+class Network(Parts, Shown):
     """Bodies, and what ties them: joints, constraint elements, controls.
 
-    `urmpipe.load_network` reads one from a file; `Network.from_dict` takes the tables of a file.
+    `urmpipe.load_network` reads one from a file, or makes one of such tables.
 
     Attributes:
-        name: What it is called.
-        bodies: The bodies but for the ground.
-        joints: The joints.
-        elements: The constraint elements.
-        controls: The controls.
-        ground: The name of the body that stands still.
         description: One line for people.
         source: Where the numbers come from.
 
@@ -163,39 +36,12 @@ class Network(Shown):
         NetworkError: With everything that is wrong.
     """
 
-    name: str
-    bodies: tuple[Body, ...]
-    joints: tuple[Joint, ...] = ()
-    elements: tuple[ConstraintElement, ...] = ()
-    controls: tuple[Control, ...] = ()
-    ground: str = GROUND
     description: str = ""
     source: str = ""
 
     def __post_init__(self) -> None:
-        from urmpipe_models.networks.faults import refuse_faults
-
-        refuse_faults(self)
-
-    @classmethod
-    def from_dict(cls, tables: Mapping[str, Any], name: str = "network") -> Network:
-        """Return the network of the tables of a file; see docs/networks.md for their keys.
-
-        Args:
-            tables: Such as {"joints": {"A": {"kind": "revolute", "bodies": ["ground", "crank"]}}, ...}.
-            name: Its name where the tables have none.
-
-        Raises:
-            NetworkError: With everything that is wrong.
-        """
-        from urmpipe_models.networks.network_file import network_of
-
-        return network_of(tables, name)
-
-    @cached_property
-    def body_names(self) -> tuple[str, ...]:
-        """The names of all bodies, the ground first."""
-        return (self.ground, *(one.name for one in self.bodies))
+        if found := tuple(dict.fromkeys(faults_of(self))):
+            raise NetworkError(*found)
 
     def _headline(self) -> str:
         """Return its name, what it is, and how much there is of it."""
@@ -209,31 +55,9 @@ class Network(Shown):
 
     def _table(self) -> str:
         """Return a row a joint or element: its name, kind and bodies."""
-        from html import escape
-
         rows = "".join(
             f"<tr><td>{escape(one.name)}</td><td>{one.kind}</td><td>{escape(one.bodies[0])}</td>"
             f"<td>{escape(one.bodies[1])}</td></tr>"
             for one in (*self.joints, *self.elements)
         )
         return f"<table><tr><th>name</th><th>kind</th><th>body</th><th>body</th></tr>{rows}</table>"
-
-
-def frame_of(m: Vector, n: Vector, a: Vector) -> Transform:
-    """Return A, whose rotation has the columns m, n and m x n [-], and whose translation is a in [m].
-
-    Source: [KinematicSystems]_ section 3.2.2.
-    """
-    return Transform(Transform((m, n, cross(m, n))).columns, a)
-
-
-def ordered_controls(controls: tuple[Control, ...]) -> list[Control]:
-    """Return controls, each after those that it is a function of; those of a cycle are left out."""
-    ordered: list[Control] = []
-    known: set[str] = set()
-    left = list(controls)
-    while ready := [one for one in left if one.value is None or one.value.names <= known]:
-        ordered += ready
-        known |= {one.name for one in ready}
-        left = [one for one in left if one.name not in known]
-    return ordered

@@ -82,7 +82,7 @@ def given(function: str, run: urmpipe.Run, folder: Path) -> dict[str, Any]:
         "log": "log.csv", "logs": "log.csv", "reference": "path.csv", "targets": [[0.3, 0.1, 0.4]],
         "results": run, "result": run, "run": run, "recordings": "run.rrd", "output": folder / "out",
         "system": "one-drive", "unit": "kinematic_chain", "name_or_path": "urm6", "path": "lab.toml",
-        "robot": "ur5e",
+        "robot": "ur5e", "network": "four-bar",
     }  # fmt: skip
     parameters = signature(FUNCTIONS[function]).parameters
     if function == "plan":

@@ -1,0 +1,193 @@
+"""Values of network files: vectors, numbers or expressions, and what drives a joint, all made SI."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal, TypeAlias
+
+from urmpipe_models.elementwise import ZERO, Vector
+from urmpipe_models.errors import shown
+from urmpipe_models.files.tables import Table, are_numbers, is_number
+from urmpipe_models.networks.control_faults import is_name
+from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.networks.parts import frame_of
+from urmpipe_models.robots.robot_frames import Units
+from urmpipe_models.transform import Transform
+
+Form: TypeAlias = Literal["one", "two", "one or two"]
+"""Whether a key holds a vector, one for each body, or either."""
+
+FORMS: dict[Form, str] = {
+    "one": "3 finite numbers",
+    "two": "two lists of 3 finite numbers, one for each body",
+    "one or two": "3 finite numbers, or two lists of 3",
+}
+
+
+M: Vector = (1.0, 0.0, 0.0)
+N: Vector = (0.0, 1.0, 0.0)
+"""m and n of a body in a joint where its table has none."""
+
+STILL = tuple(map(Expression, ("1.0", "0.0", "0.0", "0.0", "1.0", "0.0", "0.0", "0.0", "0.0")))
+"""The motion of a user joint that stands in for one whose kind is none."""
+
+
+def read_vectors(
+    table: Table, key: str, form: Form = "one or two", default: Vector | None = None
+) -> tuple[Vector, Vector]:
+    """Return the vectors of both bodies in the file's unit, twice the same where the key holds one.
+
+    Args:
+        table: The table of a joint or an element.
+        key: Its key.
+        form: How many there may be.
+        default: That of both where the key is missing; without it the key is required.
+    """
+    value = table.value(key)
+    if value is None and default is not None:
+        return default, default
+    if form != "two" and are_numbers(value, 3):
+        return _vector(value), _vector(value)
+    pair = isinstance(value, (list, tuple)) and len(value) == 2 and all(are_numbers(one, 3) for one in value)
+    if form != "one" and pair:
+        return _vector(value[0]), _vector(value[1])
+    _refuse(table, key, value, FORMS[form])
+    return default or ZERO, default or ZERO
+
+
+def read_points(table: Table, units: Units, form: Form = "one or two") -> tuple[Vector, Vector]:
+    """Return the points `a` of both bodies in [m], their origins where the key is missing."""
+    first, second = read_vectors(table, "a", form, ZERO)
+    return _metres(first, units), _metres(second, units)
+
+
+def read_frames(table: Table, units: Units) -> tuple[Transform, Transform]:
+    """Return A_1 and A_2 of a joint; not turned where its m or n are no vectors."""
+    many = len(table.faults)
+    m, n = read_vectors(table, "m", default=M), read_vectors(table, "n", default=N)
+    if len(table.faults) > many:
+        m, n = (M, M), (N, N)
+    first, second = read_points(table, units)
+    return frame_of(m[0], n[0], first), frame_of(m[1], n[1], second)
+
+
+def read_start(table: Table, of: Sequence[str], units: Units) -> tuple[float, ...]:
+    """Return the `start` of a joint in [rad] and [m]: a number of a joint with one variable, else a list.
+
+    Args:
+        table: The table of the joint.
+        of: The unit of each variable, rad or m.
+        units: The units of the file.
+    """
+    value = table.value("start")
+    if value is None:
+        return ()
+    values = [value] if len(of) == 1 and is_number(value) else value
+    if not are_numbers(values, len(of)):
+        _refuse(table, "start", value, "a finite number" if len(of) == 1 else f"{len(of)} finite numbers")
+        return ()
+    return tuple(in_si(float(one), unit, units) for one, unit in zip(values, of, strict=True))
+
+
+def read_drives(table: Table, of: Sequence[str], units: Units) -> tuple[Expression | None, ...]:
+    """Return what drives each variable of a joint, by `driven` or `value`; none where it has neither.
+
+    Args:
+        table: The table of the joint.
+        of: The unit of each variable, rad or m.
+        units: The units of the file.
+    """
+    controls, functions = table.value("driven"), table.value("value")
+    key, value = ("value", functions) if controls is None else ("driven", controls)
+    if controls is not None and functions is not None:
+        table.fault("value", "found beside driven; allowed: one of the two")
+    if value is None:
+        return ()
+    values = [value] if len(of) == 1 and not isinstance(value, (list, tuple)) else value
+    if value == "" or not isinstance(values, (list, tuple)) or len(values) != len(of):
+        many = f'a list of {len(of)}, one a variable, "" where it is free'
+        _refuse(table, key, value, "one, of its only variable" if len(of) == 1 else many)
+        return ()
+    return tuple(_drive(table, key, one, unit, units) for one, unit in zip(values, of, strict=True))
+
+
+def _drive(table: Table, key: str, value: Any, unit: str, units: Units) -> Expression | None:
+    """Return what drives a variable; None where that is "", or no name of a control under `driven`."""
+    if value == "":
+        return None
+    if key == "value" or (isinstance(value, str) and is_name(value)):
+        return expression(table, key, value, unit, units)
+    _refuse(table, key, value, "the name of a control; a function of controls is a `value`")
+    return None
+
+
+def read_motion(table: Table, units: Units) -> tuple[Expression, ...]:
+    """Return m, n [-] and a in [m] of a user joint, each three numbers or functions of controls."""
+    many = len(table.faults)
+    turned = [*_three(table, "m", "", units), *_three(table, "n", "", units)]
+    if len(table.faults) > many:  # which might not be orthonormal
+        turned = [*STILL[:6]]
+    return (*turned, *_three(table, "a", "m", units))
+
+
+def _three(table: Table, key: str, unit: str, units: Units) -> list[Expression]:
+    """Return three numbers or functions of controls in SI."""
+    value = table.value(key)
+    if isinstance(value, (list, tuple)) and len(value) == 3:
+        return [expression(table, key, one, unit, units) for one in value]
+    _refuse(table, key, value, "a list of 3 numbers or expressions")
+    return [*STILL[6:]]
+
+
+def read_expression(table: Table, key: str, unit: str, units: Units) -> Expression:
+    """Return the number or function of controls under a key in SI; the key is required.
+
+    Args:
+        table: The table.
+        key: The key.
+        unit: The unit of the value: m, rad or "" of a number without.
+        units: The units of the file.
+    """
+    return expression(table, key, table.value(key), unit, units)
+
+
+def expression(table: Table, key: str, value: Any, unit: str, units: Units) -> Expression:
+    """Return a number or text of a file as a function of controls in SI; 1 where it is no arithmetic."""
+    if is_number(value):
+        return Expression(repr(in_si(float(value), unit, units)))
+    if not isinstance(value, str):
+        _refuse(table, key, value, "a finite number, or an expression as a text")
+        return Expression("1.0")
+    try:
+        Expression(value)  # alone: in brackets `1) + (2` would be arithmetic
+        factor = _factor(unit, units)
+        return Expression(f"({value}) * {factor}" if factor else value)
+    except ValueError as error:
+        table.fault(key, str(error))
+        return Expression("1.0")
+
+
+def in_si(value: float, unit: str, units: Units) -> float:
+    """Return a number of the file in [m] or [rad]; without a unit as it is."""
+    return {"m": units.length, "rad": units.angle}.get(unit, float)(value)
+
+
+def _factor(unit: str, units: Units) -> str:
+    """Return what makes an expression of the file one in SI; nothing where it is."""
+    if unit == "m" and units.millimetres:
+        return "0.001"
+    return "pi / 180" if unit == "rad" and units.degrees else ""
+
+
+def _metres(point: Vector, units: Units) -> Vector:
+    return units.length(point[0]), units.length(point[1]), units.length(point[2])
+
+
+def _vector(value: Sequence[float]) -> Vector:
+    return float(value[0]), float(value[1]), float(value[2])
+
+
+def _refuse(table: Table, key: str, value: Any, allowed: str) -> None:
+    """Note that the value of a key is not allowed."""
+    found = "nothing" if value is None else shown(value)
+    table.fault(key, f"found {found}, allowed: {allowed}")

@@ -1,0 +1,278 @@
+"""`urmpipe network`: what it prints, writes and exits with."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+import urmpipe as api
+from urmpipe_datasets import NETWORKS
+from urmpipe_models.networks.network_file import network_names
+
+Run = Callable[..., Any]
+
+FOUR_BAR = (1.481134361, -2.271319288)
+"""The rocker's angle of the shipped four-bar in both assemblies in [rad], to nine digits."""
+
+PARALLEL = """
+[bodies.left]
+[bodies.right]
+[bodies.across]
+[joints.A]
+kind = "revolute"
+bodies = ["ground", "left"]
+start = 0.1
+[joints.B]
+kind = "revolute"
+bodies = ["left", "across"]
+a = [[0, 0, 0.4], [0, 0, 0]]
+[joints.C]
+kind = "revolute"
+bodies = ["across", "right"]
+a = [[0.9, 0, 0], [0, 0, 0.4]]
+[joints.D]
+kind = "revolute"
+bodies = ["ground", "right"]
+a = [[0.9, 0, 0], [0, 0, 0]]
+start = 0.1
+"""
+"""A parallelogram; its axes are y."""
+
+
+def bennett(b: float) -> str:
+    """Return the shipped Bennett linkage with other lengths b, as a share of its own."""
+    lines = (NETWORKS / "bennett.toml").read_text(encoding="utf-8").splitlines()
+    lengths = sorted({line.split("=")[1].split("#")[0].strip() for line in lines if line.startswith("a =")})
+    other = lengths[-1]
+    return "\n".join(
+        f"a = {float(other) * b!r}" if line.split("#")[0].strip() == f"a = {other}" else line
+        for line in lines
+    )
+
+
+def test_list_names_every_network_with_its_source(urmpipe: Run) -> None:
+    ran = urmpipe("network", "list")
+    assert ran.code == 0
+    assert all(name in ran.out for name in network_names())
+    listed = json.loads(urmpipe("network", "list", "--json").out)
+    assert listed["schema"] == 1
+    assert [one["name"] for one in listed["networks"]] == list(network_names())
+    assert all(one["source"] and one["description"] for one in listed["networks"])
+    assert set(network_names()) == {
+        "bennett", "bricard", "cluster-crc", "cluster-eg", "cluster-gc", "cluster-gg", "four-bar",
+        "nine-revolute", "nine-revolute-controlled", "rccc", "rssr", "sarrus", "screw-jack", "slider-crank",
+        "stewart-gough",
+    }  # fmt: skip
+
+
+def test_check_tells_mobility_and_why_kutzbach_differs(urmpipe: Run) -> None:
+    ran = urmpipe("network", "check", "four-bar")
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.out.startswith("PASS  four-bar: assembled, a mechanism of mobility 1 (Kutzbach -2: ")
+    told = json.loads(urmpipe("network", "check", "four-bar", "--json").out)
+    assert {key: told[key] for key in ("name", "kind", "structure", "bodies", "variables", "mobility")} == {
+        "name": "four-bar", "kind": "mechanism", "structure": "closed chain", "bodies": 4, "variables": 4,
+        "mobility": 1,
+    }  # fmt: skip
+    assert (told["kutzbach"], len(told["redundant"]), told["idle"], told["special"]) == (-2, 3, [], False)
+    assert {"theta2", "theta4", "A", "B"} == set(told["loops"][0])
+    assert len(told["loops"]) == 1
+    assert told["residual"] < 1e-12
+    assert set(told) == {
+        "schema", "name", "kind", "structure", "bodies", "variables", "mobility", "kutzbach", "loops",
+        "clusters", "redundant", "idle", "special", "residual", "gaps", "warnings", "output",
+    }  # fmt: skip
+
+
+def test_solve_finds_both_assemblies_of_a_four_bar(urmpipe: Run) -> None:
+    ran = urmpipe("network", "solve", "four-bar", "--all", "--json", "--restarts", "100")
+    told = json.loads(ran.out)
+    assert (ran.code, ran.err) == (0, "")
+    assert set(told) == {"schema", "name", "assemblies", "restarts", "reason", "gaps", "warnings", "output"}
+    angles = [one["variables"]["theta4"] for one in told["assemblies"]]
+    assert angles == pytest.approx(FOUR_BAR, abs=1e-9)
+    assert told["reason"] == "at least 2: 100 random starts in a row found nothing new"
+    assert all(set(one) == {"variables", "residual", "mobility"} for one in told["assemblies"])
+    assert told["restarts"] > 100
+    near = json.loads(urmpipe("network", "solve", "four-bar", "--json").out)
+    assert len(near["assemblies"]) == 1
+    assert near["assemblies"][0]["variables"] == told["assemblies"][0]["variables"]
+
+
+def test_a_control_is_set_and_held(urmpipe: Run) -> None:
+    told = json.loads(urmpipe("network", "solve", "slider-crank", "--set", "crank=1.2", "--json").out)
+    found = told["assemblies"][0]["variables"]
+    # r cos(theta) + sqrt(l^2 - (r sin(theta) - e)^2)
+    way = 0.3 * math.cos(1.2) + math.sqrt(0.8**2 - (0.3 * math.sin(1.2) - 0.1) ** 2)
+    assert (found["crank"], found["theta"]) == (1.2, 1.2)
+    assert found["s"] == pytest.approx(way, abs=1e-12)
+
+
+def test_what_does_not_close_fails_with_its_loop_and_gap(urmpipe: Run, tmp_path: Path) -> None:
+    (tmp_path / "longer.toml").write_text(bennett(1.05), encoding="utf-8")
+    (tmp_path / "same.toml").write_text(bennett(1.0), encoding="utf-8")
+    assert urmpipe("network", "check", "same.toml").code == 0
+    ran = urmpipe("network", "check", "longer.toml", "--restarts", "50", "--json")
+    told = json.loads(ran.out)
+    assert ran.code == 1
+    assert (told["mobility"], told["kind"], told["special"]) == (None, None, None)
+    assert (told["variables"], told["kutzbach"]) == (4, -2)
+    (gap,) = told["gaps"]
+    assert set(gap["loop"]) == {"t1", "t2", "t3", "t4"}
+    assert gap["m"] > 1e-3
+    assert told["residual"] > 1e-3
+    said = urmpipe("network", "check", "longer.toml", "--restarts", "50")
+    assert said.code == 1
+    assert said.out.startswith("FAIL  bennett: does not close: loop ")
+    assert " mm" in said.out.splitlines()[0]
+    solved = urmpipe("network", "solve", "longer.toml", "--restarts", "50", "--json")
+    assert solved.code == 1
+    assert json.loads(solved.out)["assemblies"] == []
+    assert json.loads(solved.out)["reason"] == "none of 50 random starts closed"
+
+
+def test_a_control_out_of_reach_fails(urmpipe: Run, tmp_path: Path) -> None:
+    text = (NETWORKS / "slider-crank.toml").read_text(encoding="utf-8").replace("0.8", "0.31")
+    (tmp_path / "short.toml").write_text(text, encoding="utf-8")
+    ran = urmpipe("network", "solve", "short.toml", "--set", "crank=-1.5", "--restarts", "20", "--json")
+    assert ran.code == 1
+    assert json.loads(ran.out)["assemblies"] == []
+
+
+def test_a_special_configuration_is_a_warning_and_fails_if_strict(urmpipe: Run, tmp_path: Path) -> None:
+    quarter = f"start = {math.pi / 2!r}"
+    flat = PARALLEL.replace("start = 0.1", quarter).replace(
+        "[joints.C]", f"{quarter.replace('= ', '= -')}\n[joints.C]"
+    )
+    (tmp_path / "flat.toml").write_text(flat.replace("[joints.D]", f"{quarter}\n[joints.D]"))
+    ran = urmpipe("network", "check", "flat.toml", "--json")
+    told = json.loads(ran.out)
+    assert (ran.code, told["special"], told["mobility"]) == (0, True, 2)
+    said = "a special configuration: the mobility is 2 here, and 1 at configurations nearby"
+    assert ran.err == f"warning: {said}\n"
+    strict = urmpipe("network", "check", "flat.toml", "--strict")
+    assert (strict.code, strict.out) == (2, "")
+    assert strict.err == f"error: --strict: found 1 warning, allowed: none\nerror: {said}\n"
+    (tmp_path / "regular.toml").write_text(PARALLEL)
+    told = json.loads(urmpipe("network", "check", "regular.toml", "--json").out)
+    assert (told["special"], told["mobility"], told["warnings"]) == (False, 1, [])
+
+
+def test_over_driven_controls_are_told(urmpipe: Run, tmp_path: Path) -> None:
+    driven = PARALLEL.replace(
+        'bodies = ["ground", "left"]\nstart = 0.1', 'bodies = ["ground", "left"]\ndriven = "s"'
+    )
+    driven = driven.replace('bodies = ["across", "right"]\n', 'bodies = ["across", "right"]\ndriven = "u"\n')
+    driven += "[controls.s]\nstart = 0.3\n[controls.u]\nstart = 0.3\n"
+    (tmp_path / "driven.toml").write_text(driven)
+    ran = urmpipe("network", "check", "driven.toml", "--json")
+    told = json.loads(ran.out)
+    assert (ran.code, told["mobility"]) == (0, 1)
+    assert [one["kind"] for one in told["warnings"]] == ["stuck-control"]
+
+
+def test_assemblies_that_are_no_list_are_told(urmpipe: Run) -> None:
+    ran = urmpipe("network", "solve", "nine-revolute", "--all", "--json")
+    told = json.loads(ran.out)
+    assert (ran.code, len(told["assemblies"])) == (0, 1)
+    assert [one["kind"] for one in told["warnings"]] == ["continuum"]
+    assert "has mobility 3: its assemblies are no list" in told["warnings"][0]["message"]
+
+
+def test_a_recording_and_a_drawing_are_written_and_replaced(urmpipe: Run, tmp_path: Path) -> None:
+    arguments = (
+        "network",
+        "solve",
+        "rssr",
+        "--all",
+        "--restarts",
+        "30",
+        "-o",
+        "rssr.rrd",
+        "--draw",
+        "rssr.svg",
+    )
+    assert urmpipe(*arguments).code == 0
+    ran = urmpipe(*arguments)
+    assert ran.code == 0
+    assert "rssr.rrd" in ran.out
+    read = api.read_recording(tmp_path / "rssr.rrd")
+    assert isinstance(read, api.NetworkResult)
+    assert len(read.assemblies) == 2
+    assert read.network == api.load_network("rssr")
+    drawing = (tmp_path / "rssr.svg").read_text(encoding="utf-8")
+    assert drawing.startswith("<!-- Generator: urmpipe ")
+    texts = {one.text for one in ElementTree.fromstring(drawing).iter() if one.text}
+    assert any("coupler" in text for text in texts)
+    assert urmpipe("report", "rssr.rrd").code == 0
+    assert "coupler" in (tmp_path / "rssr.html").read_text(encoding="utf-8")
+
+
+def test_an_input_and_a_foreign_file_are_not_replaced(urmpipe: Run, tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(PARALLEL)
+    (tmp_path / "mine.svg").write_text("<svg/>")
+    for arguments, said in (
+        (("--draw", "mine.svg"), "mine.svg: found a file that is no drawing of urmpipe's"),
+        (("-o", "mine.toml"), "mine.toml: found an input of this command"),
+        (("-o", "mine.csv"), "mine.csv: found a name that is none of a recording"),
+    ):
+        ran = urmpipe("network", "check", "mine.toml", *arguments)
+        assert ran.code == 2
+        assert said in ran.err
+    assert (tmp_path / "mine.svg").read_text() == "<svg/>"
+    assert (tmp_path / "mine.toml").read_text() == PARALLEL
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            ("check", "four-bar", "--set", "crak=1", "--set", "x=2"),
+            [
+                "--controls: control found 'crak' (did you mean crank?), allowed: crank",
+                "--controls: control found 'x', allowed: crank",
+            ],
+        ),
+        (
+            ("check", "four-bar", "--set", "crank"),
+            ["--controls: found 'crank', allowed: NAME=VALUE, each name once"],
+        ),
+        (("check", "four-bar", "--set", "crank=a"), ["--controls: crank: found 'a', allowed: a number"]),
+        (
+            ("solve", "four-bar", "--set", "crank=inf"),
+            ["--controls: found crank = inf, allowed: a finite number"],
+        ),
+        (("solve", "missing.toml"), ["missing.toml: cannot be read: No such file or directory"]),
+    ],
+)
+def test_wrong_use_is_told(urmpipe: Run, arguments: tuple[str, ...], said: list[str]) -> None:
+    ran = urmpipe("network", *arguments)
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.splitlines() == [f"error: {line}" for line in said]
+
+
+def test_all_that_is_wrong_with_a_file_is_told_at_once_and_as_json(urmpipe: Run, tmp_path: Path) -> None:
+    wrong = PARALLEL.replace('"across", "right"', '"acros", "right"').replace('kind = "revolute"\n', "", 1)
+    (tmp_path / "wrong.toml").write_text(wrong)
+    ran = urmpipe("network", "check", "wrong.toml")
+    assert ran.code == 2
+    assert [line.split(" ")[1] for line in ran.err.splitlines()] == ["wrong.toml:5:", "wrong.toml:14:"]
+    told = json.loads(urmpipe("network", "check", "wrong.toml", "--json").out)
+    assert [one["line"] for one in told["errors"]] == [5, 14]
+
+
+def test_python_gives_the_same_as_the_command(urmpipe: Run) -> None:
+    checked = api.network_check("rssr", controls={"crank": 0.5})
+    told = json.loads(urmpipe("network", "check", "rssr", "--set", "crank=0.5", "--json").out)
+    assert checked.to_dict() == told
+    assert checked.mobility is not None
+    assert (checked.mobility.mobility, checked.mobility.idle) == (2, ("coupler",))
+    frame = api.network_solve(api.load_network("rccc"), every=True, restarts=50).to_frame()
+    assert list(frame["assembly"]) == [1, 2]
+    assert {"crank", "r1", "c2_1", "c2_2", "residual", "mobility"} <= set(frame.columns)

@@ -1,0 +1,181 @@
+"""Arithmetic in a text: its value, its derivatives, and what is refused."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from asserting import refusal
+from urmpipe_models.networks.expressions import Expression
+
+STEP = 1e-30
+"""An imaginary step: f'(x) = Im f(x + ih) / h without a difference, exact to rounding."""
+
+
+def atan2(y: Any, x: Any) -> complex:
+    """atan2 of numbers with a small imaginary part, analytic where it is defined."""
+    y, x = complex(y), complex(x)
+    if abs(x.real) >= abs(y.real):
+        turn = math.copysign(math.pi, y.real) if x.real < 0.0 else 0.0
+        return cmath.atan(y / x) + turn
+    return math.copysign(math.pi / 2.0, y.real) - cmath.atan(x / y)
+
+
+COMPLEX = {name: getattr(cmath, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "pi")} | {
+    "atan2": atan2
+}
+REAL = {name: getattr(math, name) for name in ("sin", "cos", "tan", "sqrt", "exp", "pi", "atan2")}
+
+leaves = st.sampled_from(["x", "y", "pi", "2", "0.5", "3.0", "1e-1"])
+
+
+def deeper(parts: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
+    return (
+        st.builds("({} {} {})".format, parts, st.sampled_from("+-*/"), parts)
+        | st.builds("{}({})".format, st.sampled_from(["sin", "cos", "tan", "sqrt", "exp", "-", "+"]), parts)
+        | st.builds("atan2({}, {})".format, parts, parts)
+        | st.builds("({} ** {})".format, parts, st.sampled_from(["2", "3", "-1", "0.5", "x", "y"]))
+    )
+
+
+formulas = st.recursive(leaves, deeper, max_leaves=6)
+numbers = st.floats(-3.0, 3.0).filter(lambda x: abs(x) > 1e-2)
+
+
+def evaluated(text: str, of: dict[str, Any], **values: complex) -> complex:
+    """Python's own value of a formula; nothing is asserted where it has none, or is steep."""
+    try:
+        value = eval(text, {"__builtins__": {}, **of, **values})
+    except (ArithmeticError, ValueError):
+        value = math.inf
+    assume(abs(value) < 1e3)
+    return complex(value)
+
+
+@given(formulas, numbers, numbers)
+def test_value_and_slopes_are_those_of_python_and_of_a_complex_step(text: str, x: float, y: float) -> None:
+    formula = Expression(text)
+    value, slopes = formula.with_slopes({"x": x, "y": y})
+    assume(np.isfinite(value))
+    expected = evaluated(text, REAL, x=x, y=y)
+    by = {
+        "x": evaluated(text, COMPLEX, x=x + 1j * STEP, y=y).imag / STEP,
+        "y": evaluated(text, COMPLEX, x=x, y=y + 1j * STEP).imag / STEP,
+    }
+    assume(all(abs(one) < 1e3 for one in by.values()))
+    assume(all(np.isfinite(one) for one in slopes.values()))
+    assert set(slopes) <= formula.names
+    # 1e-9: values and slopes of parts reach 1e3 and more, each rounded to 1e-16 of itself
+    assert value == pytest.approx(expected.real, rel=1e-9, abs=1e-9)
+    for name, slope in by.items():
+        assert slopes.get(name, 0.0) == pytest.approx(slope, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "2 * x + y",
+        "x - y - 1",
+        "x / y / 2",
+        "-x ** 2",
+        "2 ** -x ** 2",
+        "+x * -y",
+        " (x + 1) * (y - 1)",
+        "1.5e-3 + 10 * pi",
+        "atan2(x, -y) ** 3",
+    ],
+)
+def test_operators_bind_as_those_of_python(text: str) -> None:
+    values = {"x": 0.7, "y": 1.9}
+    assert Expression(text).value(values) == pytest.approx(eval(text.strip(), REAL | values), rel=1e-15)
+
+
+def test_arrays_go_through_as_numbers_do() -> None:
+    x, y = np.linspace(-1.0, 1.0, 5), np.linspace(1.0, 2.0, 5)
+    value, slopes = Expression("sqrt(y) * x ** 3 + atan2(x, y)").with_slopes({"x": x, "y": y})
+    # 1e-15: a rounding or two of numbers of 1
+    np.testing.assert_allclose(value, np.sqrt(y) * x**3 + np.arctan2(x, y), atol=1e-15)
+    np.testing.assert_allclose(slopes["x"], 3.0 * np.sqrt(y) * x**2 + y / (x**2 + y**2), atol=1e-15)
+    np.testing.assert_allclose(slopes["y"], 0.5 * x**3 / np.sqrt(y) - x / (x**2 + y**2), atol=1e-15)
+
+
+def test_names_are_those_that_values_are_needed_of() -> None:
+    assert Expression("sin(a) + pi * b_2 - a").names == {"a", "b_2"}
+    assert Expression("sqrt(2) * pi").names == frozenset()
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("1 / 0", math.inf), ("sqrt(-1)", math.nan), ("exp(1000)", math.inf), ("0 / 0", math.nan)],
+)
+def test_values_that_are_no_numbers_come_back_as_they_are(text: str, value: float) -> None:
+    np.testing.assert_equal(float(Expression(text).value({})), value)
+
+
+ALLOWED = "allowed: numbers, names of controls, pi, + - * / ** and brackets, sin, cos, tan, atan2, sqrt, exp"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", f"found '', no arithmetic; {ALLOWED}"),
+        ("   ", f"found '   ', no arithmetic; {ALLOWED}"),
+        ("1 +", f"found '1 +', no arithmetic; {ALLOWED}"),
+        ("1\0", f"found '1\\x00', no arithmetic; {ALLOWED}"),
+        ("x ^ 2", f"found 'x ^ 2', no arithmetic; {ALLOWED}; a power is **"),
+        ("1 + (x < 2)", f"found 'x < 2', no arithmetic; {ALLOWED}"),
+        ("lambda: 1", f"found 'lambda: 1', no arithmetic; {ALLOWED}"),
+        ("(x := 1)", f"found 'x := 1', no arithmetic; {ALLOWED}"),
+        ("x = 1", f"found 'x = 1', no arithmetic; {ALLOWED}"),
+        ("x.real", f"found 'x.real', no arithmetic; {ALLOWED}"),
+        ("x[0]", f"found 'x[0]', no arithmetic; {ALLOWED}"),
+        ("x if y else 1", f"found 'x if y else 1', no arithmetic; {ALLOWED}"),
+        ("x or y", f"found 'x or y', no arithmetic; {ALLOWED}"),
+        ("not x", f"found 'not x', no arithmetic; {ALLOWED}"),
+        ("~x", f"found '~x', no arithmetic; {ALLOWED}"),
+        ("x // 2", f"found 'x // 2', no arithmetic; {ALLOWED}"),
+        ("x @ y", f"found 'x @ y', no arithmetic; {ALLOWED}"),
+        ("[x]", f"found '[x]', no arithmetic; {ALLOWED}"),
+        ("(x, y)", f"found '(x, y)', no arithmetic; {ALLOWED}"),
+        ("'x'", f"found \"'x'\", no arithmetic; {ALLOWED}"),
+        ("f'{x}'", f"found \"f'{{x}}'\", no arithmetic; {ALLOWED}"),
+        ("1j", f"found '1j', no arithmetic; {ALLOWED}"),
+        ("True", f"found 'True', no arithmetic; {ALLOWED}"),
+        ("1e999", f"found '1e999', no arithmetic; {ALLOWED}"),
+        ("9" * 400, f"found '{'9' * 56}..., no arithmetic; {ALLOWED}"),
+        ("sin", f"found 'sin', no arithmetic; {ALLOWED}"),
+        ("sin(x=1)", f"found 'sin(x=1)', no arithmetic; {ALLOWED}"),
+        ("sin(*x)", f"found '*x', no arithmetic; {ALLOWED}"),
+        ("sin(x)(y)", f"found 'sin(x)(y)', no arithmetic; {ALLOWED}"),
+        ("x.sin(y)", f"found 'x.sin(y)', no arithmetic; {ALLOWED}"),
+        ("sin()", "found 0 arguments of sin, allowed: 1"),
+        ("atan2(x)", "found 1 arguments of atan2, allowed: 2"),
+        (
+            "sine(x)",
+            "function found 'sine' (did you mean sin?), allowed: sin, cos, tan, atan2, sqrt, exp",
+        ),
+        (
+            "__import__('os')",
+            "function found '__import__', allowed: sin, cos, tan, atan2, sqrt, exp",
+        ),
+        ("(" * 10_000, f"found '{'(' * 56}... of 10000 letters, allowed: 1000 at most"),
+        ("-" * 900 + "1", f"found '{'-' * 56}..., nested 51 deep; allowed: 50"),
+        ("(" * 400 + "1" + ")" * 400, f"found '{'(' * 56}..., no arithmetic; {ALLOWED}"),
+    ],
+)
+def test_no_arithmetic_is_refused(text: str, message: str) -> None:
+    assert refusal(ValueError, Expression, text) == message
+
+
+@given(st.text(max_size=40))
+def test_any_other_text_is_refused_in_order(text: str) -> None:
+    try:
+        Expression(text)
+    except ValueError as error:
+        assert str(error).startswith(("found ", "function found "))

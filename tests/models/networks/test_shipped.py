@@ -1,0 +1,447 @@
+"""Shipped networks against closed forms: printed answers, then a hundred perturbed mechanisms each."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from urmpipe_datasets import NETWORKS
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.networks.assembly import Assembled, assemble
+from urmpipe_models.networks.findings import Assembly
+from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mobility import mobility_of
+from urmpipe_models.networks.network_file import load_network
+
+CLOSED = 1e-9
+"""The largest gap in [m] and [rad] that assembly lets pass."""
+
+ANSWER = 1e-9
+"""In [m] and [rad]: printed answers have nine places, and descent ends at gaps near 1e-14."""
+
+PERTURBED = 1e-11
+"""In [m] and [rad]: descent ends at gaps near 1e-14, which branches `MARGIN` apart magnify by about 10."""
+
+MARGIN = 0.98
+"""Of |C| / hypot(A, B): nearer to 1 both branches meet, and rounding grows like its distance's root."""
+
+Answer = dict[str, tuple[float, ...]]
+Tables = dict[str, Any]
+
+
+class Expected(NamedTuple):
+    """How a network moves: mobility, rank, mobility by Kutzbach's formula, idle bodies and kind."""
+
+    mobility: int
+    rank: int
+    kutzbach: int
+    idle: tuple[str, ...] = ()
+    kind: str = "mechanism"
+
+
+MOVES = {
+    "four-bar": Expected(1, 3, -2),
+    "slider-crank": Expected(1, 3, -2),
+    "bennett": Expected(1, 3, -2),
+    "bricard": Expected(1, 5, 0),
+    "sarrus": Expected(1, 5, 0),
+    "rssr": Expected(2, 6, 2, ("coupler",)),
+    "rccc": Expected(1, 6, 1),
+    "screw-jack": Expected(1, 2, -3),
+    "nine-revolute": Expected(3, 6, 3),
+    "nine-revolute-controlled": Expected(1, 6, 1),
+    "stewart-gough": Expected(0, 6, 0, kind="structure"),
+    "cluster-gg": Expected(1, 5, 1),
+    "cluster-eg": Expected(1, 5, 1),
+    "cluster-crc": Expected(1, 5, 1),
+    "cluster-gc": Expected(1, 5, 1),
+}
+
+
+def test_every_shipped_network_is_listed_here() -> None:
+    assert {path.stem for path in NETWORKS.glob("*.toml")} == set(MOVES)
+
+
+@pytest.mark.parametrize("name", MOVES)
+def test_it_assembles_from_its_start_and_moves_as_expected(name: str) -> None:
+    mechanism = mechanism_of(load_network(name))
+    assembled = assemble(mechanism)
+    assert not assembled.elsewhere
+    assert assembled.assemblies[0].residual < CLOSED
+    found = mobility_of(mechanism, assembled.x[:, 0])
+    assert Expected(found.mobility, found.rank, found.kutzbach, found.idle, found.kind) == MOVES[name]
+    assert len(found.redundant) == found.mobility - found.kutzbach
+    assert not found.special
+
+
+# --- the closed forms
+
+
+def roots(A: float, B: float, C: float) -> list[float]:
+    """Return both x of A cos(x) + B sin(x) = C in [rad]; none where they do not exist or nearly meet."""
+    size = math.hypot(A, B)
+    if abs(C) > MARGIN * size:
+        return []
+    return [math.atan2(B, A) + sign * math.acos(C / size) for sign in (1, -1)]
+
+
+def four_bar(a: float, b: float, c: float, d: float, theta2: float) -> list[Answer]:
+    """Return theta4 of |O4 + c u(theta4) - a u(theta2)| = b."""
+    x, y = d - a * math.cos(theta2), -a * math.sin(theta2)
+    return [{"theta4": (q,)} for q in roots(2 * c * x, 2 * c * y, b**2 - c**2 - x**2 - y**2)]
+
+
+def slider_crank(r: float, length: float, e: float, theta: float) -> list[Answer]:
+    """Return s = r cos(theta) +- sqrt(l^2 - (e - r sin(theta))^2)."""
+    return [
+        {"s": (r * math.cos(theta) + length * math.cos(rod),)}
+        for rod in roots(0.0, length, e - r * math.sin(theta))
+    ]
+
+
+def bennett(alpha: float, beta: float, t1: float) -> list[Answer]:
+    """Return t2 of tan(t1/2) tan(t2/2) = sin((beta + alpha)/2) / sin((beta - alpha)/2), t3 and t4."""
+    product = math.sin((beta + alpha) / 2) / math.sin((beta - alpha) / 2)
+    t2 = 2 * math.atan(product / math.tan(t1 / 2))
+    return [{"t2": (t2,), "t3": (-t1,), "t4": (-t2,)}]
+
+
+def bricard(alpha: float, t: float) -> list[Answer]:
+    """Return the angles of the three-fold symmetric linkage: t and f in turn; see its file."""
+    c, s = math.cos(alpha), math.sin(alpha)
+    both = roots(s**2 + (1 + c**2) * math.cos(t), -2 * c * math.sin(t), -(c**2) - s**2 * math.cos(t))
+    return [{"t2": (f,), "t3": (t,), "t4": (f,), "t5": (t,), "t6": (f,)} for f in both]
+
+
+def sarrus(leg_x: tuple[float, ...], leg_y: tuple[float, ...], t: float) -> list[Answer]:
+    """Return the angles of two legs (l1, l2, e): l1 u(t) + l2 u(x) = (e, h) with u = (cos, sin)."""
+    l1, l2, e = leg_x
+    k1, k2, g = leg_y
+    answers: list[Answer] = []
+    for x in roots(l2, 0.0, e - l1 * math.cos(t)):
+        h = l1 * math.sin(t) + l2 * math.sin(x)
+        for y in roots(2 * k1 * g, 2 * k1 * h, k1**2 + g**2 + h**2 - k2**2):
+            upper = math.atan2(h - k1 * math.sin(y), g - k1 * math.cos(y))
+            answers.append({"x2": (x - t,), "x3": (-x,), "y1": (y,), "y2": (upper - y,), "y3": (-upper,)})
+    return answers
+
+
+class Rssr(NamedTuple):
+    """Both arms and their heights along the axes, the coupler, a point and the tilt of the second axis."""
+
+    r1: float
+    h1: float
+    length: float
+    r2: float
+    h2: float
+    x: float
+    y: float
+    tilt: float
+
+
+def rssr(one: Rssr, t: float) -> list[Answer]:
+    """Return psi of |P2(psi) - P1(t)| = l, P2 = O + h2 n + r2 (cos(psi) m - sin(psi) m x n)."""
+    n = np.array([0.0, math.sin(one.tilt), math.cos(one.tilt)])
+    m = np.array([1.0, 0.0, 0.0])
+    p1 = np.array([one.r1 * math.cos(t), one.r1 * math.sin(t), one.h1])
+    e = np.array([one.x, one.y, 0.0]) + one.h2 * n - p1
+    A, B = 2 * one.r2 * (e @ m), -2 * one.r2 * (e @ np.cross(m, n))
+    return [{"psi": (q,)} for q in roots(A, B, one.length**2 - one.r2**2 - e @ e)]
+
+
+def rccc(a: FloatArray, alpha: FloatArray, s1: float, t1: float) -> list[Answer]:
+    """Return t4 and s4 of the loop with link lengths a, twists alpha and the offset s1.
+
+    t4 solves the spherical equation F(t1, t4, alpha) = 0, that of the angle between axes 2 and 3:
+    e1 Ry(-alpha_2) Rx(-t1) Ry(-alpha_1) Rx(-t4) Ry(-alpha_4) e1 = cos(alpha_3). By the principle of
+    transference it holds for dual angles, too: F_t1 s1 + F_t4 s4 + sum F_alpha a = 0.
+    """
+    first = row_of(t1, alpha)
+    sine = math.sin(alpha[3])
+    answers: list[Answer] = []
+    for t4 in roots(sine * first[2], sine * first[1], math.cos(alpha[2]) - first[0] * math.cos(alpha[3])):
+        # steps of 1e-30 along the imaginary axis: exact derivatives, as dual numbers give them
+        by_t4 = spherical(t1, t4 + 1e-30j, alpha).imag
+        by_others = spherical(t1 + 1e-30j * s1, t4, alpha + 1e-30j * a).imag
+        answers.append({"c4": (t4, -by_others / by_t4)})
+    return answers
+
+
+def row_of(t1: complex, alpha: FloatArray) -> FloatArray:
+    """Return e1 Ry(-alpha_2) Rx(-t1) Ry(-alpha_1)."""
+    c1, s1, c2, s2 = np.cos(alpha[0]), np.sin(alpha[0]), np.cos(alpha[1]), np.sin(alpha[1])
+    c, s = np.cos(t1), np.sin(t1)
+    return np.array([c2 * c1 - s2 * c * s1, s2 * s, -c2 * s1 - s2 * c * c1])
+
+
+def spherical(t1: complex, t4: complex, alpha: FloatArray) -> complex:
+    """Return F of `rccc`."""
+    first, (c4, s4) = row_of(t1, alpha), (np.cos(alpha[3]), np.sin(alpha[3]))
+    return complex(first[0] * c4 + first[1] * s4 * np.sin(t4) + first[2] * s4 * np.cos(t4) - np.cos(alpha[2]))
+
+
+# --- printed answers
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "answers"),
+    [
+        ("four-bar", "theta4", (1.481134361, -2.271319288)),
+        ("slider-crank", "s", (1.023997546, -0.565092234)),
+    ],
+)
+def test_both_branches_have_the_printed_answers(name: str, joint: str, answers: tuple[float, float]) -> None:
+    _, assembled = every_assembly(tables_of(name), {})
+    expected: list[Answer] = [{joint: (value,)} for value in answers]
+    assert_same_answers(mechanism_of(load_network(name)), assembled, expected, ANSWER)
+
+
+def test_bennett_obeys_its_relation_and_does_not_close_with_a_longer_link() -> None:
+    _, assembled = every_assembly(tables_of("bennett"), {})
+    (values,) = [one.values for one in assembled.assemblies]
+    product = math.tan(values["t1"][0] / 2) * math.tan(values["t2"][0] / 2)
+    assert product == pytest.approx(5.0, rel=1e-8)  # tan magnifies the answer's 1e-9 by up to 8
+    tables = tables_of("bennett")
+    for name in ("t1", "t3"):
+        tables["dh"]["elements"][name]["a"] *= 1.05
+    longer = assemble(mechanism_of(load_network(tables)), restarts=200)
+    assert not longer.assemblies
+    assert max(longer.gaps[0].metres, longer.gaps[0].radians) > 1e-3
+
+
+def test_a_turn_of_the_screw_lifts_by_the_pitch() -> None:
+    mechanism = mechanism_of(load_network("screw-jack"))
+    heights = [
+        assemble(mechanism, {"turn": turn}).assemblies[0].values["rise"][0]
+        for turn in (1.5, 1.5 + 2 * math.pi, 1.5 + 10 * math.pi)
+    ]
+    np.testing.assert_allclose(np.diff(heights), [0.005, 0.02], rtol=0, atol=1e-12)  # descent's last gap
+
+
+def test_the_platform_of_sarrus_rises_upright() -> None:
+    mechanism = mechanism_of(load_network("sarrus"))
+    for tilt in np.linspace(0.5, 1.4, 10):
+        pose = pose_of(mechanism, assemble(mechanism, {"tilt": tilt}).assemblies[0], "platform")
+        height = 0.3 * np.sin(tilt) + np.sqrt(0.35**2 - (-0.08 - 0.3 * np.cos(tilt)) ** 2)
+        np.testing.assert_allclose(pose[:3, :3], np.eye(3), rtol=0, atol=ANSWER)
+        np.testing.assert_allclose(pose[:3, 3], [0.0, 0.0, height], rtol=0, atol=ANSWER)
+
+
+def test_no_two_axes_of_the_nine_are_parallel() -> None:
+    mechanism = mechanism_of(load_network("nine-revolute"))
+    poses = assemble(mechanism).assemblies[0].poses
+    names = mechanism.network.body_names
+    axes = np.array(
+        [
+            poses[names.index(one.bodies[0]), :3, :3] @ np.array(one.frames[0].rotation)[:, 1]
+            for one in mechanism.network.joints
+        ]
+    )
+    sines = np.linalg.norm(np.cross(axes[:, np.newaxis], axes), axis=2)
+    assert sines[~np.eye(9, dtype=bool)].min() > 0.05  # about 3 degrees
+
+
+def test_dietmaiers_platform_has_forty_assemblies_with_legs_of_the_given_lengths() -> None:
+    tables = tables_of("stewart-gough")
+    mechanism, assembled = every_assembly(tables, {}, restarts=2000)
+    assert len(assembled.assemblies) == 40
+    for one in assembled.assemblies:
+        assert_elements_measure(tables, pose_of(mechanism, one, "platform"))
+    poses = np.array([pose_of(mechanism, one, "platform").ravel() for one in assembled.assemblies])
+    apart = np.abs(poses[:, np.newaxis] - poses).max(axis=2)
+    assert apart[~np.eye(40, dtype=bool)].min() > 0.1  # no assembly is listed twice
+
+
+@pytest.mark.parametrize("kind", ["gg", "eg", "crc", "gc"])
+def test_elements_measure_what_the_file_gives(kind: str) -> None:
+    tables = tables_of(f"cluster-{kind}")
+    mechanism = mechanism_of(load_network(tables))
+    start = np.eye(4)
+    x = tables["bodies"]["plate"]["start"]
+    start[:3, :3], start[:3, 3] = Rotation.from_rotvec(x[3:]).as_matrix(), x[:3]
+    assert_elements_measure(tables, start, 1e-3)  # lengths are rounded to 1 mm
+    assert_elements_measure(tables, pose_of(mechanism, assemble(mechanism).assemblies[0], "plate"))
+
+
+# --- perturbed mechanisms
+
+
+Perturb = Callable[[Tables, np.random.Generator], tuple[float, list[Answer]]]
+"""Changes tables by up to 10 %; returns a value of the control, and the answers by the closed form."""
+
+
+def change(rng: np.random.Generator, *values: float) -> list[float]:
+    """Return numbers changed by up to 10 %."""
+    return [value * float(rng.uniform(0.9, 1.1)) for value in values]
+
+
+def any_angle(rng: np.random.Generator) -> float:
+    """Return an angle in [rad] that no whole or half turn is near to, where links may be in line."""
+    return float(rng.choice([-1, 1]) * rng.uniform(0.2, 2.9))
+
+
+def perturb_four_bar(tables: Tables, rng: np.random.Generator) -> tuple[float, list[Answer]]:
+    a, b, c, d = change(rng, 0.4, 0.9, 0.7, 1.0)
+    theta2 = any_angle(rng)
+    joints = tables["joints"]
+    joints["A"]["a"][0][0], joints["B"]["a"][0][0], joints["B"]["a"][1][0] = a, b, c
+    joints["theta4"]["a"][0][0] = d
+    return theta2, four_bar(a, b, c, d, theta2)
+
+
+def perturb_slider_crank(tables: Tables, rng: np.random.Generator) -> tuple[float, list[Answer]]:
+    r, length, e = change(rng, 0.3, 0.8, 0.1)
+    theta = any_angle(rng)
+    joints = tables["joints"]
+    joints["A"]["a"][0][0], joints["B"]["a"][0][0], joints["s"]["a"][0][1] = r, length, e
+    return theta, slider_crank(r, length, e, theta)
+
+
+def perturb_bennett(tables: Tables, rng: np.random.Generator) -> tuple[float, list[Answer]]:
+    elements = tables["dh"]["elements"]
+    a, alpha, beta = change(rng, 0.3, elements["t2"]["alpha"], elements["t1"]["alpha"])
+    t1 = any_angle(rng)
+    b = a * math.sin(beta) / math.sin(alpha)
+    for name, of in {"t1": (b, beta), "t2": (a, alpha), "t3": (b, beta), "t4": (a, alpha)}.items():
+        elements[name]["a"], elements[name]["alpha"] = of
+    return t1, bennett(alpha, beta, t1)
+
+
+def perturb_bricard(tables: Tables, rng: np.random.Generator) -> tuple[float, list[Answer]]:
+    a, alpha = change(rng, 0.3, math.pi / 3)
+    t = any_angle(rng)
+    for one in tables["dh"]["elements"].values():
+        one["a"], one["alpha"] = a, math.copysign(alpha, one["alpha"])
+    return t, bricard(alpha, t)
+
+
+def perturb_sarrus(tables: Tables, rng: np.random.Generator) -> tuple[float, list[Answer]]:
+    l1, l2, x, x_top, k1, k2, y, y_top, t = change(rng, 0.3, 0.35, 0.2, 0.12, 0.25, 0.4, 0.15, 0.18, 0.9)
+    joints = tables["joints"]
+    joints["x1"]["a"][0][0], joints["x2"]["a"][0][0], joints["x3"]["a"] = x, l1, [[l2, 0, 0], [x_top, 0, 0]]
+    joints["y1"]["a"][0][1], joints["y2"]["a"][0][1], joints["y3"]["a"] = y, k1, [[0, k2, 0], [0, y_top, 0]]
+    return t, sarrus((l1, l2, x_top - x), (k1, k2, y_top - y), t)
+
+
+def perturb_rssr(tables: Tables, rng: np.random.Generator) -> tuple[float, list[Answer]]:
+    one = Rssr(*change(rng, 0.15, 0.05, 0.4, 0.25, 0.04, 0.4, 0.1, math.atan2(0.6, 0.8)))
+    t = any_angle(rng)
+    joints = tables["joints"]
+    joints["S1"]["a"][0] = [one.r1, 0.0, one.h1]
+    joints["S2"]["a"] = [[one.length, 0.0, 0.0], [one.r2, one.h2, 0.0]]
+    joints["psi"]["n"][0] = [0.0, math.sin(one.tilt), math.cos(one.tilt)]
+    joints["psi"]["a"][0] = [one.x, one.y, 0.0]
+    return t, rssr(one, t)
+
+
+def perturb_rccc(tables: Tables, rng: np.random.Generator) -> tuple[float, list[Answer]]:
+    elements = tables["dh"]["elements"]
+    for one in elements.values():
+        one["a"], one["alpha"] = change(rng, one["a"], one["alpha"])
+    (elements["r1"]["s"],) = change(rng, elements["r1"]["s"])
+    t1 = any_angle(rng)
+    a, alpha = np.array([(one["a"], one["alpha"]) for one in elements.values()]).T
+    return t1, rccc(a, alpha, elements["r1"]["s"], t1)
+
+
+def perturb_screw_jack(tables: Tables, rng: np.random.Generator) -> tuple[float, list[Answer]]:
+    screw = tables["joints"]["screw"]
+    screw["pitch"], turn = change(rng, screw["pitch"], 1.5)
+    return turn, [{"rise": (screw["pitch"] * turn,), "swivel": (-turn,)}]
+
+
+PERTURBATIONS: dict[str, Perturb] = {
+    "four-bar": perturb_four_bar,
+    "slider-crank": perturb_slider_crank,
+    "bennett": perturb_bennett,
+    "bricard": perturb_bricard,
+    "sarrus": perturb_sarrus,
+    "rssr": perturb_rssr,
+    "rccc": perturb_rccc,
+    "screw-jack": perturb_screw_jack,
+}
+
+
+@pytest.mark.parametrize("name", PERTURBATIONS)
+def test_five_perturbed_mechanisms_have_the_answers_of_the_closed_form(name: str) -> None:
+    assert_perturbed(name, 5, seed=3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PERTURBATIONS)
+def test_a_hundred_perturbed_mechanisms_have_the_answers_of_the_closed_form(name: str) -> None:
+    assert_perturbed(name, 100, seed=7)
+
+
+# --- helpers
+
+
+def tables_of(name: str) -> Tables:
+    """Return the tables of a shipped file."""
+    return tomllib.loads((NETWORKS / f"{name}.toml").read_text(encoding="utf-8"))
+
+
+def assert_perturbed(name: str, count: int, seed: int) -> None:
+    """Hold every assembly of so many perturbed mechanisms against the closed form."""
+    rng, checked = np.random.default_rng(seed), 0
+    while checked < count:
+        tables = tables_of(name)
+        value, answers = PERTURBATIONS[name](tables, rng)
+        if answers:
+            mechanism, assembled = every_assembly(tables, {next(iter(tables["controls"])): value})
+            assert_same_answers(mechanism, assembled, answers, PERTURBED)
+            checked += 1
+
+
+def every_assembly(
+    tables: Tables, controls: dict[str, float], restarts: int = 20
+) -> tuple[Mechanism, Assembled]:
+    """Return the mechanism of tables, and its assemblies."""
+    mechanism = mechanism_of(load_network(tables))
+    return mechanism, assemble(mechanism, controls, every=True, restarts=restarts)
+
+
+def pose_of(mechanism: Mechanism, assembly: Assembly, body: str) -> FloatArray:
+    """Return the pose of a body in the ground, shape (4, 4)."""
+    pose: FloatArray = assembly.poses[mechanism.network.body_names.index(body)]
+    return pose
+
+
+def assert_same_answers(
+    mechanism: Mechanism, assembled: Assembled, answers: list[Answer], tolerance: float
+) -> None:
+    """Hold the assemblies against the answers, each of which must be found once; angles up to whole turns."""
+    units = {one.name: one.units for one in mechanism.network.joints}
+    owners = list(answers[0])
+    turns = np.array([unit == "rad" for owner in owners for unit in units[owner]])
+    found = np.array([[v for owner in owners for v in one.values[owner]] for one in assembled.assemblies])
+    expected = np.array([[v for owner in owners for v in one[owner]] for one in answers])
+    apart = found[:, np.newaxis] - expected
+    apart -= 2 * np.pi * np.round(apart / (2 * np.pi)) * turns
+    same = np.abs(apart).max(axis=2) < tolerance
+    assert same.shape == (len(answers), len(answers)), f"{len(found)} assemblies, expected {len(answers)}"
+    assert (same.sum(axis=0) == 1).all(), f"nearest: {np.abs(apart).max(axis=2).min(axis=0)}"
+
+
+def assert_elements_measure(tables: Tables, pose: FloatArray, tolerance: float = CLOSED) -> None:
+    """Hold the lengths of elements between the ground and a body against the file."""
+    R, p = pose[:3, :3], pose[:3, 3]
+    for one in tables["elements"].values():
+        first, second = (np.zeros(3), one["a"]) if one["kind"] == "eg" else one["a"]
+        apart = R @ np.array(second) + p - np.array(first)
+        if one["kind"] == "gg":
+            found = np.linalg.norm(apart)
+        elif one["kind"] == "eg":
+            found = np.dot(one["n"], apart)
+        elif one["kind"] == "gc":
+            found = np.linalg.norm(np.cross(apart, one["n"]))
+        else:
+            across = np.cross(one["n"][0], R @ np.array(one["n"][1]))
+            found = abs(across @ apart) / np.linalg.norm(across)
+        assert found == pytest.approx(one.get("d", one.get("h")), abs=tolerance)
