@@ -23,6 +23,7 @@ PAGES = {
     "diagnose": "[diagnose.md](diagnose.md)",
     "robot": "[robots.md](robots.md), [dynamics.md](dynamics.md)",
     "ik": "[ik.md](ik.md), [targets.md](targets.md)",
+    "network": "[networks.md](networks.md)",
     "fmu": "[fmu.md](fmu.md), [units.md](units.md)",
     "simulate": "[simulate.md](simulate.md), [drives.md](drives.md), [dynamics.md](dynamics.md)",
 }

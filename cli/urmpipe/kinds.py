@@ -91,7 +91,11 @@ def _is_unit(value: Any) -> bool:
 def _is_network(value: Any) -> bool:
     from urmpipe_models.networks.network import Network
 
-    return isinstance(value, Network) or _is_path(value)
+    return isinstance(value, (Network, Mapping)) or _is_path(value)
+
+
+def _is_tables(value: Any) -> bool:
+    return isinstance(value, Mapping) or _is_path(value)
 
 
 def _are_controls(value: Any) -> bool:
@@ -184,10 +188,6 @@ KINDS = {
     "formats": Kind(
         _one_or_many(lambda one: isinstance(one, str) and one in ("svg", "png")), "svg, png or a list of both"
     ),
-    "load_network.network": Kind(
-        lambda value: isinstance(value, Mapping) or _is_path(value),
-        "a name, a TOML file, or the tables of one",
-    ),
     "ik.tolerance": Kind(_is_number, "a number, in m"),
     "inputs": PATHS,
     "iso": FLAG,
@@ -197,9 +197,10 @@ KINDS = {
     "lazy": FLAG,
     "limit": Kind(_is_number, "a number, in m"),
     "log_map": Kind(_is_map, "a map (TOML), or what `read_map` returned"),
+    "load_network.network": Kind(_is_tables, "a name, a TOML file, or the tables of one"),
     "method": _one_of("auto", "closed", "iterative"),
     "name_or_path": ROBOT_FILE,
-    "network": Kind(_is_network, "a name, a TOML file, or a Network"),
+    "network": Kind(_is_network, "a name, a TOML file, the tables of one, or a Network"),
     "noise": KIND_OF_LIMIT,
     "options": Kind(lambda value: isinstance(value, Mapping), 'a mapping, such as {"joints": 6}'),
     "output": PATH,

@@ -1,4 +1,4 @@
-"""Arms and a path seen along the axes of the world, as SVG: views of one scale, aligned with each other."""
+"""Arms, a path and solids seen along the axes of the world, as SVG: views of one scale, aligned."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.dynamics.over_log import mass_centres_over_log
+from urmpipe_pipeline.lettering import Box, box_about, freest, width_of
+from urmpipe_pipeline.outlines import Piece, drawn_pieces, polyline
 from urmpipe_pipeline.palette import INK_COLOUR, MASS_COLOUR, REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.parts import spot_at
 from urmpipe_pipeline.presentation.scene import Spot, ball_sizes
@@ -30,6 +32,28 @@ APART_PX = 50
 
 NEAR_PX = 10
 """Spots nearer than this in a view have one name, in pixels."""
+
+NAME_PX, BESIDE_PX, EDGE_PX = 12.0, 12.0, 4.0
+"""Size of the letters of names, and how far they are from their places and from the left edge, in pixels."""
+
+AROUND = (
+    (1, -1),
+    (-1, -1),
+    (1, 1),
+    (-1, 1),
+    (1, 0),
+    (-1, 0),
+    (0, -1.3),
+    (0, 1.3),
+    (1, -2),
+    (-1, 2),
+    (1, 2),
+    (-1, -2),
+)
+"""Where words stand beside a place: in shares of their width to the right, in lines below it."""
+
+FAR_PX = 1e5
+"""Beyond any picture, in pixels."""
 
 MASS_PX = 16
 """Radius of the dot of the largest mass, in pixels; the others are as large as balls of one density."""
@@ -83,19 +107,24 @@ class Sketch:
         spots: Places with a word.
         masses: Masses of the arms.
         asked: Where the point was to go in [m], shape (k, 3); grey, behind the path.
+        pieces: Solids and lines, in any order: what is nearer hides what is behind.
+        names: Words beside places, which have no mark of their own.
     """
 
-    arms: Sequence[FloatArray]
+    arms: Sequence[FloatArray] = ()
     path: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     spots: Sequence[Spot] = ()
     masses: Sequence[Mass] = ()
     asked: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    pieces: Sequence[Piece] = ()
+    names: Sequence[Spot] = ()
 
     @property
     def extent(self) -> tuple[FloatArray, FloatArray]:
         """Its least and its largest coordinates in [m], shape (3,) each."""
         places = [*(one.position for one in self.spots), *(one.position for one in self.masses)]
-        every = np.concatenate([*self.arms, self.path, self.asked, np.array(places).reshape(-1, 3)])
+        solids = [one.points for one in self.pieces]
+        every = np.concatenate([*self.arms, *solids, self.path, self.asked, np.array(places).reshape(-1, 3)])
         every = every[np.isfinite(every).all(axis=1)]
         return every.min(axis=0), every.max(axis=0)
 
@@ -114,6 +143,22 @@ class _Frame:
     def axes(self) -> list[int]:
         """The coordinates of the scene that run right and up: 0, 1, 2 for x, y, z."""
         return [self.view.right, self.view.up]
+
+    @property
+    def towards(self) -> FloatArray:
+        """The way to who looks at the view [-], shape (3,)."""
+        return np.cross(*np.eye(3)[self.axes])
+
+    @property
+    def outside(self) -> list[Box]:
+        """What is beyond its four sides."""
+        (left, top), (right, bottom) = self.corner.tolist(), (self.corner + self.size).tolist()
+        return [
+            Box(-FAR_PX, -FAR_PX, left, FAR_PX),
+            Box(right, -FAR_PX, FAR_PX, FAR_PX),
+            Box(-FAR_PX, -FAR_PX, FAR_PX, top),
+            Box(-FAR_PX, bottom, FAR_PX, FAR_PX),
+        ]
 
     def placed(self, points: FloatArray) -> FloatArray:
         """Return points in [m], shape (n, 3), in pixels, shape (n, 2)."""
@@ -203,15 +248,16 @@ def _scales(frame: _Frame) -> Iterator[str]:
 
 def _drawn(sketch: Sketch, frame: _Frame) -> Iterator[str]:
     """Yield arms, path and spots in a view; several arms are lighter than one."""
+    yield from drawn_pieces(sketch.pieces, frame.placed, frame.towards)
     alone = len(sketch.arms) == 1
     width, opacity = (8, 1.0) if alone else (4, 0.4)
     for arm in sketch.arms:
         style = f'stroke="#4a7ba6" stroke-width="{width}" stroke-linejoin="round" opacity="{opacity:g}"'
-        yield _polyline(frame.placed(arm), style)
+        yield polyline(frame.placed(arm), style)
     if len(sketch.asked):
-        yield _polyline(frame.placed(sketch.asked), f'stroke="{REFERENCE_COLOUR}" stroke-width="3"')
+        yield polyline(frame.placed(sketch.asked), f'stroke="{REFERENCE_COLOUR}" stroke-width="3"')
     if len(sketch.path):
-        yield _polyline(frame.placed(sketch.path), 'stroke="#d55e00" stroke-width="2"')
+        yield polyline(frame.placed(sketch.path), 'stroke="#d55e00" stroke-width="2"')
     centres = frame.placed(np.array([one.position for one in sketch.masses]).reshape(-1, 3))
     for place, size in zip(centres, ball_sizes([one.mass for one in sketch.masses]), strict=True):
         yield _mass(place, MASS_PX * size)
@@ -220,6 +266,28 @@ def _drawn(sketch: Sketch, frame: _Frame) -> Iterator[str]:
         yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{5 if alone else 3}" fill="{spot.colour}"/>'
     for (x, y), words in _names(placed, [spot.words for spot in sketch.spots]):
         yield f'<text x="{x + 8:.1f}" y="{y - 6:.1f}" {HALO}>{escape(words)}</text>'
+    yield from _beside(sketch.names, frame)
+
+
+def _beside(names: Sequence[Spot], frame: _Frame) -> Iterator[str]:
+    """Yield words beside their places, where others leave room; those of places that are near together."""
+    placed = frame.placed(np.array([one.position for one in names]).reshape(-1, 3))
+    colours = {one.words: one.colour for one in names}
+    taken = frame.outside
+    for (x, y), words in list(_names(placed, [one.words for one in names])):
+        half = width_of(words, NAME_PX) / 2.0
+        box = freest(
+            [
+                box_about(x + across * (half + BESIDE_PX), y + up * 17.0, words, NAME_PX)
+                for across, up in AROUND
+            ],
+            taken,
+        )
+        box = box.shifted(max(EDGE_PX - box.left, 0.0))
+        taken.append(box)
+        at = f'x="{box.middle[0]:.1f}" y="{box.middle[1] + 4.5:.1f}" text-anchor="middle"'
+        fill = colours.get(words, INK_COLOUR)
+        yield f'<text class="name" {at} font-size="{NAME_PX:g}" fill="{fill}" {HALO}>{escape(words)}</text>'
 
 
 def _mass(place: FloatArray, radius: float) -> str:
@@ -246,12 +314,6 @@ def _names(placed: FloatArray, words: Sequence[str]) -> Iterator[tuple[tuple[flo
         left = [k for k in left if k not in near]
         x, y = placed[first].tolist()
         yield (x, y), ", ".join(dict.fromkeys(words[k] for k in near))
-
-
-def _polyline(points: FloatArray, style: str) -> str:
-    """Return a line through points in pixels, shape (n, 2)."""
-    way = " ".join(f"{x:.1f},{y:.1f}" for x, y in points[np.isfinite(points).all(axis=1)])
-    return f'<polyline points="{way}" fill="none" {style}/>'
 
 
 def _at(frame: _Frame, axis: int, value: float) -> FloatArray:

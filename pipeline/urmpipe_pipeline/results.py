@@ -19,6 +19,8 @@ from urmpipe_pipeline.comparison import presenter as comparison
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.diagnosis import presenter as diagnosis
 from urmpipe_pipeline.diagnosis.result import Diagnosis
+from urmpipe_pipeline.networks import presenter as networks
+from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.planned_paths import presenter as planned_paths
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.presentation.exports import Exports
@@ -66,6 +68,7 @@ KINDS: tuple[Kind, ...] = (
     Kind("solved targets", SolvedTargets, solved_targets.present, solved_targets.exports),
     Kind("plan", PlannedPath, planned_paths.present, planned_paths.exports),
     Kind("accuracy", Accuracy, accuracy.present, accuracy_exports.exports),
+    Kind("network", NetworkResult, networks.present),
 )
 """Every kind."""
 

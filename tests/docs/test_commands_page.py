@@ -17,6 +17,7 @@ from urmpipe.main import cli
 from urmpipe_fmus.cosim import system_names
 from urmpipe_fmus.units import unit_names
 from urmpipe_models.errors import UrmpipeError
+from urmpipe_models.networks.network_file import network_names
 from urmpipe_models.robots.catalogue import robot_names
 
 OF_OTHERS = {"--start-values", "--debug-logging", "--no-arr", "--truncate-length"}
@@ -74,12 +75,12 @@ def parsed(line: str) -> click.Context:
 
 
 def unknown_names(given: click.Context) -> list[str]:
-    """Return the robots, units and systems that a command is given and that urmpipe does not bring along.
+    """Return the robots, networks, units and systems in a command that urmpipe does not bring along.
 
     A name in capitals stands for any, and one with a suffix is a file.
     """
     shipped = {"robot": robot_names(), "unit": unit_names(), "system": system_names()}
-    shipped["name"] = shipped["robot"]
+    shipped["name"] = (*robot_names(), *network_names())
     named = [(key, given.params.get(key)) for key in shipped]
     return [
         f"{key} {name}"

@@ -29,7 +29,7 @@ PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-
 NAMED = set(re.findall(r"`(\w+)`", PAGE))
 FREE = {
     "steps", "units", "tolerance", "noise", "before", "now", "delta", "start", "joints", "joint_turns",
-    "arguments", "points", "value",
+    "arguments", "points", "value", "variables",
 }  # fmt: skip
 """Objects whose keys are names of columns, axes, joints, kinds or options."""
 
@@ -116,6 +116,9 @@ CALLS = {
     "fmu list": "fmu list",
     "ik ik": "ik path.csv --robot urm6",
     "ingest ingest": "ingest log.csv --robot urm6 -o log.rrd",
+    "network check": "network check four-bar",
+    "network list": "network list",
+    "network solve": "network solve four-bar",
     "plan plan": "plan cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1 --robot irb60",
     "report report": "report log.rrd",
     "robot equations": "robot equations rod.toml",

@@ -90,6 +90,8 @@ def lay_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (folder / "arm.urdf").write_text("\n".join(snippets("docs/robots.md", "xml")), encoding="utf-8")
     (folder / "my-arm.toml").write_text(snippets("docs/robots.md", "toml")[0], encoding="utf-8")
     (folder / "planar.toml").write_text(snippets("docs/dynamics.md", "toml")[0], encoding="utf-8")
+    for name, text in zip(("boom", "five-bar", "door"), snippets("docs/networks.md", "toml"), strict=True):
+        (folder / f"{name}.toml").write_text(text, encoding="utf-8")
     system = next(one for one in snippets("docs/simulate.md", "toml") if one.startswith("[system]"))
     (folder / "my-system.toml").write_text(system, encoding="utf-8")
     lay_repeated(folder)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from urmpipe import __version__
 from urmpipe.keyword_checks import PathLike, public, refuse_warnings
@@ -17,6 +17,9 @@ from urmpipe_pipeline.networks.finding import Search, find_network
 from urmpipe_pipeline.networks.result import Command, NetworkResult
 from urmpipe_pipeline.outputs import DRAWING_HEADER
 from urmpipe_pipeline.sources.tables.text import fingerprint
+
+NetworkLike: TypeAlias = PathLike | Mapping[str, Any] | Network
+"""A name, a file, the tables of one, or a network."""
 
 SEARCHING = 0.9
 """Share of the work that assembly is where something is written, too."""
@@ -38,7 +41,7 @@ def load_network(network: PathLike | Mapping[str, Any]) -> Network:
 
 @public
 def network_check(
-    network: PathLike | Network,
+    network: NetworkLike,
     *,
     controls: Mapping[str, float] | None = None,
     restarts: int = RESTARTS,
@@ -51,7 +54,7 @@ def network_check(
     """Assemble a network and find how it moves: its graph, its mobility, and which constraints are redundant.
 
     Args:
-        network: A name, a file, or a `Network`.
+        network: A name, a file, the tables of one, or a `Network`.
         controls: Values of controls instead of their starts, by name.
         restarts: Random starts that are tried in vain where the network's own start does not close.
         seed: Of the random starts.
@@ -74,7 +77,7 @@ def network_check(
 
 @public
 def network_solve(
-    network: PathLike | Network,
+    network: NetworkLike,
     *,
     controls: Mapping[str, float] | None = None,
     every: bool = False,
@@ -88,7 +91,7 @@ def network_solve(
     """Assemble a network with its controls held: near its start, or in every way there is.
 
     Args:
-        network: A name, a file, or a `Network`.
+        network: A name, a file, the tables of one, or a `Network`.
         controls: Values of controls instead of their starts, by name.
         every: Find all assemblies, by random starts.
         restarts: Random starts in a row without anything new that end the search.
@@ -112,7 +115,7 @@ def network_solve(
 
 
 def _found(
-    network: PathLike | Network,
+    network: NetworkLike,
     command: Command,
     search: Search,
     strict: bool,
@@ -122,7 +125,8 @@ def _found(
 ) -> NetworkResult:
     """Return what is found of a network, and write what was requested."""
     loaded = network if isinstance(network, Network) else network_file.load_network(network)
-    files = [] if isinstance(network, Network) or not Path(network).is_file() else [Path(network)]
+    named = isinstance(network, (str, Path)) and Path(network).suffix.lower() == ".toml"
+    files = [Path(network)] if named else []
     tell = progress or (lambda share: None)
     with guarded_outputs({"recording": output, "drawing": draw}, files) as parts:
         inputs = [fingerprint(path) for path in files]

@@ -120,7 +120,7 @@ def solve(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
     Examples:
       urmpipe network solve four-bar --set crank=1.2
       urmpipe network solve four-bar --all --json
-      urmpipe network solve stewart-gough --all --draw assemblies.svg -o assemblies.rrd
+      urmpipe network solve stewart-gough --all --draw sg.svg -o sg.rrd
 
     Exit codes: 0 an assembly was found, 1 none, 2 bad file or usage.
     """

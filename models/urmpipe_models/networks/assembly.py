@@ -260,7 +260,7 @@ def poses_at(mechanism: Mechanism, x: FloatArray) -> FloatArray:
 def assembly_at(mechanism: Mechanism, x: FloatArray) -> Assembly:
     """Return a configuration, its variables in [m], [rad] and as controls are given, shape (variables,)."""
     controls = mechanism.control_slopes(x)
-    values = {name: (float(one.value),) for name, one in controls.items()}
+    values: dict[str, tuple[float, ...]] = {name: (float(one.value),) for name, one in controls.items()}
     for joint in mechanism.network.joints:
         if joint.units:
             values[joint.name] = tuple(float(one.value) for one in mechanism.joint_values(joint, x))

@@ -58,6 +58,6 @@ class Network(Parts, Shown):
         rows = "".join(
             f"<tr><td>{escape(one.name)}</td><td>{one.kind}</td><td>{escape(one.bodies[0])}</td>"
             f"<td>{escape(one.bodies[1])}</td></tr>"
-            for one in (*self.joints, *self.elements)
+            for _, one in self.ties
         )
         return f"<table><tr><th>name</th><th>kind</th><th>body</th><th>body</th></tr>{rows}</table>"

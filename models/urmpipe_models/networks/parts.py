@@ -146,7 +146,7 @@ Placed: TypeAlias = tuple[str, Expression]
 """A function of controls with its place in a file, such as joints.A.value."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Parts:
     """Bodies, and what ties them, right or wrong.
 

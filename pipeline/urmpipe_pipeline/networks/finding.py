@@ -114,8 +114,8 @@ def _warnings(
         yield LogWarning("rounded-figures", said)
     if every and found.continuum:
         said = (
-            f"with its controls held the network moves in {found.continuum} ways: its assemblies are no list;"
-            " a control for each way would make them one"
+            f"with its controls held the network has mobility {found.continuum}: its assemblies are no list;"
+            " as many more controls would make them one"
         )
         yield LogWarning("continuum", said)
     if mobility is None:

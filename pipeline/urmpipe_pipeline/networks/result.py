@@ -77,7 +77,7 @@ class NetworkResult(Result):
 
     @property
     def variables(self) -> int:
-        """How many variables there are: controls that can be set, free variables of joints, floating bodies."""
+        """Controls that can be set, free variables of joints, and six of each body that floats: how many."""
         return len(mechanism_of(self.network).variables)
 
     @property

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.presentation.scene import Arrows, BoolArray, Path, Sheets, Spot
+from urmpipe_pipeline.presentation.scene import Arrows, BoolArray, Path, Sheets, Solid, Spot
 
 Shape: TypeAlias = Literal["up", "down", "cross", "diamond"]
 
@@ -172,15 +172,16 @@ class Figure:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpaceFigure:
-    """Paths in space on a page, with equal scale on all axes; the viewer has its scene instead."""
+    """Paths and solids in space on a page, with equal scale on all axes; the viewer has its scene instead."""
 
     title: str
     caption: str
     alt: str
-    paths: tuple[Path, ...]
+    paths: tuple[Path, ...] = ()
     spots: tuple[Spot, ...] = ()
     arrows: Arrows | None = None
     sheets: Sheets | None = None
+    solids: tuple[Solid, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

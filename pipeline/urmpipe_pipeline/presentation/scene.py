@@ -1,4 +1,4 @@
-"""What stands in space: arms that move, paths, targets. Neither thinned out nor named as entities."""
+"""What stands in space: arms that move, paths, targets, solids. Neither thinned out nor named as entities."""
 
 from __future__ import annotations
 
@@ -150,6 +150,40 @@ class Balls:
     colour: str
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Solid:
+    """A thing that does not move, as its surface, with lines on and about it.
+
+    Attributes:
+        group: What it belongs to, such as bodies: the viewer's tree has it below that.
+        name: What it is called there, unique within its group.
+        colour: As #rrggbb.
+        triangles: Of its surface in [m], shape (n, 3, 3).
+        lines: In [m], shape (k, 3) each.
+        opacity: Of its surface, 0..1.
+        label: What is written at it; empty for nothing.
+        at: Where that is written, x, y, z in [m].
+        legend: What a page's legend calls it; solids that share it are one entry.
+        hidden: Whether it is there to be switched on only.
+    """
+
+    group: str
+    name: str
+    colour: str
+    triangles: FloatArray
+    lines: tuple[FloatArray, ...] = ()
+    opacity: float = 1.0
+    label: str = ""
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    legend: str = ""
+    hidden: bool = False
+
+    @property
+    def points(self) -> FloatArray:
+        """Its corners and vertices in [m], shape (n, 3)."""
+        return np.concatenate([self.triangles.reshape(-1, 3), *self.lines])
+
+
 @dataclass(frozen=True, slots=True)
 class Spot:
     """A place with a word.
@@ -198,6 +232,7 @@ class Scene:
         targets: What was asked for, if it was poses.
         arrows: What is drawn at places, at all times.
         balls: What is drawn about places, at all times.
+        solids: Things that do not move.
     """
 
     title: str = ""
@@ -207,6 +242,7 @@ class Scene:
     targets: Targets | None = None
     arrows: Arrows | None = None
     balls: Balls | None = None
+    solids: tuple[Solid, ...] = ()
 
 
 def ball_sizes(masses: Sequence[Element]) -> FloatArray:

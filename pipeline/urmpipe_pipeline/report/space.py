@@ -1,4 +1,4 @@
-"""Paths in space as plotly.js draws them: equal scale on all axes, the z axis up."""
+"""Paths and solids in space as plotly.js draws them: equal scale on all axes, the z axis up."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.palette import VALUE_SCALE
 from urmpipe_pipeline.presentation.figure import SpaceFigure
-from urmpipe_pipeline.presentation.scene import Arrows, Path, Sheets, Spot
+from urmpipe_pipeline.presentation.scene import Arrows, Path, Sheets, Solid, Spot
 from urmpipe_pipeline.report.spec import Figure, Spec, base_layout, space_axis, typed
 from urmpipe_pipeline.report.traces import label, points_for
 
@@ -37,12 +37,15 @@ DOT_PX, PLACE_PX = 3, 6
 TINT = 0.12
 """Opacity of a sheet: several behind each other still let a path through."""
 
+LIGHT = {"ambient": 0.6, "diffuse": 0.6, "specular": 0.1}
+"""How solids are lit: their colours stay those of the legend."""
+
 BACK_PX, FRONT_PX, VALUES_PX = 2, 5, 6
 """Width of a path: of those in the back, of the one in front, and of one that its values colour."""
 
 
 def drawn_space(figure: SpaceFigure) -> Figure:
-    """Return paths and places in space."""
+    """Return paths, places and solids in space."""
     lined = any(path.line for path in figure.paths)
     traces = [
         _path(path, FRONT_PX if path is figure.paths[-1] else BACK_PX, PLACE_PX if lined else DOT_PX)
@@ -55,6 +58,8 @@ def drawn_space(figure: SpaceFigure) -> Figure:
     if figure.sheets is not None and len(figure.sheets.corners):
         traces = [*_sheets(figure.sheets), *traces]
         places.append(figure.sheets.corners.reshape(-1, 3))
+    traces += _solids(figure.solids)
+    places += [one.points for one in figure.solids if not one.hidden]
     return Figure(
         figure.title,
         f"{figure.caption} {HANDLING}",
@@ -132,6 +137,31 @@ def _sheets(sheets: Sheets) -> Iterator[Spec]:
     closed = np.concatenate((corners, corners[:, :1], np.full_like(corners[:, :1], np.nan)), axis=1)
     style = {"mode": "lines", "line": {"color": sheets.colour, "width": BACK_PX}}
     yield _in_space(closed.reshape(-1, 3)) | shared | style
+
+
+def _solids(solids: tuple[Solid, ...]) -> Iterator[Spec]:
+    """Yield solids with their lines and words; those of one entry of the legend are switched together."""
+    told: set[str] = set()
+    for one in solids:
+        name = label(one.legend or one.name)
+        shared = {"name": name, "legendgroup": name, "showlegend": name not in told}
+        shared |= {"visible": "legendonly"} if one.hidden else {}
+        told.add(name)
+        own = label(one.name)
+        corners, places = np.unique(one.triangles.reshape(-1, 3), axis=0, return_inverse=True)
+        x, y, z = (typed(column) for column in corners.T)
+        faces = dict(zip("ijk", places.reshape(-1, 3).T.tolist(), strict=True))
+        look = {"color": one.colour, "opacity": one.opacity, "flatshading": True, "hoverinfo": "name"}
+        told_as = {"hovertemplate": f"{own}<extra></extra>", "lighting": LIGHT}
+        yield {"type": "mesh3d", "x": x, "y": y, "z": z} | faces | look | shared | told_as
+        rest = shared | {"showlegend": False}
+        if one.lines:
+            apart = [np.vstack((line, np.full((1, 3), np.nan))) for line in one.lines]
+            style = {"mode": "lines", "line": {"color": one.colour, "width": BACK_PX}, "hoverinfo": "skip"}
+            yield _in_space(np.concatenate(apart)) | rest | style
+        if one.label:
+            words = {"mode": "text", "text": [label(one.label)], "hoverinfo": "skip"}
+            yield _in_space(np.array([one.at])) | rest | words
 
 
 def _arrows(arrows: Arrows) -> Iterator[Spec]:

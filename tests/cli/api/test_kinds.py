@@ -56,7 +56,7 @@ RIGHT = {
         "planes",
     },
     "a list": {"logs", "inputs", "platforms", "formats", "joints", "measured"},
-    "a mapping": {"arguments", "options", "unit", "interval"},
+    "a mapping": {"arguments", "controls", "network", "options", "unit", "interval"},
 }
 """Which keywords take what is odd elsewhere; each takes its default."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,6 +38,7 @@ from urmpipe_pipeline.recording.views.geometry import (
     opens_row,
 )
 from urmpipe_pipeline.recording.views.shapes import draw_body, hide_body, lacks_shapes
+from urmpipe_pipeline.recording.views.solids import draw_solids
 from urmpipe_pipeline.text import encodable
 
 if TYPE_CHECKING:
@@ -44,7 +46,7 @@ if TYPE_CHECKING:
     from rerun.blueprint import Spatial3DView
 
 LINK, JOINT, POINT, SPOT, AXIS, MARK, MASS = 0.012, 0.022, 0.018, 0.024, 0.005, 0.034, 0.04
-ASKED, DONE = 0.0065, 0.0035
+ASKED, DONE, THREAD = 0.0065, 0.0035, 0.002
 FRAME_LENGTH, FRAME, TARGET, MISSED = 0.09, 0.004, 0.012, 0.02
 """Sizes in the 3D view, as shares of the radius of everything in it."""
 
@@ -67,16 +69,15 @@ LABEL_COLOUR = "#ffffff"
 def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spatial3DView | None:
     """Send a scene that opens at a time in [ns] and return its view; None if there is nothing to see."""
     import rerun as rr
-    import rerun.blueprint as rrb
 
     arm = next((drawn_arm(one) for one in scene.arms if not one.ghost), None)
     ghosts = drawn_ghosts(scene.arms)
     paths = [drawn_path(path) for path in scene.paths]
     targets = None if scene.targets is None else drawn_targets(scene.targets)
-    if arm is None and not paths and not ghosts and targets is None:
+    if arm is None and not (paths or ghosts or targets is not None or scene.solids):
         return None
-    points = extent(arm, ghosts, paths, targets, scene.arrows, scene.balls)
-    centre, size = ball(points)
+    points = extent(arm, ghosts, paths, targets, scene.arrows, scene.balls, scene.solids)
+    size = ball(points)[1]
     stream.log(ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     labelled = [one for one in scene.arms if one.label]
     row = opens_row(scene, opens_at_ns) if labelled else 0
@@ -97,10 +98,24 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
         _draw_label(stream, label, shown_path("scene", "label", str(number)))
     if arm is not None:
         _draw_arm(stream, arm, size)
+    hidden = draw_solids(stream, scene.solids, THREAD * size)
+    return _view(scene.title, points, hidden)
+
+
+def _view(title: str, points: FloatArray, hidden: Sequence[str]) -> Spatial3DView:
+    """Return the view, its eye so that it sees points in [m], shape (n, 3); some entities are hidden."""
+    import rerun.blueprint as rrb
+
+    centre, size = ball(points)
     position = centre + max(size, eye_distance(seen(points - centre))) * EYE
     eye = rrb.EyeControls3D(position=position, look_target=centre, eye_up=(0.0, 0.0, 1.0))
-    name = encodable(scene.title)
-    return rrb.Spatial3DView(origin=ROOT, contents=shown_path("scene") + "/**", name=name, eye_controls=eye)
+    return rrb.Spatial3DView(
+        origin=ROOT,
+        contents=shown_path("scene") + "/**",
+        name=encodable(title),
+        eye_controls=eye,
+        overrides={entity: [rrb.EntityBehavior(visible=False)] for entity in hidden},
+    )
 
 
 def _send(

@@ -1,0 +1,255 @@
+"""Kinematic networks: assembly side by side and one by one, all assemblies of a platform, mobility.
+
+python benchmarks/networks.py [--rounds N] [--solves N] [--seeds N] [--box SECONDS]
+
+The peer is SciPy's least_squares (MINPACK's Levenberg-Marquardt). Of the spatial loop RCCC it gets urmpipe's
+own residual, with and without its Jacobian; of the Stewart-Gough platform the six lengths in NumPy, as a
+script has them. Both are run in turn with urmpipe in one process.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pairs import Bound, machine, rounds, timed, write_results
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.networks.assembly import assemble
+from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.descent import descend
+from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mobility import mobility_of
+from urmpipe_models.networks.network_file import load_network
+
+CLOSED = 1e-9
+"""A gap of less, in lengths (of the script: in [m]) and in [rad], is closed."""
+
+SAME = 1e-6
+"""Assemblies that are nearer to each other in each variable, in [m] and [rad], are one."""
+
+ALONE = 100
+"""Control values that the jobs one by one solve in a round."""
+
+POSTURES = 40
+"""Real assemblies of the Stewart-Gough platform. Source: Dietmaier 1998."""
+
+COUNTED = (
+    "four-bar", "slider-crank", "screw-jack", "bennett", "bricard", "sarrus", "rssr", "nine-revolute",
+    "nine-revolute-controlled", "cluster-gg", "stewart-gough",
+)  # fmt: skip
+"""The networks whose mobility is counted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Searched:
+    """What a search for all assemblies came to: how many, from how many starts, and its time in [s]."""
+
+    found: int
+    tried: int
+    seconds: float
+
+
+def milliseconds(taken: list[float]) -> str:
+    """Return the median and the span of times in [s], in ms."""
+    middle, least, most = (1e3 * one for one in (statistics.median(taken), min(taken), max(taken)))
+    return f"{middle:.3f} ({least:.3f}-{most:.3f})"
+
+
+def turned(mechanism: Mechanism, count: int) -> FloatArray:
+    """Return starts that differ by the control alone, which takes a full turn, shape (variables, count)."""
+    x = np.repeat(mechanism.start[:, np.newaxis], count, axis=1)
+    x[mechanism.controls[0]] = np.linspace(0.0, 2.0 * np.pi, count)
+    return x
+
+
+def alone(mechanism: Mechanism, x: FloatArray, *, slopes: bool) -> float:
+    """Return the largest gap in lengths of the mechanism and [rad] that SciPy leaves, start by start.
+
+    Args:
+        mechanism: The network.
+        x: The starts, shape (variables, n).
+        slopes: Whether it gets the Jacobian; else it takes differences.
+    """
+    free, largest = mechanism.free, 0.0
+    for start in x.T:
+        at = start[:, np.newaxis].copy()
+
+        def residual(values: FloatArray, at: FloatArray = at) -> FloatArray:
+            at[free, 0] = values
+            return np.asarray(closure_of(mechanism, at).residual[:, 0])
+
+        def jacobian(values: FloatArray, at: FloatArray = at) -> FloatArray:
+            at[free, 0] = values
+            return np.asarray(closure_of(mechanism, at).jacobian[:, free, 0])
+
+        how: Any = jacobian if slopes else "2-point"
+        found = least_squares(residual, start[free], jac=how, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        largest = max(largest, float(np.abs(found.fun * mechanism.row_scales).max()))
+    return largest
+
+
+def batches(count: int, solves: int) -> tuple[list[str], list[Bound]]:
+    """Return the table of RCCC, and what is held."""
+    mechanism = mechanism_of(load_network("rccc"))
+    x = turned(mechanism, solves)
+    few = x[:, :: max(1, solves // ALONE)][:, :ALONE]
+    single = few.shape[1]
+    jobs: dict[str, tuple[int, Callable[[], float]]] = {
+        "urmpipe, side by side": (solves, lambda: float(descend(mechanism, x, mechanism.free).gap.max())),
+        "urmpipe, one by one": (
+            single,
+            lambda: max(float(descend(mechanism, one[:, None], mechanism.free).gap[0]) for one in few.T),
+        ),
+        "SciPy with urmpipe's Jacobian, one by one": (single, lambda: alone(mechanism, few, slopes=True)),
+        "SciPy by differences, one by one": (single, lambda: alone(mechanism, few, slopes=False)),
+    }
+    gaps = {name: job() for name, (_, job) in jobs.items()}
+    taken: dict[str, list[float]] = {name: [] for name in jobs}
+    for _ in range(count):
+        for name, (of, job) in jobs.items():
+            taken[name].append(timed(job) / of)
+    base = taken["urmpipe, side by side"]
+    lines = [
+        f"RCCC, a loop of one revolute and three cylindrical joints, at {solves} values of its control from 0"
+        f" to 2 π, all from the start of the file; one by one at {single} of them. Gaps are in lengths of the"
+        " mechanism and rad.",
+        "",
+        "| job | ms a solve, median (min-max) | solves a second | largest gap"
+        " | times side by side, median of pairs |",
+        "|---|---|---|---|---|",
+    ]
+    for name, seconds in taken.items():
+        ratio = statistics.median(a / b for a, b in zip(seconds, base, strict=True))
+        each = 1.0 / statistics.median(seconds)
+        lines.append(f"| {name} | {milliseconds(seconds)} | {each:.0f} | {gaps[name]:.0e} | {ratio:.1f} |")
+    closed = int((descend(mechanism, x, mechanism.free).gap < CLOSED).sum())
+    return lines, [
+        Bound("RCCC: solves a second, side by side", 1.0 / statistics.median(base), least=2000.0),
+        Bound(f"RCCC: assembled of {solves}", closed, least=solves),
+    ]
+
+
+def searched(mechanism: Mechanism, seed: int) -> Searched:
+    """Return what urmpipe finds of a platform."""
+    start = time.perf_counter()
+    found = assemble(mechanism, every=True, seed=seed)
+    return Searched(len(found.assemblies), found.tried, time.perf_counter() - start)
+
+
+def by_script(mechanism: Mechanism, seed: int, starts: int, box: float) -> Searched:
+    """Return what a script finds of a platform from random starts, at most so many, and for so many seconds.
+
+    Its residual is |g + R p - b| - d of the legs, in [m].
+    """
+    elements = mechanism.network.elements
+    base, plate = (np.array([one.points[k] for one in elements]) for k in (0, 1))
+    lengths = np.array([float(one.length.value({})) for one in elements])
+    rng, kept = np.random.default_rng(seed), np.empty((0, 12))
+
+    def residual(pose: FloatArray) -> FloatArray:
+        points = pose[:3] + Rotation.from_rotvec(pose[3:]).apply(plate)
+        return np.asarray(np.linalg.norm(points - base, axis=1) - lengths)
+
+    begun, tried = time.perf_counter(), 0
+    while tried < starts and time.perf_counter() - begun < box:
+        tried += 1
+        vector = Rotation.random(random_state=rng).as_rotvec()
+        pose = np.concatenate((mechanism.start[:3] + mechanism.length * rng.normal(size=3), vector))
+        found = least_squares(residual, pose, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        if np.abs(found.fun).max() < CLOSED:
+            place = np.concatenate((found.x[:3], Rotation.from_rotvec(found.x[3:]).as_matrix().ravel()))
+            if not (np.abs(kept - place).max(axis=1) < SAME).any():
+                kept = np.vstack((kept, place))
+    return Searched(len(kept), tried, time.perf_counter() - begun)
+
+
+def platforms(seeds: int, box: float) -> tuple[list[str], list[Bound]]:
+    """Return the table of the Stewart-Gough platform, and what is held."""
+    mechanism = mechanism_of(load_network("stewart-gough"))
+    lines = [
+        f"All assemblies of Dietmaier's Stewart-Gough platform, which has {POSTURES}. The script takes as"
+        f" many random starts as urmpipe, and {box:g} s at most.",
+        "",
+        "| seed | found, urmpipe | starts | s | found, script | starts | s |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    own = []
+    for seed in range(seeds):
+        own.append(searched(mechanism, seed))
+        other = by_script(mechanism, seed, own[-1].tried, box)
+        cells = (f"{one.found} | {one.tried} | {one.seconds:.2f}" for one in (own[-1], other))
+        lines.append(f"| {seed} | {' | '.join(cells)} |")
+    return lines, [
+        Bound("Stewart-Gough: fewest assemblies of all seeds", min(one.found for one in own), least=POSTURES),
+        Bound("Stewart-Gough: longest search, s", max(one.seconds for one in own), under=30.0),
+    ]
+
+
+def counts(count: int) -> list[str]:
+    """Return the table of mobilities."""
+    lines = [
+        "| network | variables | rank | mobility | Kutzbach | redundant | idle spins | mobility alone, ms,"
+        " median (min-max) |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for name in COUNTED:
+        mechanism = mechanism_of(load_network(name))
+        x = assemble(mechanism).x_nearest
+        moves = mobility_of(mechanism, x)
+        taken = [timed(lambda at=x, one=mechanism: mobility_of(one, at)) for _ in range(count)]  # type: ignore[misc]
+        lines.append(
+            f"| {name} | {moves.variables} | {moves.rank} | {moves.mobility} | {moves.kutzbach}"
+            f" | {len(moves.redundant)} | {', '.join(moves.idle)} | {milliseconds(taken)} |"
+        )
+    return lines
+
+
+def commands(count: int) -> list[str]:
+    """Return the table of whole commands."""
+    network = [sys.executable, "-m", "urmpipe", "network"]
+    told = ("list", "check four-bar", "solve four-bar --all", "solve stewart-gough --all")
+    taken = rounds({one: [*network, *one.split()] for one in told}, count)
+    lines = ["| urmpipe network | wall s, median (min-max) | CPU s | MB |", "|---|---|---|---|"]
+    for name, usages in taken.items():
+        walls = [one.wall for one in usages]
+        cpu, rss = (statistics.median(getattr(one, key) for one in usages) for key in ("cpu", "rss"))
+        span = f"{statistics.median(walls):.2f} ({min(walls):.2f}-{max(walls):.2f})"
+        lines.append(f"| `{name}` | {span} | {cpu:.2f} | {rss:.0f} |")
+    return lines
+
+
+def main() -> None:
+    """Measure and keep the results."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--solves", type=int, default=1000)
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--box", type=float, default=10.0)
+    options = parser.parse_args()
+    of_batches = batches(options.rounds, options.solves)
+    of_platforms = platforms(options.seeds, options.box)
+    lines = [
+        f"# Kinematic networks: {options.rounds} rounds in turn",
+        "",
+        *machine("scipy"),
+        *of_batches[0],
+        "",
+        *of_platforms[0],
+        "",
+        *counts(options.rounds),
+        "",
+        *commands(options.rounds),
+    ]
+    write_results("networks", lines, [*of_batches[1], *of_platforms[1]])
+
+
+main()

@@ -1,0 +1,179 @@
+"""Mechanisms with known answers, drawn where every body's frame is the ground's and all variables are 0."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from random_networks import Vec, axis_frame, transform, unit, vec
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.networks.network import Network
+from urmpipe_models.networks.parts import (Body, ConstraintElement, Control, Joint, JointKind)
+
+X, Y, Z, ORIGIN = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+
+
+def tied(name: str, kind: JointKind, bodies: tuple[str, str], n: Vec, p: Vec, pitch: float = 0.0) -> Joint:
+    """Return a joint along n [-] at a point in [m] of the drawing."""
+    frame = transform(axis_frame(unit(n), np.array(p), np.random.default_rng(0)))
+    return Joint(name, kind, bodies, (frame, frame), pitch=pitch)
+
+
+def driven(joint: Joint, *values: str | None) -> Joint:
+    """Return a joint whose variables functions of controls drive."""
+    found = tuple(None if one is None else Expression(one) for one in values)
+    return Joint(joint.name, joint.kind, joint.bodies, joint.frames, values=found, pitch=joint.pitch)
+
+
+def rod(name: str, bodies: tuple[str, str], p: Vec, q: Vec, more: str = "0") -> ConstraintElement:
+    """Return a gg element between two points in [m] of the drawing, `more` longer than that."""
+    length = float(np.linalg.norm(np.subtract(q, p)))
+    return ConstraintElement(name, "gg", bodies, Expression(f"{length!r} + {more}"), (p, q))
+
+
+def ring(kinds: str, axes: FloatArray, points: FloatArray, drives: str | None = None) -> Network:
+    """Return a loop of joints r, p, c, h, g along axes [-] through points in [m]; drives turn the first."""
+    named: dict[str, JointKind] = {
+        "r": "revolute",
+        "p": "prismatic",
+        "c": "cylindrical",
+        "h": "helical",
+        "g": "global",
+    }
+    names = ["ground", *(f"b{k}" for k in range(1, len(kinds)))]
+    joints = [
+        tied(f"j{k}", named[kind], (names[k], names[(k + 1) % len(kinds)]), vec(axes[k]), vec(points[k]), 0.1)
+        for k, kind in enumerate(kinds)
+    ]
+    if drives is not None:
+        joints[0] = driven(joints[0], drives)
+    controls = (Control("s"),) if drives is not None else ()
+    return Network(kinds, tuple(map(Body, names[1:])), tuple(joints), controls=controls)
+
+
+def circles(p: FloatArray, r: float, q: FloatArray, s: float, sign: float = 1.0) -> FloatArray:
+    """Return the point at r from p and s from q in the plane, in [m]."""
+    d = float(np.linalg.norm(q - p))
+    along = (d**2 + r**2 - s**2) / (2.0 * d)
+    e = (q - p) / d
+    across = sign * np.sqrt(max(r**2 - along**2, 0.0))
+    return np.asarray(p + along * e + across * np.array([-e[1], e[0]]))
+
+
+def four_bar(
+    a: float = 0.4, b: float = 0.9, c: float = 0.7, d: float = 1.0, t: float = 0.9, drive: str | None = None
+) -> Network:
+    """Return a planar four-bar: crank a, coupler b, rocker c, frame d in [m], its crank at t in [rad]."""
+    crank, pivot = a * np.array([np.cos(t), np.sin(t)]), np.array([d, 0.0])
+    joint = circles(crank, b, pivot, c)
+    points = np.zeros((4, 3))
+    points[1:, :2] = np.array([crank, joint, pivot])
+    return ring("rrrr", np.tile(Z, (4, 1)), points, drive)
+
+
+def screw_displacement(t: float, a: float, alpha: float) -> FloatArray:
+    """Return Rz(t) Tx(a) Rx(alpha)."""
+    c, s, ca, sa = np.cos(t), np.sin(t), np.cos(alpha), np.sin(alpha)
+    return np.array(
+        [
+            [c, -s * ca, s * sa, a * c],
+            [s, c * ca, -c * sa, a * s],
+            [0.0, sa, ca, 0.0],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+
+
+def bennett(drive: str | None = None, alpha: float = 0.6, beta: float = 1.1, t: float = 0.8) -> Network:
+    """Return Bennett's linkage: a / sin(alpha) = b / sin(beta)."""
+    a, b = np.sin(alpha), np.sin(beta)
+    other = 2.0 * np.arctan(np.sin((beta + alpha) / 2) / np.sin((beta - alpha) / 2) / np.tan(t / 2))
+    steps = [(t, a, alpha), (other, b, beta), (-t, a, alpha), (-other, b, beta)]
+    frame, axes, points = np.eye(4), [], []
+    for one in steps:
+        axes.append(frame[:3, 2])
+        points.append(frame[:3, 3])
+        frame = frame @ screw_displacement(*one)
+    np.testing.assert_allclose(frame, np.eye(4), rtol=0.0, atol=1e-14)  # it closes
+    return ring("rrrr", np.array(axes), np.array(points), drive)
+
+
+def sarrus(drive: str | None = None) -> Network:
+    """Return Sarrus' linkage: two legs of three parallel hinges in planes across each other."""
+    axes = np.array([Y, Y, Y, X, X, X])
+    points = np.array(
+        [(0.5, 0, 0), (0.75, 0, 0.3), (0.4, 0, 0.6), (0, 0.35, 0.6), (0, 0.8, 0.35), (0, 0.45, 0)],
+        dtype=float,
+    )
+    return ring("rrrrrr", axes, points, drive)
+
+
+def random_ring(kinds: str, seed: int, drive: str | None = None) -> Network:
+    """Return one loop about axes and points at random."""
+    rng = np.random.default_rng(seed)
+    axes = np.array([unit(rng.normal(size=3)) for _ in kinds])
+    return ring(kinds, axes, rng.uniform(-1.0, 1.0, (len(kinds), 3)), drive)
+
+
+def rssr(drive: str | None = None) -> Network:
+    return random_ring("rggr", 6, drive)
+
+
+def rccc(drive: str | None = None) -> Network:
+    return random_ring("rccc", 4, drive)
+
+
+def nine_revolutes(drive: str | None = None) -> Network:
+    """Return nine hinges in a ring: three are driven by one control if asked, as in the paper."""
+    free = random_ring("rrrrrrrrr", 9)
+    if drive is None:
+        return free
+    joints = [
+        driven(one, (drive, f"0.5 * ({drive})", f"sin({drive})")[k // 3]) if k % 3 == 0 else one
+        for k, one in enumerate(free.joints)
+    ]
+    return Network("nine", free.bodies, tuple(joints), controls=(Control("s"),))
+
+
+def coupled_loops(drive: str | None = None) -> Network:
+    """Return two planar four-bars: the rocker of the first is the crank of the second."""
+    names = ("crank", "coupler", "rocker", "rod", "output")
+    joints = [
+        tied("A", "revolute", ("ground", "crank"), Z, (0.0, 0.0, 0.0)),
+        tied("B", "revolute", ("crank", "coupler"), Z, (0.2, 0.35, 0.0)),
+        tied("C", "revolute", ("rocker", "coupler"), Z, (1.1, 0.7, 0.0)),
+        tied("D", "revolute", ("ground", "rocker"), Z, (1.0, 0.0, 0.0)),
+        tied("E", "revolute", ("rocker", "rod"), Z, (1.4, 0.6, 0.0)),
+        tied("F", "revolute", ("rod", "output"), Z, (2.1, 0.8, 0.0)),
+        tied("G", "revolute", ("output", "ground"), Z, (2.0, 0.0, 0.0)),
+    ]
+    if drive is not None:
+        joints[0] = driven(joints[0], drive)
+    controls = (Control("s"),) if drive is not None else ()
+    return Network("coupled", tuple(map(Body, names)), tuple(joints), controls=controls)
+
+
+def rod_platform(drive: str | None = None, rods: int = 6) -> Network:
+    """Return a platform on rods between random points; the first is driven if asked."""
+    rng = np.random.default_rng(5)
+    ends = rng.uniform(-1.0, 1.0, (rods, 2, 3)) + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.5]])
+    held = [
+        rod(f"r{k}", ("ground", "platform"), vec(p), vec(q), drive if drive and k == 0 else "0")
+        for k, (p, q) in enumerate(ends)
+    ]
+    controls = (Control("s"),) if drive is not None else ()
+    return Network("platform", (Body("platform", (0.0,) * 6),), (), tuple(held), controls)
+
+
+MECHANISMS: dict[str, Callable[..., Network]] = {
+    "four-bar": four_bar,
+    "bennett": bennett,
+    "sarrus": sarrus,
+    "rssr": rssr,
+    "rccc": rccc,
+    "rod platform": rod_platform,
+    "nine revolutes": nine_revolutes,
+    "coupled loops": coupled_loops,
+}

@@ -1,0 +1,299 @@
+"""Random networks that close at their start, and what is computed of networks with matrices alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import expm, logm
+from scipy.spatial.transform import Rotation
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.networks.mechanism import Mechanism
+from urmpipe_models.networks.network import Network
+from urmpipe_models.networks.parts import (FREEDOMS, Body, ConstraintElement, ElementKind, Joint, JointKind)
+from urmpipe_models.transform import Transform
+
+Poses = dict[str, FloatArray]
+Vec = tuple[float, float, float]
+
+KINDS: tuple[JointKind, ...] = ("revolute", "prismatic", "cylindrical", "helical", "global")
+ELEMENTS: tuple[ElementKind, ...] = ("gg", "eg", "crc", "gc")
+
+
+def vec(array: FloatArray) -> Vec:
+    return float(array[0]), float(array[1]), float(array[2])
+
+
+def unit(array: FloatArray | Sequence[float]) -> FloatArray:
+    return np.asarray(np.asarray(array) / np.linalg.norm(array))
+
+
+def transform(matrix: FloatArray) -> Transform:
+    R = matrix[:3, :3]
+    return Transform((vec(R[0]), vec(R[1]), vec(R[2])), vec(matrix[:3, 3]))
+
+
+def matrix(frame: Transform) -> FloatArray:
+    full = np.eye(4)
+    full[:3, :3], full[:3, 3] = np.array(frame.rotation), np.array(frame.translation)
+    return full
+
+
+def random_pose(rng: np.random.Generator, size: float = 1.0) -> FloatArray:
+    pose = np.eye(4)
+    pose[:3, :3] = Rotation.random(random_state=rng).as_matrix()
+    pose[:3, 3] = size * rng.uniform(-1.0, 1.0, 3)
+    return pose
+
+
+def axis_frame(n: FloatArray, a: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return a frame at a in [m] whose second column is n; its first is any across it."""
+    frame = np.eye(4)
+    m = unit(np.cross(n, rng.normal(size=3)))
+    frame[:3, :3] = np.column_stack((m, n, np.cross(m, n)))
+    frame[:3, 3] = a
+    return frame
+
+
+def skew(w: FloatArray) -> FloatArray:
+    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+
+
+def generator(w: FloatArray | Sequence[float], v: FloatArray | Sequence[float]) -> FloatArray:
+    """Return the 4 x 4 matrix of a twist in [rad] and [m]."""
+    full = np.zeros((4, 4))
+    full[:3, :3], full[:3, 3] = skew(np.asarray(w)), v
+    return full
+
+
+def motion(kind: JointKind, q: Sequence[float] | FloatArray, pitch: float = 0.0) -> FloatArray:
+    """Return T(q) as a matrix exponential: an oracle that shares no formula with the models."""
+    theta = q[0] if kind in ("revolute", "cylindrical", "helical") else 0.0
+    s = {"prismatic": q[0], "cylindrical": q[-1], "helical": pitch * q[0]}.get(kind, 0.0)
+    w = tuple(q) if kind == "global" else (0.0, theta, 0.0)
+    return np.asarray(expm(generator(w, (0.0, s, 0.0))))
+
+
+def random_values(kind: JointKind, rng: np.random.Generator) -> tuple[float, ...]:
+    """Return variables in [rad] and [m] away from half a turn."""
+    return tuple(float(one) for one in rng.uniform(-1.2, 1.2, len(FREEDOMS[kind])))
+
+
+def joint_between(
+    name: str,
+    kind: JointKind,
+    bodies: tuple[str, str],
+    poses: Poses,
+    rng: np.random.Generator,
+    at: FloatArray | None = None,
+    start: Sequence[float] | None = None,
+) -> Joint:
+    """Return a joint that closes where its bodies have these poses.
+
+    Args:
+        name: Its name.
+        kind: Its kind.
+        bodies: Its bodies.
+        poses: The bodies in the ground.
+        rng: Of what is left open.
+        at: Its frame a on the first body, in the ground.
+        start: Its variables there in [rad] and [m].
+    """
+    at = random_pose(rng) if at is None else at
+    q = random_values(kind, rng) if start is None else tuple(start)
+    pitch = float(rng.uniform(-0.5, 0.5)) if kind == "helical" else 0.0
+    first = np.linalg.inv(poses[bodies[0]]) @ at
+    second = np.linalg.inv(poses[bodies[1]]) @ at @ motion(kind, q, pitch)
+    return Joint(name, kind, bodies, (transform(first), transform(second)), q, pitch=pitch)
+
+
+def distance_of(
+    kind: ElementKind, p: FloatArray, n: FloatArray, q: FloatArray, other: FloatArray, origin: FloatArray
+) -> float:
+    """Return what an element measures, all in the ground, by the geometry of schools."""
+    if kind == "gg":
+        return float(np.linalg.norm(q - p))
+    if kind == "eg":
+        return float(n @ (q - origin))
+    if kind == "gc":
+        return float(np.linalg.norm(np.cross(q - p, n)))
+    return float(abs(np.linalg.det(np.column_stack((q - p, n, other)))) / np.linalg.norm(np.cross(n, other)))
+
+
+def element_between(
+    name: str, kind: ElementKind, bodies: tuple[str, str], poses: Poses, rng: np.random.Generator
+) -> ConstraintElement:
+    """Return an element with random points and lines that is satisfied where its bodies have these poses."""
+    p, q = rng.uniform(-1.0, 1.0, (2, 3))
+    n, other = unit(rng.normal(size=3)), unit(rng.normal(size=3))
+    first, second = poses[bodies[0]], poses[bodies[1]]
+    length = distance_of(kind, p, n, q, other, first[:3, 3])
+    return ConstraintElement(
+        name,
+        kind,
+        bodies,
+        Expression(repr(length)),
+        (vec(into(first, p)), vec(into(second, q))),
+        (vec(first[:3, :3].T @ n), vec(second[:3, :3].T @ other)),
+    )
+
+
+def into(pose: FloatArray, point: FloatArray) -> FloatArray:
+    """Return a point of the ground in a body, in [m]."""
+    return np.asarray(pose[:3, :3].T @ (point - pose[:3, 3]))
+
+
+def start_of(pose: FloatArray) -> tuple[float, ...]:
+    """Return x, y, z in [m] and the rotation vector in [rad]."""
+    return tuple(float(one) for one in (*pose[:3, 3], *Rotation.from_matrix(pose[:3, :3]).as_rotvec()))
+
+
+def random_network(
+    rng: np.random.Generator,
+    bodies: int = 4,
+    extra: int = 2,
+    elements: int = 2,
+    kinds: Sequence[JointKind] = KINDS,
+) -> Network:
+    """Return a network that closes at its start: a tree of joints of any kind and direction, loops, elements.
+
+    The joints stand in random order, so that any of a loop may be where it is cut.
+    """
+    names = ["ground", *(f"b{k}" for k in range(1, bodies + 1))]
+    poses = {name: np.eye(4) if name == "ground" else random_pose(rng) for name in names}
+    pairs = [(names[int(rng.integers(k))], names[k]) for k in range(1, len(names))]
+    pairs += [random_pair(names, rng) for _ in range(extra)]
+    joints = []
+    for k, pair in enumerate(pairs):
+        kind = kinds[int(rng.integers(len(kinds)))]
+        joints.append(joint_between(f"j{k}", kind, pair if rng.random() < 0.5 else pair[::-1], poses, rng))
+    held = [
+        element_between(f"e{k}", ELEMENTS[int(rng.integers(4))], random_pair(names, rng), poses, rng)
+        for k in range(elements)
+    ]
+    order = rng.permutation(len(joints))
+    return Network("random", tuple(map(Body, names[1:])), tuple(joints[k] for k in order), tuple(held))
+
+
+def random_pair(names: Sequence[str], rng: np.random.Generator) -> tuple[str, str]:
+    first, second = rng.choice(len(names), 2, replace=False)
+    return names[int(first)], names[int(second)]
+
+
+def reframed(network: Network, rng: np.random.Generator, size: float = 1.0) -> Network:
+    """Return a network whose joints' frames in its bodies are seen from others: the same mechanism."""
+    moved = {one.name: random_pose(rng, size) for one in network.bodies}
+    moved[network.ground] = np.eye(4)
+    back = {name: np.linalg.inv(pose) for name, pose in moved.items()}
+
+    def frame(one: Joint, k: int) -> Transform:
+        return transform(back[one.bodies[k]] @ matrix(one.frames[k]))
+
+    def point(one: ConstraintElement, k: int) -> Vec:
+        return vec(into(moved[one.bodies[k]], np.array(one.points[k])))
+
+    def normal(one: ConstraintElement, k: int) -> Vec:
+        return vec(back[one.bodies[k]][:3, :3] @ np.array(one.normals[k]))
+
+    joints = tuple(replace(one, frames=(frame(one, 0), frame(one, 1))) for one in network.joints)
+    elements = tuple(
+        replace(
+            one,
+            length=lifted(one, moved[one.bodies[0]]),
+            points=(point(one, 0), point(one, 1)),
+            normals=(normal(one, 0), normal(one, 1)),
+        )
+        for one in network.elements
+    )
+    return replace(network, joints=joints, elements=elements)
+
+
+def lifted(element: ConstraintElement, moved: FloatArray) -> Expression:
+    """Return the length of an element whose first body is seen from elsewhere: h counts from its origin."""
+    if element.kind != "eg":
+        return element.length
+    return Expression(f"{element.length.text} - ({float(np.array(element.normals[0]) @ moved[:3, 3])!r})")
+
+
+def null_space(jacobian: FloatArray, cutoff: float = 1e-8) -> FloatArray:
+    """Return a basis of what a matrix maps to 0; below this share of the largest singular values are 0."""
+    if not len(jacobian):
+        return np.eye(jacobian.shape[1])
+    _, values, rows = np.linalg.svd(jacobian)
+    rank = int((values > cutoff * values[0]).sum()) if values[0] > 0.0 else 0
+    return np.asarray(rows[rank:].T)
+
+
+def column_space(vectors: FloatArray, cutoff: float = 1e-6) -> FloatArray:
+    left, values, _ = np.linalg.svd(vectors, full_matrices=False)
+    return np.asarray(left[:, values > cutoff * max(1.0, values.max(initial=0.0))])
+
+
+def difference(function: Callable[[FloatArray], FloatArray], x: FloatArray, step: float = 1e-3) -> FloatArray:
+    """Return the derivatives of a function by each entry of x, shape (..., entries).
+
+    Central differences over 1, 2 and 3 steps: an error of step^6 times the seventh derivative / 140, and
+    rounding of 1e-16 / step.
+
+    Args:
+        function: From shape (entries, n) to shape (..., n).
+        x: Where, shape (entries,).
+        step: In the units of x.
+    """
+    size = len(x)
+    steps = np.concatenate([m * step * np.eye(size) for m in (1, 2, 3, -1, -2, -3)], axis=1)
+    values = function(x[:, np.newaxis] + steps)
+    sides = [
+        values[..., m * size : (m + 1) * size] - values[..., (m + 3) * size : (m + 4) * size]
+        for m in range(3)
+    ]
+    return np.asarray((45.0 * sides[0] - 9.0 * sides[1] + sides[2]) / (60.0 * step))
+
+
+def one_by_one(function: Callable[[FloatArray], FloatArray]) -> Callable[[FloatArray], FloatArray]:
+    """Return a function of shape (entries, n) from one of shape (entries,)."""
+    return lambda x: np.stack([function(one) for one in x.T], axis=-1)
+
+
+def pose_of(mechanism: Mechanism, x: FloatArray, body: str) -> FloatArray:
+    return matrix(mechanism.poses([float(one) for one in x])[body])
+
+
+def body_jacobian(mechanism: Mechanism, x: FloatArray, body: str) -> FloatArray:
+    """Return a body's twists in the ground a unit of each variable, by differences, shape (6, variables)."""
+
+    def poses(at: FloatArray) -> FloatArray:
+        frame = mechanism.poses(at)[body]
+        full = np.zeros((4, 4, at.shape[1]))
+        for i in range(3):
+            full[i, 3] = frame.translation[i]
+            for j in range(3):
+                full[i, j] = frame.rotation[i][j]
+        return full
+
+    rates = difference(poses, x)
+    now = np.linalg.inv(pose_of(mechanism, x, body))
+    twists = [rates[:, :, k] @ now for k in range(len(x))]
+    return np.array([[t[2, 1], t[0, 2], t[1, 0], *t[:3, 3]] for t in twists]).T
+
+
+def twist_space(mechanism: Mechanism, x: FloatArray, body: str) -> FloatArray:
+    """Return a basis of the twists that a body can have in the closed network, shape (6, k)."""
+    ways = null_space(closure_of(mechanism, x[:, np.newaxis]).jacobian[:, :, 0])
+    return column_space(body_jacobian(mechanism, x, body) @ ways)
+
+
+def assert_same_space(first: FloatArray, second: FloatArray, atol: float) -> None:
+    """Hold two orthonormal bases to the same space by their projections."""
+    assert first.shape == second.shape
+    np.testing.assert_allclose(first @ first.T, second @ second.T, rtol=0.0, atol=atol)
+
+
+def log_of(matrix: FloatArray) -> FloatArray:
+    """Return the rotation vector in [rad] by the logarithm of a matrix."""
+    full = np.real(logm(matrix[:3, :3]))
+    return np.array([full[2, 1], full[0, 2], full[1, 0]])

@@ -1,0 +1,257 @@
+"""Each constraint element is a composition of joints: the same mobility, and the same motions of its body."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from random_networks import (
+    ELEMENTS,
+    Poses,
+    assert_same_space,
+    axis_frame,
+    element_between,
+    into,
+    joint_between,
+    matrix,
+    motion,
+    random_pose,
+    start_of,
+    transform,
+    twist_space,
+    unit,
+    vec,
+)
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.element_measures import measure
+from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.mobility import mobility_of
+from urmpipe_models.networks.network import Network
+from urmpipe_models.networks.parts import (Body, ConstraintElement, Control, ElementKind, Joint)
+
+CLOSES = 1e-12
+"""Residuals in [m] and [rad]: products of some ten matrices with entries up to 10."""
+
+SAME = 1e-6
+"""Of projections onto twist spaces: differences of 1e-12 times the networks' conditions, below 1e5."""
+
+NETWORKS = 5
+"""So many of each kind and each number of other elements, 0 to 4: 100."""
+
+
+class Composition(NamedTuple):
+    """Bodies and joints in the place of an element, and how many idle spins they have."""
+
+    bodies: tuple[str, ...]
+    joints: tuple[Joint, ...]
+    idle: tuple[str, ...] = ()
+
+
+def in_ground(
+    element: ConstraintElement, poses: Poses
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the points in [m] and normals [-] of an element in the ground: p, n, q and the other n."""
+    first, second = (poses[name] for name in element.bodies)
+    p, q = (
+        pose[:3, :3] @ np.array(a) + pose[:3, 3]
+        for pose, a in zip((first, second), element.points, strict=True)
+    )
+    n, other = (
+        pose[:3, :3] @ np.array(one) for pose, one in zip((first, second), element.normals, strict=True)
+    )
+    return p, n, q, other
+
+
+def as_rod(element: ConstraintElement, poses: Poses, rng: np.random.Generator) -> Composition:
+    """A rod with a global joint at each end, which spins."""
+    p, _, q, _ = in_ground(element, poses)
+    a, b = element.bodies
+    return Composition(
+        ("rod",),
+        (
+            joint_between("G1", "global", (a, "rod"), poses, rng, point_frame(p, rng)),
+            joint_between("G2", "global", ("rod", b), poses, rng, point_frame(q, rng)),
+        ),
+        ("rod",),
+    )
+
+
+def as_plane(element: ConstraintElement, poses: Poses, rng: np.random.Generator) -> Composition:
+    """Two slides in the plane across each other, and a global joint at the point."""
+    _, n, q, _ = in_ground(element, poses)
+    a, b = element.bodies
+    u = unit(np.cross(n, rng.normal(size=3)))
+    return Composition(
+        ("slide", "cross"),
+        (
+            joint_between("P1", "prismatic", (a, "slide"), poses, rng, axis_frame(u, q, rng)),
+            joint_between(
+                "P2", "prismatic", ("cross", "slide"), poses, rng, axis_frame(np.cross(n, u), q, rng)
+            ),
+            joint_between("G", "global", ("cross", b), poses, rng, point_frame(q, rng)),
+        ),
+    )
+
+
+def as_lines(element: ConstraintElement, poses: Poses, rng: np.random.Generator) -> Composition:
+    """A cylindrical joint on each line, a revolute along their common perpendicular between both."""
+    p, n, q, other = in_ground(element, poses)
+    a, b = element.bodies
+    u = unit(np.cross(n, other))
+    along = np.linalg.solve(np.column_stack((n, -other, u)), q - p)
+    foot = p + along[0] * n
+    return Composition(
+        ("sleeve", "cross"),
+        (
+            joint_between("C1", "cylindrical", (a, "sleeve"), poses, rng, axis_frame(n, foot, rng)),
+            joint_between("R", "revolute", ("sleeve", "cross"), poses, rng, axis_frame(u, foot, rng)),
+            joint_between("C2", "cylindrical", ("cross", b), poses, rng, axis_frame(other, q, rng)),
+        ),
+    )
+
+
+def as_cylinder(element: ConstraintElement, poses: Poses, rng: np.random.Generator) -> Composition:
+    """A rod across the axis of a cylindrical joint, a global joint at its end."""
+    p, n, q, _ = in_ground(element, poses)
+    a, b = element.bodies
+    return Composition(
+        ("rod",),
+        (
+            joint_between("C", "cylindrical", (a, "rod"), poses, rng, axis_frame(n, p, rng)),
+            joint_between("G", "global", (b, "rod"), poses, rng, point_frame(q, rng)),
+        ),
+    )
+
+
+def point_frame(point: FloatArray, rng: np.random.Generator) -> FloatArray:
+    frame = random_pose(rng)
+    frame[:3, 3] = point
+    return frame
+
+
+COMPOSED: dict[ElementKind, Callable[[ConstraintElement, Poses, np.random.Generator], Composition]] = {
+    "gg": as_rod,
+    "eg": as_plane,
+    "crc": as_lines,
+    "gc": as_cylinder,
+}
+
+
+def both(kind: ElementKind, others: int, seed: int) -> tuple[Network, Network, Composition]:
+    """Return a platform on some random elements and one of a kind, and with that one composed of joints."""
+    rng = np.random.default_rng((seed, others, ELEMENTS.index(kind)))
+    names = ("platform", "rod", "slide", "cross", "sleeve")
+    poses = {name: random_pose(rng) for name in names} | {"ground": np.eye(4)}
+    swapped = rng.random() < 0.5
+    bodies = ("platform", "ground") if swapped else ("ground", "platform")
+    element = element_between("E", kind, bodies, poses, rng)
+    more = [
+        element_between(f"e{k}", ELEMENTS[int(rng.integers(4))], ("ground", "platform"), poses, rng)
+        for k in range(others)
+    ]
+    built = COMPOSED[kind](element, poses, rng)
+    start = start_of(poses["platform"])
+    first = Network("element", (Body("platform", start),), (), (*more, element))
+    second = Network("joints", (Body("platform"), *map(Body, built.bodies)), built.joints, tuple(more))
+    return first, second, built
+
+
+@pytest.mark.parametrize("kind", ELEMENTS)
+@pytest.mark.parametrize("others", range(5))
+def test_an_element_equals_its_joints_on_a_hundred_networks(kind: ElementKind, others: int) -> None:
+    for seed in range(NETWORKS):
+        first, second, built = both(kind, others, seed)
+        of_element, of_joints = mechanism_of(first), mechanism_of(second)
+        x, y = of_element.start, of_joints.start
+        for mechanism, at in ((of_element, x), (of_joints, y)):
+            assert np.abs(closure_of(mechanism, at[:, np.newaxis]).residual).max(initial=0.0) < CLOSES
+        held: FloatArray = np.array(of_joints.poses(y.tolist())["platform"].rotation)
+        np.testing.assert_allclose(
+            held, np.array(of_element.poses(x.tolist())["platform"].rotation), rtol=0.0, atol=CLOSES
+        )
+        one, other = mobility_of(of_element, x), mobility_of(of_joints, y)
+        assert one.mobility == 5 - others
+        assert other.idle == built.idle
+        assert other.mobility - len(other.idle) == one.mobility
+        assert other.kutzbach - len(other.idle) == one.kutzbach
+        assert one.redundant == other.redundant == ()
+        space = twist_space(of_element, x, "platform")
+        assert space.shape == (6, 5 - others)
+        assert_same_space(space, twist_space(of_joints, y, "platform"), SAME)
+
+
+@pytest.mark.parametrize("kind", ELEMENTS)
+def test_an_element_holds_wherever_its_joints_move(kind: ElementKind) -> None:
+    """The composition's loop is opened: wherever its joints are set, the element is satisfied."""
+    rng = np.random.default_rng(1)
+    for seed in range(NETWORKS):
+        first, second, _ = both(kind, 0, seed)
+        element = first.elements[0]
+        mechanism = mechanism_of(second)
+        for _ in range(5):
+            x = rng.uniform(-2.0, 2.0, len(mechanism.variables))
+            poses = mechanism.poses(x.tolist())
+            distance = float(measure(element, *(poses[name] for name in element.bodies)).distance)
+            # points up to some 4 m away, eps each; crc's distance has no sign
+            assert distance == pytest.approx(float(element.length.value({})), abs=1e-12)
+
+
+def meeting_lines(d: float) -> Network:
+    """Return a body with a line along x that is d from the ground's line along z."""
+    element = ConstraintElement(
+        "E", "crc", ("ground", "b"), Expression(repr(d)), normals=((0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
+    )  # fmt: skip
+    return Network("lines", (Body("b", (0.3, d, 0.2, 0.0, 0.3, 0.0)),), (), (element,))
+
+
+def test_lines_that_meet_have_a_twist_space_of_five_as_well() -> None:
+    """d = 0: the joints' composition has no perpendicular of its own there, the lines' normal serves."""
+    network = meeting_lines(0.0)
+    mechanism = mechanism_of(network)
+    x = mechanism.start
+    assert np.abs(closure_of(mechanism, x[:, np.newaxis]).residual).max() == 0.0
+    found = mobility_of(mechanism, x)
+    assert (found.mobility, found.special) == (5, False)
+    rng = np.random.default_rng(0)
+    pose = matrix(mechanism.poses(x.tolist())["b"])
+    poses = {"ground": np.eye(4), "b": pose, "sleeve": random_pose(rng), "cross": random_pose(rng)}
+    built = as_lines(network.elements[0], poses, rng)
+    composed = mechanism_of(Network("joints", (Body("b"), Body("sleeve"), Body("cross")), built.joints))
+    assert_same_space(twist_space(mechanism, x, "b"), twist_space(composed, composed.start, "b"), SAME)
+
+
+def test_the_driven_length_of_an_element_is_followed() -> None:
+    """A rod's platform on a slide: its end follows sqrt(l^2 - h^2), by its derivative, too."""
+    rng = np.random.default_rng(2)
+    slide = joint_between(
+        "P", "prismatic", ("ground", "b"), {"ground": np.eye(4), "b": np.eye(4)}, rng,
+        axis_frame(np.array([1.0, 0.0, 0.0]), np.zeros(3), rng), (0.0,),
+    )  # fmt: skip
+    rod = ConstraintElement(
+        "R", "gg", ("b", "ground"), Expression("2 * s"), ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0))
+    )
+    mechanism = mechanism_of(Network("rod", (Body("b"),), (slide,), (rod,), (Control("s", 0.25),)))
+    x = np.array([0.25, 0.4])  # 0.5^2 = 0.4^2 + 0.3^2
+    closure = closure_of(mechanism, x[:, np.newaxis])
+    assert abs(closure.residual[0, 0]) < 1e-15
+    np.testing.assert_allclose(closure.jacobian[0, :, 0], [-2.0, 0.8], rtol=0.0, atol=1e-15)
+
+
+def test_points_and_lines_of_elements_are_fixed_to_their_bodies() -> None:
+    """Both bodies moved alike measure the same."""
+    rng = np.random.default_rng(3)
+    for kind in ELEMENTS:
+        poses = {"a": random_pose(rng), "b": random_pose(rng)}
+        element = element_between("E", kind, ("a", "b"), poses, rng)
+        for _ in range(5):
+            step = random_pose(rng, 3.0) @ motion("helical", (1.0,), 0.3)
+            moved = (transform(step @ poses["a"]), transform(step @ poses["b"]))
+            assert float(measure(element, *moved).distance) == pytest.approx(
+                float(element.length.value({})), abs=1e-13
+            )
+    assert into(np.eye(4), np.array([1.0, 2.0, 3.0])).tolist() == list(vec(np.array([1.0, 2.0, 3.0])))

@@ -1,0 +1,142 @@
+"""The Jacobian of what does not close, against differences: all kinds, driven or free, closed or open."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from known_mechanisms import MECHANISMS
+from random_networks import (
+    KINDS,
+    difference,
+    joint_between,
+    random_network,
+    random_pair,
+    random_pose,
+    random_values,
+)
+from test_joint_motion import user_motion
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.network import Network
+from urmpipe_models.networks.parts import (Body, Control, Joint)
+
+RELATIVE = 1e-8
+"""Of the largest entry: differences of step 1e-3 round to 1e-12 and neglect 1e-18 times the seventh
+derivative, which is large near a half turn and where lines are nearly parallel."""
+
+HALF_TURN = 3.0
+"""In [rad]: gaps beyond are left out, as at pi the rotation vector jumps."""
+
+FORMULAS = ("0.7 * s - t", "sin(u) + 0.2 * s ** 2", "atan2(t, 2 + s * s)", "0.4", "sqrt(2 + s * t / 4) - u")
+"""Of what drives joints: u is itself a function of s and t."""
+
+CONTROLS = (
+    Control("u", value=Expression("v * s + cos(t)")),  # stands before what it is a function of
+    Control("s", 0.3),
+    Control("v", value=Expression("0.5 + t")),
+    Control("t", -0.4),
+)
+
+
+def driven_at_random(network: Network, rng: np.random.Generator) -> Network:
+    """Return a network with about half of its variables and lengths driven, and a user joint."""
+    joints = []
+    for one in network.joints:
+        drives = tuple(
+            Expression(FORMULAS[int(rng.integers(len(FORMULAS)))]) if rng.random() < 0.5 else None
+            for _ in one.units
+        )
+        start = random_values(one.kind, rng)
+        joints.append(replace(one, start=start, values=drives if any(drives) else ()))
+    user = Joint("user", "user", random_pair(network.body_names, rng), motion=user_motion())
+    joints.insert(int(rng.integers(len(joints))), user)
+    elements = tuple(
+        replace(
+            one, length=Expression(f"{one.length.text} + 0.1 * s * u") if rng.random() < 0.7 else one.length
+        )
+        for one in network.elements
+    )
+    return Network(network.name, network.bodies, tuple(joints), elements, CONTROLS)
+
+
+def residual_of(mechanism: Mechanism, x: FloatArray) -> FloatArray:
+    return closure_of(mechanism, x[:, np.newaxis]).residual[:, 0]
+
+
+def assert_right(mechanism: Mechanism, x: FloatArray) -> int:
+    """Hold the Jacobian to differences but for loops half a turn open; return how many rows were held."""
+    residual = residual_of(mechanism, x)
+    held = np.ones(len(residual), dtype=bool)
+    for k in range(len(mechanism.graph.cuts)):
+        held[6 * k : 6 * k + 6] = np.linalg.norm(residual[6 * k + 3 : 6 * k + 6]) < HALF_TURN
+    found = closure_of(mechanism, x[:, np.newaxis]).jacobian[held, :, 0]
+    expected = difference(lambda at: closure_of(mechanism, at).residual[held], x)
+    np.testing.assert_allclose(
+        found, expected, rtol=0.0, atol=RELATIVE * max(1.0, np.abs(expected).max(initial=0.0))
+    )
+    return int(held.sum())
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_networks_far_from_closing(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    network = driven_at_random(random_network(rng, bodies=4, extra=2, elements=3), rng)
+    mechanism = mechanism_of(network)
+    x = mechanism.start
+    held = [assert_right(mechanism, x + rng.normal(size=len(x)) * step) for step in (0.0, 0.3, 1.0, 1.0)]
+    assert sum(held) > len(residual_of(mechanism, x))  # of four times as many
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_random_networks_where_they_close(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    mechanism = mechanism_of(random_network(rng, bodies=4, extra=2, elements=3))
+    assert np.abs(residual_of(mechanism, mechanism.start)).max() < 1e-13
+    assert assert_right(mechanism, mechanism.start) == mechanism.rows
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_clusters_of_bodies_of_their_own(seed: int) -> None:
+    """Parts that only elements tie: the freedoms of their first bodies are variables, near 0 turns, too."""
+    rng = np.random.default_rng(seed)
+    names = ("a1", "a2", "b1", "b2")
+    poses = {name: np.eye(4) if name == "ground" else random_pose(rng) for name in ("ground", *names)}
+    joints = [
+        joint_between("a", KINDS[seed % 5], ("a2", "a1"), poses, rng),
+        joint_between("b", KINDS[(seed + 2) % 5], ("b1", "b2"), poses, rng),
+    ]
+    base = random_network(rng, bodies=4, extra=0, elements=6)
+    rename = dict(zip((f"b{k}" for k in range(1, 5)), names, strict=True)) | {"ground": "ground"}
+    elements = [replace(one, bodies=(rename[one.bodies[0]], rename[one.bodies[1]])) for one in base.elements]
+    bridges = [
+        replace(base.elements[0], name=f"bridge{k}", bodies=("ground", end))
+        for k, end in enumerate(("a2", "b1"))
+    ]
+    vector = 1e-5 if seed % 3 == 0 else 1.0
+    bodies = (
+        Body("a1", (0.1, 0.2, 0.3, vector, 0.0, -vector)), Body("a2"), Body("b1"), Body("b2"),
+    )  # fmt: skip
+    mechanism = mechanism_of(Network("clusters", bodies, tuple(joints), (*elements, *bridges)))
+    assert len(mechanism.graph.roots) == 3
+    for step in (0.0, 0.3, 1.0):
+        assert_right(mechanism, mechanism.start + step * rng.normal(size=len(mechanism.variables)))
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_known_mechanisms_and_many_configurations_at_once(name: str) -> None:
+    """A block of configurations gives what each gives alone."""
+    mechanism = mechanism_of(MECHANISMS[name](drive="s"))
+    rng = np.random.default_rng(0)
+    x = mechanism.start[:, np.newaxis] + 0.3 * rng.normal(size=(len(mechanism.variables), 7))
+    together = closure_of(mechanism, x)
+    for k in range(7):
+        alone = closure_of(mechanism, x[:, k : k + 1])
+        # sums in another order
+        np.testing.assert_allclose(together.residual[:, k], alone.residual[:, 0], rtol=0.0, atol=1e-14)
+        np.testing.assert_allclose(together.jacobian[:, :, k], alone.jacobian[:, :, 0], rtol=0.0, atol=1e-14)
+        assert_right(mechanism, x[:, k])

@@ -1,0 +1,188 @@
+"""Rotation vectors and the global joint: matrices, their rates, and three revolutes in its place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
+
+from random_networks import (
+    assert_same_space,
+    axis_frame,
+    body_jacobian,
+    column_space,
+    difference,
+    matrix,
+    pose_of,
+    random_pose,
+    skew,
+    transform,
+)
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.networks.joint_motion import joint_frame
+from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.network import Network
+from urmpipe_models.networks.parts import (Body, Joint)
+from urmpipe_models.networks.rotations import SMALL, rotation_of, turning_of, untwisted, wrapped
+
+ROUNDING = 1e-14
+"""Entries of rotations are sums of a few products of rounded numbers up to pi^2."""
+
+ANGLES = [
+    0.0, 1e-300, 1e-160, 1e-12, 0.99 * SMALL**0.5, SMALL**0.5, 1.01 * SMALL**0.5, 1e-3, 1.0,
+    np.pi - 1e-9, np.pi, np.pi + 1e-9, 5.0, 2.0 * np.pi, 40.0,
+]  # fmt: skip
+
+
+def vectors(angle: float) -> FloatArray:
+    """Return 20 rotation vectors of an angle, those along the axes among them, shape (3, 20)."""
+    axes = np.random.default_rng(1).normal(size=(3, 20))
+    axes[:, :3], axes[:, 3:6] = np.eye(3), -np.eye(3)
+    return np.asarray(angle * axes / np.linalg.norm(axes, axis=0))
+
+
+def rotations(q: FloatArray) -> FloatArray:
+    """Return the rotations of rotation vectors, shape (n, 3, 3)."""
+    rows = rotation_of((q[0], q[1], q[2])).rotation
+    return np.array(rows).transpose(2, 0, 1)
+
+
+@pytest.mark.parametrize("angle", ANGLES)
+def test_rotations_are_orthogonal_and_equal_the_matrix_exponential(angle: float) -> None:
+    q = vectors(angle)
+    found = rotations(q)
+    size = max(1.0, angle)  # the rounding of the angle itself turns by eps |q|
+    np.testing.assert_allclose(
+        found @ found.transpose(0, 2, 1), np.tile(np.eye(3), (20, 1, 1)), rtol=0.0, atol=ROUNDING
+    )
+    np.testing.assert_allclose(np.linalg.det(found), 1.0, rtol=0.0, atol=ROUNDING)
+    expected = np.array([expm(skew(one)) for one in q.T])
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=10 * ROUNDING * size)  # expm squares 6 times
+
+
+def test_one_rotation_vector_of_floats_is_the_same() -> None:
+    q = vectors(2.0)
+    rows: FloatArray = np.array(rotation_of((float(q[0, 7]), float(q[1, 7]), float(q[2, 7]))).rotation)
+    np.testing.assert_array_equal(rows, rotations(q)[7])
+
+
+def test_series_and_closed_form_meet_where_they_take_over() -> None:
+    """Both neglect less than rounding: no step in the rotation, nor in what turns it, at the threshold."""
+    axis = vectors(1.0)
+    below, above = ((1.0 + sign * 1e-15) * SMALL**0.5 * axis for sign in (-1, 1))
+    for function in (rotation_of, turning_of):
+        one, other = (
+            np.array(getattr(found, "rotation", found))
+            for found in (function((q[0], q[1], q[2])) for q in (below, above))
+        )
+        # the closed forms of 1 - cos and a - sin lose digits there, which count times |q| = 1e-4
+        np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-13)
+
+
+def test_the_printed_matrix_is_no_rotation() -> None:
+    """T(1,1) = u1 u3 v + cos(theta), as printed, has another determinant and other lengths of its columns."""
+    q = np.array([0.3, -0.5, 0.4])
+    theta = float(np.linalg.norm(q))
+    u = q / theta
+    v = 1.0 - np.cos(theta)
+    right: FloatArray = np.array(joint_frame(Joint("G", "global", ("a", "b")), q.tolist()).rotation)
+    printed = np.array(right)
+    printed[0, 0] = u[0] * u[2] * v + np.cos(theta)
+    corrected = np.array(right)
+    corrected[0, 0] = u[0] * u[0] * v + np.cos(theta)
+    np.testing.assert_allclose(corrected, right, rtol=0.0, atol=ROUNDING)
+    assert abs(np.linalg.det(right) - 1.0) < ROUNDING
+    assert abs(np.linalg.det(printed) - 1.0) > 0.01
+    assert np.abs(printed @ printed.T - np.eye(3)).max() > 0.01
+
+
+def test_the_printed_determinant_is_that_of_the_errata() -> None:
+    """Of the errata's 1.025: somewhere the printed matrix has that, so it is no rounding of print."""
+    rng = np.random.default_rng(2)
+    worst = 0.0
+    for q in rng.normal(size=(200, 3)):
+        u, theta = q / np.linalg.norm(q), np.linalg.norm(q)
+        printed = Rotation.from_rotvec(q).as_matrix()
+        printed[0, 0] = u[0] * u[2] * (1.0 - np.cos(theta)) + np.cos(theta)
+        worst = max(worst, abs(np.linalg.det(printed) - 1.0))
+    assert worst > 0.025
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 0.99e-4, 1.01e-4, 1e-2, 1.0, 3.0, np.pi, 5.0])
+def test_turning_is_the_derivative_of_the_rotation(angle: float) -> None:
+    for q in vectors(angle).T:
+        rates = difference(lambda at: rotations(at).transpose(1, 2, 0), q, 1e-2)
+        w = rates.transpose(2, 0, 1) @ np.array(rotation_of((q[0], q[1], q[2])).rotation).T
+        expected = np.array([w[:, 2, 1], w[:, 0, 2], w[:, 1, 0]])
+        found: FloatArray = np.array(turning_of((q[0], q[1], q[2]))).T
+        # differences of step 1e-2: truncation 1e-12 / 140, rounding 1e-14
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=2e-12)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 0.99e-4, 1.01e-4, 1e-2, 1.0, 3.0, np.pi, 6.0])
+def test_untwisted_is_the_inverse_of_turning(angle: float) -> None:
+    q = vectors(angle)
+    turning: FloatArray = np.array(turning_of((q[0], q[1], q[2]))).transpose(2, 1, 0)
+    back = untwisted(q).transpose(2, 0, 1)
+    # near 2 pi the inverse grows like 1 / (2 pi - angle), here 1 / 0.28
+    np.testing.assert_allclose(back @ turning, np.tile(np.eye(3), (20, 1, 1)), rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("angle", [*ANGLES, 3.0 * np.pi - 1e-6, 3.0 * np.pi + 1e-6, 100.0])
+def test_wrapped_vectors_turn_the_same_by_half_a_turn_at_most(angle: float) -> None:
+    q = vectors(angle)
+    short = wrapped(q)
+    assert (np.linalg.norm(short, axis=0) <= np.pi + 1e-14 * max(1.0, angle)).all()
+    # 2 pi n is rounded to eps |q|
+    np.testing.assert_allclose(rotations(short), rotations(q), rtol=0.0, atol=1e-13 * max(1.0, angle))
+
+
+def one_joint(joints: list[Joint], bodies: int) -> Network:
+    return Network("arm", tuple(Body(f"b{k}") for k in range(1, bodies + 1)), tuple(joints))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_global_joint_is_three_revolutes_whose_axes_meet(seed: int) -> None:
+    """The second axis across both others they reach every rotation; twists span the same three."""
+    rng = np.random.default_rng(seed)
+    before, after = random_pose(rng), random_pose(rng)
+    q = rng.normal(size=3)
+    ball = Joint("G", "global", ("ground", "b1"), (transform(before), transform(after)))
+    ball_arm = mechanism_of(one_joint([ball], 1))
+
+    # R = R(n1, t1) R(n2, t2) R(n3, t3) with n2 across both others: angles of Davenport
+    n2, seen = np.array([0.0, 1.0, 0.0]), rng.uniform(0.3, 1.2)
+    n1, n3 = np.array([1.0, 0.0, 0.0]), np.array([np.cos(seen), 0.0, np.sin(seen)])
+    angles = Rotation.from_rotvec(q).as_davenport(np.array([n1, n2, n3]), "intrinsic")
+    origin = np.zeros(3)
+    frames = [axis_frame(n, origin, rng) for n in (n1, n2, n3)]
+    hinges = []
+    for k, frame in enumerate(frames):
+        first = before @ frame if k == 0 else frame
+        second = np.linalg.inv(np.linalg.inv(frame) if k < 2 else np.linalg.inv(frame) @ np.linalg.inv(after))
+        names = ("ground", "b1", "b2", "b3")
+        hinges.append(
+            Joint(f"R{k}", "revolute", (names[k], names[k + 1]), (transform(first), transform(second)))
+        )
+    three = mechanism_of(one_joint(hinges, 3))
+
+    np.testing.assert_allclose(
+        pose_of(three, np.asarray(angles), "b3"), pose_of(ball_arm, q, "b1"), rtol=0.0, atol=1e-13
+    )  # rounding of seven matrix products
+    # 1e-10: differences are good to 1e-12, the least sine of these axes with each other is 0.05
+    assert_same_space(
+        column_space(body_jacobian(ball_arm, q, "b1")),
+        column_space(body_jacobian(three, np.asarray(angles), "b3")),
+        1e-9,
+    )
+
+
+def test_a_global_joint_keeps_its_centre() -> None:
+    rng = np.random.default_rng(3)
+    joint = Joint("G", "global", ("ground", "b1"), (transform(random_pose(rng)), transform(random_pose(rng))))
+    arm = mechanism_of(one_joint([joint], 1))
+    centre = matrix(joint.frames[0])[:3, 3]
+    for q in vectors(2.5).T:
+        seen = pose_of(arm, q, "b1") @ matrix(joint.frames[1])
+        np.testing.assert_allclose(seen[:3, 3], centre, rtol=0.0, atol=1e-14)
