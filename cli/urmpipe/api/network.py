@@ -125,8 +125,8 @@ def _found(
 ) -> NetworkResult:
     """Return what is found of a network, and write what was requested."""
     loaded = network if isinstance(network, Network) else network_file.load_network(network)
-    named = isinstance(network, (str, Path)) and Path(network).suffix.lower() == ".toml"
-    files = [Path(network)] if named else []
+    named = [Path(network)] if isinstance(network, (str, Path)) else []
+    files = [path for path in named if path.suffix.lower() == ".toml"]
     tell = progress or (lambda share: None)
     with guarded_outputs({"recording": output, "drawing": draw}, files) as parts:
         inputs = [fingerprint(path) for path in files]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IndexArray
+from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray
 from urmpipe_models.inverse.iterative.descent import FIRST_GAIN, GAINS, LEAST_RATIO, STATIONARY, damped_step
 from urmpipe_models.inverse.iterative.small_systems import (
     column_squares,
@@ -89,11 +89,11 @@ class _Scaled:
     error: FloatArray
     jacobian: FloatArray
 
-    def kept(self, which: IndexArray | FloatArray) -> _Scaled:
+    def kept(self, which: BoolArray) -> _Scaled:
         """Return those of some starts."""
         return _Scaled(self.error[:, which], self.jacobian[:, :, which])
 
-    def or_else(self, taken: FloatArray, other: _Scaled) -> _Scaled:
+    def or_else(self, taken: BoolArray, other: _Scaled) -> _Scaled:
         """Return these where they are taken, else those of another."""
         return _Scaled(
             np.where(taken, self.error, other.error), np.where(taken, self.jacobian, other.jacobian)
@@ -109,7 +109,7 @@ def _scaled(mechanism: Mechanism, x: FloatArray, free: IndexArray) -> _Scaled:
     return _Scaled(closure.residual * rows, jacobian)
 
 
-def _going(now: _Scaled, gain: FloatArray) -> FloatArray:
+def _going(now: _Scaled, gain: FloatArray) -> BoolArray:
     """Return which starts go on: those that are finite, not closed, and not at a least residual."""
     square = dot_product(now.error, now.error)
     slope = transposed_product(now.jacobian, now.error)

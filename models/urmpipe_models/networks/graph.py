@@ -69,7 +69,7 @@ class Graph:
         """Tree, closed chain (loops, and at each body two joints or elements or more), or loops."""
         if not self.loops:
             return "tree"
-        ends = [name for one in (*self.network.joints, *self.network.elements) for name in one.bodies]
+        ends = [name for _, one in self.network.ties for name in one.bodies]
         least = min(ends.count(name) for name in self.network.body_names)
         return "closed chain" if least >= 2 else "loops"
 
@@ -125,7 +125,7 @@ def _way(tree: Sequence[tuple[str, str, str]], start: str, end: str) -> tuple[st
 def parts_without(network: Parts, left_out: Iterable[str]) -> list[set[str]]:
     """Return the sets of bodies that hang together by joints and elements without some of these, by name."""
     out = set(left_out)
-    edges = [one.bodies for one in (*network.joints, *network.elements) if one.name not in out]
+    edges = [one.bodies for _, one in network.ties if one.name not in out]
     parts: list[set[str]] = [{name} for name in network.body_names]
     for first, second in edges:
         a, b = (next(part for part in parts if name in part) for name in (first, second))

@@ -20,7 +20,8 @@ from urmpipe_models.networks.rotations import rotation_of
 from urmpipe_models.transform import Transform
 
 
-class Variable(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Variable:
     """A variable of a network.
 
     Attributes:
@@ -175,7 +176,7 @@ class Mechanism:
         """A step of each variable, shape (variables,): the length, 1 rad, of a control what moves so much."""
         scales = np.array([self.length if one.unit == "m" else 1.0 for one in self.variables])
         moved = np.zeros(len(self.variables))
-        driven = [(given, one) for one in self.network.joints for given, one in self._driven(one)]
+        driven = [pair for joint in self.network.joints for pair in self._driven(joint)]
         driven += [(given, "m") for given in self.lengths(self.start)]
         for given, unit in driven:
             for k, slope in given.slopes.items():

@@ -165,7 +165,7 @@ def assemblies_table(result: NetworkResult) -> Table:
 
 def _variables(network: Network, one: Assembly) -> Iterator[tuple[str, str, int, str]]:
     """Yield the variables: name, owner, number there and unit; the names of several of one are numbered."""
-    units = {body.name: POSE_UNITS for body in network.bodies}
+    units: dict[str, tuple[str, ...]] = {body.name: POSE_UNITS for body in network.bodies}
     units |= {joint.name: joint.units for joint in network.joints}  # a body may be called as its joint
     for owner, values in one.values.items():
         own = units.get(owner, ())
