@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,10 +14,11 @@ from urmpipe_models.names import not_among
 from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.descent import Reached, descend
 from urmpipe_models.networks.findings import Assembly, Gap
-from urmpipe_models.networks.idle_spins import idle_spins, unspun
+from urmpipe_models.networks.idle_spins import idle_spins, spinning_parts, unspun
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.mobility import mobility_at, mobility_nearby
 from urmpipe_models.networks.parts import POSE_UNITS
+from urmpipe_models.networks.value_faults import value_faults
 
 CLOSED = 1e-9
 """A gap of less, in lengths of the mechanism and in [rad], is rounding."""
@@ -43,10 +45,11 @@ class Assembled:
     """What assembly came to.
 
     Attributes:
-        x: The variables of each assembly, the nearest to the start first, shape (variables, n).
+        x: The variables of each assembly, the nearest to the start first, shape (variables, n), in [m], [rad]
+            and as controls are given.
         assemblies: The assemblies; none if nothing closes.
         nearest: What comes nearest to closing where nothing closes.
-        x_nearest: Its variables, shape (variables,); those of the first assembly if there is one.
+        x_nearest: Its variables in [m] and [rad], shape (variables,); of the first assembly if there is one.
         gaps: What does not close there, the largest first.
         tried: How many starts were tried, the network's own counted.
         reason: Why the search ended.
@@ -109,25 +112,32 @@ def assemble(
 
 
 def start_with(mechanism: Mechanism, controls: Mapping[str, float]) -> FloatArray:
-    """Return where assembly starts with some controls set, shape (variables,).
+    """Return where assembly starts with some controls set, in [m], [rad] and as controls are given.
+
+    Of shape (variables,).
 
     Raises:
-        NetworkError: With every control that is not of the network or cannot be set, and every value out of
-            the control's range.
+        NetworkError: With every control that is not of the network or cannot be set, every value out of the
+            control's range, and what such values make no number or no length.
     """
     own = {one.name: one for one in mechanism.network.controls if one.value is None}
     faults = []
-    start = np.array(mechanism.start)
     for name, value in controls.items():
         if name not in own:
             faults.append(Finding(f"control {not_among(name, own)}", parameter="controls"))
-        elif not own[name].lower <= value <= own[name].upper:
+        elif not (math.isfinite(value) and own[name].lower <= value <= own[name].upper):
             allowed = f"{own[name].lower:g} to {own[name].upper:g}"
             faults.append(Finding(found=f"{name} = {value:g}", allowed=allowed, parameter="controls"))
-        else:
-            start[mechanism.places[name, 0]] = value
+    if controls and not faults:
+        parts = mechanism.network.as_parts()
+        set_ones = (replace(one, start=controls.get(one.name, one.start)) for one in parts.controls)
+        at = "at " + ", ".join(f"{name} = {value:g}" for name, value in controls.items())
+        faults += value_faults(replace(parts, controls=tuple(set_ones)), at)
     if faults:
         raise NetworkError(*faults)
+    start = np.array(mechanism.start)
+    for name, value in controls.items():
+        start[mechanism.places[name, 0]] = value
     return start
 
 
@@ -175,7 +185,7 @@ def _random_starts(
 
 def _continuum(mechanism: Mechanism, x: FloatArray) -> int:
     """Return how many ways there are to move with controls and idle spins held."""
-    return max(0, mobility_nearby(mechanism, x, mechanism.free) - len(idle_spins(mechanism)))
+    return max(0, mobility_nearby(mechanism, x, mechanism.free) - len(spinning_parts(mechanism, x)))
 
 
 class _Found:
@@ -235,11 +245,18 @@ class _Found:
         return turned
 
     def _places_of(self, x: FloatArray) -> FloatArray:
-        """Return rotations and positions of the bodies, in lengths of the mechanism, shape (n, k)."""
+        """Return where the bodies are, in lengths of the mechanism, shape (n, k).
+
+        Of a body that spins idly its points where it is tied, of others the first of them and its rotation.
+        """
+        spinning = {name for spin in self._spins for name in spin.bodies}
         places = []
-        for frame in self.mechanism.poses(x).values():
-            places += [entry for row in frame.rotation for entry in row]
-            places += [entry / self.mechanism.length for entry in frame.translation]
+        for name, frame in self.mechanism.poses(x).items():
+            points = self.mechanism.points[name]
+            if name not in spinning:
+                places += [entry for row in frame.rotation for entry in row]
+            for point in points if name in spinning else points[:1]:
+                places += [entry / self.mechanism.length for entry in frame.point(point)]
         return np.stack([np.broadcast_to(one, x.shape[1:]) for one in places], axis=1)
 
 
@@ -248,7 +265,7 @@ def poses_at(mechanism: Mechanism, x: FloatArray) -> FloatArray:
 
     Args:
         mechanism: The network.
-        x: The variables, shape (variables,).
+        x: The variables, shape (variables,), in [m], [rad] and as controls are given.
     """
     frames = mechanism.poses([float(value) for value in x])
     poses = np.tile(np.eye(4), (len(frames), 1, 1))
@@ -281,7 +298,7 @@ def gaps_at(mechanism: Mechanism, x: FloatArray) -> tuple[Gap, ...]:
 
     Args:
         mechanism: The network.
-        x: The variables, shape (variables,).
+        x: The variables, shape (variables,), in [m], [rad] and as controls are given.
     """
     residual = closure_of(mechanism, x[:, np.newaxis]).residual[:, 0]
     gaps = []

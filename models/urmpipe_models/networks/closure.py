@@ -82,8 +82,7 @@ def closure_of(mechanism: Mechanism, x: FloatArray) -> Closure:
 def released(mechanism: Mechanism, x: FloatArray) -> Iterator[tuple[str, str, FloatArray]]:
     """Yield what each constraint forbids: its joint or element, its name, and what it would add to J.
 
-    That is a column in [m] and [rad], shape (rows,), of a joint in [m] along or [rad] about an axis of its
-    frame, of a driven variable in its unit, of an element in [m].
+    That is a column [-], scaled as `row_scales` and `column_scales` do, shape (rows,).
 
     Args:
         mechanism: The network.
@@ -95,12 +94,12 @@ def released(mechanism: Mechanism, x: FloatArray) -> Iterator[tuple[str, str, Fl
     for joint in mechanism.network.joints:
         values = [one.value for one in mechanism.values(joint, at, controls)]
         frame = posed[joint.bodies[0]].frame @ joint.frames[0]
-        for constraint, (w, v) in forbidden(joint, values, frame):
-            twist = _stacked((*w, *v), 1)[:, 0]
+        for constraint, unit, (w, v) in forbidden(joint, values, frame):
+            twist = _stacked((*w, *v), 1)[:, 0] * (mechanism.length if unit == "m" else 1.0)
             column = np.zeros(mechanism.rows)
             for one in equations:
                 column[one.rows] += one.movers.get(joint.name, 0) * (one.carrier[:, :, 0] @ twist)
-            yield joint.name, constraint, column
+            yield joint.name, constraint, column * mechanism.row_scales
     for row, element in enumerate(mechanism.network.elements, 6 * len(mechanism.graph.cuts)):
         yield element.name, MEASURES[element.kind], np.eye(mechanism.rows)[row]
 

@@ -50,8 +50,8 @@ def descend(mechanism: Mechanism, x: FloatArray, free: IndexArray) -> Reached:
 
     Args:
         mechanism: The network.
-        x: The starts, shape (variables, n).
-        free: The numbers of the variables that may change.
+        x: The starts, shape (variables, n), in [m], [rad] and as controls are given.
+        free: The numbers of the variables that may change, shape (free,) [-].
     """
     found = np.array(x, dtype=np.float64)
     rows = np.arange(found.shape[1])

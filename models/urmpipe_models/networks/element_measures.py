@@ -14,6 +14,10 @@ MEASURES = {"gg": "length", "eg": "height", "crc": "distance", "gc": "radius"}
 """What an element of a kind holds."""
 
 
+PARALLEL = 1e-12
+"""Below this sine of their angle two lines have no common normal: their distance is none then."""
+
+
 class Measured(NamedTuple):
     """What an element measures between its bodies.
 
@@ -62,7 +66,8 @@ def _between_lines(
     """Return the distance of two lines: p + n a, and the line through p + apart along other."""
     sine, u = _length_and_unit(cross(n, other))
     distance = dot(apart, u)
-    along = dot(cross(apart, other), u) / sine  # where on the first line the second is nearest
+    # where on the first line the second is nearest: nowhere in particular if they are parallel
+    along = np.where(sine > PARALLEL, dot(cross(apart, other), u) / np.maximum(sine, PARALLEL), 0.0)
     if not element.meeting:
         sign = np.where(distance < 0.0, -1.0, 1.0)
         distance, u = sign * distance, scale(sign, u)

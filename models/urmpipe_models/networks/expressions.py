@@ -172,7 +172,7 @@ def _divide(a: Valued, b: Valued) -> Valued:
 def _power(a: Valued, b: Valued) -> Valued:
     """(a^b)' = b a^(b - 1) a' + a^b ln(a) b', the last only where b varies: a may be negative else."""
     value = np.power(a[0], b[0])
-    slopes = _by(a[1], b[0] * np.power(a[0], minus(b[0], 1.0))) if a[1] else {}
+    slopes = _by(a[1], times(b[0], np.power(a[0], minus(b[0], 1.0)))) if a[1] else {}
     return value, _sum(slopes, _by(b[1], value * np.log(a[0]))) if b[1] else slopes
 
 

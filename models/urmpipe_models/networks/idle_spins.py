@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.elementwise import Vector, scale, subtract
+from urmpipe_models.elementwise import Vector, cross, scale, subtract
 from urmpipe_models.networks.closure import gap_of
 from urmpipe_models.networks.graph import parts_without
 from urmpipe_models.networks.joint_motion import joint_frame
@@ -18,6 +18,9 @@ from urmpipe_models.networks.parts import Joint
 from urmpipe_models.networks.rotations import rotation_of
 from urmpipe_models.orientation import quaternions
 from urmpipe_models.transform import Transform
+
+COAXIAL = 1e-7
+"""Share of the mechanism's length by which points may be beside an axis that they are on: see `RANK`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,11 +34,6 @@ class IdleSpin:
 
     joints: tuple[Joint, Joint]
     bodies: tuple[str, ...]
-
-    @property
-    def name(self) -> str:
-        """The names of its bodies."""
-        return " + ".join(self.bodies)
 
 
 def idle_spins(mechanism: Mechanism) -> tuple[IdleSpin, ...]:
@@ -51,6 +49,42 @@ def idle_spins(mechanism: Mechanism) -> tuple[IdleSpin, ...]:
     return tuple(one for one in found if not any(set(other.bodies) < set(one.bodies) for other in found))
 
 
+def spinning_parts(mechanism: Mechanism, x: FloatArray) -> tuple[str, ...]:
+    """Return the names of the bodies that spin together, joined, of each idle spin at a configuration.
+
+    Bodies of a part spin apart where the joint between them lets them turn about the line.
+
+    Args:
+        mechanism: The network.
+        x: The variables, shape (variables,), in [m], [rad] and as controls are given.
+    """
+    frames = mechanism.poses([float(value) for value in x])
+    joints, found = mechanism.network.joints, []
+    for spin in idle_spins(mechanism):
+        ends = [_part_frame(joint, spin, frames).translation for joint in spin.joints]
+        apart = [one.name for one in joints if _turns_about(one, frames, ends, mechanism.length)]
+        pieces = parts_without(mechanism.network, [one.name for one in spin.joints] + apart)
+        inner = (piece for piece in pieces if piece <= set(spin.bodies))
+        found += [" + ".join(name for name in spin.bodies if name in piece) for piece in inner]
+    return tuple(found)
+
+
+def _turns_about(joint: Joint, frames: dict[str, Transform], ends: Sequence[Vector], length: float) -> bool:
+    """Return whether a joint turns freely about the line through two points [m].
+
+    Args:
+        joint: The joint.
+        frames: The bodies in the ground.
+        ends: The points.
+        length: That of the mechanism in [m].
+    """
+    if joint.kind not in ("revolute", "cylindrical") or joint.drives[0] is not None:
+        return False
+    at = frames[joint.bodies[0]] @ joint.frames[0]
+    off = [np.linalg.norm(cross(subtract(end, at.translation), at.columns[1])) for end in ends]
+    return bool(max(off) <= COAXIAL * length)
+
+
 def unspun(mechanism: Mechanism, spins: Sequence[IdleSpin], x: FloatArray, start: FloatArray) -> FloatArray:
     """Return the same configurations with their idle spins as they are at the start.
 
@@ -60,8 +94,11 @@ def unspun(mechanism: Mechanism, spins: Sequence[IdleSpin], x: FloatArray, start
     Args:
         mechanism: The network.
         spins: Its idle spins.
-        x: The variables, shape (variables, n).
-        start: Those of the start, shape (variables,).
+        x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
+        start: Those of the start, shape (variables,), likewise.
+
+    Returns:
+        The variables in [m], [rad] and as controls are given, shape (variables, n).
     """
     x = np.array(x)
     for spin in spins:

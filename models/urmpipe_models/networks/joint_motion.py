@@ -71,8 +71,8 @@ def joint_screws(joint: Joint, values: Sequence[Element], at: Transform) -> Scre
 
 def forbidden(
     joint: Joint, values: Sequence[Element], at: Transform
-) -> Iterator[tuple[str, tuple[Vector, Vector]]]:
-    """Yield what a joint does not let its bodies do: in words, and as a twist in the ground.
+) -> Iterator[tuple[str, str, tuple[Vector, Vector]]]:
+    """Yield what a joint does not let its bodies do: in words, in which unit, and as a twist in the ground.
 
     Turns about and shifts along the axes m, n and m x n of its frame that none of its variables makes, and
     what its driven variables would do.
@@ -86,12 +86,13 @@ def forbidden(
     for k, name in enumerate(AXES):
         axis = at.columns[k]
         if not (joint.kind == "global" or (k == 1 and joint.kind in TURNING)):
-            yield f"rotation about {name}", (axis, cross(origin, axis))
+            yield f"rotation about {name}", "rad", (axis, cross(origin, axis))
         if not (k == 1 and joint.kind in SLIDING):
-            yield f"translation along {name}", (ZERO, axis)
-    for drive, screw in zip(joint.drives, joint_screws(joint, values, at), strict=False):
+            yield f"translation along {name}", "m", (ZERO, axis)
+    screws = joint_screws(joint, values, at)
+    for drive, unit, screw in zip(joint.drives, joint.units, screws, strict=False):
         if drive is not None:
-            yield "drive", screw
+            yield "drive", unit, screw
 
 
 def _user_screws(values: Sequence[Element], at: Transform) -> Screws:

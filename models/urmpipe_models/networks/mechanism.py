@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -18,6 +18,12 @@ from urmpipe_models.networks.joint_motion import joint_frame
 from urmpipe_models.networks.parts import POSE_UNITS, Joint, Parts, ordered_controls
 from urmpipe_models.networks.rotations import rotation_of
 from urmpipe_models.transform import Transform
+
+Configuration: TypeAlias = Sequence[Element] | FloatArray
+"""The variables, one element each, in [m], [rad] and as controls are given."""
+
+SAMPLES = 11
+"""At so many values of a control its effect is looked at."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,12 +106,12 @@ class Mechanism:
 
     @cached_property
     def controls(self) -> IndexArray:
-        """The numbers of the variables that are controls."""
+        """The numbers of the variables that are controls, shape (controls,) [-]."""
         return np.array([k for k, one in enumerate(self.variables) if one.kind == "control"], dtype=np.intp)
 
     @cached_property
     def free(self) -> IndexArray:
-        """The numbers of the variables that assembly finds: all but the controls."""
+        """The numbers of the variables that assembly finds: all but the controls, shape (free,) [-]."""
         return np.arange(len(self.controls), len(self.variables))
 
     @cached_property
@@ -120,7 +126,7 @@ class Mechanism:
 
     @cached_property
     def angles(self) -> IndexArray:
-        """The numbers of the free variables that are the same after a full turn: not those of a helix."""
+        """The numbers of free variables that are the same after a full turn, shape (angles,) [-]."""
         kinds = {one.name: one.kind for one in self.network.joints}
         turning = ("revolute", "cylindrical")
         found = [
@@ -153,17 +159,24 @@ class Mechanism:
     @cached_property
     def length(self) -> float:
         """The largest distance in [m] between two joints of a body, or length of an element; 1 if it is 0."""
-        spans = [abs(float(one.value)) for one in self.lengths(self.start)]
-        points: dict[str, list[Vector]] = {name: [] for name in self.network.body_names}
-        for joint in self.network.joints:
-            for name, frame in zip(joint.bodies, joint.frames, strict=True):
-                points[name].append(frame.translation)
-        for element in self.network.elements:
-            for name, point in zip(element.bodies, element.points, strict=True):
-                points[name].append(point)
-        for some in points.values():
+        pairs = zip(self.network.elements, self.lengths(self.start), strict=True)
+        spans = [abs(float(length.value)) for one, length in pairs if one.kind != "eg"]
+        for some in self.points.values():
             spans += [float(np.linalg.norm(subtract(a, b))) for a, b in combinations(some, 2)]
         return max(spans, default=0.0) or 1.0
+
+    @cached_property
+    def points(self) -> dict[str, list[Vector]]:
+        """Of each body the points in [m] where joints and elements tie it; a plane has none in particular."""
+        found: dict[str, list[Vector]] = {name: [] for name in self.network.body_names}
+        for joint in self.network.joints:
+            for name, frame in zip(joint.bodies, joint.frames, strict=True):
+                found[name].append(frame.translation)
+        for element in self.network.elements:
+            skipped = int(element.kind == "eg")
+            for name, point in [*zip(element.bodies, element.points, strict=True)][skipped:]:
+                found[name].append(point)
+        return found
 
     @cached_property
     def row_scales(self) -> FloatArray:
@@ -173,28 +186,41 @@ class Mechanism:
 
     @cached_property
     def column_scales(self) -> FloatArray:
-        """A step of each variable, shape (variables,): the length, 1 rad, of a control what moves so much."""
+        """A step of each variable, shape (variables,): the length, 1 rad, of a control what moves so much.
+
+        What moves by a control is the root of its squared slopes, the largest of some values of the control:
+        where it starts, its effect may stand still.
+        """
         scales = np.array([self.length if one.unit == "m" else 1.0 for one in self.variables])
-        moved = np.zeros(len(self.variables))
-        driven = [pair for joint in self.network.joints for pair in self._driven(joint)]
-        driven += [(given, "m") for given in self.lengths(self.start)]
-        for given, unit in driven:
-            for k, slope in given.slopes.items():
-                moved[k] += (float(slope) / (self.length if unit == "m" else 1.0)) ** 2
-        at = self.controls
-        scales[at] = np.where(moved[at] > 0.0, 1.0 / np.sqrt(np.where(moved[at] > 0.0, moved[at], 1.0)), 1.0)
+        for k in self.controls:
+            x = np.repeat(self.start[:, np.newaxis], SAMPLES, axis=1)
+            x[k] = self._sampled(self.variables[k].owner)
+            moved = np.zeros(SAMPLES)
+            for given, unit in self._driven(x):
+                slope = np.nan_to_num(np.asarray(given.slopes.get(k, 0.0)), posinf=0.0, neginf=0.0)
+                moved += (slope / (self.length if unit == "m" else 1.0)) ** 2
+            scales[k] = 1.0 / np.sqrt(moved.max()) if moved.max() > 0.0 else 1.0
         return scales
 
-    def _driven(self, joint: Joint) -> Iterator[tuple[Given, str]]:
-        """Yield what controls make of a joint at the start, and the unit."""
-        controls = self.control_slopes(self.start)
-        for drive, unit in zip(joint.drives, joint.units, strict=True):
-            if drive is not None:
-                yield of_controls(drive, controls), unit
-        for k, part in enumerate(joint.motion):
-            yield of_controls(part, controls), "m" if k >= 6 else "rad"
+    def _sampled(self, name: str) -> FloatArray:
+        """Return values of a control, shape (SAMPLES,): over its range, else from its start - 1 to + 1."""
+        (one,) = (one for one in self.network.controls if one.name == name)
+        ranged = np.isfinite(one.upper - one.lower)
+        low, high = (one.lower, one.upper) if ranged else (one.start - 1.0, one.start + 1.0)
+        return np.linspace(low, high, SAMPLES)
 
-    def control_slopes(self, x: Sequence[Element] | FloatArray) -> dict[str, Given]:
+    def _driven(self, x: FloatArray) -> Iterator[tuple[Given, str]]:
+        """Yield what controls make of joints and elements, and the unit."""
+        controls = self.control_slopes(x)
+        for joint in self.network.joints:
+            for drive, unit in zip(joint.drives, joint.units, strict=True):
+                if drive is not None:
+                    yield of_controls(drive, controls), unit
+            for k, part in enumerate(joint.motion):
+                yield of_controls(part, controls), "m" if k >= 6 else "rad"
+        yield from ((length, "m") for length in self.lengths(x))
+
+    def control_slopes(self, x: Configuration) -> dict[str, Given]:
         """Return the value of each control, and its derivatives by the variables.
 
         Args:
@@ -209,18 +235,16 @@ class Mechanism:
                 found[one.name] = of_controls(one.value, found)
         return found
 
-    def lengths(self, x: Sequence[Element] | FloatArray) -> list[Given]:
+    def lengths(self, x: Configuration) -> list[Given]:
         """Return the length of each element in [m], and its derivatives."""
         controls = self.control_slopes(x)
         return [of_controls(one.length, controls) for one in self.network.elements]
 
-    def joint_values(self, joint: Joint, x: Sequence[Element] | FloatArray) -> list[Given]:
+    def joint_values(self, joint: Joint, x: Configuration) -> list[Given]:
         """Return the value of each variable of a joint, free or driven, and its derivatives."""
         return self.values(joint, x, self.control_slopes(x))
 
-    def values(
-        self, joint: Joint, x: Sequence[Element] | FloatArray, controls: dict[str, Given]
-    ) -> list[Given]:
+    def values(self, joint: Joint, x: Configuration, controls: dict[str, Given]) -> list[Given]:
         """Return the same where `control_slopes` is known; of a user joint the entries of m, n and a."""
         found = []
         for index, drive in enumerate(joint.drives):
@@ -231,7 +255,7 @@ class Mechanism:
                 found.append(of_controls(drive, controls))
         return found or [of_controls(one, controls) for one in joint.motion]
 
-    def poses(self, x: Sequence[Element] | FloatArray) -> dict[str, Transform]:
+    def poses(self, x: Configuration) -> dict[str, Transform]:
         """Return the pose of each body in the ground.
 
         Args:
@@ -239,7 +263,7 @@ class Mechanism:
         """
         return {name: one.frame for name, one in self.posed(x).items()}
 
-    def posed(self, x: Sequence[Element] | FloatArray) -> dict[str, Pose]:
+    def posed(self, x: Configuration) -> dict[str, Pose]:
         """Return the pose of each body, and what moves it."""
         controls = self.control_slopes(x)
         posed = {self.network.ground: Pose(Transform(), {})}

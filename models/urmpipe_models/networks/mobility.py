@@ -10,7 +10,7 @@ from urmpipe_models.arrays import FloatArray, IndexArray
 from urmpipe_models.networks.closure import closure_of, released
 from urmpipe_models.networks.descent import descend
 from urmpipe_models.networks.findings import Mobility, Redundant
-from urmpipe_models.networks.idle_spins import idle_spins
+from urmpipe_models.networks.idle_spins import spinning_parts
 from urmpipe_models.networks.mechanism import Mechanism
 
 RANK = 1e-7
@@ -36,8 +36,8 @@ def mobility_at(mechanism: Mechanism, x: FloatArray, columns: IndexArray) -> int
 
     Args:
         mechanism: The network.
-        x: The variables, shape (variables,).
-        columns: The numbers of those that may change.
+        x: The variables, shape (variables,), in [m], [rad] and as controls are given.
+        columns: The numbers of those that may change, shape (k,) [-].
     """
     return len(columns) - _rank(_scaled(mechanism, x[:, np.newaxis])[:, columns, 0])
 
@@ -47,7 +47,7 @@ def mobility_of(mechanism: Mechanism, x: FloatArray) -> Mobility:
 
     Args:
         mechanism: The network.
-        x: The variables of an assembly, shape (variables,).
+        x: The variables of an assembly, shape (variables,), in [m], [rad] and as controls are given.
     """
     variables = len(mechanism.variables)
     jacobian = _scaled(mechanism, x[:, np.newaxis])[:, :, 0]
@@ -57,7 +57,7 @@ def mobility_of(mechanism: Mechanism, x: FloatArray) -> Mobility:
         rank,
         variables - mechanism.rows,
         tuple(_redundant(mechanism, x, jacobian, mechanism.rows - rank)),
-        tuple(spin.name for spin in idle_spins(mechanism)),
+        spinning_parts(mechanism, x),
         mobility_nearby(mechanism, x, np.arange(variables)),
     )
 
@@ -67,7 +67,7 @@ def stuck_controls(mechanism: Mechanism, x: FloatArray) -> tuple[str, ...]:
 
     Args:
         mechanism: The network.
-        x: The variables of an assembly, shape (variables,).
+        x: The variables of an assembly, shape (variables,), in [m], [rad] and as controls are given.
     """
     ways = _null_space(_scaled(mechanism, x[:, np.newaxis])[:, :, 0])[mechanism.controls]
     stuck = []
@@ -85,7 +85,7 @@ def _scaled(mechanism: Mechanism, x: FloatArray) -> FloatArray:
 
 def _rank(jacobian: FloatArray, least: float = 0.0) -> int:
     """Return the rank of a scaled Jacobian; singular values of `least` or less count as 0, too."""
-    if not jacobian.size:
+    if not (jacobian.size and np.isfinite(jacobian).all()):
         return 0
     values = np.linalg.svd(jacobian, compute_uv=False)
     return int((values > max(RANK * values[0], least)).sum()) if values[0] > 0.0 else 0
@@ -105,8 +105,8 @@ def mobility_nearby(mechanism: Mechanism, x: FloatArray, columns: IndexArray) ->
 
     Args:
         mechanism: The network.
-        x: The variables of an assembly, shape (variables,).
-        columns: The numbers of those that may change.
+        x: The variables of an assembly, shape (variables,), in [m], [rad] and as controls are given.
+        columns: The numbers of those that may change, shape (k,) [-].
     """
     ways = _null_space(_scaled(mechanism, x[:, np.newaxis])[:, columns, 0])
     if not ways.size:
@@ -131,7 +131,7 @@ def _redundant(mechanism: Mechanism, x: FloatArray, jacobian: FloatArray, count:
         return
     unreached = np.linalg.svd(jacobian)[0][:, mechanism.rows - count :]
     constraints = list(released(mechanism, x))
-    reach = np.array([(column * mechanism.row_scales) @ unreached for _, _, column in constraints])
+    reach = np.array([column @ unreached for _, _, column in constraints])
     for _ in range(count):
         size = np.linalg.norm(reach, axis=1)
         best = int(np.flatnonzero(size >= ALIKE * size.max())[-1])

@@ -8,18 +8,7 @@ from html import escape
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import NetworkError
 from urmpipe_models.networks.faults import faults_of
-from urmpipe_models.networks.parts import FREEDOMS as FREEDOMS
-from urmpipe_models.networks.parts import GROUND as GROUND
-from urmpipe_models.networks.parts import POSE_UNITS as POSE_UNITS
-from urmpipe_models.networks.parts import Body as Body
-from urmpipe_models.networks.parts import ConstraintElement as ConstraintElement
-from urmpipe_models.networks.parts import Control as Control
-from urmpipe_models.networks.parts import ElementKind as ElementKind
-from urmpipe_models.networks.parts import Joint as Joint
-from urmpipe_models.networks.parts import JointKind as JointKind
-from urmpipe_models.networks.parts import Parts as Parts
-from urmpipe_models.networks.parts import frame_of as frame_of
-from urmpipe_models.networks.parts import ordered_controls as ordered_controls
+from urmpipe_models.networks.parts import Parts
 
 
 @dataclass(frozen=True, repr=False)

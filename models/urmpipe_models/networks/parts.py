@@ -166,6 +166,10 @@ class Parts:
     controls: tuple[Control, ...] = ()
     ground: str = GROUND
 
+    def as_parts(self) -> Parts:
+        """Return the parts of a network alone: others may take their places, right or wrong."""
+        return Parts(self.name, self.bodies, self.joints, self.elements, self.controls, self.ground)
+
     @cached_property
     def body_names(self) -> tuple[str, ...]:
         """The names of all bodies, the ground first."""

@@ -99,6 +99,9 @@ def wrapped(vector: FloatArray) -> FloatArray:
 
     Args:
         vector: In [rad], shape (3, n).
+
+    Returns:
+        In [rad], shape (3, n).
     """
     angle = np.sqrt(np.einsum("kn,kn->n", vector, vector))
     turns = np.round(angle / (2.0 * np.pi))

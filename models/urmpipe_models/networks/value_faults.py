@@ -23,18 +23,23 @@ SAMPLES = 11
 """At so many values of a control, from its least to its largest, a user joint is looked at."""
 
 
-def value_faults(parts: Parts) -> Iterator[Finding]:
-    """Yield what is wrong with the values of functions, where controls start and over their ranges."""
+def value_faults(parts: Parts, at: str = "where controls start") -> Iterator[Finding]:
+    """Yield what is wrong with the values of functions, where controls start and over their ranges.
+
+    Args:
+        parts: The parts.
+        at: Where controls start, in words.
+    """
     values = control_values(parts.controls, {})
     finite = {name: float(value) for name, value in values.items() if math.isfinite(value)}
     for where, one in (*parts.between_controls, *parts.functions, *parts.lengths):
         if one.names <= finite.keys() and not math.isfinite(value := float(one.value(finite))):
-            message = f"found {value:g} where controls start, allowed: a finite number"
+            message = f"found {value:g} {at}, allowed: a finite number"
             yield Finding(message, about=where)
-    yield from _length_faults(parts, finite)
+    yield from _length_faults(parts, finite, at)
     for joint in parts.joints:
         if len(joint.motion) == 9 and all(one.names <= finite.keys() for one in joint.motion):
-            yield from _motion_faults(joint, parts.controls)
+            yield from _motion_faults(joint, parts.controls, at)
 
 
 def control_values(controls: tuple[Control, ...], given: Mapping[str, Element]) -> dict[str, Element]:
@@ -50,30 +55,30 @@ def control_values(controls: tuple[Control, ...], given: Mapping[str, Element]) 
     return found
 
 
-def _length_faults(parts: Parts, values: Mapping[str, float]) -> Iterator[Finding]:
+def _length_faults(parts: Parts, values: Mapping[str, float], at: str) -> Iterator[Finding]:
     """Yield lengths that are too small where controls start; h of eg may be less than 0."""
     for element, (where, function) in zip(parts.elements, parts.lengths, strict=True):
         if element.kind != "eg" and function.names <= values.keys():
             length, lines = float(function.value(values)), element.kind == "crc"
             if length < 0.0 or (length == 0.0 and not lines):
                 allowed = "0 or more" if lines else "more than 0"
-                message = f"found {length:g} m where controls start, allowed: {allowed}"
+                message = f"found {length:g} m {at}, allowed: {allowed}"
                 yield Finding(message, about=where)
 
 
-def _motion_faults(joint: Joint, controls: tuple[Control, ...]) -> Iterator[Finding]:
+def _motion_faults(joint: Joint, controls: tuple[Control, ...], at: str) -> Iterator[Finding]:
     """Yield where m and n of a user joint are not orthonormal: at the start, or along each control."""
     where = f"joints.{joint.name}.n"
     worst = _worst(joint, control_values(controls, {}))[1]
     if not np.max(np.abs(worst)) <= ORTHONORMAL:
-        yield Finding(not_orthonormal(worst, " where controls start"), about=where)
+        yield Finding(not_orthonormal(worst, f" {at}"), about=where)
         return
     for one in controls:
         if one.value is None and math.isfinite(one.upper - one.lower):
-            at = np.linspace(one.lower, one.upper, SAMPLES)
-            k, worst = _worst(joint, control_values(controls, {one.name: at}))
+            sampled = np.linspace(one.lower, one.upper, SAMPLES)
+            k, worst = _worst(joint, control_values(controls, {one.name: sampled}))
             if not np.max(np.abs(worst)) <= ORTHONORMAL:
-                message = not_orthonormal(worst, f" at {one.name} = {at[k]:.6g}")
+                message = not_orthonormal(worst, f" at {one.name} = {sampled[k]:.6g}")
                 yield Finding(message, about=where)
 
 
@@ -98,7 +103,7 @@ def not_orthonormal(off: Sequence[float] | FloatArray, place: str) -> str:
     """Return how far m and n are from orthonormal.
 
     Args:
-        off: |m| - 1, |n| - 1 and m . n [-].
+        off: |m| - 1, |n| - 1 and m . n [-], shape (3,).
         place: Where that is so, such as " in the first body".
     """
     m, n, both = off

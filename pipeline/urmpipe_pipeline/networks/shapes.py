@@ -39,7 +39,7 @@ def prism(corners: FloatArray, along: FloatArray) -> FloatArray:
         along: From it to the other one in [m], shape (3,).
 
     Returns:
-        Shape (4 k - 4, 3, 3), in [m].
+        Three corners in [m] of each of the 4 k - 4 triangles, shape (n, 3, 3).
     """
     other, k = corners + along, len(corners)
     following = np.roll(np.arange(k), -1)

@@ -10,7 +10,7 @@ from random_networks import Vec, axis_frame, transform, unit, vec
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.networks.expressions import Expression
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import (Body, ConstraintElement, Control, Joint, JointKind)
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Joint, JointKind
 
 X, Y, Z, ORIGIN = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
 

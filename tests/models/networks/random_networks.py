@@ -14,7 +14,7 @@ from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.expressions import Expression
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import (FREEDOMS, Body, ConstraintElement, ElementKind, Joint, JointKind)
+from urmpipe_models.networks.parts import FREEDOMS, Body, ConstraintElement, ElementKind, Joint, JointKind
 from urmpipe_models.transform import Transform
 
 Poses = dict[str, FloatArray]

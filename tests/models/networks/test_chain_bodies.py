@@ -18,8 +18,8 @@ from urmpipe_models.networks.chain_bodies import chain_parts, control_name
 from urmpipe_models.networks.expressions import Expression
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import (Body, Control)
 from urmpipe_models.networks.network_file import load_network
+from urmpipe_models.networks.parts import Body, Control
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.transform import Transform
 

@@ -18,8 +18,8 @@ from urmpipe_models.networks.dh_elements import DHElement, element_frame, joint_
 from urmpipe_models.networks.joint_motion import joint_frame
 from urmpipe_models.networks.mechanism import mechanism_of
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import (Body, Joint)
 from urmpipe_models.networks.network_file import load_network
+from urmpipe_models.networks.parts import Body, Joint
 from urmpipe_models.transform import Transform
 
 EXACT = 1e-14

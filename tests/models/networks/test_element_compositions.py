@@ -32,7 +32,7 @@ from urmpipe_models.networks.expressions import Expression
 from urmpipe_models.networks.mechanism import mechanism_of
 from urmpipe_models.networks.mobility import mobility_of
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import (Body, ConstraintElement, Control, ElementKind, Joint)
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, ElementKind, Joint
 
 CLOSES = 1e-12
 """Residuals in [m] and [rad]: products of some ten matrices with entries up to 10."""

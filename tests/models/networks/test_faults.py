@@ -11,7 +11,7 @@ from asserting import refusal
 from urmpipe_models.errors import NetworkError
 from urmpipe_models.networks.expressions import Expression
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import (Body, ConstraintElement, Control, Joint, frame_of)
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Joint, frame_of
 from urmpipe_models.transform import Transform, translation
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

@@ -23,7 +23,7 @@ from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.expressions import Expression
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import (Body, Control, Joint)
+from urmpipe_models.networks.parts import Body, Control, Joint
 
 RELATIVE = 1e-8
 """Of the largest entry: differences of step 1e-3 round to 1e-12 and neglect 1e-18 times the seventh

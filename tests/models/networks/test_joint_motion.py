@@ -28,7 +28,7 @@ from urmpipe_models.networks.expressions import Expression
 from urmpipe_models.networks.joint_motion import forbidden, joint_frame, joint_screws
 from urmpipe_models.networks.mechanism import mechanism_of
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import (FREEDOMS, Body, Control, Joint, JointKind)
+from urmpipe_models.networks.parts import FREEDOMS, Body, Control, Joint, JointKind
 
 ROUNDING = 1e-13
 """Products of some ten matrices with entries near 1, and scipy's expm."""
@@ -131,7 +131,7 @@ def test_what_a_joint_allows_and_forbids_is_all_that_there_is(kind: JointKind) -
     rng = np.random.default_rng(4)
     for _ in range(10):
         joint, q, at = joint_of(kind, rng), np.array(random_values(kind, rng)), random_pose(rng)
-        names, refused = zip(*forbidden(joint, list(q), transform(at)), strict=True)
+        names, _, refused = zip(*forbidden(joint, list(q), transform(at)), strict=True)
         assert len(set(names)) == len(names)
         every = np.column_stack([twists_of(joint, q, at), *(np.array((*w, *v)) for w, v in refused)])
         assert every.shape == (6, 6)
@@ -149,7 +149,8 @@ def test_a_driven_joint_forbids_what_it_is_driven_by(kind: JointKind) -> None:
     )
     at, q = random_pose(rng), np.array(random_values(kind, rng))
     found = list(forbidden(joint, list(q), transform(at)))
-    drives = np.array([(*w, *v) for name, (w, v) in found if name == "drive"]).T
+    drives = np.array([(*w, *v) for name, _, (w, v) in found if name == "drive"]).T
+    assert [unit for name, unit, _ in found if name == "drive"] == list(FREEDOMS[kind])
     np.testing.assert_array_equal(drives, twists_of(free, q, at))
     assert len(found) == 6
 

@@ -16,7 +16,7 @@ from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.mechanism import mechanism_of
 from urmpipe_models.networks.mobility import mobility_of
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import (Joint, JointKind)
+from urmpipe_models.networks.parts import Joint, JointKind
 
 pin = pytest.importorskip("pinocchio")
 

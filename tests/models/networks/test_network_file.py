@@ -13,8 +13,8 @@ from asserting import refusal
 from urmpipe_models.errors import NetworkError
 from urmpipe_models.networks.expressions import Expression
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import (Body, ConstraintElement, Control, Joint, frame_of)
 from urmpipe_models.networks.network_file import load_network, network_names
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Joint, frame_of
 from urmpipe_models.robots.catalogue import robot_names
 
 X, Y, Z, O = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)  # noqa: E741 - the origin

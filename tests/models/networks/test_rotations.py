@@ -23,7 +23,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.networks.joint_motion import joint_frame
 from urmpipe_models.networks.mechanism import mechanism_of
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import (Body, Joint)
+from urmpipe_models.networks.parts import Body, Joint
 from urmpipe_models.networks.rotations import SMALL, rotation_of, turning_of, untwisted, wrapped
 
 ROUNDING = 1e-14
