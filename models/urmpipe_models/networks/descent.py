@@ -24,6 +24,11 @@ STEPS = 300
 ENOUGH = 1e-14
 """The length of the residual, in lengths of the mechanism and [rad], from which on it is rounding."""
 
+STUCK = 1e-3
+"""Where the cosine between e and what each variable can change of it is less than this times the root of |e|,
+e cannot be made 0 near by: on the way to a singular assembly, where |e| falls as the square of the distance,
+the cosine falls as the distance."""
+
 FLOOR = 1e-13
 """The least damping: singular directions, as of redundant constraints, must not amplify rounding."""
 
@@ -42,7 +47,7 @@ class Reached:
     gap: FloatArray
 
 
-def descend(mechanism: Mechanism, x: FloatArray, free: IndexArray) -> Reached:
+def descend(mechanism: Mechanism, x: FloatArray, free: IndexArray, *, patient: bool = True) -> Reached:
     """Return the configurations nearby that close, or come nearest to it.
 
     Each step is the least of (J^T J + mu I) dx = -J^T e, in lengths of the mechanism and [rad], with mu in
@@ -52,13 +57,14 @@ def descend(mechanism: Mechanism, x: FloatArray, free: IndexArray) -> Reached:
         mechanism: The network.
         x: The starts, shape (variables, n), in [m], [rad] and as controls are given.
         free: The numbers of the variables that may change, shape (free,) [-].
+        patient: Whether the least gap is sought where nothing closes; else a start is given up there.
     """
     found = np.array(x, dtype=np.float64)
     rows = np.arange(found.shape[1])
     gain = np.full(len(rows), FIRST_GAIN)
     now = _scaled(mechanism, found, free)
     for _ in range(STEPS):
-        going = _going(now, gain)
+        going = _going(now, gain, patient)
         if not going.any():
             break
         rows, gain, now = rows[going], gain[going], now.kept(going)
@@ -109,10 +115,11 @@ def _scaled(mechanism: Mechanism, x: FloatArray, free: IndexArray) -> _Scaled:
     return _Scaled(closure.residual * rows, jacobian)
 
 
-def _going(now: _Scaled, gain: FloatArray) -> BoolArray:
+def _going(now: _Scaled, gain: FloatArray, patient: bool) -> BoolArray:
     """Return which starts go on: those that are finite, not closed, and not at a least residual."""
     square = dot_product(now.error, now.error)
     slope = transposed_product(now.jacobian, now.error)
-    moves = slope * slope > STATIONARY**2 * square * column_squares(now.jacobian)
+    least = np.maximum(STATIONARY, 0.0 if patient else STUCK * square**0.25)
+    moves = slope * slope > least**2 * square * column_squares(now.jacobian)
     under_way = (square > ENOUGH**2) & (square < np.inf) & (gain < GAINS[1])
     return np.asarray(under_way & moves.any(axis=0))

@@ -95,6 +95,7 @@ class Placed:
     Attributes:
         network: The network.
         poses: Where each body is, as a matrix [-] and [m], shape (4, 4), by its name.
+        points: Where joints and elements tie each body, in its own frame in [m], by its name.
         lengths: The length of each element in [m].
         extent: The diagonal of the box around all points of its bodies in [m].
         sides: Of what is round.
@@ -102,6 +103,7 @@ class Placed:
 
     network: Network
     poses: dict[str, FloatArray]
+    points: dict[str, list[Vector]]
     lengths: tuple[float, ...]
     extent: float
     sides: int = SIDES
@@ -131,25 +133,16 @@ def placed(network: Network, assembly: Assembly, sides: int = SIDES) -> Placed:
         ]
     ).reshape(-1)
     lengths = tuple(float(one.value) for one in mechanism.lengths(x))
-    unscaled = Placed(network, poses, lengths, 1.0)
+    unscaled = Placed(network, poses, mechanism.points, lengths, 1.0)
     points = np.concatenate([body_points(unscaled, name) for name in network.body_names])
     extent = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
-    return Placed(network, poses, lengths, extent or max((mechanism.length, *map(abs, lengths))), sides)
+    extent = extent or max((mechanism.length, *map(abs, lengths)))
+    return Placed(network, poses, mechanism.points, lengths, extent, sides)
 
 
 def body_points(at: Placed, body: str) -> FloatArray:
     """Return the points at which joints and elements hold a body in [m], shape (n, 3), all different."""
-    network = at.network
-    points = [
-        at.point(body, frame.translation)
-        for joint in network.joints
-        for name, frame in zip(joint.bodies, joint.frames, strict=True)
-        if name == body
-    ]
-    for element in network.elements:
-        for side, (name, point) in enumerate(zip(element.bodies, element.points, strict=True)):
-            if name == body and (element.kind, side) != ("eg", 0):
-                points.append(at.point(body, point))
+    points = [at.point(body, point) for point in at.points[body]]
     found = np.array(points).reshape(-1, 3)
     different = _different(found, SAME * at.extent)
     if len(different) == 1:  # a body that ends there reaches to its own origin
