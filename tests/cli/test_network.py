@@ -182,7 +182,9 @@ def test_assemblies_that_are_no_list_are_told(urmpipe: Run) -> None:
     told = json.loads(ran.out)
     assert (ran.code, len(told["assemblies"])) == (0, 1)
     assert [one["kind"] for one in told["warnings"]] == ["continuum"]
-    assert "has mobility 3: its assemblies are no list" in told["warnings"][0]["message"]
+    assert (
+        "with mobility 3: its assemblies cannot be listed; 3 more controls" in told["warnings"][0]["message"]
+    )
 
 
 def test_a_recording_and_a_drawing_are_written_and_replaced(urmpipe: Run, tmp_path: Path) -> None:

@@ -37,6 +37,8 @@ def parse_toml(path: Path, error: type[UrmpipeError]) -> dict[str, Any]:
         line = int(place[1]) if place else None
         hint = _unquoted(text.split("\n")[line - 1]) if line else ""
         raise error(Finding(f"not valid TOML: {fault}{hint}", str(path), line=line)) from fault
+    except ValueError as fault:  # an integer of more digits than Python reads
+        raise error(Finding(f"not valid TOML: {fault}", str(path))) from fault
 
 
 def _unquoted(written: str) -> str:

@@ -105,8 +105,8 @@ def assemble(
             continuum = _continuum(mechanism, found.kept[0])
     if continuum and every:
         reason = (
-            f"with its controls held the network has mobility {continuum}: its assemblies are no list, the"
-            " nearest to the start is shown"
+            f"with its controls held the network still moves, with mobility {continuum}: the assembly nearest"
+            " to the start is shown"
         )
     return found.result(tried, reason, elsewhere=not closed and bool(found.kept), continuum=continuum)
 

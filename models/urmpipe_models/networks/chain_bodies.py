@@ -10,7 +10,7 @@ from pathlib import Path
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.chains.chain import Joint as ChainJoint
 from urmpipe_models.elementwise import ZERO, Vector, cross
-from urmpipe_models.errors import RobotError, shown
+from urmpipe_models.errors import OptionError, RobotError, shown
 from urmpipe_models.files.tables import Table, are_numbers
 from urmpipe_models.names import not_among
 from urmpipe_models.networks.expressions import Expression
@@ -129,7 +129,7 @@ def read_chain(
 
     Args:
         name: Its name in the network.
-        table: Its table, with `robot`, `body`, `start` and `value`.
+        table: Its table, with `robot`, `base_link`, `tip_link`, `body`, `start` and `value`.
         units: The units of the file.
         folder: Where files of robots are relative to.
         ground: The body that carries it where its table has none.
@@ -160,9 +160,11 @@ def _load(table: Table, folder: Path) -> Chain | None:
         table.fault("robot", f"found {shown(robot)}, allowed: a robot or a file")
     if len(table.faults) > many:
         return None
+    base, tip = (table.text(key, "") or None for key in ("base_link", "tip_link"))
     try:
-        return load_robot(folder / robot if Path(robot).suffix.lower() in FILES else robot)
-    except RobotError as error:
+        path = folder / robot if Path(robot).suffix.lower() in FILES else robot
+        return load_robot(path, base_link=base, tip_link=tip)
+    except (OptionError, RobotError) as error:
         for one in error.findings:
             table.fault("robot", str(one))
     return None

@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
+from itertools import accumulate
 from typing import TypeAlias
 
 import numpy as np
@@ -71,12 +72,22 @@ def _parsed(text: str) -> ast.expr:
     """Return the tree of an expression whose parts are all arithmetic; raise a `ValueError` of any other."""
     if len(text) > LONGEST:
         raise ValueError(f"found {shown(text)} of {len(text)} letters, allowed: {LONGEST} at most")
+    if (nested := _nested(text)) > DEEPEST:
+        raise ValueError(f"found {shown(text)}, nested {nested} deep; allowed: {DEEPEST}")
     try:
+        if "#" in text:  # the rest would be a remark
+            raise SyntaxError("a remark")
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise ValueError(f"found {shown(text)}, no arithmetic; allowed: {ALLOWED}") from error
     _refuse(tree, text, 0)
     return tree
+
+
+def _nested(text: str) -> int:
+    """Return how many brackets of a text are open at most."""
+    open_ones = accumulate((sign == "(") - (sign == ")") for sign in text)
+    return max(open_ones, default=0)
 
 
 def _refuse(node: ast.expr, text: str, depth: int) -> None:

@@ -7,12 +7,18 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, get_args
 
 from urmpipe_models.elementwise import Vector, cross, dot, subtract
-from urmpipe_models.errors import Finding
+from urmpipe_models.errors import Finding, shown
 from urmpipe_models.names import nearest, not_among
 from urmpipe_models.networks.control_faults import control_faults
 from urmpipe_models.networks.graph import graph_of
 from urmpipe_models.networks.parts import FREEDOMS, POSE_UNITS, ConstraintElement, ElementKind, Joint, Parts
-from urmpipe_models.networks.value_faults import ORTHONORMAL, lines_faults, not_orthonormal, value_faults
+from urmpipe_models.networks.value_faults import (
+    LARGEST,
+    ORTHONORMAL,
+    lines_faults,
+    not_orthonormal,
+    value_faults,
+)
 
 if TYPE_CHECKING:
     from urmpipe_models.transform import Transform
@@ -60,6 +66,8 @@ def _name_faults(parts: Parts) -> Iterator[Finding]:
     first: dict[str, str] = {}
     for table, name in named:
         where = f"{table}.{name}"
+        if table != "controls" and not name.strip():
+            yield Finding(f"found {shown(name)} as a name, allowed: one that can be seen", about=where)
         if name in first:
             yield Finding(f"{first[name]} has this name, too; allowed: each name once", about=where)
         first.setdefault(name, where)
@@ -167,6 +175,8 @@ def _element_faults(where: str, element: ConstraintElement) -> Iterator[Finding]
 
 
 def _finite_faults(where: str, numbers: tuple[float, ...]) -> Iterator[Finding]:
-    """Yield the first number that is none, or infinite."""
+    """Yield the first number that is none, infinite or of no mechanism."""
     if wrong := [one for one in numbers if not math.isfinite(one)]:
         yield Finding(f"found {wrong[0]:g}, allowed: a finite number", about=where)
+    elif wrong := [one for one in numbers if abs(one) > LARGEST]:
+        yield Finding(f"found {wrong[0]:g}, allowed: {LARGEST:g} at most, in m or rad", about=where)

@@ -15,7 +15,7 @@ from urmpipe_models.elementwise import Element, Vector, subtract
 from urmpipe_models.networks.expressions import Expression, Slopes
 from urmpipe_models.networks.graph import Branch, Graph, graph_of
 from urmpipe_models.networks.joint_motion import joint_frame
-from urmpipe_models.networks.parts import POSE_UNITS, Joint, Parts, ordered_controls
+from urmpipe_models.networks.parts import POSE_UNITS, Joint, Parts, ordered_controls, ranged
 from urmpipe_models.networks.rotations import rotation_of
 from urmpipe_models.transform import Transform
 
@@ -205,9 +205,7 @@ class Mechanism:
     def _sampled(self, name: str) -> FloatArray:
         """Return values of a control, shape (SAMPLES,): over its range, else from its start - 1 to + 1."""
         (one,) = (one for one in self.network.controls if one.name == name)
-        ranged = np.isfinite(one.upper - one.lower)
-        low, high = (one.lower, one.upper) if ranged else (one.start - 1.0, one.start + 1.0)
-        return np.linspace(low, high, SAMPLES)
+        return np.linspace(*ranged(one), SAMPLES)
 
     def _driven(self, x: FloatArray) -> Iterator[tuple[Given, str]]:
         """Yield what controls make of joints and elements, and the unit."""

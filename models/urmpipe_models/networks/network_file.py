@@ -154,9 +154,12 @@ class _Reader:
             joints.append(joint)
             bodies += [] if body is None else [body]
         unread = []
-        for name, table in self._rows("chains"):
+        rows = dict(self._rows("chains"))
+        for name, table in rows.items():
             chain = read_chain(name, table, self.units, self.folder, self.ground, self.places)
-            if chain is None:
+            if _stands_on_itself(name, rows):
+                table.fault("body", f"found a body that {name} carries itself; allowed: another")
+            if chain is None or _stands_on_itself(name, rows):
                 unread.append(f"{name}.")
             else:
                 bodies, joints = bodies + chain.bodies, joints + chain.joints
@@ -270,6 +273,18 @@ def _ends(table: Table) -> tuple[str, str]:
     if len(table.faults) == many:
         table.fault("bodies", f"found {len(names)}, allowed: the names of two bodies")
     return "", ""
+
+
+def _stands_on_itself(name: str, chains: Mapping[str, Table]) -> bool:
+    """Return whether a chain is carried by its own bodies, be it through other chains."""
+    on, passed = name, 0
+    while passed < len(chains):
+        carrier = str(chains[on].value("body"))
+        on = next((other for other in chains if carrier.startswith(f"{other}.")), "")
+        passed += 1
+        if on in ("", name):
+            return on == name
+    return False
 
 
 def _standing_in(unread: list[str], ties: Iterable[Joint | ConstraintElement]) -> Iterator[Body]:

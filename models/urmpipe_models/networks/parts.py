@@ -223,3 +223,10 @@ def ordered_controls(controls: Sequence[Control]) -> list[Control]:
         known |= {one.name for one in ready}
         left = [one for one in left if one.name not in known]
     return ordered
+
+
+def ranged(control: Control) -> tuple[float, float]:
+    """Return where a control is looked at: its range, where that is open at most 1 from its start."""
+    if math.isfinite(control.upper - control.lower):
+        return control.lower, control.upper
+    return max(control.lower, control.start - 1.0), min(control.upper, control.start + 1.0)

@@ -11,10 +11,13 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.elementwise import Element, cross, dot
 from urmpipe_models.errors import Finding
 from urmpipe_models.networks.mechanism import mechanism_of
-from urmpipe_models.networks.parts import Control, Joint, Parts, ordered_controls
+from urmpipe_models.networks.parts import Control, Joint, Parts, ordered_controls, ranged
 
 ORTHONORMAL = 1e-9
 """Lengths and scalar products of unit vectors may be off by this: rounding, not a forgotten normalisation."""
+
+LARGEST = 1e9
+"""No length in [m] or angle in [rad] of a mechanism is larger: rounding would leave nothing of it."""
 
 PARALLEL = 1e-9
 """Below this sine of their angle two lines have no common normal."""
@@ -33,9 +36,10 @@ def value_faults(parts: Parts, at: str = "where controls start") -> Iterator[Fin
     values = control_values(parts.controls, {})
     finite = {name: float(value) for name, value in values.items() if math.isfinite(value)}
     for where, one in (*parts.between_controls, *parts.functions, *parts.lengths):
-        if one.names <= finite.keys() and not math.isfinite(value := float(one.value(finite))):
-            message = f"found {value:g} {at}, allowed: a finite number"
-            yield Finding(message, about=where)
+        value = float(one.value(finite)) if one.names <= finite.keys() else 0.0
+        if not abs(value) <= LARGEST:
+            allowed = f"{LARGEST:g} at most, in m or rad" if math.isfinite(value) else "a finite number"
+            yield Finding(f"found {value:g} {at}, allowed: {allowed}", about=where)
     yield from _length_faults(parts, finite, at)
     for joint in parts.joints:
         if len(joint.motion) == 9 and all(one.names <= finite.keys() for one in joint.motion):
@@ -74,8 +78,9 @@ def _motion_faults(joint: Joint, controls: tuple[Control, ...], at: str) -> Iter
         yield Finding(not_orthonormal(worst, f" {at}"), about=where)
         return
     for one in controls:
-        if one.value is None and math.isfinite(one.upper - one.lower):
-            sampled = np.linspace(one.lower, one.upper, SAMPLES)
+        if one.value is None:
+            low, high = ranged(one)
+            sampled = np.linspace(low, high, SAMPLES)
             k, worst = _worst(joint, control_values(controls, {one.name: sampled}))
             if not np.max(np.abs(worst)) <= ORTHONORMAL:
                 message = not_orthonormal(worst, f" at {one.name} = {sampled[k]:.6g}")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Integral, Real
 
+from urmpipe_models.display import number_of
 from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.networks.assembly import RESTARTS, Assembled, assemble
 from urmpipe_models.networks.findings import Mobility
@@ -114,8 +115,8 @@ def _warnings(
         yield LogWarning("rounded-figures", said)
     if every and found.continuum:
         said = (
-            f"with its controls held the network has mobility {found.continuum}: its assemblies are no list;"
-            " as many more controls would make them one"
+            f"with its controls held the network still moves, with mobility {found.continuum}: its assemblies"
+            f" cannot be listed; {number_of(found.continuum, 'more control')} would hold it"
         )
         yield LogWarning("continuum", said)
     if mobility is None:

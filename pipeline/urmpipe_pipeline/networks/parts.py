@@ -73,15 +73,18 @@ def facts(result: NetworkResult) -> Iterator[Fact]:
     network = result.network
     yield Fact("Network", network.description, brief=False)
     yield Fact("Structure", structure_words(result))
+    yield Fact("Loops", _listed(result.loops))
     yield Fact("Controls", control_values(result))
-    yield Fact(
-        "Clusters",
-        "; ".join(map(", ".join, result.clusters)) if len(result.clusters) > 1 else "",
-        brief=False,
-    )
+    yield Fact("Clusters", _listed(result.clusters) if len(result.clusters) > 1 else "")
     yield Fact("Assemblies", found_words(result))
     yield Fact("Source", network.source, brief=False)
     yield recording_fact(result.recording)
+
+
+def _listed(groups: Sequence[Sequence[str]]) -> str:
+    """Return groups of names, as far as there is room."""
+    more = len(groups) - MANY
+    return "; ".join([*map(", ".join, groups[:MANY]), *([f"and {more} more"] if more > 0 else [])])
 
 
 def structure_words(result: NetworkResult) -> str:
@@ -120,7 +123,7 @@ def mobility_table(moves: Mobility) -> Table:
         ),
         ("rank", Value(moves.rank), "of the Jacobian of what must close"),
         ("mobility", Value(moves.mobility), "variables less rank"),
-        ("Kutzbach", Value(moves.kutzbach), "6 (bodies - 1) less the constraints, as if each took a freedom"),
+        ("Kutzbach", Value(moves.kutzbach), "6 (bodies - 1) less the constraints, as if none were redundant"),
     ]
     if moves.redundant:
         rows.append(("redundant", Value(len(moves.redundant)), redundant_words(moves)))
@@ -153,14 +156,17 @@ def assemblies_table(result: NetworkResult) -> Table:
     if len(every) == 1:
         title = "Variables" if result.assemblies else "Variables where it comes nearest to closing"
         rows = [(name, _cell(every[0], owner, k, unit)) for name, owner, k, unit in named]
-        return table_of(title, {"name": "Variable", "value": "Value"}, rows)
+        return table_of(title, {"name": "Variable", "value": "Value"}, rows, brief=result.command == "solve")
     columns = [Column("assembly", "Assembly", [Value(k) for k in range(1, len(every) + 1)])]
     for place, (name, owner, k, unit) in enumerate(named):
         columns.append(
             Column(name, name, [_cell(one, owner, k, unit) for one in every], brief=place < NARROW)
         )
     columns.append(Column("mobility", "Mobility", [Value(one.mobility) for one in every]))
-    return Table(f"Assemblies ({len(every)})", tuple(columns), brief=len(named) <= NARROW)
+    title = f"Assemblies ({len(every)})"
+    if (more := len(named) - NARROW) > 0:
+        title += f"; {counted(more, 'more variable')} in the report and in --json"
+    return Table(title, tuple(columns))
 
 
 def _variables(network: Network, one: Assembly) -> Iterator[tuple[str, str, int, str]]:

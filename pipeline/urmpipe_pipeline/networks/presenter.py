@@ -42,12 +42,11 @@ def present(result: NetworkResult) -> Presentation:
         result.verdict,
         tuple(facts(result)),
         tuple(_tables(result)),
-        partial(drawings, result),
-        partial(_page, result),
-        (_check(result),),
-        _properties(result),
-        partial(_events, result),
-        result.warnings,
+        blocks=partial(_page, result),
+        checks=(_check(result),),
+        properties=_properties(result),
+        events=partial(_events, result),
+        warnings=result.warnings,
     )
     return Presentation(
         name=result.name,
@@ -126,7 +125,8 @@ def _properties(result: NetworkResult) -> dict[str, Any]:
 
 
 def _page(result: NetworkResult) -> Iterator[Block]:
-    """Yield what only a page has room for."""
+    """Yield what only a page has room for, its drawings among it: the viewer has its scene."""
+    yield from drawings(result)
     yield from space_figure(result)
     if result.provenance.inputs:
         yield inputs_table("Input files", result.provenance.inputs)

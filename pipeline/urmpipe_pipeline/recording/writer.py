@@ -52,7 +52,7 @@ def write_result(
     """
     with guarded_output(path, inputs, "recording") as part:
         encoded = _encoded(result, path)
-        with _stream_into(part) as stream:
+        with _stream_into(part, path) as stream:
             encoded, metadata = _described(stream, kind, shown, encoded)
             _send(stream, part.parent, encoded, progress)
         verify(part, path, encoded, metadata)
@@ -67,14 +67,18 @@ def _encoded(result: Any, path: Path) -> Encoded:
 
 
 @contextmanager
-def _stream_into(part: Path) -> Iterator[RecordingStream]:
-    """Give a stream into a file; afterwards write the footer and let go of the file."""
+def _stream_into(part: Path, path: Path) -> Iterator[RecordingStream]:
+    """Give a stream into the part of a file; afterwards write the footer and let go of it."""
     import rerun as rr
 
     stream = rr.RecordingStream(APPLICATION_ID, send_properties=False)
     if not rr.is_enabled(stream):
         raise OutputError("Rerun is switched off by the environment variable RERUN; allowed: unset or on")
-    stream.save(part)
+    try:
+        stream.save(part)
+    except RuntimeError as error:  # Rerun's, of a folder that nobody may write to
+        reason = str(error).rpartition("Failed to create file: ")[2].partition(", path: ")[0]
+        raise OutputError(Finding(f"cannot be written: {reason}", str(path))) from error
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)
     # Strict: Rerun raises where it would warn and drop data, such as for a column of the wrong length.

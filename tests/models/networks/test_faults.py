@@ -298,13 +298,22 @@ def test_a_user_joint_is_looked_at_along_each_control() -> None:
     ]
 
 
-def test_a_user_joint_follows_controls_of_controls_and_skips_infinite_limits() -> None:
+def test_a_user_joint_follows_controls_of_controls_and_is_looked_at_near_an_open_range() -> None:
     joint = user("1", "0", "0", "0", "1 + u", "0", "0", "0", "0")
     follower = Control("u", value=Expression("sqrt(s)"))
-    assert Network(
-        "n", (Body("b"), Body("c")), (A, joint), controls=(Control("s", lower=0.0), follower)
-    ).joints
+    assert complaints(A, joint, controls=(Control("s", lower=0.0), follower)) == [
+        "joints.U.n: m and n are not orthonormal at s = 1:"
+        " |m| - 1 = 0, |n| - 1 = 1, m . n = 0; allowed: 1e-09 at most"
+    ]
     assert complaints(A, joint, controls=(Control("s", 0.0, -1.0, 0.0), follower)) == [
         "joints.U.n: m and n are not orthonormal at s = -1:"
         " |m| - 1 = 0, |n| - 1 = nan, m . n = nan; allowed: 1e-09 at most"
+    ]
+
+
+def test_names_that_nobody_sees_and_numbers_of_no_mechanism_are_refused() -> None:
+    far = Joint("A", "revolute", ("ground", "b"), (frame_of(X, Y, (1e10, 0.0, 0.0)),) * 2)
+    assert complaints(far, Joint(" ", "revolute", ("b", "c"))) == [
+        "joints. : found ' ' as a name, allowed: one that can be seen",
+        "joints.A.a: found 1e+10, allowed: 1e+09 at most, in m or rad",
     ]

@@ -6,6 +6,7 @@ import math
 import tomllib
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
@@ -15,7 +16,8 @@ from urmpipe_models.networks.expressions import Expression
 from urmpipe_models.networks.network import Network
 from urmpipe_models.networks.network_file import load_network, network_names
 from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Joint, frame_of
-from urmpipe_models.robots.catalogue import robot_names
+from urmpipe_models.robots.catalogue import load_robot, robot_names
+from urmpipe_models.robots.urdf_writer import urdf_text
 
 X, Y, Z, O = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)  # noqa: E741 - the origin
 
@@ -516,3 +518,32 @@ robot = "\\u0000.toml"
         "net.toml:13: joints.B.m: found [1, 0], allowed: a list of 3 numbers or expressions",
         "net.toml:18: chains.arm.robot: found '\\x00.toml', allowed: a robot or a file",
     ]
+
+
+def test_chains_that_stand_on_themselves_are_named(network: Any) -> None:
+    text = '[chains.a]\nrobot = "urm4"\nbody = "b.tool"\n[chains.b]\nrobot = "urm4"\nbody = "a.tool"\n'
+    assert complaints(network, text) == [
+        "net.toml:3: chains.a.body: found a body that a carries itself; allowed: another",
+        "net.toml:6: chains.b.body: found a body that b carries itself; allowed: another",
+    ]
+
+
+def test_a_urdf_in_a_network_begins_and_ends_at_its_links(network: Any, tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(urdf_text(load_robot("urm4")), encoding="utf-8")
+    links = [link.get("name") for link in ElementTree.parse(tmp_path / "arm.urdf").getroot().iter("link")]
+    whole = network('[chains.a]\nrobot = "arm.urdf"\n')
+    part = network(f'[chains.a]\nrobot = "arm.urdf"\ntip_link = "{links[2]}"\n')
+    assert 1 < len(part.joints) < len(whole.joints)
+    (said,) = complaints(network, '[chains.a]\nrobot = "urm4"\ntip_link = "x"\n')
+    assert said.endswith("robot urm4: found a base or tip link, allowed only for a .urdf file")
+
+
+def test_many_digits_remarks_and_brackets_are_refused_in_their_place(network: Any) -> None:
+    (said,) = complaints(network, f"[controls.s]\nstart = {'9' * 5001}\n")
+    assert said.startswith("net.toml: not valid TOML: Exceeds the limit")
+    rest = 'kind = "revolute"\nbodies = ["ground", "b"]\n[bodies.b]\n'
+    joint = 'angle_unit = "deg"\n[controls.s]\n[joints.A]\nvalue = "{}"\n' + rest
+    (said,) = complaints(network, joint.format("s # x"))
+    assert said.startswith("net.toml:4: joints.A.value: found 's # x', no arithmetic")
+    (said,) = complaints(network, joint.format("(" * 60 + "s" + ")" * 60))
+    assert said.endswith("nested 60 deep; allowed: 50")
