@@ -278,3 +278,26 @@ def test_python_gives_the_same_as_the_command(urmpipe: Run) -> None:
     frame = api.network_solve(api.load_network("rccc"), every=True, restarts=50).to_frame()
     assert list(frame["assembly"]) == [1, 2]
     assert {"crank", "r1", "c2_1", "c2_2", "residual", "mobility"} <= set(frame.columns)
+
+
+@pytest.mark.skipif(
+    not Path("/proc/version").exists(), reason="no folder that nobody may write to is known here"
+)
+def test_a_recording_where_nobody_may_write_is_refused_in_a_line(urmpipe: Run) -> None:
+    ran = urmpipe("network", "check", "four-bar", "-o", "/proc/x.rrd")
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith("error: /proc/x.rrd: cannot be written: ")
+    assert len(ran.err.splitlines()) == 1
+
+
+def test_tables_in_python_are_a_network_too() -> None:
+    tables = {"bodies": {"b": {}}, "joints": {"A": {"kind": "revolute", "bodies": ["ground", "b"]}}}
+    checked = api.network_check(tables)
+    assert checked.mobility is not None
+    assert (checked.name, checked.structure, checked.mobility.mobility) == ("network", "tree", 1)
+    with pytest.raises(api.NetworkError) as error:
+        api.load_network({**tables, "joints": {"A": {"kind": "revolute", "bodies": ["ground", "c"]}}})
+    assert [str(one) for one in error.value.findings] == [
+        "bodies.b: nothing is tied to it; allowed: bodies with a joint or an element",
+        "joints.A.bodies: body found 'c', allowed: ground, b",
+    ]
