@@ -79,6 +79,18 @@ def closure_of(mechanism: Mechanism, x: FloatArray) -> Closure:
     return Closure(residual, jacobian)
 
 
+def scaled_closure(mechanism: Mechanism, x: FloatArray) -> Closure:
+    """Return what `closure_of` does, in lengths of the mechanism and [rad], so that m and rad compare.
+
+    Args:
+        mechanism: The network.
+        x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
+    """
+    found, rows = closure_of(mechanism, x), mechanism.row_scales[:, np.newaxis]
+    scales = (rows * mechanism.column_scales)[:, :, np.newaxis]
+    return Closure(found.residual * rows, found.jacobian * scales)
+
+
 def released(mechanism: Mechanism, x: FloatArray) -> Iterator[tuple[str, str, FloatArray]]:
     """Yield what each constraint forbids: its joint or element, its name, and what it would add to J.
 

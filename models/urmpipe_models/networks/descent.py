@@ -14,7 +14,7 @@ from urmpipe_models.inverse.iterative.small_systems import (
     product,
     transposed_product,
 )
-from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.closure import scaled_closure
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.rotations import wrapped
 
@@ -84,8 +84,8 @@ def descend(mechanism: Mechanism, x: FloatArray, free: IndexArray, *, patient: b
         gain = np.clip(gain * np.where(good, 0.125, np.where(poor, 4.0, 1.0)), *GAINS)
         found[:, rows[taken]] = moved[:, taken]
         now = new.or_else(taken, now)
-    left_over = closure_of(mechanism, found).residual * mechanism.row_scales[:, np.newaxis]
-    return Reached(found, np.abs(left_over).max(axis=0, initial=0.0))
+    left_over = np.abs(scaled_closure(mechanism, found).residual)
+    return Reached(found, left_over.max(axis=0, initial=0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,11 +108,8 @@ class _Scaled:
 
 def _scaled(mechanism: Mechanism, x: FloatArray, free: IndexArray) -> _Scaled:
     """Return residual and Jacobian at configurations, scaled."""
-    closure = closure_of(mechanism, x)
-    rows = mechanism.row_scales[:, np.newaxis]
-    columns = mechanism.column_scales[free]
-    jacobian = closure.jacobian[:, free] * (rows * columns)[:, :, np.newaxis]
-    return _Scaled(closure.residual * rows, jacobian)
+    closure = scaled_closure(mechanism, x)
+    return _Scaled(closure.residual, closure.jacobian[:, free])
 
 
 def _going(now: _Scaled, gain: FloatArray, patient: bool) -> BoolArray:

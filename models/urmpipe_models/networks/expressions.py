@@ -91,7 +91,7 @@ def _nested(text: str) -> int:
 
 
 def _refuse(node: ast.expr, text: str, depth: int) -> None:
-    """Raise a `ValueError` of what is no arithmetic, or is nested too deep."""
+    """Raise a `ValueError` if a tree holds anything but arithmetic, or is nested too deep."""
     if depth > DEEPEST:
         raise ValueError(f"found {shown(text)}, nested {depth} deep; allowed: {DEEPEST}")
     match node:

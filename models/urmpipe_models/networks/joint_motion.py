@@ -45,8 +45,8 @@ def joint_screws(joint: Joint, values: Sequence[Element], at: Transform) -> Scre
     """Return the twists of the second body against the first in the ground, one a value.
 
     Of theta: (n, p x n); of s: (0, n); of a helical joint: (n, p x n + pitch n); of the rotation vector:
-    what turns as each of its entries changes. Of an entry of m, n or a of a user joint: what T' T^-1 is
-    where that entry alone changes, of which the parts that are no rotation cancel over all entries.
+    the rotation as each entry changes. Of a user joint: the rotation and shift as each entry of m, n and a
+    changes; their sum over all entries is T' T^-1.
 
     Args:
         joint: The joint.

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IndexArray
-from urmpipe_models.networks.closure import closure_of, released
+from urmpipe_models.networks.closure import released, scaled_closure
 from urmpipe_models.networks.descent import descend
 from urmpipe_models.networks.findings import Mobility, Redundant
 from urmpipe_models.networks.idle_spins import spinning_parts
@@ -39,7 +39,7 @@ def mobility_at(mechanism: Mechanism, x: FloatArray, columns: IndexArray) -> int
         x: The variables, shape (variables,), in [m], [rad] and as controls are given.
         columns: The numbers of those that may change, shape (k,) [-].
     """
-    return len(columns) - _rank(_scaled(mechanism, x[:, np.newaxis])[:, columns, 0])
+    return len(columns) - _rank(scaled_closure(mechanism, x[:, np.newaxis]).jacobian[:, columns, 0])
 
 
 def mobility_of(mechanism: Mechanism, x: FloatArray) -> Mobility:
@@ -50,7 +50,7 @@ def mobility_of(mechanism: Mechanism, x: FloatArray) -> Mobility:
         x: The variables of an assembly, shape (variables,), in [m], [rad] and as controls are given.
     """
     variables = len(mechanism.variables)
-    jacobian = _scaled(mechanism, x[:, np.newaxis])[:, :, 0]
+    jacobian = scaled_closure(mechanism, x[:, np.newaxis]).jacobian[:, :, 0]
     rank = _rank(jacobian)
     return Mobility(
         variables,
@@ -69,18 +69,12 @@ def stuck_controls(mechanism: Mechanism, x: FloatArray) -> tuple[str, ...]:
         mechanism: The network.
         x: The variables of an assembly, shape (variables,), in [m], [rad] and as controls are given.
     """
-    ways = _null_space(_scaled(mechanism, x[:, np.newaxis])[:, :, 0])[mechanism.controls]
+    ways = _null_space(scaled_closure(mechanism, x[:, np.newaxis]).jacobian[:, :, 0])[mechanism.controls]
     stuck = []
     for k, row in enumerate(mechanism.controls):
         if _rank(ways[: k + 1], least=RANK) == _rank(ways[:k], least=RANK):
             stuck.append(mechanism.variables[row].owner)
     return tuple(stuck)
-
-
-def _scaled(mechanism: Mechanism, x: FloatArray) -> FloatArray:
-    """Return Jacobians in lengths of the mechanism and [rad], shape (rows, variables, n)."""
-    scales = mechanism.row_scales[:, np.newaxis] * mechanism.column_scales
-    return np.asarray(closure_of(mechanism, x).jacobian * scales[:, :, np.newaxis])
 
 
 def _rank(jacobian: FloatArray, least: float = 0.0) -> int:
@@ -108,7 +102,7 @@ def mobility_nearby(mechanism: Mechanism, x: FloatArray, columns: IndexArray) ->
         x: The variables of an assembly, shape (variables,), in [m], [rad] and as controls are given.
         columns: The numbers of those that may change, shape (k,) [-].
     """
-    ways = _null_space(_scaled(mechanism, x[:, np.newaxis])[:, columns, 0])
+    ways = _null_space(scaled_closure(mechanism, x[:, np.newaxis]).jacobian[:, columns, 0])
     if not ways.size:
         return 0
     steps = np.random.default_rng(0).normal(size=(ways.shape[1], PROBES))
@@ -118,7 +112,10 @@ def mobility_nearby(mechanism: Mechanism, x: FloatArray, columns: IndexArray) ->
     near = descend(mechanism, starts, columns)
     away = np.linalg.norm((near.x[columns] - x[columns, np.newaxis]) / scales, axis=0)
     there = np.flatnonzero((away > MOVED * NEARBY) & (near.gap < RANK))
-    ranks = [_rank(one) for one in _scaled(mechanism, near.x[:, there])[:, columns].transpose(2, 0, 1)]
+    ranks = [
+        _rank(one)
+        for one in scaled_closure(mechanism, near.x[:, there]).jacobian[:, columns].transpose(2, 0, 1)
+    ]
     return min((len(columns) - rank for rank in ranks), default=0)
 
 

@@ -69,8 +69,8 @@ def load_network(network: str | Path | Mapping[str, Any]) -> Network:
             such as {"joints": {"A": {"kind": "revolute", "bodies": ["ground", "crank"]}}, ...}.
 
     Raises:
-        NetworkError: If there is no such network, or with everything that is wrong with its tables; `about`
-            is the table or key, such as joints.A.n.
+        NetworkError: If there is no such network, or with everything that is wrong with its tables. A
+            finding's `about` is the table or key, such as joints.A.n.
     """
     if isinstance(network, Mapping):
         return _network(network, "network", Path())

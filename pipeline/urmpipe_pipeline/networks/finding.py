@@ -128,5 +128,5 @@ def _warnings(
         )
         yield LogWarning("special-configuration", said)
     for name in stuck_controls(mechanism, found.x_nearest):
-        said = f"control {name} cannot be moved: the network is over-driven, or locked here"
+        said = f"control {name} cannot move: there are too many controls, or it is at a dead point"
         yield LogWarning("stuck-control", said)

@@ -103,6 +103,7 @@ def _small(
     centre = np.array([left + SMALL_PX / 2.0, top + 18.0 + SMALL_PX / 2.0])
 
     def flat(points: FloatArray) -> FloatArray:
+        """Return points in [m], shape (n, 3), in pixels, shape (n, 2)."""
         return np.asarray(centre + scale * (points @ look.T - middle) * [1.0, -1.0])
 
     yield f'<text x="{left + 6:.0f}" y="{top + 12:.0f}">assembly {k + 1}</text>'

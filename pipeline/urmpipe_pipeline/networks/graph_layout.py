@@ -188,6 +188,7 @@ def _cross(one: FloatArray, other: FloatArray) -> bool:
     """Return whether two pieces of lines in pixels, shape (2, 2) each, cross."""
 
     def side(line: FloatArray, point: FloatArray) -> float:
+        """Return a number whose sign tells on which side of a line a point is."""
         (x, y), (u, v) = line[1] - line[0], point - line[0]
         return float(x * v - y * u)
 

@@ -250,6 +250,7 @@ def _element(at: Placed, element: ConstraintElement, length: float) -> Part:
     dots = (ball(p, DOT * e, at.sides), ball(q, DOT * e, at.sides))
 
     def made(where: FloatArray, *pieces: FloatArray, lines: Iterator[FloatArray] | None = None) -> Part:
+        """Return the element with its pieces and lines."""
         opacity = SEEN_THROUGH if element.kind in ("eg", "gc") else 1.0
         return Part(element.name, "element", colour, where, pieces, tuple(lines or ()), opacity)
 
