@@ -145,4 +145,4 @@ def _times(table: PoseTable) -> tuple[Column, ...]:
     layout, unused = table.plan.tables.layouts[table.plan.main], table.unused
     if layout.header is None or not unused:
         return ()
-    return time_columns(unused, layout, ReadOptions(), None)[0]
+    return time_columns(unused, layout, ReadOptions(), None, Whole(layout))[0]

@@ -86,7 +86,8 @@ def assemble(
     signs, offsets = _corrections(options, len(roles.joints))
     measured = _measured(plan, content, robot, t_ns, options)
     joints, rates, seconds, position, rotation = measured.groups
-    written = (plan.tables.layouts[column.table].number_texts(column.index) for column in roles.joints)
+    texts = (column for column in roles.joints if plan.tables.layouts[column.table].held is None)
+    written = (plan.tables.layouts[column.table].number_texts(column.index) for column in texts)
     digits, coarse = significant_digits(chain(*written)), "every joint value is written with as many"
     return JointLog(
         name=name,

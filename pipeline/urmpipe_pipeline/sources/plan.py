@@ -92,7 +92,8 @@ def make_plan(
     columns = tuple(column for column in columns if column not in beside.values())
     apart = None if options.time else time_file(tables, columns)
     if apart is None:
-        clocks = find_clocks(tables, columns, options, units, len(robot.coordinates) if robot else None)
+        joints = len(robot.coordinates) if robot else None
+        clocks = find_clocks(tables, columns, options, units, joints)
     else:
         found = clock_of_file(tables, columns, apart, units, label=options.poses)
         clocks = tuple(found if table == apart else Clock() for table in (0, 1))
@@ -133,7 +134,9 @@ def _roles(
     main = tables.layouts[only or 0]
     several = only is None and len(set(tables.paths)) > 1
     if main.header is None and not several:
-        return without_header(columns, tables.layouts, options, robot, path=options.source == PATH)
+        return without_header(
+            columns, tables.layouts, options, robot, tables.whole, path=options.source == PATH
+        )
     plots = one_plot_a_file(columns, tables.paths, robot) if several and not options.joints else None
     if plots is not None:
         return _plots(*plots, tables)
@@ -185,7 +188,8 @@ def _refuse_several_logs(
         own = [column for column in columns if column.table == i]
         try:
             if layout.header is None and joints is None:
-                count = len(without_header(own, tables.layouts, options, robot, path=False).joints)
+                found = without_header(own, tables.layouts, options, robot, tables.whole, path=False)
+                count = len(found.joints)
             else:
                 count = len(_by_names(own, tables.layouts, options, robot).joints)
         except LogError:

@@ -14,6 +14,7 @@ from urmpipe_pipeline.sources.assemble import assemble, recorded
 from urmpipe_pipeline.sources.content import Content, read_content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
+from urmpipe_pipeline.sources.tables.held import Held, fingerprint_of
 from urmpipe_pipeline.sources.tables.opening import open_tables
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.sources.units.kinematic_units import Recorded
@@ -48,26 +49,26 @@ class Reading:
 
 
 def read_numbers(
-    paths: Sequence[Path], options: ReadOptions | None = None, robot: Chain | None = None
+    files: Sequence[Path | Held], options: ReadOptions | None = None, robot: Chain | None = None
 ) -> Reading:
     """Return the numbers of a log; arguments and errors are those of `read_log`."""
     options = options or ReadOptions()
-    files = [Path(path) for path in paths]
     tables = open_tables(files, options)
     with ThreadPoolExecutor(max_workers=1) as beside:
-        hashed = [beside.submit(fingerprint, file) for file in files]
+        hashed = [beside.submit(_fingerprint, file) for file in files]
         plan = make_plan(tables, options, robot)
         content = read_content(plan, skip_bad=options.skip_bad)
         return Reading(plan, content, options, _name(files), tuple(future.result() for future in hashed))
 
 
 def read_log(
-    paths: Sequence[Path], options: ReadOptions | None = None, robot: Chain | None = None
+    files: Sequence[Path | Held], options: ReadOptions | None = None, robot: Chain | None = None
 ) -> JointLog:
     """Return a log as its files have it, in SI.
 
     Args:
-        paths: The log's file; several if its source writes one a plot (SolidWorks), joined on their times.
+        files: The log's file, or a table in memory; several if its source writes one a plot (SolidWorks),
+            joined on their times.
         options: What the user says where the files need not, or cannot, tell.
         robot: The arm: it tells how many joints there are, their names, and which of them slide.
 
@@ -75,12 +76,15 @@ def read_log(
         LogError: With everything that is wrong with the files, each with its file, line and column.
         OptionError: If an option's value makes no sense.
     """
-    return read_numbers(paths, options, robot).log(robot)
+    return read_numbers(files, options, robot).log(robot)
 
 
-def _name(files: Sequence[Path]) -> str:
+def _fingerprint(file: Path | Held) -> SourceFile:
+    return fingerprint_of(file) if isinstance(file, Held) else fingerprint(file)
+
+
+def _name(files: Sequence[Path | Held]) -> str:
     """Return the stem of the only file, or what the stems of several share at their beginning."""
-    if len(files) == 1:
-        return files[0].stem
-    shared = os.path.commonprefix([file.stem for file in files])  # noqa: RUF071 (stems, not paths)
-    return shared.strip(" _-.,()[]#") or files[0].stem
+    stems = [file.name if isinstance(file, Held) else file.stem for file in files]
+    shared = os.path.commonprefix(stems)  # noqa: RUF071 (stems, not paths)
+    return stems[0] if len(stems) == 1 else shared.strip(" _-.,()[]#") or stems[0]

@@ -115,7 +115,7 @@ def find_clocks(
     clocks = []
     for table, layout in enumerate(tables.layouts):
         own = [column for column in columns if column.table == table]
-        chosen = time_columns(own, layout, options, joints)
+        chosen = time_columns(own, layout, options, joints, tables.whole[table])
         clocks.append(clock_of(*chosen, layout, tables.known, units, label=options.poses))
     return tuple(clocks)
 

@@ -17,6 +17,7 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 _EVEN = 0.01  # steps of a clock in a file without header differ by less than this share
@@ -24,7 +25,11 @@ _FEW = 0.02  # share of its steps that a damaged clock may have otherwise
 
 
 def time_columns(
-    columns: Sequence[Column], layout: Layout, options: ReadOptions, joints: int | None
+    columns: Sequence[Column],
+    layout: Layout,
+    options: ReadOptions,
+    joints: int | None,
+    whole: Whole,
 ) -> tuple[tuple[Column, ...], str]:
     """Return the columns that hold the time, and why; none if there is no time.
 

@@ -48,7 +48,7 @@ def clock_of_file(
             other = tables.layouts[column.table]
             hints = (Hint("time", None, "says which column"),)
             message, file = f"found a time here and in {title}, allowed: one clock", other.file
-            raise LogError(Finding(message, file, other.header, column=column.header, hints=hints))
+            raise LogError(Finding(message, file, other.header_line, column=column.header, hints=hints))
     own = tuple(column for column in columns if column.table == index)
     form = "one row" if layout.across else "one column"
     found = clock_of(

@@ -205,7 +205,7 @@ def refuse_twins(
         if twins:
             numbers = ", ".join(str(n) for n in sorted(c.number for c in (column, *twins)))
             layout, said = layouts[column.table], f"found as columns {numbers}, allowed: once"
-            place = (layout.file, layout.header, None, column.header)
+            place = (layout.file, layout.header_line, None, column.header)
             findings.append(Finding(said, *place, hints=(remedy,)))
     if findings:
         raise LogError(*findings)

@@ -35,6 +35,7 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.vocabulary import split_unit
 
 GIVEN = "given as an option"
@@ -48,6 +49,7 @@ def without_header(
     layouts: Sequence[Layout],
     options: ReadOptions,
     robot: Chain | None,
+    whole: Sequence[Whole],
     *,
     path: bool,
 ) -> Roles:
@@ -61,6 +63,7 @@ def without_header(
         layouts: All tables; the columns are of one.
         options: What the user says: joint columns, position, orientation.
         robot: The arm; without one every column is a joint.
+        whole: All numbers of each table.
         path: The user says that it is a path: the columns are x, y, z, and an orientation behind them.
 
     Raises:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
@@ -14,10 +14,13 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables import coppeliasim
 from urmpipe_pipeline.sources.tables.arrays import sniff_arrays
 from urmpipe_pipeline.sources.tables.conflict import refuse_among_rows, refuse_conflict
+from urmpipe_pipeline.sources.tables.held import Held, layout_of
 from urmpipe_pipeline.sources.tables.labels import sniff_labels
 from urmpipe_pipeline.sources.tables.ros2 import with_names
 from urmpipe_pipeline.sources.tables.sniff import Layout, across, sniff
 from urmpipe_pipeline.sources.tables.text import Segment, open_text
+from urmpipe_pipeline.sources.tables.typed_files import read_typed
+from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.vocabulary import KnownSource, vocabulary
 
 COPPELIASIM, PATH, TABLE = "coppeliasim", "path", "table"
@@ -39,6 +42,7 @@ class Tables:
         titles: Title of each table: the file's stem, or the graph's path.
         inferences: What was found out.
         foreign: Whether its source was given, and has columns or graphs of its own, which are not there.
+        whole: All numbers of each table, for what the first rows do not prove.
     """
 
     source: str
@@ -47,6 +51,7 @@ class Tables:
     titles: tuple[str, ...]
     inferences: tuple[Inference, ...]
     foreign: bool = False
+    whole: tuple[Whole, ...] = ()
 
     @property
     def paths(self) -> list[Path]:
@@ -58,8 +63,8 @@ Sniff: TypeAlias = Callable[[Segment, str | None, str | None], Layout]
 """What finds out how a plain table is written, with delimiter and decimal sign as options give them."""
 
 
-def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff = sniff) -> Tables:
-    """Return the tables of a log's files.
+def open_tables(files: Sequence[Path | Held], options: ReadOptions, sniff_plain: Sniff = sniff) -> Tables:
+    """Return the tables of a log's files, or of what is in memory.
 
     Raises:
         LogError: If a file is no text table, or holds a merge conflict; all files are looked at first.
@@ -70,15 +75,24 @@ def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff 
     if options.source is not None and options.source not in source_names():
         found, allowed = shown(options.source), ", ".join(source_names())
         raise OptionError(Finding(parameter="source", found=found, allowed=allowed))
-    segments = for_each(lambda path: open_text(path, any_suffix=options.source is not None), files)
-    markers = for_each(refuse_conflict, segments)
-    titled = [(file.stem, segment) for file, segment in zip(files, segments, strict=True)]
-    forced, graphs = options.source == COPPELIASIM, []
-    if len(files) == 1 and (forced or (options.source is None and coppeliasim.is_export(segments[0]))):
-        graphs = coppeliasim.graphs(segments[0])
-        titled, forced = graphs or titled, True
+    opened = for_each(lambda one: _opened(one, options), files)
+    texts = [one for one in opened if isinstance(one, Segment)]
+    markers = for_each(refuse_conflict, texts)
+    titled = [
+        (file.stem if isinstance(file, Path) else file.name, one)
+        for file, one in zip(files, opened, strict=True)
+    ]
+    forced, graphs = options.source == COPPELIASIM, list[tuple[str, Segment]]()
+    if len(texts) == len(files) == 1 and (
+        forced or (options.source is None and coppeliasim.is_export(texts[0]))
+    ):
+        graphs = coppeliasim.graphs(texts[0])
+        titled, forced = [*graphs] or titled, True
     layouts = for_each(lambda item: _layout(item[1], options, sniff_plain), titled)
-    for_each(lambda table: refuse_among_rows(*table), zip(layouts, markers, strict=False))
+    for_each(
+        lambda table: refuse_among_rows(*table),
+        zip([layout for layout in layouts if layout.held is None], markers, strict=False),
+    )
     if len(files) > 1:
         layouts = [across(layout) for layout in layouts]
     titles = tuple(title for title, _ in titled)
@@ -86,19 +100,34 @@ def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff 
     known, why = _known(names, options.source, titles if forced else ())
     name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
     said = Inference("source", name, why, hints=(Hint("source"),))
-    mark = "byte order mark" if segments[0].start else "its bytes"
-    utf_8 = (Hint("", does="save the file as UTF-8"),)
-    encoding = Inference("encoding", segments[0].encoding, mark, hints=utf_8)
     foreign = known is not None and bool(known.columns) and not known.wrote(names)
     foreign = not graphs if options.source == COPPELIASIM else foreign
-    return Tables(name, known, tuple(layouts), titles, (encoding, said), foreign)
+    said_of_all, whole = (*_encoding(texts[:1]), said), tuple(map(Whole, layouts))
+    return Tables(name, known, tuple(layouts), titles, said_of_all, foreign, whole)
 
 
-def _layout(segment: Segment, options: ReadOptions, sniff_plain: Sniff) -> Layout:
+def _opened(one: Path | Held, options: ReadOptions) -> Segment | Held:
+    """Return a table as it is in memory, a file of typed columns read, any other as text."""
+    if isinstance(one, Held):
+        return one
+    return read_typed(one) or open_text(one, any_suffix=options.source is not None)
+
+
+def _encoding(texts: Sequence[Segment]) -> Iterator[Inference]:
+    """Yield the encoding of a text."""
+    for text in texts:
+        mark = "byte order mark" if text.start else "its bytes"
+        utf_8 = (Hint("", does="save the file as UTF-8"),)
+        yield Inference("encoding", text.encoding, mark, hints=utf_8)
+
+
+def _layout(one: Segment | Held, options: ReadOptions, sniff_plain: Sniff) -> Layout:
     """Return how a table is written: rows with labels, with arrays in their cells, or plain ones."""
+    if isinstance(one, Held):
+        return layout_of(one)
     given = options.delimiter, options.decimal
-    found = None if options.delimiter else sniff_labels(segment)
-    return found or sniff_arrays(segment, *given) or with_names(sniff_plain(segment, *given))
+    found = None if options.delimiter else sniff_labels(one)
+    return found or sniff_arrays(one, *given) or with_names(sniff_plain(one, *given))
 
 
 def _known(names: Sequence[str], given: str | None, graphs: Sequence[str]) -> tuple[KnownSource | None, str]:

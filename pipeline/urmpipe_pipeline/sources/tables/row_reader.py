@@ -44,7 +44,9 @@ MAY_BE_MISSING = "a number, or an empty, Null or NaN cell where a sample is miss
 
 
 def lines_of_rows(layout: Layout, rows: Sequence[int]) -> dict[int, int]:
-    """Return the line of the file of some data rows, both counted from 1."""
+    """Return the line of the file of some data rows, both counted from 1; none of a table in memory."""
+    if layout.held is not None:
+        return {}
     numbered = enumerate(data_lines(layout, layout.segment.lines()), start=1)
     wanted = set(rows)
     return {row: line for row, (line, _) in islice(numbered, max(rows, default=0)) if row in wanted}

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_models.messages import Hint
@@ -73,6 +74,7 @@ class Layout:
         inferences: What was found out.
         form: How its rows become rows of plain cells, if they hold arrays or labels.
         across: Whether the rows of its only column stand side by side in one line.
+        held: The Arrow table that it is, where it is no text: then it has no lines.
     """
 
     segment: Segment
@@ -87,6 +89,12 @@ class Layout:
     inferences: tuple[Inference, ...]
     form: Form | None = None
     across: bool = False
+    held: Any = None
+
+    @property
+    def header_line(self) -> int | None:
+        """Line of the header for messages; None without one, and of a table in memory."""
+        return self.header if self.held is None else None
 
     @property
     def file(self) -> str:
@@ -95,7 +103,8 @@ class Layout:
 
     def error(self, message: str, column: str | None, *hints: Hint) -> LogError:
         """Return an error about its first row, or a column there."""
-        return LogError(Finding(message, self.file, self.first_line, 1, column, hints=hints))
+        line = self.first_line if self.held is None else None
+        return LogError(Finding(message, self.file, line, 1, column, hints=hints))
 
     def cells(self, column: int) -> list[str]:
         """Return the sampled cells of a column."""

@@ -11,6 +11,7 @@ from urmpipe_models.arrays import IntArray
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.tables.block_parser import Scales, clock_scales, parse_block
 from urmpipe_pipeline.sources.tables.blocks import byte_encoding, end_of_rows, row_blocks
+from urmpipe_pipeline.sources.tables.held import read_held
 from urmpipe_pipeline.sources.tables.numbers import ClockColumn, Numbers
 from urmpipe_pipeline.sources.tables.row_reader import RowReader
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -31,6 +32,8 @@ def read_table(
     comments. The values of the clock in [ns] are added; if they are text, their cells are read as they are.
     What a cell may hold is told as in a log, or by its column in other words.
     """
+    if layout.held is not None:
+        return read_held(layout, columns, clock)
     reader = RowReader(layout, columns, clock, allowed)
     scales = clock_scales(layout, clock)
     parts = [part for block in row_blocks(layout) for part in _parts(reader, block, scales)]

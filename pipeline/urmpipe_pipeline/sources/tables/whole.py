@@ -1,0 +1,54 @@
+"""All numbers of a table, for what its first rows cannot prove: read once, when they are first looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from urmpipe_models.arrays import BoolArray, FloatArray
+from urmpipe_pipeline.sources.cells.cell import is_missing, is_text
+from urmpipe_pipeline.sources.tables.numbers import Numbers
+from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.tables.table import read_table
+
+
+class Whole:
+    """All rows of a table.
+
+    Args:
+        layout: How it is written.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        self.layout = layout
+
+    @cached_property
+    def columns(self) -> tuple[int, ...]:
+        """The columns that hold numbers, by their sampled cells."""
+        layout = self.layout
+
+        def holds(column: int) -> bool:
+            cells = [cell for cell in layout.cells(column) if not is_missing(cell)]
+            return 2 * sum(is_text(cell, layout.decimal) for cell in cells) <= len(cells) and bool(cells)
+
+        return tuple(column for column in range(len(layout.names)) if holds(column))
+
+    @cached_property
+    def numbers(self) -> Numbers:
+        """Their numbers in the file's own units, shape (n, columns), with what is wrong with them."""
+        return read_table(self.layout, self.columns, ())
+
+    def values(self, columns: Sequence[int]) -> FloatArray:
+        """Return some of them, shape (n, columns); NaN where a cell or a row is missing or wrong."""
+        places = [self.columns.index(column) for column in columns]
+        return self.numbers.values[:, places]
+
+    @cached_property
+    def increasing(self) -> BoolArray:
+        """Which columns of numbers increase from each row to the next, over two rows or more, shape (c,)."""
+        values = self.numbers.values
+        if len(values) < 2:
+            return np.zeros(len(self.columns), dtype=bool)
+        return np.asarray((np.diff(values, axis=0) > 0).all(axis=0))
