@@ -19,6 +19,7 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.text import fingerprint
+from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.targets.pose_table import PoseTable, read_pose_table
 from urmpipe_pipeline.sources.targets.row_faults import ExtraColumn
 from urmpipe_pipeline.sources.vocabulary import vocabulary
