@@ -109,14 +109,19 @@ def test_epoch_in_seconds(arm: Arm) -> None:
         read_log([path], robot=arm(6))
 
 
-def test_no_header_and_more_columns_than_joints(arm: Arm) -> None:
+@pytest.mark.parametrize("joints", [6, None])
+def test_twelve_columns_without_a_header_are_asked_about(arm: Arm, joints: int | None) -> None:
     path = LOGS / "unitree-z1-noheader" / "joint_states.csv"
-    log = read_log([path], robot=arm(6))
+    robot = arm(joints) if joints else None
+    with pytest.raises(LogError, match="found 12 columns that no header names") as asked:
+        read_log([path], robot=robot)
+    answer = asked.value.findings[0].hints[0].value
+    assert answer == ["1", "2", "3", "4", "5", "6"]
+    log = read_log([path], ReadOptions(joints=answer), robot)
     assert log.q.shape == (2099, 6)
     assert log.q[0, 1] == 0.7844660375193842
     assert (log.first_line, log.period) == (1, 0.005)
-    assert kinds(log.warnings) == ["assumed-period", "columns-not-used", "assumed-unit"]
-    assert read_log([path]).q.shape == (2099, 12)
+    assert kinds(log.warnings) == ["assumed-period", "assumed-unit"]
 
 
 @pytest.mark.parametrize(

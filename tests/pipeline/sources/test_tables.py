@@ -12,6 +12,7 @@ import pyarrow.csv
 import pytest
 
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import read_log, source_names
 
@@ -191,15 +192,19 @@ def test_whole_numbers_are_not_taken_for_decimals(read: Read) -> None:
 def test_without_header_the_columns_are_joints(read: Read, arm: Arm) -> None:
     text = "0.1,0.2,0.3,0.4\n0.05,0.1,0.5,0.7\n"
     assert read(text).joints == ("q1", "q2", "q3", "q4")
-    log = read(text, arm(3))
+    assert read(text, arm(4)).first_line == 1
+
+
+def test_more_columns_without_names_than_joints_are_asked_about(read: Read, arm: Arm) -> None:
+    text = "0.1,0.2,0.3,0.4\n0.05,0.1,0.5,0.7\n"
+    with pytest.raises(LogError, match="found 4 columns that no header names") as asked:
+        read(text, arm(3))
+    answers = [hint.value for hint in asked.value.findings[0].hints]
+    assert answers == [["1", "2", "3"], ["2", "3", "4"], None]
+    log = read(text, arm(3), joints=answers[0])
     assert log.joints == ("phi1", "phi2", "phi3")
     assert log.q.tolist() == [[0.1, 0.2, 0.3], [0.05, 0.1, 0.5]]
     assert found(log, "columns not used") == "4"
-    assert log.first_line == 1
-    assert [warning.kind for warning in log.warnings] == [
-        "assumed-period", "columns-not-used", "assumed-unit",
-    ]  # fmt: skip
-    assert log.warnings[1].message == ("4 columns without names, and arm has 3 joints: column 4 is left out")
 
 
 @pytest.mark.parametrize(
@@ -222,7 +227,7 @@ def test_without_header_a_first_column_that_may_be_a_time_is_asked_for(
     others = text.partition("\n")[0].count(",")
     assert read(text, robot, time="1").q.shape[1] == others
     assert read(text, robot, joints=[str(k + 2) for k in range(others)]).q[0, 0] == 0.5
-    assert read(text, arm(1), time="none").q[:, 0].tolist() == first
+    assert read(text, time="none").q[:, 0].tolist() == first
 
 
 def test_without_header_a_first_column_in_even_steps_is_the_time(read: Read, arm: Arm) -> None:

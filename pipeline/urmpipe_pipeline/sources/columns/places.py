@@ -12,6 +12,7 @@ from urmpipe_models.errors import Finding, LogError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import width
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS, proved_blocks
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.pose import (
     Pose,
@@ -21,9 +22,8 @@ from urmpipe_pipeline.sources.columns.pose import (
     trailing_quaternion,
     with_form,
 )
+from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, which_joints
 from urmpipe_pipeline.sources.columns.roles import (
-    NAME_JOINTS,
-    OTHER_ROBOT,
     Roles,
     about_pose,
     check_count,
@@ -40,6 +40,9 @@ from urmpipe_pipeline.sources.vocabulary import split_unit
 
 GIVEN = "given as an option"
 """The evidence for columns that the user named."""
+
+USUAL = 6
+"""Joints that most arms have."""
 
 NO_HEADER = "no header tells what they are"
 
@@ -91,10 +94,43 @@ def without_header(
     used = (*pose.position, *pose.rotation)
     start = min(map(columns.index, used)) if behind else len(columns)
     free = [column for column in columns[:start] if column not in used]
-    joints = tuple(free[: len(robot.coordinates)] if robot else free)
+    joints, rates, evidence = _joints_among(free, layout, whole[free[0].table] if free else None, robot)
     check_count(joints, file, robot)
-    many = ", as many as the robot has" if robot else ""
-    return _by_place(joints, columns, robot, f"no header: joints in order{many}", pose)
+    return _by_place(joints, columns, robot, evidence, pose, rates)
+
+
+def _joints_among(
+    free: Sequence[Column], layout: Layout, whole: Whole | None, robot: Chain | None
+) -> tuple[tuple[Column, ...], tuple[Column, ...], str]:
+    """Return the joints among columns without names, their rates, and why.
+
+    They are all columns, if these are as many as the robot has joints; those whose rates stand beside them;
+    without a robot all of a few columns.
+
+    Raises:
+        LogError: With the question which they are, if none of that holds.
+    """
+    count = len(robot.coordinates) if robot else None
+    if whole is None or (count is not None and len(free) <= count):
+        return tuple(free), (), f"no header: joints in order{', as many as the robot has' if robot else ''}"
+    blocks = proved_blocks(whole.values([column.index for column in free]), count)
+    if len(blocks) == 1:
+        joints, rates = (tuple(free[k] for k in some) for some in (blocks[0].joints, blocks[0].rates))
+        alike = f"steps and rates correlate by {blocks[0].correlation:.3g}"
+        return joints, rates, f"columns {listed(rates)} are their rates: {alike}"
+    if not blocks and count is None and len(free) <= MOST_JOINTS:
+        return tuple(free), (), "no header: joints in order"
+    groups = [[free[k] for k in block.joints] for block in blocks] or _parts(free, count)
+    need = f", and robot {robot.name} has {count} joints" if robot else ""
+    raise which_joints(layout, f"{len(free)} columns that no header names{need}", groups)
+
+
+def _parts(free: Sequence[Column], count: int | None) -> list[Sequence[Column]]:
+    """Return the columns that may be joints where nothing tells: the first and the last, or all."""
+    if count:
+        return [free[:count], free[-count:]]
+    half = len(free) // 2
+    return [*([free[:half]] if len(free) == 2 * half else []), free[:USUAL], free]
 
 
 def _path_by_place(
@@ -196,22 +232,18 @@ def _only_numbers_differ(names: Sequence[str]) -> list[int] | None:
 
 
 def _by_place(
-    joints: Sequence[Column], columns: Sequence[Column], robot: Chain | None, evidence: str, pose: Pose | None
+    joints: Sequence[Column],
+    columns: Sequence[Column],
+    robot: Chain | None,
+    evidence: str,
+    pose: Pose | None,
+    rates: tuple[Column, ...] = (),
 ) -> Roles:
-    """Return joints that are named by the robot, or q1, q2, ..., and the pose beside them."""
+    """Return joints that are named by the robot, or q1, q2, ..., their rates, and the pose beside them."""
     pose = pose or Pose()
-    rest = [column for column in columns if column not in (*joints, *pose.position, *pose.rotation)]
+    rest = [column for column in columns if column not in (*joints, *rates, *pose.position, *pose.rotation)]
     said = [joint_inference(joints, evidence), *about_pose(pose), *not_used(rest, NO_HEADER)]
-    warnings = (_about_rest(robot, joints, rest),) if robot and rest and evidence != GIVEN else ()
     names = robot.coordinates if robot else [f"q{k + 1}" for k in range(len(joints))]
     named = tuple(replace(column, name=name) for column, name in zip(joints, names, strict=True))
     place = pose.position, pose.rotation, pose.forms
-    return Roles(named, (), (), *place, tuple(said), warnings, pose.measured)
-
-
-def _about_rest(robot: Chain, joints: Sequence[Column], rest: Sequence[Column]) -> LogWarning:
-    """Say that a table has more columns than the robot has joints, and no header that tells them apart."""
-    count = f"{len(joints) + len(rest)} columns without names, and {robot.name} has {len(joints)} joints"
-    which = f"column {listed(rest)} is" if len(rest) == 1 else f"columns {listed(rest, most=8)} are"
-    hints = (OTHER_ROBOT, NAME_JOINTS)
-    return LogWarning("columns-not-used", f"{count}: {which} left out", hints=hints)
+    return Roles(named, rates, (), *place, tuple(said), (), pose.measured)

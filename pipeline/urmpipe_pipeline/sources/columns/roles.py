@@ -14,12 +14,12 @@ from urmpipe_pipeline.sources.cells.cell import grouped_number
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.families import families, measured
 from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, with_form
+from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS
 from urmpipe_pipeline.sources.columns.tcp_like import about_odd_rows, about_tcp
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import key, vocabulary
 
-NAME_JOINTS = Hint("joints", None, "names the joint columns, in the robot's order")
 RECORD = Hint("", does="record the missing one")
 OTHER_ROBOT = Hint("robot", None, "gives another arm")
 

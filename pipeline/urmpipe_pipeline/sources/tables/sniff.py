@@ -21,15 +21,14 @@ from urmpipe_pipeline.sources.cells.cell import (
     is_number,
     is_text,
     plain,
-    printable,
     split_line,
     to_float,
 )
 from urmpipe_pipeline.sources.cells.text_clock import looks_like_a_clock
 from urmpipe_pipeline.sources.tables.form import Form
+from urmpipe_pipeline.sources.tables.header_lines import header_of, numbered
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.text import HEAD_BYTES, HeadLine, Segment, head_lines
-from urmpipe_pipeline.sources.vocabulary import vocabulary
 from urmpipe_pipeline.text import counted
 
 LEAST_FIT = 0.2
@@ -46,10 +45,6 @@ SAMPLED_LINES = 250
 
 _NAMES = {",": "comma", ";": "semicolon", "\t": "tab", SPACE: "spaces", "|": "bar", ".": "point"}
 _SIGNS = {name: sign for sign, name in _NAMES.items()} | {"\\t": "\t", "space": SPACE, "pipe": "|"}
-
-_UNIT = r"(?:[^\])\d]|(?<=[sm^])[23]|1(?=/))*"
-_BRACKETED = re.compile(rf"\[{_UNIT}\]|\({_UNIT}\)")
-"""A unit in brackets, such as [rad/s^2] or (1/min); with another number it is an index."""
 
 _TOLD = re.compile(r'"?sep=([,;|\t])"?', re.IGNORECASE)
 
@@ -163,7 +158,9 @@ def sniff(
         raise LogError(_no_rows(segment, body, {what: sign for what, sign in given.items() if sign}))
     _refuse_prose(segment, body[first:], [len(row) for row in rows[first:]], width)
     before = [line for line in lines if line.number < body[first].number]
-    header, units = _header(before, style.delimiter, width)
+    if before and first + 1 < len(rows) and numbered(before[-1], rows[first], style.delimiter):
+        before, first = [*before, body[first]], first + 1
+    header, units = header_of(before, style.delimiter, width)
     names, said = _names(segment, header, body[first:], rows[first:], width)
     return Layout(
         segment=segment,
@@ -299,38 +296,6 @@ def _is_numbered_header(rows: Sequence[Row], i: int, numbers: Sequence[str]) -> 
         return False
     others = len(rows[0]) - len(numbers)
     return others <= 1 and not any(cell.isdigit() for cell in rows[1][others:])
-
-
-def _header(before: Sequence[HeadLine], delimiter: str, width: int) -> tuple[tuple[int, Row] | None, Row]:
-    """Return line and cells of the header, and the cells of a line of units between it and the data."""
-    units: Row = []
-    split = [_header_cells(line.text, delimiter, width) for line in before]
-    for at in reversed(range(len(before))):
-        line, cells = before[at], split[at]
-        if abs(len(cells) - width) > 1 and (line.is_comment or len(cells) == 1):
-            continue  # a comment or a title
-        if not units and at > 0 and _all_units(cells, split[:at]):
-            units = cells
-            continue
-        return (line.number, [printable(cell) for cell in cells]), units
-    return None, units
-
-
-def _header_cells(text: str, delimiter: str, width: int) -> Row:
-    """Split a header line, with its own delimiter if only that gives a name a column (numpy.savetxt)."""
-    text = text.strip(" " if delimiter == "\t" else None)  # a tab before the first name: an unnamed index
-    for comment in ("#", "//", "% "):
-        text = text.removeprefix(comment)
-    tried = [split_line(text, sign) for sign in (delimiter, *DELIMITERS)]
-    return next((cells for cells in tried if len(cells) == width), tried[0])
-
-
-def _all_units(cells: Row, above: Sequence[Row]) -> bool:
-    """Return whether a line holds units alone: known ones, or any in brackets below a line of names."""
-    words = [cell.strip("[]() ") for cell in cells]
-    bracketed = all(_BRACKETED.fullmatch(cell.strip()) for cell in cells if cell.strip())
-    named = bracketed and any(len(row) == len(cells) for row in above)
-    return any(words) and (named or all(not word or vocabulary().unit(word) for word in words))
 
 
 def _names(

@@ -1,0 +1,180 @@
+"""Blocks of columns without names: which are joints and which their rates, proved by the numbers.
+
+A column v is the rate of a column q if q goes on as v says. With the rows h apart, by the trapezoidal rule,
+
+    q[k + 1] - q[k] = h (v[k] + v[k + 1]) / 2 + O(h^3),
+
+so that the steps of q and the means of v are proportional, with one h for all joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.arrays import BoolArray, FloatArray
+
+CORRELATED = 0.9
+"""Steps and rates of one joint correlate so: of measured rates 0.97 was seen, of torques and speeds less."""
+
+ONE_PERIOD = 0.15
+"""The periods that the joints of a block tell differ by this share of their median at the most."""
+
+RESTS = 0.05
+"""A joint whose steps are smaller than this share of the largest of its block proves nothing: noise."""
+
+ALIKE = 0.005
+"""Blocks whose correlations differ by less are not told apart; of the others the better is right."""
+
+MOST_JOINTS = 8
+"""Joints that an arm has, where nobody tells how many."""
+
+OUTLYING = 8.0
+"""Steps this many times larger than nine in ten are wraps and faults, no motion."""
+
+LEAST_ROWS = 20
+"""Fewer rows prove nothing."""
+
+MOST_ROWS = 50_000
+"""Pairs of rows, spread evenly, that decide."""
+
+SURE = 0.99
+"""Where steps and rates correlate so, the period that they tell is exact to a percent."""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Joints beside their rates.
+
+    Attributes:
+        joints: Columns of the joints, by index.
+        rates: Columns of their rates.
+        period: Time between rows in units of value over rate: in [s] if these are rad and rad/s.
+        correlation: Median correlation of steps and rates.
+    """
+
+    joints: range
+    rates: range
+    period: float
+    correlation: float
+
+
+def proved_blocks(values: FloatArray, count: int | None) -> list[Block]:
+    """Return the blocks of joints whose rates stand beside them, by their numbers; the largest.
+
+    Their columns are adjacent, as in [q, qd] and [tau, q, qd], or every second or third, as in q1, qd1, q2,
+    qd2. Columns that have rates and are themselves the rates of others are no joints: [q, qd, qdd].
+
+    Args:
+        values: The columns in the file's own units, shape (n, columns); NaN where a sample is missing.
+        count: How many joints the arm has; None where nobody tells.
+    """
+    evidence = _Evidence.of(values)
+    columns = values.shape[1]
+    if evidence is None or columns < 2:
+        return []
+    sizes = [count] if count else range(min(MOST_JOINTS, columns // 2), 1 if columns == 4 else 2, -1)
+    for size in sizes:
+        tried = (evidence.block(*ranges) for ranges in _pairs_of_ranges(columns, size))
+        proved = [block for block in tried if block and not evidence.of_rates(block)]
+        proved = [one for one in proved if count or one.joints.step > 1 or one.joints.start % size == 0]
+        if proved:
+            best = max(block.correlation for block in proved)
+            return [block for block in proved if block.correlation >= best - ALIKE]
+    return []
+
+
+def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
+    """Return the time between rows that joints and their rates tell, and how well they correlate.
+
+    It is in [s] if the joints are in [rad] or [m] and the rates in [rad/s] or [m/s], both of shape (n,
+    joints); None where nothing moves, or the two do not agree.
+    """
+    joints = q.shape[1]
+    evidence = _Evidence.of(np.hstack([q, rates]))
+    block = evidence and evidence.block(range(joints), range(joints, 2 * joints))
+    return (block.period, block.correlation) if block else None
+
+
+def _pairs_of_ranges(columns: int, size: int) -> Iterator[tuple[range, range]]:
+    """Yield where so many joints and their rates may stand among columns: in two blocks, or in turns."""
+    for start in range(columns - size + 1):
+        joints = range(start, start + size)
+        for other in range(columns - size + 1):
+            if abs(other - start) >= size:
+                yield joints, range(other, other + size)
+    for step in range(2, columns // size + 1):
+        for start in range(columns - (size - 1) * step):
+            first = range(start, start + (size - 1) * step + 1, step)
+            for shift in range(1 - step, step):
+                end = start + shift + (size - 1) * step
+                if shift and start + shift >= 0 and end < columns:
+                    yield first, range(start + shift, end + 1, step)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Evidence:
+    """How columns go on as others say: of each pair, first the column that steps, shape (columns, columns).
+
+    Attributes:
+        correlation: Of the steps of the one and the means of the other [-].
+        period: Their ratio: steps = period * means, by least squares.
+        size: Root mean square of the steps of each column, in the file's own unit, shape (columns,).
+    """
+
+    correlation: FloatArray
+    period: FloatArray
+    size: FloatArray
+
+    @classmethod
+    def of(cls, values: FloatArray) -> _Evidence | None:
+        """Return what columns of shape (n, columns) tell; None where there are too few rows."""
+        steps, means = _steps_and_means(values)
+        if len(steps) < LEAST_ROWS:
+            return None
+        moves = _in_motion(steps)
+        clean = np.where(moves, steps, 0.0)
+        cross, rates = clean.T @ means, moves.T.astype(np.float64) @ means**2
+        size = np.sqrt((clean**2).sum(axis=0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            correlation, period = cross / (size[:, np.newaxis] * np.sqrt(rates)), cross / rates
+        return cls(np.nan_to_num(correlation), np.nan_to_num(period), size)
+
+    def block(self, joints: range, rates: range) -> Block | None:
+        """Return joints and their rates as a block if all that move agree, with one period; else None."""
+        q, v = np.array(joints), np.array(rates)
+        moved = self.size[q] > RESTS * self.size[q].max()
+        if np.count_nonzero(moved) < min(2, len(q)) or (self.correlation[q, v][moved] < CORRELATED).any():
+            return None
+        periods = self.period[q, v][moved]
+        usual = float(np.median(periods))
+        if (np.abs(periods - usual) > ONE_PERIOD * usual).any():
+            return None
+        return Block(joints, rates, usual, float(np.median(self.correlation[q, v][moved])))
+
+    def of_rates(self, block: Block) -> bool:
+        """Return whether a joint of a block is the rate of another column, as far away as its own rate."""
+        shift = block.rates.start - block.joints.start
+        before = [(joint - shift, joint) for joint in block.joints if 0 <= joint - shift < len(self.size)]
+        return any(
+            self.correlation[pair] >= CORRELATED
+            and abs(self.period[pair] - block.period) <= ONE_PERIOD * block.period
+            for pair in before
+        )
+
+
+def _steps_and_means(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return steps from row to row and the means of both rows, shape (k, columns), where all are known."""
+    before = np.linspace(0, len(values) - 2, min(MOST_ROWS, max(len(values) - 1, 0))).astype(np.int64)
+    first, second = values[before], values[before + 1] if len(before) else values[:0]
+    known = np.isfinite(first).all(axis=1) & np.isfinite(second).all(axis=1)
+    return (second - first)[known], ((first + second) / 2)[known]
+
+
+def _in_motion(steps: FloatArray) -> BoolArray:
+    """Return which steps are no wraps or faults, shape (k, columns)."""
+    size = np.abs(steps)
+    usual = np.sort(size, axis=0)[int(0.9 * (len(size) - 1))]
+    return np.asarray(size <= OUTLYING * np.where(usual > 0.0, usual, np.inf))

@@ -1,0 +1,90 @@
+"""The lines above the numbers: names of the columns, groups over them, and their units."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from itertools import groupby, pairwise
+
+from urmpipe_pipeline.sources.cells.cell import DELIMITERS, count_up, printable, split_line
+from urmpipe_pipeline.sources.tables.text import HeadLine
+from urmpipe_pipeline.sources.vocabulary import vocabulary
+
+_UNIT = r"(?:[^\])\d]|(?<=[sm^])[23]|1(?=/))*"
+_BRACKETED = re.compile(rf"\[{_UNIT}\]|\({_UNIT}\)")
+"""A unit in brackets, such as [rad/s^2] or (1/min); with another number it is an index."""
+
+Row = list[str]
+
+
+def header_of(before: Sequence[HeadLine], delimiter: str, width: int) -> tuple[tuple[int, Row] | None, Row]:
+    """Return line and names of the header, and the cells of a line of units between it and the data.
+
+    Where names repeat and the line above has groups that tell them apart, as Position and Velocity do over
+    the names of joints, a name is GROUP/NAME.
+    """
+    units: Row = []
+    split = [_header_cells(line.text, delimiter, width) for line in before]
+    for at in reversed(range(len(before))):
+        line, cells = before[at], split[at]
+        if abs(len(cells) - width) > 1 and (line.is_comment or len(cells) == 1):
+            continue  # a comment or a title
+        if not units and at > 0 and _all_units(cells, split[:at]):
+            units = cells
+            continue
+        above = split[at - 1] if at else []
+        names = _grouped(cells, above) if abs(len(above) - len(cells)) <= 1 else cells
+        return (line.number, [printable(cell) for cell in names]), units
+    return None, units
+
+
+def numbered(above: HeadLine, row: Sequence[str], delimiter: str) -> bool:
+    """Return whether a row of numbers is the second line of a header: it counts up below each group.
+
+    Below q, q, q, qd, qd, qd stand 1, 2, 3, 1, 2, 3, as pandas writes columns of two levels.
+    """
+    groups = _header_cells(above.text, delimiter, len(row))
+    if len(groups) != len(row):
+        return False
+    both = [(group, name) for group, name in zip(groups, row, strict=True) if name]
+    counts = [[name for _, name in cells] for _, cells in groupby(both, key=lambda pair: pair[0])]
+    return any(len(count) > 1 for count in counts) and all(map(count_up, counts))
+
+
+def _grouped(names: Row, above: Row) -> Row:
+    """Return names with the groups above them, where they repeat and with their groups do not."""
+    if above and names[0] and not any(names[1:]):  # the name of an index alone, below those of the columns
+        return [names[0], *above[1:]]
+    above = [*above, *("" for _ in range(len(names) - len(above)))][: len(names)]
+    groups, last = [], ""
+    for cell in above:
+        last = cell or last
+        groups.append(last)
+    joined = [
+        f"{group}/{name}" if group and name else name or own
+        for name, own, group in zip(names, above, groups, strict=True)
+    ]
+    return joined if _repeat(names) and not _repeat(joined) else names
+
+
+def _repeat(names: Row) -> bool:
+    """Return whether a name stands there twice."""
+    known = sorted(filter(None, names))
+    return any(one == other for one, other in pairwise(known))
+
+
+def _header_cells(text: str, delimiter: str, width: int) -> Row:
+    """Split a header line, with its own delimiter if only that gives a name a column (numpy.savetxt)."""
+    text = text.strip(" " if delimiter == "\t" else None)  # a tab before the first name: an unnamed index
+    for comment in ("#", "//", "% "):
+        text = text.removeprefix(comment)
+    tried = [split_line(text, sign) for sign in (delimiter, *DELIMITERS)]
+    return next((cells for cells in tried if len(cells) == width), tried[0])
+
+
+def _all_units(cells: Row, above: Sequence[Row]) -> bool:
+    """Return whether a line holds units alone: known ones, or any in brackets below a line of names."""
+    words = [cell.strip("[]() ") for cell in cells]
+    bracketed = all(_BRACKETED.fullmatch(cell.strip()) for cell in cells if cell.strip())
+    named = bracketed and any(len(row) == len(cells) for row in above)
+    return any(words) and (named or all(not word or vocabulary().unit(word) for word in words))
