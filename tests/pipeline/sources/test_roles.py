@@ -158,7 +158,7 @@ def test_without_a_word_for_joints_the_user_must_say(wrong: Wrong, arm: Arm) -> 
     text = table(["t", "boom", "stick", "bucket"])
     assert wrong(text) == [
         "log.csv: found no joint columns in boom, stick, bucket, allowed: such as q1, q2, ... or J1, J2, ...;"
-        f" {OPTION}"
+        f' joints=["boom", "stick", "bucket"] takes these; {OPTION}'
     ]
     assert wrong(text, arm(2)) == [
         f"log.csv: found no joint columns in boom, stick, bucket, allowed: 2 for robot arm; {OPTION}"
@@ -219,7 +219,8 @@ def test_a_missing_name_is_named(wrong: Wrong, arm: Arm) -> None:
 def test_two_groups_are_ambiguous_unless_one_fits_the_robot(wrong: Wrong, read: Read, arm: Arm) -> None:
     names = ["left_q1", "left_q2", "right_q1", "right_q2"]
     said = "found several groups of joint columns: left_q1, left_q2; right_q1, right_q2, allowed: one"
-    assert wrong(table(["t", *names])) == [f"log.csv: {said}; {OPTION}"]
+    answers = 'joints=["left_q1", "left_q2"] or joints=["right_q1", "right_q2"] takes these'
+    assert wrong(table(["t", *names])) == [f"log.csv: {said}; {answers}; {OPTION}"]
     assert read(table(["t", *names, "right_q3"]), arm(3)).joints == ("right_q1", "right_q2", "right_q3")
 
 

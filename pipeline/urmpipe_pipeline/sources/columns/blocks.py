@@ -25,7 +25,7 @@ ONE_PERIOD = 0.15
 RESTS = 0.05
 """A joint whose steps are smaller than this share of the largest of its block proves nothing: noise."""
 
-ALIKE = 0.005
+ALIKE = 0.02
 """Blocks whose correlations differ by less are not told apart; of the others the better is right."""
 
 MOST_JOINTS = 8
@@ -43,6 +43,9 @@ MOST_ROWS = 50_000
 SURE = 0.99
 """Where steps and rates correlate so, the period that they tell is exact to a percent."""
 
+EXACT = 0.002
+"""Share of a period by which it is rounded: of a motion that is well sampled the rule misses by less."""
+
 
 @dataclass(frozen=True, slots=True)
 class Block:
@@ -53,12 +56,14 @@ class Block:
         rates: Columns of their rates.
         period: Time between rows in units of value over rate: in [s] if these are rad and rad/s.
         correlation: Median correlation of steps and rates.
+        weakest: The smallest of a joint that moves.
     """
 
     joints: range
     rates: range
     period: float
     correlation: float
+    weakest: float
 
 
 def proved_blocks(values: FloatArray, count: int | None) -> list[Block]:
@@ -78,12 +83,19 @@ def proved_blocks(values: FloatArray, count: int | None) -> list[Block]:
     sizes = [count] if count else range(min(MOST_JOINTS, columns // 2), 1 if columns == 4 else 2, -1)
     for size in sizes:
         tried = (evidence.block(*ranges) for ranges in _pairs_of_ranges(columns, size))
-        proved = [block for block in tried if block and not evidence.of_rates(block)]
-        proved = [one for one in proved if count or one.joints.step > 1 or one.joints.start % size == 0]
+        proved = [block for block in tried if block and (count or _tiles(block, columns))]
         if proved:
-            best = max(block.correlation for block in proved)
-            return [block for block in proved if block.correlation >= best - ALIKE]
+            best = max(block.weakest for block in proved)
+            proved = [block for block in proved if block.weakest >= best - ALIKE]
+            least = min(map(evidence.rates_among, proved))
+            return [block for block in proved if evidence.rates_among(block) == least]
     return []
+
+
+def _tiles(block: Block, columns: int) -> bool:
+    """Return whether blocks of its kind fill all columns, up to some behind them."""
+    joints = block.joints
+    return joints.start % len(joints) == 0 if joints.step == 1 else len(joints) * joints.step == columns
 
 
 def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
@@ -96,6 +108,15 @@ def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
     evidence = _Evidence.of(np.hstack([q, rates]))
     block = evidence and evidence.block(range(joints), range(joints, 2 * joints))
     return (block.period, block.correlation) if block else None
+
+
+def rounded_period(period: float) -> float:
+    """Return a period with as few digits as are within what rates tell of it, in the same unit."""
+    return next(
+        one
+        for digits in range(1, 17)
+        if abs((one := float(f"{period:.{digits}g}")) - period) <= EXACT * period
+    )
 
 
 def _pairs_of_ranges(columns: int, size: int) -> Iterator[tuple[range, range]]:
@@ -134,31 +155,35 @@ class _Evidence:
         steps, means = _steps_and_means(values)
         if len(steps) < LEAST_ROWS:
             return None
-        moves = _in_motion(steps)
-        clean = np.where(moves, steps, 0.0)
-        cross, rates = clean.T @ means, moves.T.astype(np.float64) @ means**2
-        size = np.sqrt((clean**2).sum(axis=0))
+        moves = _in_motion(steps).astype(np.float64)
+        clean, count = np.where(moves > 0, steps, 0.0), moves.sum(axis=0)[:, np.newaxis]
+        cross, squares = clean.T @ means, moves.T @ means**2
+        step, mean = clean.sum(axis=0)[:, np.newaxis] / count, moves.T @ means / count
+        about = [(clean**2).sum(axis=0)[:, np.newaxis] - count * step**2, squares - count * mean**2]
         with np.errstate(divide="ignore", invalid="ignore"):
-            correlation, period = cross / (size[:, np.newaxis] * np.sqrt(rates)), cross / rates
-        return cls(np.nan_to_num(correlation), np.nan_to_num(period), size)
+            correlation = (cross - count * step * mean) / np.sqrt(np.maximum(about[0] * about[1], 0.0))
+            period = cross / squares
+        size = np.sqrt((clean**2).sum(axis=0))
+        return cls(*(np.nan_to_num(one, posinf=0.0, neginf=0.0) for one in (correlation, period)), size)
 
     def block(self, joints: range, rates: range) -> Block | None:
         """Return joints and their rates as a block if all that move agree, with one period; else None."""
         q, v = np.array(joints), np.array(rates)
         moved = self.size[q] > RESTS * self.size[q].max()
-        if np.count_nonzero(moved) < min(2, len(q)) or (self.correlation[q, v][moved] < CORRELATED).any():
+        agree = self.correlation[q, v][moved]
+        if len(agree) < min(2, len(q)) or (agree < CORRELATED).any():
             return None
         periods = self.period[q, v][moved]
         usual = float(np.median(periods))
         if (np.abs(periods - usual) > ONE_PERIOD * usual).any():
             return None
-        return Block(joints, rates, usual, float(np.median(self.correlation[q, v][moved])))
+        return Block(joints, rates, usual, float(np.median(agree)), float(agree.min()))
 
-    def of_rates(self, block: Block) -> bool:
-        """Return whether a joint of a block is the rate of another column, as far away as its own rate."""
+    def rates_among(self, block: Block) -> int:
+        """Return how many joints of a block are the rate of another column, as far away as their own is."""
         shift = block.rates.start - block.joints.start
         before = [(joint - shift, joint) for joint in block.joints if 0 <= joint - shift < len(self.size)]
-        return any(
+        return sum(
             self.correlation[pair] >= CORRELATED
             and abs(self.period[pair] - block.period) <= ONE_PERIOD * block.period
             for pair in before

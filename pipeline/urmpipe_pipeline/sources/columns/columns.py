@@ -13,6 +13,8 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import Patterns, Quantity, Unit, key, split_unit, vocabulary
 
+_UNIT_WORDS = re.compile(r"_(rad|deg)(_(per_)?s(ec)?2?)?(?=_|$)")
+_GLUED = re.compile(r"(?<![a-z])q(?=(act|actual|cmd|des|fb|meas|msr|ref|set|target)_?\d)")
 _NAME_COLUMN = re.compile(r"(?P<before>.*?)name_?(?P<n>\d+)\Z")
 _NUMBERED = re.compile(r"(?P<before>.*?)(position|velocity|effort)_?(?P<n>\d+)\Z")
 
@@ -55,6 +57,11 @@ class Column:
     def words(self) -> frozenset[str]:
         """The words of its name."""
         return frozenset(self.key.split("_"))
+
+    @property
+    def plain(self) -> str:
+        """Its key without the words of a unit, qdes as q_des: joint_rad_1 is joint_1."""
+        return _GLUED.sub("q_", _UNIT_WORDS.sub("", self.key))
 
     @property
     def called(self) -> str:

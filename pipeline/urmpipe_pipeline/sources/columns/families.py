@@ -40,7 +40,7 @@ class Family:
     @property
     def words(self) -> frozenset[str]:
         """The words of their name; the d of a derivative, which also stands for desired, is none."""
-        words = self.name.split("_")
+        words = self.name.replace("#", "_").split("_")
         return frozenset(words[1:] if self.order and words[0] == "d" else words)
 
     @property
@@ -58,19 +58,23 @@ def families(columns: Iterable[Column], patterns: Patterns, order: int) -> list[
             i and j (row and column of a matrix).
         order: Derivative in time that their units may not contradict: 0 for positions.
     """
-    found: dict[tuple[int, str], Family] = {}
+    found: dict[tuple[int, str, str | None], Family] = {}
     for column in columns:
         match = _first_match(column, patterns)
         if match is None or (column.unit is not None and column.unit.order != order):
             continue
         rank, place = match
         number, start, end = _number(place)
-        name = f"{column.key[:start]}#{column.key[end:]}"
-        family = found.setdefault((rank, name), Family(rank, name, order))
+        name = f"{column.plain[:start]}#{column.plain[end:]}"
+        family = found.setdefault((rank, name, None), Family(rank, name, order))
         if number in family.columns:
             family.twins.append(column)
+            if column.unit_text == family.columns[number].unit_text:
+                continue
+            family = found.setdefault((rank, name, column.unit_text), Family(rank, name, order))
         family.columns.setdefault(number, column)
-    ranked = sorted(found.values(), key=lambda family: family.rank)
+    whole = [family for (*_, unit), family in found.items() if unit is None or len(family.columns) > 1]
+    ranked = sorted(whole, key=lambda family: family.rank)
     return measured(ranked)
 
 
@@ -84,7 +88,7 @@ def _first_match(column: Column, patterns: Patterns) -> tuple[int, re.Match[str]
     if "n" in patterns[0].groupindex and column.words & vocabulary().other:
         return None
     for rank, pattern in enumerate(patterns):
-        match = pattern.search(column.key)
+        match = pattern.search(column.plain)
         if match:
             return rank, match
     return None

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, shown
 from urmpipe_models.messages import Hint
@@ -31,6 +34,7 @@ from urmpipe_pipeline.sources.columns.roles import (
     not_used,
     path_inference,
 )
+from urmpipe_pipeline.sources.columns.trajectories import path_of_poses
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
@@ -40,6 +44,9 @@ from urmpipe_pipeline.sources.vocabulary import split_unit
 
 GIVEN = "given as an option"
 """The evidence for columns that the user named."""
+
+MOST_DEGREES = 720.0
+"""No joint of an arm goes further than two turns either way in [deg], as clocks, wheels and counts do."""
 
 USUAL = 6
 """Joints that most arms have."""
@@ -80,6 +87,9 @@ def without_header(
         joints = tuple(find_column(columns, text, parameter="joints") for text in options.joints)
         check_count(joints, file, robot)
         return _by_place(joints, columns, robot, GIVEN, pose)
+    alone = path_of_poses(columns, whole, options.rotation) if pose is None else None
+    if alone is not None:
+        return alone
     for column in () if path else columns:  # of a path they are wrong rows
         if column.text:
             cell = layout.cells(column.index)[0]
@@ -113,22 +123,33 @@ def _joints_among(
     count = len(robot.coordinates) if robot else None
     if whole is None or (count is not None and len(free) <= count):
         return tuple(free), (), f"no header: joints in order{', as many as the robot has' if robot else ''}"
-    blocks = proved_blocks(whole.values([column.index for column in free]), count)
+    values = whole.values([column.index for column in free])
+    blocks = proved_blocks(values, count)
     if len(blocks) == 1:
         joints, rates = (tuple(free[k] for k in some) for some in (blocks[0].joints, blocks[0].rates))
         alike = f"steps and rates correlate by {blocks[0].correlation:.3g}"
         return joints, rates, f"columns {listed(rates)} are their rates: {alike}"
-    if not blocks and count is None and len(free) <= MOST_JOINTS:
+    far = [column for column, size in zip(free, _usual_size(values), strict=True) if size > MOST_DEGREES]
+    if not blocks and count is None and len(free) <= MOST_JOINTS and not far:
         return tuple(free), (), "no header: joints in order"
-    groups = [[free[k] for k in block.joints] for block in blocks] or _parts(free, count)
-    need = f", and robot {robot.name} has {count} joints" if robot else ""
-    raise which_joints(layout, f"{len(free)} columns that no header names{need}", groups)
+    near = [column for column in free if column not in far]
+    groups = [[free[k] for k in block.joints] for block in blocks] or _parts(near if far else free, count)
+    whose = f"column {listed(far)} goes" if len(far) == 1 else f"columns {listed(far)} go"
+    need = f"; {whose} further than two turns in deg" if far else ""
+    need += f", and robot {robot.name} has {count} joints" if robot else ""
+    raise which_joints(layout.file, f"{len(free)} columns that no header names{need}", groups)
+
+
+def _usual_size(values: FloatArray) -> FloatArray:
+    """Return the absolute value below which each column is in nine of ten rows; NaN counts as the largest."""
+    size = np.sort(np.abs(values), axis=0)
+    return np.asarray(size[int(0.9 * (len(size) - 1))]) if len(size) else np.zeros(values.shape[1])
 
 
 def _parts(free: Sequence[Column], count: int | None) -> list[Sequence[Column]]:
     """Return the columns that may be joints where nothing tells: the first and the last, or all."""
     if count:
-        return [free[:count], free[-count:]]
+        return [free[:count], free[-count:]] if len(free) >= count else []
     half = len(free) // 2
     return [*([free[:half]] if len(free) == 2 * half else []), free[:USUAL], free]
 

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.sources.columns.columns import Column
-from urmpipe_pipeline.sources.tables.sniff import Layout
 
 NAME_JOINTS = Hint("joints", None, "names the joint columns, in the robot's order")
+
+_SIDES = (frozenset(("left", "l")), frozenset(("right", "r")))
 
 MOST_ANSWERS = 3
 """Groups of columns that a question offers."""
@@ -20,15 +21,30 @@ def take(columns: Sequence[Column], does: str = "takes these") -> Hint:
     return Hint("joints", [column.called for column in columns], does)
 
 
-def which_joints(layout: Layout, found: str, groups: Sequence[Sequence[Column]]) -> LogError:
+def by_side(columns: Sequence[Column]) -> list[Sequence[Column]]:
+    """Return columns of a left and a right arm apart; all together if there are no such two."""
+    sides = [[column for column in columns if column.words & words] for words in _SIDES]
+    return sides if all(sides) else [columns]
+
+
+def which_joints(
+    file: str,
+    found: str,
+    groups: Sequence[Sequence[Column]],
+    allowed: str = "columns that are known to be joints",
+    *hints: Hint,
+) -> LogError:
     """Return the question which columns are the joints, with the groups that they may be.
 
     Args:
-        layout: The table.
+        file: The file.
         found: What was found, and why it does not tell.
         groups: Columns that may be all joints; the likeliest first.
+        allowed: What is allowed.
+        hints: What else helps.
     """
     different = list(dict.fromkeys(tuple(group) for group in groups if group))
-    hints = (*map(take, different[:MOST_ANSWERS]), NAME_JOINTS)
-    message = f"found {found}, allowed: columns that are known to be joints"
-    return LogError(Finding(message, layout.file, layout.header_line, hints=hints))
+    answers = map(take, different[:MOST_ANSWERS])
+    return LogError(
+        Finding(f"found {found}, allowed: {allowed}", file, hints=(*hints, *answers, NAME_JOINTS))
+    )

@@ -11,10 +11,11 @@ from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import RotationForm
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import grouped_number
+from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.families import families, measured
 from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, with_form
-from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS
+from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, by_side, which_joints
 from urmpipe_pipeline.sources.columns.tcp_like import about_odd_rows, about_tcp
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -161,26 +162,58 @@ def _find_joints(free: Sequence[Column], file: str, robot: Chain | None, *, half
         if by_name and count in (None, len(by_name)):
             whose = "the robot's" if robot and names == robot.coordinates else "known"
             return _Joints(by_name, f"{whose} joint names", names=tuple(names))
-    return _numbered(free, file, count) or _without_number(free, count, half_pose=half_pose)
+    return _numbered(free, file, count) or _without_number(free, file, count, half_pose=half_pose)
 
 
-def _without_number(free: Sequence[Column], count: int | None, *, half_pose: bool) -> _Joints:
-    """Return joints without numbers: by the word position, by their units, or as all that is left."""
+def _without_number(free: Sequence[Column], file: str, count: int | None, *, half_pose: bool) -> _Joints:
+    """Return joints without numbers: by a word that they share, by their units, or as all that is left."""
     words = vocabulary()
     about_else = words.other | words.joint_words["rate"] | words.joint_words["acceleration"]
-    still = tuple(c for c in free if not c.words & about_else and not (c.unit and c.unit.order))
-    marked = tuple(column for column in still if column.words & words.marks)
-    if marked and count in (None, len(marked)):
-        names = tuple("_".join(w for w in c.key.split("_") if w not in words.marks) for c in marked)
+    still = measured([c for c in free if not c.words & about_else and not (c.unit and c.unit.order)])
+    family = _sharing_a_mark(still)
+    if family and count in (None, len(family)):
+        _refuse_half(family, still, file, count)
+        names = tuple("_".join(w for w in c.key.split("_") if w not in words.marks) for c in family)
         evidence = "the word position or angle in their names; the order is the file's"
-        return _Joints(marked, evidence, names=names)
+        return _Joints(family, evidence, names=names)
     sized = tuple(c for c in still if c.unit and c.unit.quantity in ("angle", "length"))
     turning = any(c.unit and c.unit.quantity == "angle" for c in sized)
     if turning and count in (None, len(sized)) and not (half_pose and count is None and len(sized) == 3):
         return _Joints(sized, "their units; the order is the file's")
     if count is not None and len(still) == count:
-        return _Joints(still, f"the only {count} columns left; the order is the file's")
+        return _Joints(tuple(still), f"the only {count} columns left; the order is the file's")
     return _Joints(())
+
+
+def _sharing_a_mark(still: Sequence[Column]) -> tuple[Column, ...]:
+    """Return the most columns whose names have a word for positions at the same place, from front or back.
+
+    In wrist_angle_pos and elbow_pos that is the last one.
+    """
+    alike: dict[tuple[str, int], list[Column]] = {}
+    for column in still:
+        words = column.key.split("_")
+        for place, word in enumerate(words):
+            if word in vocabulary().marks:
+                for key_of in ((word, place), (word, place - len(words))):
+                    alike.setdefault(key_of, []).append(column)
+    return tuple(max(alike.values(), key=len, default=()))
+
+
+def _refuse_half(family: Sequence[Column], still: Sequence[Column], file: str, count: int | None) -> None:
+    """Raise a `LogError` where other columns may belong to a family of joints: a family is taken whole.
+
+    Their names have a mark as well, a word that the family's have, or one of a limb.
+    """
+    words = vocabulary()
+    limbs = frozenset(word for order in words.orders for name in order for word in name.split("_"))
+    own = frozenset(word for column in family for word in column.words) | limbs
+    others = [column for column in still if column not in family and column.words & own]
+    if not others or len(family) == count:
+        return
+    whole = [column for column in still if column in family or column in others]
+    found = f"{listed(family)}, whose names say that they are positions, beside {listed(others)}"
+    raise which_joints(file, found, [whole, family])
 
 
 def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> tuple[Column, ...]:
@@ -230,9 +263,9 @@ def _numbered(free: Sequence[Column], file: str, count: int | None) -> _Joints |
     fitting = [family for family in found if len(family.columns) == count] or found
     best = [family for family in fitting if family.rank == min(f.rank for f in fitting)]
     if len(best) > 1 and not all(len(family.columns) == 1 for family in best):
-        groups = "; ".join(listed(family.ordered()) for family in best)
-        message = f"found several groups of joint columns: {groups}, allowed: one"
-        raise LogError(Finding(message, file=file, hints=(NAME_JOINTS,)))
+        groups = [family.ordered() for family in best]
+        found_all = f"several groups of joint columns: {'; '.join(map(listed, groups))}"
+        raise which_joints(file, found_all, groups, "one")
     if len(best) > 1:  # one plot a joint, each with a number of its own
         columns = tuple(column for family in best for column in family.ordered())
         return _Joints(columns, "their names; the order is the file's")
@@ -351,8 +384,15 @@ def _path(
         hints = _cure(len(missing), spare, len(robot.coordinates) if robot else None)
         lacking = f"found joint columns {listed(found)} and none for {', '.join(missing)}, allowed: {need}"
         raise LogError(Finding(lacking, file=file, hints=hints))
-    message = f"found no joint columns in {listed(columns)}, allowed: {need}"
-    raise LogError(Finding(message, file=file, hints=(NAME_JOINTS,)))
+    raise which_joints(file, f"no joint columns in {listed(columns)}", _may_be(numeric, robot), need)
+
+
+def _may_be(numeric: Sequence[Column], robot: Chain | None) -> list[Sequence[Column]]:
+    """Return the columns that may be joints whatever their names, if they are as many as an arm has."""
+    about_else = vocabulary().other | vocabulary().outside
+    others = [column for column in numeric if not column.words & about_else]
+    fits = {len(robot.coordinates)} if robot else range(1, MOST_JOINTS + 1)
+    return [group for group in by_side(others) if len(group) in fits]
 
 
 def _some_named(numeric: Sequence[Column], robot: Chain | None) -> tuple[tuple[Column, ...], list[str]]:

@@ -32,6 +32,9 @@ def header_of(before: Sequence[HeadLine], delimiter: str, width: int) -> tuple[t
         if not units and at > 0 and _all_units(cells, split[:at]):
             units = cells
             continue
+        if at and cells[0] and not any(cells[1:]):  # the name of an index alone, below those of the columns
+            split[at - 1] = [cells[0], *split[at - 1][1:]]
+            continue
         above = split[at - 1] if at else []
         names = _grouped(cells, above) if abs(len(above) - len(cells)) <= 1 else cells
         return (line.number, [printable(cell) for cell in names]), units
@@ -53,8 +56,6 @@ def numbered(above: HeadLine, row: Sequence[str], delimiter: str) -> bool:
 
 def _grouped(names: Row, above: Row) -> Row:
     """Return names with the groups above them, where they repeat and with their groups do not."""
-    if above and names[0] and not any(names[1:]):  # the name of an index alone, below those of the columns
-        return [names[0], *above[1:]]
     above = [*above, *("" for _ in range(len(names) - len(above)))][: len(names)]
     groups, last = [], ""
     for cell in above:

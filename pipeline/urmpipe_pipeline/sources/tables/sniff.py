@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
@@ -152,14 +153,17 @@ def sniff(
     rows = [split_line(line.text, style.delimiter) for line in body]
     width = _common_width(rows, style.decimal)
     numeric = _numeric_columns(rows, width, style.decimal)
-    first = next((i for i in range(len(rows)) if _is_data(rows, i, numeric, style.decimal)), None)
+    numbers = (i for i in range(len(rows)) if _is_data(rows, i, numeric, style.decimal))
+    data = list(islice(numbers, 2))
+    counted_below = (
+        len(data) > 1 and data[0] > 0 and numbered(body[data[0] - 1], rows[data[0]], style.delimiter)
+    )
+    first = data[1] if counted_below else next(iter(data), None)
     if first is None:
         given = {"delimiter": delimiter, "decimal sign": decimal}
         raise LogError(_no_rows(segment, body, {what: sign for what, sign in given.items() if sign}))
     _refuse_prose(segment, body[first:], [len(row) for row in rows[first:]], width)
     before = [line for line in lines if line.number < body[first].number]
-    if before and first + 1 < len(rows) and numbered(before[-1], rows[first], style.delimiter):
-        before, first = [*before, body[first]], first + 1
     header, units = header_of(before, style.delimiter, width)
     names, said = _names(segment, header, body[first:], rows[first:], width)
     return Layout(

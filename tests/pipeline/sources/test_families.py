@@ -1,0 +1,92 @@
+"""Families of names: taken whole, or asked about."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from urmpipe_models.errors import LogError
+from urmpipe_pipeline.joint_log import JointLog
+
+Read = Callable[..., JointLog]
+
+T = np.arange(60) / 50
+
+
+def table(names: str, sign: str = ",") -> str:
+    """Return a table of smooth columns, the time first where its name says so."""
+    columns = names.split()
+    values = [np.round(0.8 * np.sin(T * (1 + 0.3 * k) + k), 6) for k in range(len(columns))]
+    if columns[0] in ("t", "time", "timestamp"):
+        values[0] = T
+    return "\n".join([sign.join(columns), *(sign.join(map(repr, row)) for row in np.transpose(values).tolist())])
+
+
+@pytest.mark.parametrize(
+    ("names", "joints", "rates"),
+    [
+        # families whose names share a word, whatever else is in them
+        ("t wrist_angle_pos elbow_pos shoulder_pos", "2 3 4", ""),
+        ("t waist_pos elbow_pos wrist_angle_pos waist_vel elbow_vel wrist_angle_vel", "2 3 4", "5 6 7"),
+        ("t angle_rad_base angle_rad_elbow angle_rad_wrist", "2 3 4", ""),
+        ("t pos_1 pos_2 vel_1 vel_2 eff_1 eff_2", "2 3", "4 5"),
+        # Interbotix
+        ("time waist shoulder elbow forearm_roll wrist_angle wrist_rotate gripper left_finger", "2 3 4 5 6 7", ""),
+        ("time wrist_rotate wrist_angle waist shoulder elbow gripper", "4 5 6 3 2", ""),
+        # LeRobot
+        ("timestamp shoulder_pan.pos shoulder_lift.pos elbow_flex.pos wrist_flex.pos wrist_roll.pos gripper.pos",
+         "2 3 4 5 6", ""),
+        ("timestamp frame_index observation.state_1 observation.state_2 action_1 action_2", "3 4", ""),
+        ("timestamp action.a.pos action.b.pos observation.a.pos observation.b.pos", "4 5", ""),
+        # RAPID
+        ("time robax.rax_1 robax.rax_2 robax.rax_3 extax.eax_a extax.eax_b", "2 3 4", ""),
+        ("time;rax_1;rax_2;rax_3;eax_a", "2 3 4", ""),
+        # asked for and done
+        ("t q_des_1 q_des_2 q_act_1 q_act_2", "4 5", ""),
+        ("t q1_des q2_des q1_act q2_act", "4 5", ""),
+        ("t qdes1 qdes2 qact1 qact2", "4 5", ""),
+        ("t q_des_1 q_des_2 tau_1 tau_2", "2 3", ""),
+        # a unit inside a name
+        ("t joint_rad_1 joint_rad_2", "2 3", ""),
+        ("t q_rad_1 q_rad_2 qd_rad_s_1 qd_rad_s_2", "2 3", "4 5"),
+        ("t q_rad_1 q_rad_2 dq_rad_per_s_1 dq_rad_per_s_2", "2 3", "4 5"),
+        # simulators
+        ("time qpos_0 qpos_1 qvel_0 qvel_1 ctrl_0 ctrl_1", "2 3", "4 5"),
+        ("t dof_pos_0 dof_pos_1 dof_vel_0 dof_vel_1", "2 3", "4 5"),
+        ("wrist_1 shoulder upper_arm forearm wrist_2 wrist_3 robotiq_gripper ins_x ins_xr", "2 3 4 1 5 6", ""),
+        ("time panda_joint1 panda_joint2 panda_finger_joint1 panda_finger_joint2", "2 3", ""),
+    ],
+)  # fmt: skip
+def test_what_each_column_is(names: str, joints: str, rates: str, read: Read) -> None:
+    sign = ";" if ";" in names else ","
+    log = read(table(names.replace(";", " "), sign))
+    found = {role: [str(c.number) for c in log.columns if c.role == role] for role in ("joint", "rate")}
+    assert found == {"joint": joints.split(), "rate": rates.split()}
+
+
+@pytest.mark.parametrize(
+    ("names", "answers"),
+    [
+        ("t shoulder elbow wrist_angle", ["shoulder elbow wrist_angle", "wrist_angle"]),
+        ("t shoulder_angle elbow_angle wrist_roll", ["shoulder_angle elbow_angle wrist_roll",
+                                                     "shoulder_angle elbow_angle"]),
+        ("t left_j1 left_j2 right_j1 right_j2", ["left_j1 left_j2", "right_j1 right_j2"]),
+        ("t left_pan left_lift right_pan right_lift", ["left_pan left_lift", "right_pan right_lift"]),
+        ("t A B C D", ["A B C D"]),
+        ("t q1_rad q2_rad q1_deg q2_deg", ["q1_rad q2_rad", "q1_deg q2_deg"]),
+    ],
+)  # fmt: skip
+def test_what_is_asked(names: str, answers: list[str], read: Read) -> None:
+    with pytest.raises(LogError) as asked:
+        read(table(names))
+    (finding,) = asked.value.findings
+    assert [hint.value for hint in finding.hints] == [*(answer.split() for answer in answers), None]
+    assert {hint.parameter for hint in finding.hints} == {"joints"}
+    assert read(table(names), joints=answers[0].split()).joints == tuple(answers[0].split())
+
+
+def test_units_inside_of_names(read: Read) -> None:
+    log = read(table("t joint_deg_1 joint_deg_2 vel_deg_s_1 vel_deg_s_2"))
+    assert set(log.units.values()) == {"s", "deg", "deg/s"}
