@@ -11,19 +11,31 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
+from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import RotationForm
-from urmpipe_pipeline.joint_log import ROLES, ROW_NS, Inference, JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.joint_log import (
+    ASSUMED_PERIOD,
+    ROLES,
+    ROW_NS,
+    Inference,
+    JointLog,
+    LogColumn,
+    LogWarning,
+    SourceFile,
+)
 from urmpipe_pipeline.sources.cells.cell import significant_digits
 from urmpipe_pipeline.sources.checks import gaps, missing_samples, refuse_empty
+from urmpipe_pipeline.sources.clocks.chosen import EXPONENTS
 from urmpipe_pipeline.sources.clocks.clock import even_clock
 from urmpipe_pipeline.sources.clocks.clock_columns import like_a_time
-from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS
+from urmpipe_pipeline.sources.columns.blocks import SURE, period_of, rounded_period
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of
 from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.content import Content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.opening import PATH, TABLE
+from urmpipe_pipeline.sources.units.interpolated import without_contradicted, without_interpolated
 from urmpipe_pipeline.sources.units.kinematic_units import Recorded, by_kinematics
 from urmpipe_pipeline.sources.units.measured import length_by_spread
 from urmpipe_pipeline.sources.units.rotation import settle_rotation
@@ -187,10 +199,17 @@ def _measured(
     arm = (robot, q) if robot and roles.joints else None
     given = options.rotation is not None
     measured = tcp if roles.measured else None
+    rotation, between = without_interpolated(rotation, [column.name for column in roles.rotation])
     turned = settle_rotation(roles.rotation, roles.forms, rotation, told, arm, given=given, measured=measured)
     if turned.form:
         finder.tell_reach(roles.rotation, told, turned.units, "rotation", "the orientation is")
     turning = [roles.rotation[k] for k in turned.order]
+    rotation, contradicted = without_contradicted(
+        _in_si(rotation[:, turned.order], turned.units),
+        turned.form,
+        None if roles.measured or content.still else arm,
+        [column.name for column in turning],
+    )
     doubts = finder.doubts | {column.number: turned.doubt for column in turning if turned.doubt}
     return _Measured(
         groups=(
@@ -198,11 +217,11 @@ def _measured(
             _Group(roles.rates, _in_si(qd, rates), rates),
             _Group(roles.accelerations, _in_si(qdd, seconds), seconds),
             _Group(roles.position, tcp, lengths),
-            _Group(turning, _in_si(rotation[:, turned.order], turned.units), turned.units),
+            _Group(turning, rotation, turned.units),
         ),
         form=turned.form,
         inferences=(*finder.inferences, *why, *turned.inferences),
-        warnings=(*finder.warnings, *turned.warnings),
+        warnings=(*finder.warnings, *between, *turned.warnings, *contradicted),
         doubts=doubts,
         by_source=finder.by_source,
     )
@@ -230,6 +249,8 @@ def _times(
     if content.still:
         return np.arange(content.rows, dtype=np.int64) * ROW_NS, 0, (), ()
     if content.clock is None:
+        if options.period is None and (by_rates := _by_rates(content)):
+            return by_rates
         like = None if options.time else _like_a_time(plan, content.roles.columns)
         t_ns, said, noticed = even_clock(content.rows, options.period, like=like.called if like else "")
         return t_ns, 0, said, noticed
@@ -238,6 +259,33 @@ def _times(
         "start of the time", plan.clock.shown(start), "the first row; times are counted from it"
     )
     return content.clock - start, start, (counted,) if start else (), ()
+
+
+def _by_rates(
+    content: Content,
+) -> tuple[IntArray, int, tuple[Inference, ...], Sequence[LogWarning]] | None:
+    """Return the times of rows without a clock by the joints' recorded rates; None if these tell none."""
+    roles = content.roles
+    if not roles.rates or not roles.joints:
+        return None
+    joints, rates = content.values(roles.joints), content.values(roles.rates)
+    told = [(q.unit, v.unit) for q, v in zip(roles.joints, roles.rates, strict=True)]
+    ratio = np.array([v.factor / q.factor if q and v else 1.0 for q, v in told])
+    found = period_of(joints, rates * ratio)
+    if found is None:
+        return None
+    period, correlation = rounded_period(found[0]), found[1]
+    t_ns, _, _ = even_clock(content.rows, period)
+    evidence = f"the joints go on so by their recorded rates: steps and rates correlate by {correlation:.3g}"
+    said = Inference("period", f"{period:g} s", evidence, hints=(Hint("period"),))
+    if correlation >= SURE:
+        return t_ns, 0, (said,), ()
+    apart = f"the rows are {1e3 * period:g} ms apart"
+    warning = LogWarning(
+        ASSUMED_PERIOD, f"no time column: by the recorded rates {apart}", assumption=apart, role="time",
+        hints=(Hint("period", None, "sets another time between rows"),),
+    )  # fmt: skip
+    return t_ns, 0, (said,), (warning,)
 
 
 def _like_a_time(plan: Plan, used: Sequence[Column]) -> Column | None:

@@ -10,7 +10,7 @@ from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.clock import Clock, find_clocks
-from urmpipe_pipeline.sources.clocks.time_file import clock_of_file, time_file
+from urmpipe_pipeline.sources.clocks.time_file import clocks_apart, time_file, with_time_file
 from urmpipe_pipeline.sources.columns.columns import (
     Column,
     columns_named,
@@ -18,13 +18,12 @@ from urmpipe_pipeline.sources.columns.columns import (
     given_units,
     refuse_twins,
 )
-from urmpipe_pipeline.sources.columns.own_log import own_joints
+from urmpipe_pipeline.sources.columns.own_log import own_joints, written_roles
 from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_header
 from urmpipe_pipeline.sources.columns.roles import Roles, assign, joint_inference
 from urmpipe_pipeline.sources.columns.sides import of_side
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH, Tables
-from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import Patterns, Unit
 
 SHOWN_LOGS = 6
@@ -86,22 +85,22 @@ def make_plan(
         LogError: If clock or joints cannot be told.
         OptionError: If an option's value makes no sense.
     """
+    tables, apart = with_time_file(tables, options)
     columns = columns_of(tables.layouts, tables.titles)
     units = given_units(columns, options)
     beside = columns_named(columns, tables.layouts, further or {})
     columns = tuple(column for column in columns if column not in beside.values())
-    apart = None if options.time else time_file(tables, columns)
+    apart = apart if options.time else time_file(tables, columns)
     if apart is None:
         joints = len(robot.coordinates) if robot else None
         clocks = find_clocks(tables, columns, options, units, joints)
     else:
-        found = clock_of_file(tables, columns, apart, units, label=options.poses)
-        clocks = tuple(found if table == apart else Clock() for table in (0, 1))
+        clocks = clocks_apart(tables, columns, apart, options, units)
     for i, clock in enumerate(() if options.time or apart is not None else clocks):
         own = [column for column in columns if column.table == i]
         refuse_twins(clock.columns, own, tables.layouts, Hint("time", None, "says which: give its number"))
     times = {column for clock in clocks for column in clock.columns}
-    rest = [column for column in columns if column not in times]
+    rest = [column for column in columns if column not in times and column.table != apart]
     rest = of_side(rest, options.side, tables.layouts[0].file)
     only = None if apart is None else 1 - apart
     roles = _renamed(_roles(rest, tables, options, robot, only), options.names)
@@ -133,6 +132,9 @@ def _roles(
     """Return the roles of the columns of all tables, or of the only one that matters."""
     main = tables.layouts[only or 0]
     several = only is None and len(set(tables.paths)) > 1
+    given = options.joints or options.position or options.measured or options.source or options.side
+    if len(tables.layouts) == 1 and not given and (written := written_roles(columns, main, robot)) is not None:
+        return written
     if main.header is None and not several:
         return without_header(
             columns, tables.layouts, options, robot, tables.whole, path=options.source == PATH
@@ -143,7 +145,7 @@ def _roles(
     try:
         ours = tables.known is not None and tables.known.own and not (tables.foreign or options.joints)
         own = own_joints(columns) if ours else None
-        roles = _by_names(columns, tables.layouts, options, robot, own)
+        roles = _by_names(columns, tables, options, robot, own)
     except LogError:
         if several:
             _refuse_several_logs(columns, tables, options, robot)
@@ -155,14 +157,15 @@ def _roles(
 
 def _by_names(
     columns: Sequence[Column],
-    layouts: Sequence[Layout],
+    tables: Tables,
     options: ReadOptions,
     robot: Chain | None,
     own: tuple[Column, ...] | None = None,
 ) -> Roles:
     """Return the roles of columns with names, each there once; a log of our own without joints is a path."""
     path = options.source == PATH or own == ()
-    roles = assign(columns, layouts, options, robot, path=path, written=() if path else own or ())
+    layouts, written = tables.layouts, () if path else own or ()
+    roles = assign(columns, layouts, options, robot, tables.whole, path=path, written=written)
     if not options.joints:
         refuse_twins(roles.joints, columns, layouts, Hint("joints", None, "says which: give their numbers"))
     refuse_twins(
@@ -190,7 +193,7 @@ def _refuse_several_logs(
             if layout.header is None and joints is None:
                 count = sum(not column.text for column in own)
             else:
-                count = len(_by_names(own, tables.layouts, options, robot).joints)
+                count = len(_by_names(own, tables, options, robot).joints)
         except LogError:
             continue
         whole += [path] if count > 1 and count == (joints or count) else []

@@ -16,6 +16,11 @@ Quantity = Literal["angle", "length", "time", "date", "ratio"]
 Patterns = tuple[re.Pattern[str], ...]
 
 _BRACKETS = re.compile(r"^(?P<label>.*?\S)\s*[\[(](?P<inside>[^\[\]()]*)[\])]\s*$")
+_INSIDE = re.compile(
+    r"(?<=[\s_./])(?P<unit>rad|deg)(?P<rate>_?(?:per_)?s(?:ec)?_?(?P<power>2?))?(?=[\s_./][\w])", re.IGNORECASE
+)
+"""A unit between other words of a name, perhaps one per second."""
+
 _PER_SECOND = re.compile(r"\s*(?:/|per\s+)\s*(?:s|sec|second|sek)\s*(?:\^|\*\*)?\s*(?P<power>[2²]?)$")
 
 
@@ -69,6 +74,7 @@ class Container:
     what: str
     suffixes: tuple[str, ...]
     magic: tuple[bytes, ...]
+    lone: tuple[bytes, ...]
     advice: str
     parameters: Mapping[str, str] = field(default_factory=dict)
 
@@ -87,15 +93,19 @@ class Vocabulary:
 
     time: Patterns
     dates: Patterns
+    period: Patterns
     long_times: frozenset[str]
     months: Mapping[str, int]
-    time_pairs: tuple[Patterns, ...]
+    time_seconds: re.Pattern[str]
+    time_rests: Mapping[str, re.Pattern[str]]
+    durations: Patterns
     index: Patterns
     joint: Mapping[str, Patterns]
     joint_words: Mapping[str, frozenset[str]]
     marks: frozenset[str]
     orders: tuple[tuple[str, ...], ...]
     other: frozenset[str]
+    grippers: frozenset[str]
     commanded: frozenset[str]
     tcp_position: Patterns
     measured: Patterns
@@ -136,15 +146,19 @@ def vocabulary() -> Vocabulary:
     return Vocabulary(
         time=_compiled(time["patterns"]),
         dates=_compiled(time["dates"]),
+        period=_compiled(time["period"]),
         long_times=frozenset(time["long"]),
         months={word: k for k, words in enumerate(time["months"], start=1) for word in words},
-        time_pairs=tuple(_compiled((pair["seconds"], pair["nanoseconds"])) for pair in time["pairs"]),
+        time_seconds=re.compile(time["seconds"]),
+        time_rests={rest["unit"]: re.compile(rest["pattern"]) for rest in time["rests"]},
+        durations=_compiled(time["durations"]),
         index=_compiled(data["index"]["patterns"]),
         joint={role: _compiled(joint[role]) for role in roles},
         joint_words={role: frozenset(joint[f"{role}_words"]) for role in roles},
         marks=frozenset(joint["marks"]),
         orders=tuple(tuple(order) for order in joint["orders"]),
-        other=frozenset(joint["other"]),
+        other=frozenset((*joint["other"], *joint["grippers"])),
+        grippers=frozenset(joint["grippers"]),
         commanded=frozenset(joint["commanded"]),
         tcp_position=_compiled(tcp["position"]),
         measured=_compiled(tcp["measured"]),
@@ -171,6 +185,7 @@ def vocabulary() -> Vocabulary:
                 one["what"],
                 tuple(one["suffixes"]),
                 tuple(magic.encode("latin-1") for magic in one["magic"]),
+                tuple(magic.encode("latin-1") for magic in one.get("lone", ())),
                 one["advice"],
                 one.get("parameters", {}),
             )
@@ -183,11 +198,14 @@ def split_unit(name: str) -> tuple[str, str | None]:
     """Return a column's name without its unit, and the unit's text: "q1 [deg]" is q1 and deg.
 
     An index such as in state.q[0] and joint(1) stays part of the name. A unit as the last word
-    (c_arm_wigwag_deg) is told, and stays part of the name as well.
+    (c_arm_wigwag_deg) or inside of it (joint_rad_1, qd_deg_s_1) is told, and stays part of the name as well.
     """
     match = _BRACKETS.match(name)
     if match and not match["inside"].strip().isdigit():
         return match["label"].strip(), match["inside"].strip()
+    inside = _INSIDE.search(name.strip())
+    if inside:
+        return name.strip(), f"{inside['unit'].lower()}/s{inside['power']}" if inside["rate"] else inside["unit"]
     word = re.split(r"[\s_./]+", name.strip())[-1]
     known = word.lower() in vocabulary().units and word != name.strip()
     return name.strip(), word if known else None

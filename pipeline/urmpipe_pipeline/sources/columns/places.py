@@ -7,15 +7,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import width
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS, proved_blocks
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.pose import (
     Pose,
@@ -25,7 +21,7 @@ from urmpipe_pipeline.sources.columns.pose import (
     trailing_quaternion,
     with_form,
 )
-from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, which_joints
+from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS
 from urmpipe_pipeline.sources.columns.roles import (
     Roles,
     about_pose,
@@ -35,6 +31,7 @@ from urmpipe_pipeline.sources.columns.roles import (
     path_inference,
 )
 from urmpipe_pipeline.sources.columns.trajectories import path_of_poses
+from urmpipe_pipeline.sources.columns.unnamed import joints_among
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
@@ -44,12 +41,6 @@ from urmpipe_pipeline.sources.vocabulary import split_unit
 
 GIVEN = "given as an option"
 """The evidence for columns that the user named."""
-
-MOST_DEGREES = 720.0
-"""No joint of an arm goes further than two turns either way in [deg], as clocks, wheels and counts do."""
-
-USUAL = 6
-"""Joints that most arms have."""
 
 NO_HEADER = "no header tells what they are"
 
@@ -104,54 +95,9 @@ def without_header(
     used = (*pose.position, *pose.rotation)
     start = min(map(columns.index, used)) if behind else len(columns)
     free = [column for column in columns[:start] if column not in used]
-    joints, rates, evidence = _joints_among(free, layout, whole[free[0].table] if free else None, robot)
+    joints, rates, evidence = joints_among(free, layout, whole[free[0].table] if free else None, robot)
     check_count(joints, file, robot)
     return _by_place(joints, columns, robot, evidence, pose, rates)
-
-
-def _joints_among(
-    free: Sequence[Column], layout: Layout, whole: Whole | None, robot: Chain | None
-) -> tuple[tuple[Column, ...], tuple[Column, ...], str]:
-    """Return the joints among columns without names, their rates, and why.
-
-    They are all columns, if these are as many as the robot has joints; those whose rates stand beside them;
-    without a robot all of a few columns.
-
-    Raises:
-        LogError: With the question which they are, if none of that holds.
-    """
-    count = len(robot.coordinates) if robot else None
-    if whole is None or (count is not None and len(free) <= count):
-        return tuple(free), (), f"no header: joints in order{', as many as the robot has' if robot else ''}"
-    values = whole.values([column.index for column in free])
-    blocks = proved_blocks(values, count)
-    if len(blocks) == 1:
-        joints, rates = (tuple(free[k] for k in some) for some in (blocks[0].joints, blocks[0].rates))
-        alike = f"steps and rates correlate by {blocks[0].correlation:.3g}"
-        return joints, rates, f"columns {listed(rates)} are their rates: {alike}"
-    far = [column for column, size in zip(free, _usual_size(values), strict=True) if size > MOST_DEGREES]
-    if not blocks and count is None and len(free) <= MOST_JOINTS and not far:
-        return tuple(free), (), "no header: joints in order"
-    near = [column for column in free if column not in far]
-    groups = [[free[k] for k in block.joints] for block in blocks] or _parts(near if far else free, count)
-    whose = f"column {listed(far)} goes" if len(far) == 1 else f"columns {listed(far)} go"
-    need = f"; {whose} further than two turns in deg" if far else ""
-    need += f", and robot {robot.name} has {count} joints" if robot else ""
-    raise which_joints(layout.file, f"{len(free)} columns that no header names{need}", groups)
-
-
-def _usual_size(values: FloatArray) -> FloatArray:
-    """Return the absolute value below which each column is in nine of ten rows; NaN counts as the largest."""
-    size = np.sort(np.abs(values), axis=0)
-    return np.asarray(size[int(0.9 * (len(size) - 1))]) if len(size) else np.zeros(values.shape[1])
-
-
-def _parts(free: Sequence[Column], count: int | None) -> list[Sequence[Column]]:
-    """Return the columns that may be joints where nothing tells: the first and the last, or all."""
-    if count:
-        return [free[:count], free[-count:]] if len(free) >= count else []
-    half = len(free) // 2
-    return [*([free[:half]] if len(free) == 2 * half else []), free[:USUAL], free]
 
 
 def _path_by_place(

@@ -173,7 +173,11 @@ def matrix_pose(columns: Sequence[Column], layouts: Sequence[Layout], *, some: b
     """
     if len(columns) not in (12, 16):
         return None
-    values, _ = _sampled(columns, layouts)
+    return transform_pose(columns, _sampled(columns, layouts)[0], some=some)
+
+
+def transform_pose(columns: Sequence[Column], values: FloatArray, *, some: bool = False) -> Pose | None:
+    """Return the pose that 16 or 12 columns hold by their values, shape (n, columns); see `matrix_pose`."""
     for order, entries in _ORDERS[: 1 if len(columns) == 12 else 2]:
         if _enough(_are_transforms(values, entries), some=some):
             position, turned = entries[:3, 3].tolist(), entries[:3, :3].ravel().tolist()
@@ -195,7 +199,7 @@ def trailing_quaternion(
 def _is_unit(columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool) -> bool:
     """Return whether the numbers of three rows or more, or of some, have length 1, as quaternions have."""
     values, _ = _sampled(columns, layouts)
-    return (some or len(values) > 2) and _enough(_have_length_1(values), some=some)
+    return (some or len(values) > 2) and _enough(have_length_1(values), some=some)
 
 
 def odd_rows(columns: Sequence[Column], layouts: Sequence[Layout]) -> list[int]:
@@ -210,7 +214,7 @@ def odd_rows(columns: Sequence[Column], layouts: Sequence[Layout]) -> list[int]:
         laws = [_orthogonal(values.reshape(-1, 3, 3))]
     else:
         changes = (np.diff(values, axis=0) != 0).any(axis=1)
-        laws = [_have_length_1(values)] if 2 * np.count_nonzero(changes) > len(changes) else []
+        laws = [have_length_1(values)] if 2 * np.count_nonzero(changes) > len(changes) else []
     few = (rows[~holds].tolist() for holds in laws if 0 < np.count_nonzero(~holds) <= FEW * len(rows))
     return next(few, [])
 
@@ -234,7 +238,7 @@ def _are_transforms(values: FloatArray, entries: IntArray) -> BoolArray:
     return holds if values.shape[1] == 12 else holds & (values[:, entries[3]] == (0, 0, 0, 1)).all(axis=1)
 
 
-def _have_length_1(values: FloatArray) -> BoolArray:
+def have_length_1(values: FloatArray) -> BoolArray:
     """Return which rows are unit vectors; shape (n,)."""
     return np.asarray(np.abs((values**2).sum(axis=1) - 1.0) < _UNIT_LENGTH)
 
@@ -278,7 +282,7 @@ def _rotation(
         if len(found) != 1:
             continue
         columns = found[0].ordered()
-        told = not _LIKE_JOINT.fullmatch(columns[0].key) or form in words.forms
+        told = not _LIKE_JOINT.fullmatch(columns[0].plain) or form in words.forms
         if told or _is_unit(columns, layouts, some=some):
             return columns, words.forms
     nine = [family for family in families(rest, vocabulary().tcp_matrix, 0) if len(family.columns) == 9]

@@ -8,11 +8,16 @@ from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.sources.columns.columns import Column
 
+RECORD = Hint("", does="record the missing one")
+OTHER_ROBOT = Hint("robot", None, "gives another arm")
 NAME_JOINTS = Hint("joints", None, "names the joint columns, in the robot's order")
 
 _SIDES = (frozenset(("left", "l")), frozenset(("right", "r")))
 
-MOST_ANSWERS = 3
+UNKNOWN = "columns that are known to be joints"
+"""What is allowed where nothing tells which columns they are."""
+
+MOST_ANSWERS = 4
 """Groups of columns that a question offers."""
 
 
@@ -31,7 +36,7 @@ def which_joints(
     file: str,
     found: str,
     groups: Sequence[Sequence[Column]],
-    allowed: str = "columns that are known to be joints",
+    allowed: str = UNKNOWN,
     *hints: Hint,
 ) -> LogError:
     """Return the question which columns are the joints, with the groups that they may be.

@@ -13,16 +13,25 @@ from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import grouped_number
 from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
-from urmpipe_pipeline.sources.columns.families import families, measured
+from urmpipe_pipeline.sources.columns.families import families
+from urmpipe_pipeline.sources.columns.joint_names import (
+    NamedJoints,
+    called_as_joints,
+    cure,
+    family_of,
+    find_joints,
+    named_after,
+    numbered_alike,
+    proved_by_rates,
+    some_named,
+)
 from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, with_form
-from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, by_side, which_joints
+from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, OTHER_ROBOT, by_side, which_joints
 from urmpipe_pipeline.sources.columns.tcp_like import about_odd_rows, about_tcp
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.vocabulary import key, vocabulary
-
-RECORD = Hint("", does="record the missing one")
-OTHER_ROBOT = Hint("robot", None, "gives another arm")
+from urmpipe_pipeline.sources.tables.whole import Whole
+from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +78,7 @@ def assign(
     layouts: Sequence[Layout],
     options: ReadOptions,
     robot: Chain | None,
+    whole: Sequence[Whole] = (),
     *,
     path: bool = False,
     written: tuple[Column, ...] = (),
@@ -77,13 +87,15 @@ def assign(
 
     The joints are, in this order: the columns that the user names; those named like the robot's
     joints; those with a word for a joint and its number; those with a unit of angle; as many
-    columns as the robot has joints, if no more are left. Without any, x, y, z make a path.
+    columns as the robot has joints, if no more are left; those of a family whose rates are another
+    family, by their numbers. Without any, x, y, z make a path.
 
     Args:
         columns: The columns, without the clock.
         layouts: The tables.
         options: What the user says: joint columns, position, orientation.
         robot: The arm, or None.
+        whole: All numbers of each table.
         path: It is a path, as the user says: joints are not looked for.
         written: The joints of a log that urmpipe wrote.
 
@@ -95,21 +107,23 @@ def assign(
     if options.joints or written:
         joints = written or tuple(find_column(columns, text, parameter="joints") for text in options.joints)
         evidence = "urmpipe wrote them" if written else "given as an option"
-        found = _Joints(joints, evidence, *_family_of(joints))
+        found = NamedJoints(joints, evidence, *family_of(joints))
         pose = chosen_pose(columns, options) or find_pose([c for c in numeric if c not in joints], layouts)
     else:
-        own = () if path else _called_as_joints(numeric, robot)
+        own = () if path else called_as_joints(numeric, robot)
         pose = chosen_pose(columns, options) or find_pose(
             [c for c in numeric if c not in own], layouts, form=options.rotation if path else None, some=path
         )
         free = [column for column in numeric if column not in (*pose.position, *pose.rotation)]
         half = bool(pose.position and not pose.rotation)
-        found = _Joints(()) if path else _find_joints(free, file, robot, half_pose=half)
+        found = NamedJoints(()) if path else find_joints(free, file, robot, half_pose=half)
+        if whole and not (path or found.columns or pose.position):
+            found = proved_by_rates(numbered_alike(free), whole)
     pose = with_form(pose, options.rotation)
     if not found.columns:
         return _path(columns, numeric, pose, layouts, robot, path=path)
     check_count(found.columns, file, robot)
-    rates = _derivative("rate", numeric, found)
+    rates = found.rates or _derivative("rate", numeric, found)
     accelerations = _derivative("acceleration", numeric, found)
     roles = Roles(
         found.columns, rates, accelerations, pose.position, pose.rotation, pose.forms, measured=pose.measured
@@ -119,174 +133,6 @@ def assign(
         if group:
             said.append(Inference(what, ", ".join(column.name for column in group), "their names"))
     return _with_rest(roles, [*said, *about_pose(pose)], numeric, layouts)
-
-
-@dataclass(frozen=True, slots=True)
-class _Joints:
-    """Joint columns, why they are, and the names and numbers that their rates share."""
-
-    columns: tuple[Column, ...]
-    evidence: str = ""
-    numbers: tuple[int, ...] = ()
-    names: tuple[str, ...] = ()
-
-
-def _family_of(joints: Sequence[Column]) -> tuple[tuple[int, ...], tuple[str, ...]]:
-    """Return the numbers, or else the names, that chosen joints share with their rates, in their order."""
-    for family in families(joints, vocabulary().joint["position"], order=0):
-        if len(family.columns) == len(joints):
-            number_of = {column: n for n, column in family.columns.items()}
-            return tuple(number_of[column] for column in joints), ()
-    for names in vocabulary().orders:
-        of_joint = [[name for name in names if _role_beside(c, name) == "position"] for c in joints]
-        if all(len(matching) == 1 for matching in of_joint):
-            return (), tuple(matching[0] for matching in of_joint)
-    return (), ()
-
-
-def _called_as_joints(numeric: Sequence[Column], robot: Chain | None) -> tuple[Column, ...]:
-    """Return the columns named exactly as the robot's joints: x, y, z of a gantry are no position."""
-    if robot is None:
-        return ()
-    found = named_after(numeric, robot.coordinates, "position")
-    names = [key(name) for name in robot.coordinates]
-    return found if [column.key for column in found] == names else ()
-
-
-def _find_joints(free: Sequence[Column], file: str, robot: Chain | None, *, half_pose: bool) -> _Joints:
-    """Return the joints among some columns; beside half a pose, three angles may be its other half."""
-    count = len(robot.coordinates) if robot else None
-    orders = [*((robot.coordinates,) if robot else ()), *vocabulary().orders]
-    for names in orders:
-        by_name = named_after(free, names, "position")
-        if by_name and count in (None, len(by_name)):
-            whose = "the robot's" if robot and names == robot.coordinates else "known"
-            return _Joints(by_name, f"{whose} joint names", names=tuple(names))
-    return _numbered(free, file, count) or _without_number(free, file, count, half_pose=half_pose)
-
-
-def _without_number(free: Sequence[Column], file: str, count: int | None, *, half_pose: bool) -> _Joints:
-    """Return joints without numbers: by a word that they share, by their units, or as all that is left."""
-    words = vocabulary()
-    about_else = words.other | words.joint_words["rate"] | words.joint_words["acceleration"]
-    still = measured([c for c in free if not c.words & about_else and not (c.unit and c.unit.order)])
-    family = _sharing_a_mark(still)
-    if family and count in (None, len(family)):
-        _refuse_half(family, still, file, count)
-        names = tuple("_".join(w for w in c.key.split("_") if w not in words.marks) for c in family)
-        evidence = "the word position or angle in their names; the order is the file's"
-        return _Joints(family, evidence, names=names)
-    sized = tuple(c for c in still if c.unit and c.unit.quantity in ("angle", "length"))
-    turning = any(c.unit and c.unit.quantity == "angle" for c in sized)
-    if turning and count in (None, len(sized)) and not (half_pose and count is None and len(sized) == 3):
-        return _Joints(sized, "their units; the order is the file's")
-    if count is not None and len(still) == count:
-        return _Joints(tuple(still), f"the only {count} columns left; the order is the file's")
-    return _Joints(())
-
-
-def _sharing_a_mark(still: Sequence[Column]) -> tuple[Column, ...]:
-    """Return the most columns whose names have a word for positions at the same place, from front or back.
-
-    In wrist_angle_pos and elbow_pos that is the last one.
-    """
-    alike: dict[tuple[str, int], list[Column]] = {}
-    for column in still:
-        words = column.key.split("_")
-        for place, word in enumerate(words):
-            if word in vocabulary().marks:
-                for key_of in ((word, place), (word, place - len(words))):
-                    alike.setdefault(key_of, []).append(column)
-    return tuple(max(alike.values(), key=len, default=()))
-
-
-def _refuse_half(family: Sequence[Column], still: Sequence[Column], file: str, count: int | None) -> None:
-    """Raise a `LogError` where other columns may belong to a family of joints: a family is taken whole.
-
-    Their names have a mark as well, a word that the family's have, or one of a limb.
-    """
-    words = vocabulary()
-    limbs = frozenset(word for order in words.orders for name in order for word in name.split("_"))
-    own = frozenset(word for column in family for word in column.words) | limbs
-    others = [column for column in still if column not in family and column.words & own]
-    if not others or len(family) == count:
-        return
-    whole = [column for column in still if column in family or column in others]
-    found = f"{listed(family)}, whose names say that they are positions, beside {listed(others)}"
-    raise which_joints(file, found, [whole, family])
-
-
-def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> tuple[Column, ...]:
-    """Return the columns that carry the names of joints, one each in their order, or nothing.
-
-    Args:
-        columns: Candidates.
-        names: Names of the joints.
-        role: position, rate or acceleration: decided by the words beside the joint's name.
-    """
-    result = []
-    for name in names:
-        matches = [column for column in columns if _role_beside(column, name) == role]
-        matches, own = measured(matches), frozenset(key(name).split("_"))
-        exact = [c for c in matches if c.words - own <= vocabulary().joint_words["position"]]
-        matches = exact if len(exact) == 1 else matches
-        if len(matches) != 1:
-            return ()
-        result.append(matches[0])
-    return tuple(result) if len(set(result)) == len(result) else ()
-
-
-def _role_beside(column: Column, name: str) -> str | None:
-    """Return what a column says about a joint: by the words beside the joint's name in its own."""
-    padded, inner = f"_{column.key}_", f"_{key(name)}_"
-    if inner not in padded:
-        return None
-    beside = frozenset(padded.replace(inner, "_", 1).strip("_").split("_")) - {""}
-    words = vocabulary().joint_words
-    if beside & vocabulary().other:
-        return None
-    order = column.unit.order if column.unit else 0
-    for role, its_order in (("acceleration", 2), ("rate", 1)):
-        if beside & words[role] or order == its_order:
-            return role
-    return "position"
-
-
-def _numbered(free: Sequence[Column], file: str, count: int | None) -> _Joints | None:
-    """Return the joints by a word and a number: q1, J1_Angle, actual_q_0, ..."""
-    words = vocabulary()
-    moving = words.joint_words["rate"] | words.joint_words["acceleration"]
-    still = [column for column in free if not column.words & moving]
-    found = families(still, words.joint["position"], order=0)
-    if not found:
-        return None
-    fitting = [family for family in found if len(family.columns) == count] or found
-    best = [family for family in fitting if family.rank == min(f.rank for f in fitting)]
-    if len(best) > 1 and not all(len(family.columns) == 1 for family in best):
-        groups = [family.ordered() for family in best]
-        found_all = f"several groups of joint columns: {'; '.join(map(listed, groups))}"
-        raise which_joints(file, found_all, groups, "one")
-    if len(best) > 1:  # one plot a joint, each with a number of its own
-        columns = tuple(column for family in best for column in family.ordered())
-        return _Joints(columns, "their names; the order is the file's")
-    family = best[0]
-    lowest = min(family.columns)
-    first = lowest if len(family.columns) == 1 else min(lowest, 1)
-    gaps = [n for n in range(first, first + len(family.columns)) if n not in family.columns]
-    if gaps and not family.twins:  # a number that is there twice is told as such
-        missing = ", ".join(map(str, gaps))
-        said = f"found joint columns {listed(family.ordered())} and none with number {missing}"
-        allowed = "numbers without a gap" if count is None else f"the {count} joints of the robot"
-        spare = [c for c in still if c not in family.columns.values() and not c.words & words.other]
-        hints = _cure(len(gaps), spare, count)
-        raise LogError(Finding(f"{said}, allowed: {allowed}", file=file, hints=hints))
-    evidence = "their names, in the order of their numbers"
-    return _Joints(family.ordered(), evidence, tuple(sorted(family.columns)))
-
-
-def _cure(missing: int, spare: Sequence[Column], count: int | None) -> tuple[Hint, Hint]:
-    """Return what helps where joints are missing: naming them only where columns are left for a robot's."""
-    return RECORD, OTHER_ROBOT if count is not None and len(spare) < missing else NAME_JOINTS
 
 
 def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> None:
@@ -302,7 +148,7 @@ def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> Non
         return
     need = f"allowed: {len(robot.coordinates)}, as robot {robot.name} has"
     more = len(joints) > len(robot.coordinates)
-    numbers = () if all(column.header.isdigit() for column in joints) else _family_of(joints)[0]
+    numbers = () if all(column.header.isdigit() for column in joints) else family_of(joints)[0]
     first = min((1, *numbers))
     missing = [n for n in range(first, first + len(robot.coordinates)) if n not in numbers]
     none = f" and none with number {', '.join(map(str, missing))}" if numbers and not more else ""
@@ -311,7 +157,7 @@ def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> Non
     raise LogError(Finding(message, file=file, hints=hints))
 
 
-def _derivative(role: str, numeric: Sequence[Column], joints: _Joints) -> tuple[Column, ...]:
+def _derivative(role: str, numeric: Sequence[Column], joints: NamedJoints) -> tuple[Column, ...]:
     """Return the recorded rates or accelerations of exactly these joints, or nothing."""
     if joints.names:
         return named_after(numeric, joints.names, role)
@@ -378,10 +224,10 @@ def _path(
     need = (
         f"{len(robot.coordinates)} for robot {robot.name}" if robot else "such as q1, q2, ... or J1, J2, ..."
     )
-    found, missing = _some_named(numeric, robot)
+    found, missing = some_named(numeric, robot)
     if found:
         spare = [column for column in numeric if column not in found]
-        hints = _cure(len(missing), spare, len(robot.coordinates) if robot else None)
+        hints = cure(len(missing), spare, len(robot.coordinates) if robot else None)
         lacking = f"found joint columns {listed(found)} and none for {', '.join(missing)}, allowed: {need}"
         raise LogError(Finding(lacking, file=file, hints=hints))
     raise which_joints(file, f"no joint columns in {listed(columns)}", _may_be(numeric, robot), need)
@@ -392,18 +238,8 @@ def _may_be(numeric: Sequence[Column], robot: Chain | None) -> list[Sequence[Col
     about_else = vocabulary().other | vocabulary().outside
     others = [column for column in numeric if not column.words & about_else]
     fits = {len(robot.coordinates)} if robot else range(1, MOST_JOINTS + 1)
-    return [group for group in by_side(others) if len(group) in fits]
-
-
-def _some_named(numeric: Sequence[Column], robot: Chain | None) -> tuple[tuple[Column, ...], list[str]]:
-    """Return the columns of most joints with known names, and the names that have none; nothing of fewer."""
-    for names in [*((robot.coordinates,) if robot else ()), *vocabulary().orders]:
-        own = {name: named_after(numeric, [name], "position") for name in names}
-        found = tuple(dict.fromkeys(column for columns in own.values() for column in columns))
-        missing = [name for name, columns in own.items() if not columns]
-        if len(names) / 2 < len(found) == len(names) - len(missing) < len(names):
-            return found, missing
-    return (), []
+    groups = [*by_side(others), *numbered_alike(others)]
+    return [group for group in groups if len(group) in fits]
 
 
 def _refuse_thousands(layouts: Sequence[Layout], file: str) -> None:

@@ -1,0 +1,247 @@
+"""Joints by their names: those of the arm, of known arms, with numbers, or in families that share a word."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import permutations
+from typing import NoReturn
+
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.messages import Hint
+from urmpipe_pipeline.sources.columns.blocks import period_of
+from urmpipe_pipeline.sources.columns.columns import Column, listed
+from urmpipe_pipeline.sources.columns.families import families, measured
+from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, OTHER_ROBOT, RECORD, which_joints
+from urmpipe_pipeline.sources.tables.whole import Whole
+from urmpipe_pipeline.sources.vocabulary import key, vocabulary
+
+
+@dataclass(frozen=True, slots=True)
+class NamedJoints:
+    """Joint columns, why they are, the names and numbers that their rates share, and these if proved."""
+
+    columns: tuple[Column, ...]
+    evidence: str = ""
+    numbers: tuple[int, ...] = ()
+    names: tuple[str, ...] = ()
+    rates: tuple[Column, ...] = ()
+
+
+def numbered_alike(columns: Sequence[Column]) -> list[tuple[Column, ...]]:
+    """Return families of two columns or more of one table whose names differ by a number at the end."""
+    alike: dict[tuple[str, int], list[Column]] = {}
+    for column in columns:
+        stem = column.key.rstrip("0123456789")
+        if stem != column.key:
+            alike.setdefault((stem, column.table), []).append(column)
+    return [tuple(family) for family in alike.values() if len(family) > 1]
+
+
+def proved_by_rates(families: Sequence[tuple[Column, ...]], whole: Sequence[Whole]) -> NamedJoints:
+    """Return the family whose rates are another one, by their numbers; nothing unless there is one."""
+    pairs = []
+    for joints, rates in permutations(families, 2):
+        values = [whole[some[0].table].values([column.index for column in some]) for some in (joints, rates)]
+        if len(joints) == len(rates) and len(values[0]) == len(values[1]) and period_of(*values):
+            pairs.append((joints, rates))
+    first = [pair for pair in pairs if pair[0] not in [rates for _, rates in pairs]]
+    if len(first) != 1:
+        return NamedJoints(())
+    joints, rates = first[0]
+    return NamedJoints(joints, f"{listed(rates)} are their rates, by steps and rates", rates=rates)
+
+
+def family_of(joints: Sequence[Column]) -> tuple[tuple[int, ...], tuple[str, ...]]:
+    """Return the numbers, or else the names, that chosen joints share with their rates, in their order."""
+    for family in families(joints, vocabulary().joint["position"], order=0):
+        if len(family.columns) == len(joints):
+            number_of = {column: n for n, column in family.columns.items()}
+            return tuple(number_of[column] for column in joints), ()
+    for names in vocabulary().orders:
+        of_joint = [[name for name in names if _role_beside(c, name) == "position"] for c in joints]
+        if all(len(matching) == 1 for matching in of_joint):
+            return (), tuple(matching[0] for matching in of_joint)
+    return (), ()
+
+
+def called_as_joints(numeric: Sequence[Column], robot: Chain | None) -> tuple[Column, ...]:
+    """Return the columns named exactly as the robot's joints: x, y, z of a gantry are no position."""
+    if robot is None:
+        return ()
+    found = named_after(numeric, robot.coordinates, "position")
+    names = [key(name) for name in robot.coordinates]
+    return found if [column.key for column in found] == names else ()
+
+
+def find_joints(free: Sequence[Column], file: str, robot: Chain | None, *, half_pose: bool) -> NamedJoints:
+    """Return the joints among some columns; beside half a pose, three angles may be its other half."""
+    count = len(robot.coordinates) if robot else None
+    orders = [*((robot.coordinates,) if robot else ()), *vocabulary().orders]
+    for names in orders:
+        by_name = named_after(free, names, "position")
+        if by_name and count in (None, len(by_name)):
+            whose = "the robot's" if robot and names == robot.coordinates else "known"
+            return NamedJoints(by_name, f"{whose} joint names", names=tuple(names))
+        if count in (None, len(names)):
+            _refuse_several_arms(free, names, file)
+    return _numbered(free, file, count) or _without_number(free, file, count, half_pose=half_pose)
+
+
+def _without_number(free: Sequence[Column], file: str, count: int | None, *, half_pose: bool) -> NamedJoints:
+    """Return joints without numbers: by a word that they share, by their units, or as all that is left."""
+    words = vocabulary()
+    about_else = words.other | words.joint_words["rate"] | words.joint_words["acceleration"]
+    still = measured([c for c in free if not c.words & about_else and not (c.unit and c.unit.order)])
+    family = _sharing_a_mark(still)
+    if family and count in (None, len(family)):
+        _refuse_half(family, free, still, file, count)
+        names = tuple("_".join(w for w in c.key.split("_") if w not in words.marks) for c in family)
+        evidence = "the word position or angle in their names; the order is the file's"
+        return NamedJoints(family, evidence, names=names)
+    sized = tuple(c for c in still if c.unit and c.unit.quantity in ("angle", "length"))
+    turning = any(c.unit and c.unit.quantity == "angle" for c in sized)
+    if turning and count in (None, len(sized)) and not (half_pose and count is None and len(sized) == 3):
+        return NamedJoints(sized, "their units; the order is the file's")
+    if count is not None and len(still) == count:
+        return NamedJoints(tuple(still), f"the only {count} columns left; the order is the file's")
+    return NamedJoints(())
+
+
+def _sharing_a_mark(still: Sequence[Column], having: Sequence[Column] = ()) -> tuple[Column, ...]:
+    """Return the most columns whose names have a word for positions at the same place, from front or back.
+
+    In wrist_angle_pos and elbow_pos that is the last one. They hold all columns that they are to have.
+    """
+    alike: dict[tuple[str, int], list[Column]] = {}
+    for column in still:
+        words = column.key.split("_")
+        for place, word in enumerate(words):
+            if word in vocabulary().marks:
+                for key_of in ((word, place), (word, place - len(words))):
+                    alike.setdefault(key_of, []).append(column)
+    return tuple(max((some for some in alike.values() if {*having} <= {*some}), key=len, default=()))
+
+
+def _refuse_half(
+    family: Sequence[Column], free: Sequence[Column], still: Sequence[Column], file: str, count: int | None
+) -> None:
+    """Raise a `LogError` where other columns may belong to a family of joints: a family is taken whole.
+
+    Their names have the family's mark at the same place, as that of a tool may, or a word that the family's
+    have, or one of a limb.
+    """
+    words = vocabulary()
+    limbs = frozenset(word for order in words.orders for name in order for word in name.split("_"))
+    own = frozenset(word for column in family for word in column.words) | limbs
+    moving = words.joint_words["rate"] | words.joint_words["acceleration"] | words.grippers
+    same = _sharing_a_mark(measured([column for column in free if not column.words & moving]), family)
+    others = [c for c in free if c not in family and (c in same or (c in still and c.words & own))]
+    if not others or len(family) == count:
+        return
+    whole = [column for column in free if column in family or column in others]
+    found = f"{listed(family)}, whose names say that they are positions, beside {listed(others)}"
+    raise which_joints(file, found, [whole, family])
+
+
+def _refuse_several_arms(free: Sequence[Column], names: Sequence[str], file: str) -> None:
+    """Raise a `LogError` where columns have the names of all joints more than once, as those of two arms."""
+    arms: dict[str, dict[str, Column]] = {}
+    for name in names:
+        for column in measured([one for one in free if _role_beside(one, name) == "position"]):
+            rest = f"_{column.key}_".replace(f"_{key(name)}_", "_", 1).strip("_")
+            arms.setdefault(rest, {}).setdefault(name, column)
+    groups = [[arm[name] for name in names] for arm in arms.values() if len(arm) == len(names)]
+    if len(groups) > 1:
+        _refuse_groups(groups, file)
+
+
+def _refuse_groups(groups: Sequence[Sequence[Column]], file: str) -> NoReturn:
+    """Raise the question which of several groups are the joints."""
+    found = f"several groups of joint columns: {'; '.join(map(listed, groups))}"
+    raise which_joints(file, found, groups, "one")
+
+
+def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> tuple[Column, ...]:
+    """Return the columns that carry the names of joints, one each in their order, or nothing.
+
+    Args:
+        columns: Candidates.
+        names: Names of the joints.
+        role: position, rate or acceleration: decided by the words beside the joint's name.
+    """
+    result = []
+    for name in names:
+        matches = [column for column in columns if _role_beside(column, name) == role]
+        matches, own = measured(matches), frozenset(key(name).split("_"))
+        exact = [c for c in matches if c.words - own <= vocabulary().joint_words["position"]]
+        matches = exact if len(exact) == 1 else matches
+        if len(matches) != 1:
+            return ()
+        result.append(matches[0])
+    return tuple(result) if len(set(result)) == len(result) else ()
+
+
+def _role_beside(column: Column, name: str) -> str | None:
+    """Return what a column says about a joint: by the words beside the joint's name in its own."""
+    padded, inner = f"_{column.key}_", f"_{key(name)}_"
+    if inner not in padded:
+        return None
+    beside = frozenset(padded.replace(inner, "_", 1).strip("_").split("_")) - {""}
+    words = vocabulary().joint_words
+    if beside & vocabulary().other:
+        return None
+    order = column.unit.order if column.unit else 0
+    for role, its_order in (("acceleration", 2), ("rate", 1)):
+        if beside & words[role] or order == its_order:
+            return role
+    return "position"
+
+
+def _numbered(free: Sequence[Column], file: str, count: int | None) -> NamedJoints | None:
+    """Return the joints by a word and a number: q1, J1_Angle, actual_q_0, ..."""
+    words = vocabulary()
+    moving = words.joint_words["rate"] | words.joint_words["acceleration"]
+    still = [column for column in free if not column.words & moving]
+    found = families(still, words.joint["position"], order=0)
+    if not found:
+        return None
+    fitting = [family for family in found if len(family.columns) == count] or found
+    best = [family for family in fitting if family.rank == min(f.rank for f in fitting)]
+    if len(best) > 1 and not all(len(family.columns) == 1 for family in best):
+        _refuse_groups([family.ordered() for family in best], file)
+    if len(best) > 1:  # one plot a joint, each with a number of its own
+        columns = tuple(column for family in best for column in family.ordered())
+        return NamedJoints(columns, "their names; the order is the file's")
+    family = best[0]
+    lowest = min(family.columns)
+    first = lowest if len(family.columns) == 1 else min(lowest, 1)
+    gaps = [n for n in range(first, first + len(family.columns)) if n not in family.columns]
+    if gaps and not family.twins:  # a number that is there twice is told as such
+        missing = ", ".join(map(str, gaps))
+        said = f"found joint columns {listed(family.ordered())} and none with number {missing}"
+        allowed = "numbers without a gap" if count is None else f"the {count} joints of the robot"
+        spare = [c for c in still if c not in family.columns.values() and not c.words & words.other]
+        hints = cure(len(gaps), spare, count)
+        raise LogError(Finding(f"{said}, allowed: {allowed}", file=file, hints=hints))
+    if larger := _sharing_a_mark(still, family.ordered()):
+        _refuse_half(family.ordered(), larger, larger, file, count)
+    evidence = "their names, in the order of their numbers"
+    return NamedJoints(family.ordered(), evidence, tuple(sorted(family.columns)))
+
+
+def cure(missing: int, spare: Sequence[Column], count: int | None) -> tuple[Hint, Hint]:
+    """Return what helps where joints are missing: naming them only where columns are left for a robot's."""
+    return RECORD, OTHER_ROBOT if count is not None and len(spare) < missing else NAME_JOINTS
+
+
+def some_named(numeric: Sequence[Column], robot: Chain | None) -> tuple[tuple[Column, ...], list[str]]:
+    """Return the columns of most joints with known names, and the names that have none; nothing of fewer."""
+    for names in [*((robot.coordinates,) if robot else ()), *vocabulary().orders]:
+        own = {name: named_after(numeric, [name], "position") for name in names}
+        found = tuple(dict.fromkeys(column for columns in own.values() for column in columns))
+        missing = [name for name, columns in own.items() if not columns]
+        if len(names) / 2 < len(found) == len(names) - len(missing) < len(names):
+            return found, missing
+    return (), []

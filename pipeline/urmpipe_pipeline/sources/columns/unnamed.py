@@ -1,0 +1,93 @@
+"""Joints among columns without names: as many as the arm has, proved by their rates, or asked about."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import groupby
+
+import numpy as np
+
+from urmpipe_models.arrays import BoolArray, FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.messages import Hint
+from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS, proved_blocks
+from urmpipe_pipeline.sources.columns.columns import Column, listed
+from urmpipe_pipeline.sources.columns.questions import UNKNOWN, which_joints
+from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.tables.whole import Whole
+
+TWO_TURNS = 720.0, 2.0 * math.tau
+"""No joint of an arm goes further either way in [deg] and in [rad], as clocks, wheels and counts do."""
+
+SELDOM = 0.2
+"""A column that moves in a smaller share of the rows than others do, by this factor, may be a gripper's."""
+
+USUAL = 6
+"""Joints that most arms have."""
+
+Found = tuple[tuple[Column, ...], tuple[Column, ...], str]
+"""Joints, their rates, and why."""
+
+
+def joints_among(free: Sequence[Column], layout: Layout, whole: Whole | None, robot: Chain | None) -> Found:
+    """Return the joints among columns without names, their rates, and why.
+
+    They are all columns, if these are as many as the robot has joints; those whose rates stand beside them;
+    without a robot all of a few columns that move alike.
+
+    Raises:
+        LogError: With the question which they are, if none of that holds.
+    """
+    count = len(robot.coordinates) if robot else None
+    if whole is None or (count is not None and len(free) <= count):
+        return tuple(free), (), f"no header: joints in order{', as many as the robot has' if robot else ''}"
+    values = whole.values([column.index for column in free])
+    blocks = proved_blocks(values, count)
+    if len(blocks) == 1:
+        joints, rates = (tuple(free[k] for k in some) for some in (blocks[0].joints, blocks[0].rates))
+        alike = f"steps and rates correlate by {blocks[0].correlation:.3g}"
+        return joints, rates, f"columns {listed(rates)} are their rates: {alike}"
+    odd = unlike_joints(values)
+    if not blocks and count is None and len(free) <= MOST_JOINTS and not odd.any():
+        return tuple(free), (), "no header: joints in order"
+    groups = [[free[k] for k in block.joints] for block in blocks] or _groups(free, odd, count)
+    others = [column for column, is_odd in zip(free, odd, strict=True) if is_odd]
+    found = f"{len(free)} columns that no header names"
+    found += f", of which {listed(others)} may be no joints" if others else ""
+    found += f", and robot {robot.name} has {count} joints" if robot else ""
+    path = (Hint("source", "path", "reads them as x, y, z"),) if len(free) == 3 else ()
+    raise which_joints(layout.file, found, groups, UNKNOWN, *path)
+
+
+def unlike_joints(values: FloatArray) -> BoolArray:
+    """Return which columns are unlike joints, or unlike the others, shape (columns,).
+
+    They go further than any arm's joint, or than one in rad where most of the others do not; or they move
+    seldom while others do.
+
+    Args:
+        values: The columns in the file's own units, shape (n, columns); NaN where a sample is missing.
+    """
+    if len(values) < 2:
+        return np.zeros(values.shape[1], dtype=bool)
+    size = np.sort(np.abs(values), axis=0)[int(0.9 * (len(values) - 1))]  # NaN counts as the largest
+    in_rad = int(2 * np.count_nonzero(size <= TWO_TURNS[1]) > len(size))
+    moves = (np.diff(values, axis=0) != 0.0).mean(axis=0)
+    seldom = (moves > 0.0) & (moves < SELDOM * np.median(moves))
+    return np.asarray((size > TWO_TURNS[in_rad]) | seldom)
+
+
+def _groups(free: Sequence[Column], odd: BoolArray, count: int | None) -> list[Sequence[Column]]:
+    """Return the columns that may be all joints: those between odd ones, either half, the first, all."""
+    together = [
+        [free[k] for k, _ in run]
+        for is_odd, run in groupby(enumerate(odd), lambda pair: pair[1])
+        if not is_odd
+    ]
+    near = sorted((run for run in together if len(run) > 1 and len(run) < len(free)), key=len, reverse=True)
+    if count:
+        return [run for run in (*near, free[:count], free[-count:]) if len(run) == count]
+    half = len(free) // 2
+    halves = [free[:half], free[half:]] if len(free) == 2 * half > USUAL else []
+    return [*halves, *near[:1], *([] if halves else [free[:USUAL]]), free]
