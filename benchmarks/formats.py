@@ -19,6 +19,8 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pairs import Bound, Usage, machine, ratio, rounds, table, write_results
 from pyarrow import csv
+from pyarrow import parquet as pq
+from scipy.io import savemat
 
 from urmpipe_models.arrays import FloatArray
 
@@ -127,6 +129,17 @@ def array_cells(path: Path, t_ms: NDArray[np.int64], q: FloatArray) -> None:
         file.writelines(lines(pattern, t_ms / 1e3, *q.T))
 
 
+def parquet(path: Path, t_ms: NDArray[np.int64], q: FloatArray) -> None:
+    """Write the same columns as Parquet, doubles with the settings of pandas."""
+    names = ["t [s]", *(f"{name} [rad]" for name in NAMES[1:])]
+    pq.write_table(pa.table([pa.array(column) for column in (t_ms / 1e3, *q.T)], names=names), path)
+
+
+def mat(path: Path, t_ms: NDArray[np.int64], q: FloatArray) -> None:
+    """Write what SciPy, or MATLAB's `save -v6`, writes of a vector and a matrix."""
+    savemat(path, {"t": t_ms / 1e3, "q": q})
+
+
 PLAIN = Format(separated(","))
 FORMATS = {
     "semicolon, decimal comma": Format(separated(";", ",")),
@@ -140,6 +153,10 @@ FORMATS = {
 TEXTS = {
     "FRI text": Format(fri_text, under=4.0, options=("--unit", "rad"), suffix=".txt"),
     "array cells over two lines": Format(array_cells, under=4.0, options=("--unit", "rad")),
+}
+TYPED = {
+    "Parquet": Format(parquet, under=1.0, suffix=".parquet"),
+    "MAT": Format(mat, options=("--unit", "rad"), suffix=".mat"),
 }
 
 
@@ -186,11 +203,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rows", type=int, default=1_000_000)
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--only", nargs="*", default=[*FORMATS, *TEXTS])
+    parser.add_argument("--only", nargs="*", default=[*FORMATS, *TEXTS, *TYPED])
     options = parser.parse_args()
     found: list[str] = []
     bounds: list[Bound] = []
-    for name, one in (FORMATS | TEXTS).items():
+    for name, one in (FORMATS | TEXTS | TYPED).items():
         if name not in options.only:
             continue
         with tempfile.TemporaryDirectory() as temporary:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from urmpipe.kinds import kind_of
+from urmpipe_models.display import Shown
 from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError, shown
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.recording import is_recording
@@ -21,8 +22,6 @@ Parameters = ParamSpec("Parameters")
 Made = TypeVar("Made")
 
 PathLike = str | Path
-
-WRITTEN_FIRST = 'arrays and tables are written first, such as table.to_csv("log.csv", index=False)'
 
 
 class UrmpipeWarning(UserWarning):
@@ -100,6 +99,8 @@ def _unseen(made: Any, given: Iterable[Any]) -> Iterator[str]:
 
 def _warnings_of(result: Any) -> Iterator[LogWarning]:
     """Yield the warnings of a result, and those of the logs that it compares with the log's name."""
+    if not isinstance(result, Shown):  # a table may have a column of that name
+        return
     yield from getattr(result, "warnings", ())
     for deviation in getattr(result, "runs", ()):
         yield from (one.of(deviation.name) for one in deviation.run.warnings)
@@ -107,7 +108,8 @@ def _warnings_of(result: Any) -> Iterator[LogWarning]:
 
 def one_or_many(given: object) -> list[Any]:
     """Return what was given as a list: a path, a run or another result alone is a list of one."""
-    alone = isinstance(given, (str, Path, Mapping)) or hasattr(given, "__array__")  # a table is no list
+    table = hasattr(given, "__array__") or hasattr(given, "__arrow_c_stream__")
+    alone = table or isinstance(given, (str, Path, Mapping))
     return [given] if alone or not isinstance(given, Iterable) else list(given)
 
 

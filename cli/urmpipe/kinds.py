@@ -170,6 +170,10 @@ KINDS = {
     "audit": PATH,
     "backend": _one_of("native", "python"),
     "base_link": LINK,
+    "block": Kind(
+        lambda value: _is_text(value) or (_one_or_many(_is_text)(value) and len(value) > 0),
+        "a block, or one for each simulation",
+    ),
     "band": Kind(_is_number, "a number, in m"),
     "controls": Kind(_are_controls, 'a mapping of names to numbers, such as {"crank": 0.9}'),
     "csv": PATH,
@@ -188,6 +192,7 @@ KINDS = {
     "formats": Kind(
         _one_or_many(lambda one: isinstance(one, str) and one in ("svg", "png")), "svg, png or a list of both"
     ),
+    "ingest.name": Kind(_is_text, "a text, not empty"),
     "ik.tolerance": Kind(_is_number, "a number, in m"),
     "inputs": PATHS,
     "iso": FLAG,

@@ -53,12 +53,15 @@ class LogReading(TableReading, total=False):
     Attributes:
         source: Who wrote the log: coppeliasim, solidworks, path, ...
         joints: Names or numbers (from 1) of the joint columns, in the robot's order.
+        layout: What a row of the file is: "table" a sample, "transposed" a joint; of a flat array "flat:N" or
+            "flat-by-joint:N", with N numbers a sample.
         period: Time between rows in [s], of a log without a time column.
         skip_bad: Leave out rows that cannot be read, up to one in a hundred; each is a warning.
     """
 
     source: str | None
     joints: Sequence[str | int] | None
+    layout: str | None
     period: float | None
     skip_bad: bool
 
@@ -103,6 +106,7 @@ def resolved(
     tool: Frame | None = None,
     base_link: str | None = None,
     tip_link: str | None = None,
+    names: Sequence[str] | None = None,
 ) -> Resolved:
     """Return what keywords and map together say; the keywords come before the map.
 
@@ -113,6 +117,7 @@ def resolved(
         tool: The tool centre point in the frame of its tip, likewise.
         base_link: Link of a URDF where it begins.
         tip_link: Link of a URDF where it ends.
+        names: What to call the joints.
 
     Raises:
         UrmpipeError: With everything that is wrong with the map, the arm or a keyword.
@@ -123,7 +128,7 @@ def resolved(
     tool = tool if tool is not None or not log_map.tool else from_offset(log_map.tool)
     parts: tuple[Callable[[], Any], ...] = (
         lambda: place_robot(arm, base, tool, base_link=base_link, tip_link=tip_link),
-        lambda: read_options(reading, log_map.read),
+        lambda: read_options({**reading, "names": names}, log_map.read),
     )
     chain, options = for_each(lambda make: make(), parts)
     return Resolved(chain, arm, options)

@@ -52,6 +52,7 @@ IN_MAP = {
     "source": "source",
     "delimiter": "delimiter",
     "decimal": "decimal",
+    "layout": "layout",
     "time": "clock.column",
     "period": "clock.period",
     "poses": "clock.poses",

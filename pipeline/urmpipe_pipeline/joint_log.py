@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -295,14 +296,30 @@ class JointLog(Shown):
         import pandas as pd
 
         columns: dict[str, Any] = {"t": self.t} if self.timed else {"row": np.arange(1, self.rows + 1)}
-        for prefix, values in (("", self.q), ("d_", self.qd), ("dd_", self.qdd)):
-            if values is not None:
-                columns |= {f"{prefix}{name}": values[:, i] for i, name in enumerate(self.joints)}
-        rotation = NAMES[self.rotation_form] if self.rotation_form else ()
-        for names, values in (("xyz", self.tcp_position), (rotation, self.tcp_rotation)):
+        roles: dict[str, tuple[Role, int]] = {"t": ("time", 0)} if self.timed else {}
+        units = {"t": "s"}
+        for role, names, own, values in self._groups():
             if values is not None:
                 columns |= {name: values[:, i] for i, name in enumerate(names)}
-        return pd.DataFrame(columns)
+                roles |= {name: (role, i) for i, name in enumerate(names)}
+                units |= dict(zip(names, own, strict=True))
+        frame = pd.DataFrame(columns)
+        frame.attrs[OWN] = {"columns": roles, "units": units}  # by which `ingest` reads it again
+        return frame
+
+    def _groups(self) -> Iterator[tuple[Role, Sequence[str], Sequence[str], FloatArray | None]]:
+        """Yield the columns of its table by role: names, units in SI, and values."""
+        orders: dict[Role, tuple[str, str, FloatArray | None]] = {
+            "joint": ("", "", self.q),
+            "rate": ("d_", "/s", self.qd),
+            "acceleration": ("dd_", "/s2", self.qdd),
+        }
+        for role, (before, behind, values) in orders.items():
+            names, units = ([before + n for n in self.joints], [u + behind for u in self.joint_units])
+            yield role, names, units, values
+        yield "position", tuple("xyz"), ("m",) * 3, self.tcp_position
+        rotation = NAMES[self.rotation_form] if self.rotation_form else ()
+        yield "rotation", rotation, ("rad" if len(rotation) == 3 else "",) * len(rotation), self.tcp_rotation
 
     def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return what the log is and how it was read, without its rows; messages in somebody's words."""

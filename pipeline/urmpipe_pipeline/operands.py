@@ -1,8 +1,8 @@
-"""Operands of a command: a log, a folder of plots, a path or a recording, each as a run."""
+"""Operands of a command: a log, a folder of plots, a path, a recording or a simulation, each as a run."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeAlias
@@ -18,85 +18,127 @@ from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.other_robot import on_robot
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.motion import run_of_block
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import Held, ReadOptions
 from urmpipe_pipeline.sources.vocabulary import key
+from urmpipe_pipeline.text import counted
 
 JUDGED = "found the recording of {}, allowed: one that ingest wrote"
 
+OF_A_BLOCK = Hint("block", None, "takes the motion of a block", call="compare")
+
 WITH_BASELINE = Hint("baseline", None, "compares it, alone, with an earlier one")
-
-SIMULATION = (
-    "found the recording of a simulation, allowed: one that ingest wrote; a simulation is judged by the delta"
-    " meters in it: urmpipe report shows what they found"
-)
-
 
 MadeRun: TypeAlias = Run | SolvedTargets | PlannedPath
 MADE_RUNS: tuple[type[MadeRun], ...] = (Run, SolvedTargets, PlannedPath)
 """Results that are a run, or have one."""
 
+Operand: TypeAlias = Path | Held | MadeRun | Simulation
+"""What stands for a run, or is read as one."""
+
 
 def load_runs(
-    operands: Sequence[Path | MadeRun],
+    operands: Sequence[Operand],
     *,
     sides: tuple[str, str] | None = None,
     robot: Chain | None = None,
     read: ReadOptions | None = None,
     tsp: float | None = None,
     derivative: Method | None = None,
+    block: str | Sequence[str] | None = None,
     judged: Sequence[Hint] = (WITH_BASELINE,),
 ) -> list[Run]:
     """Return the runs of several operands, or both sides of one log; the reading options hold for every log.
 
     Args:
-        operands: Recordings (.rrd), logs and paths (CSV), folders whose CSV files make one log; runs, and
-            solved targets as theirs.
+        operands: Recordings (.rrd), logs and paths (CSV), folders whose CSV files make one log; tables in
+            memory, runs, solved targets as theirs, and simulations as the motion of a block.
         sides: What was asked for, then what was done, of one log that is yet to be read: a word in the names
             of the columns of each side, or "rest" for all others.
         robot: The arm; of a recording or a run it replaces the one inside.
         read: How to read the CSV files, all of them; the unit of a column holds for those that have it.
         tsp: Period of the grid in [s], of the CSV files.
         derivative: How the joints of CSV files are differentiated.
+        block: The block whose motion is meant of every simulation, or one for each of them in their order.
         judged: What the recording of a comparison, which is no operand, can be given to.
 
     Raises:
         UrmpipeError: With everything that is wrong with any of them: a bad CSV, a recording without a run.
-        OptionError: If sides are wanted of anything but one log.
+        OptionError: If sides are wanted of anything but one log, or blocks of no simulation.
     """
-    shared = sum(isinstance(one, Path) and not _is_recording(one) for one in operands) > 1
-    read = replace(read or ReadOptions(), shared=shared)
+    shared = sum(map(is_log, operands)) > 1
+    read, blocks = replace(read or ReadOptions(), shared=shared), _Blocks(block)
 
-    def run_of(one: tuple[Path | MadeRun, tuple[str, str] | None]) -> Run:
+    def run_of(one: tuple[Operand, tuple[str, str] | None]) -> Run:
         """Return the run that an operand is, is recorded in, or is read as."""
         operand, side = one
-        if not isinstance(operand, Path):
-            return on_robot(operand.as_run(), robot)
-        name = operand.resolve().name if operand.is_dir() else None
-        name = name if side is None else f"{operand.resolve().stem} ({side[0]})"
+        made = _recorded(operand, judged) if isinstance(operand, Path) and _is_recording(operand) else operand
         try:
-            if _is_recording(operand):
-                return on_robot(_recorded(operand, judged).as_run(), robot)
-            files, own = log_files(operand), replace(read, side=side)
-            return ingest_log(files, robot=robot, read=own, tsp=tsp, derivative=derivative, name=name)
-        except LogError as error:  # of several logs, each is named
-            found = (one if one.file else replace(one, file=str(operand)) for one in error.findings)
-            raise LogError(*found) from error
+            if isinstance(made, (Path, Held)):
+                return _read(made, replace(read, side=side), robot=robot, tsp=tsp, derivative=derivative)
+            if isinstance(made, Simulation):
+                return run_of_block(made, blocks.next(), robot)
+            return on_robot(made.as_run(), robot)
+        except LogError as error:  # of several operands, each is named
+            name = str(operand) if isinstance(operand, Path) else None
+            raise LogError(*(replace(one, file=one.file or name) for one in error.findings)) from error
 
     if sides is not None:
         _refuse_sides(operands, sides)
-        return _on_one_arm(for_each(run_of, [(operands[0], side) for side in (sides, sides[::-1])]))
-    runs = for_each(run_of, [(operand, None) for operand in operands])
+    each = [(operand, None) for operand in operands]
+    runs = for_each(run_of, each if sides is None else [(operands[0], one) for one in (sides, sides[::-1])])
+    blocks.refuse_unused()
+    if sides is not None:
+        return _on_one_arm(runs)
     if shared:
         _refuse_unreached(read, runs)
     return _told_apart(operands, runs)
 
 
-def _refuse_sides(operands: Sequence[Path | MadeRun], sides: tuple[str, str]) -> None:
+def _read(
+    log: Path | Held, read: ReadOptions, robot: Chain | None, tsp: float | None, derivative: Method | None
+) -> Run:
+    """Return the run that a log, a folder, or a side of a log is read as."""
+    files = [log] if isinstance(log, Held) else log_files(log)
+    name = log.resolve().name if isinstance(log, Path) and log.is_dir() else None
+    stem = log.name if isinstance(log, Held) else log.resolve().stem
+    name = name if read.side is None else f"{stem} ({read.side[0]})"
+    return ingest_log(files, robot=robot, read=read, tsp=tsp, derivative=derivative, name=name)
+
+
+class _Blocks:
+    """The blocks whose motions are meant: one for every simulation, or one for each in their order.
+
+    Args:
+        named: The names; None for the only block that has a motion.
+    """
+
+    def __init__(self, named: str | Sequence[str] | None) -> None:
+        self._named = [named] if isinstance(named, str) else list(named or ())
+        self._simulations = 0
+
+    def next(self) -> str | None:
+        """Return the block of the next simulation; None where none is named."""
+        self._simulations += 1
+        if len(self._named) == 1:
+            return self._named[0]
+        return self._named[self._simulations - 1] if self._simulations <= len(self._named) else None
+
+    def refuse_unused(self) -> None:
+        """Raise an `OptionError` if blocks are named of no simulation, or of more or fewer than there are."""
+        if len(self._named) in {0, 1, self._simulations} and (self._simulations or not self._named):
+            return
+        found = ", ".join(map(shown, self._named)) + f" with {counted(self._simulations, 'simulation')}"
+        allowed = "a block of a simulation, or one for each of several"
+        raise OptionError(Finding(parameter="block", found=found, allowed=allowed))
+
+
+def _refuse_sides(operands: Sequence[Operand], sides: tuple[str, str]) -> None:
     """Raise an `OptionError` if there is more than one log, it was read before, or its sides are one."""
     log, several = operands[0], len(operands) > 1
-    if several or not isinstance(log, Path) or _is_recording(log) or sides[0].lower() == sides[1].lower():
+    if several or not is_log(log) or sides[0].lower() == sides[1].lower():
         found = ",".join(sides) + (" with several logs" if several else "")
         allowed = "two words for two sides of one log that is yet to be read"
         raise OptionError(Finding(parameter="sides", found=found, allowed=allowed))
@@ -119,7 +161,7 @@ def _refuse_unreached(read: ReadOptions, runs: Sequence[Run]) -> None:
         raise OptionError(*said)
 
 
-def _told_apart(operands: Sequence[Path | MadeRun], runs: Sequence[Run]) -> list[Run]:
+def _told_apart(operands: Sequence[Operand], runs: Sequence[Run]) -> list[Run]:
     """Return runs of which no two have one name: those of files by these, or by their folders, too."""
     files = [one.resolve() if isinstance(one, Path) else None for one in operands]
     stems = [None if path is None else path.name if path.is_dir() else path.stem for path in files]
@@ -133,17 +175,52 @@ def _told_apart(operands: Sequence[Path | MadeRun], runs: Sequence[Run]) -> list
     return [named(*each) for each in zip(runs, files, stems, strict=True)]
 
 
-def _recorded(operand: Path, judged: Sequence[Hint]) -> MadeRun:
-    """Return the run of a recording, or raise a `RecordingError` that says what else it is."""
+def _recorded(operand: Path, judged: Sequence[Hint]) -> MadeRun | Simulation:
+    """Return the result of a recording that a run can be made of, or raise a `RecordingError`: what it is."""
     result = read_recording(operand)
-    if isinstance(result, MADE_RUNS):
+    if isinstance(result, (MADE_RUNS, Simulation)):
         return result
-    if isinstance(result, Simulation):
-        raise RecordingError(Finding(SIMULATION, file=str(operand)))
     hints = judged if isinstance(result, Comparison) else ()
     raise RecordingError(
         Finding(JUDGED.format(kind_of(result).with_article), str(operand), hints=tuple(hints))
     )
+
+
+def run_of_recording(
+    files: Sequence[Path | Held], robot: Chain | None, reading: Mapping[str, object]
+) -> Run | None:
+    """Return the run of a recording, on another arm if one is given; None of logs, which are to be read.
+
+    Args:
+        files: A recording alone, or the files of a log.
+        robot: The arm that replaces the one inside.
+        reading: How a log is read, by keyword; None or False where nothing is said.
+
+    Raises:
+        RecordingError: If it is a recording without a run, or stands among other files.
+        OptionError: With all that says how a log is read: a recording stands as it was ingested.
+    """
+    recordings = [one for one in files if isinstance(one, Path) and _is_recording(one)]
+    if not recordings:
+        return None
+    if len(files) > 1:
+        said = "found a recording among files of one log, allowed: it alone, or the files"
+        raise RecordingError(*(Finding(said, str(one)) for one in recordings))
+    refuse_reading(reading)
+    made = _recorded(recordings[0], ())
+    if isinstance(made, Simulation):
+        said = JUDGED.format("a simulation")
+        raise RecordingError(Finding(said, str(recordings[0]), hints=(OF_A_BLOCK,)))
+    return on_robot(made.as_run(), robot)
+
+
+def refuse_reading(reading: Mapping[str, object]) -> None:
+    """Raise an `OptionError` with all keywords that say how a log is read, as there is none to be read."""
+    unused = [name for name, value in reading.items() if value is not None and value is not False]
+    if unused:
+        found = "found with what was ingested before"
+        allowed = "with a log; a run or a recording stands as `ingest` made it"
+        raise OptionError(*(Finding(found, parameter=name, allowed=allowed) for name in unused))
 
 
 def load_comparison(operand: Path) -> Comparison | None:
@@ -156,9 +233,9 @@ def load_comparison(operand: Path) -> Comparison | None:
     return result if isinstance(result, Comparison) else None
 
 
-def is_log(operand: Path) -> bool:
+def is_log(operand: object) -> bool:
     """Return whether an operand is a log that is yet to be read."""
-    return not _is_recording(operand)
+    return isinstance(operand, Held) or (isinstance(operand, Path) and not _is_recording(operand))
 
 
 def _is_recording(operand: Path) -> bool:

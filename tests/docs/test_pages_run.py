@@ -11,6 +11,7 @@ from pages import ROOT, command_lines, files_told, lay_files, pages, run_in_proc
 
 ELSEWHERE = {
     "urmpipe view ": "needs a display: tests/cli/test_view.py",
+    "--block ": "needs a simulation, which is slow: tests/cli/test_compare_simulation.py",
     "--platforms": "takes minutes for its first build: tests/fmus/native/test_cross.py",
 }
 """What is run by tests of its own: a part of the line, and why."""

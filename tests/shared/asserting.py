@@ -7,6 +7,11 @@ from typing import ParamSpec, TypeVar
 
 import pytest
 
+OTHER_TIME = '; time=COLUMN names the time column; time="none" leaves the time column out'
+"""What every finding about a clock ends with."""
+
+INCREASE = f"allowed: times that increase from row to row{OTHER_TIME}"
+
 Item = TypeVar("Item")
 Given = ParamSpec("Given")
 

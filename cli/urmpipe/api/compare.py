@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -11,7 +11,6 @@ from typing import Any, Unpack
 from urmpipe.api.iso_options import Cycles, iso_options
 from urmpipe.arm_placing import Frame, Robot
 from urmpipe.keyword_checks import (
-    WRITTEN_FIRST,
     PathLike,
     one_or_many,
     paths,
@@ -33,21 +32,34 @@ from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.warnings import BEYOND, EXCHANGED, LARGE_NOISE, large_noises
-from urmpipe_pipeline.operands import MADE_RUNS, WITH_BASELINE, MadeRun, is_log, load_comparison, load_runs
+from urmpipe_pipeline.operands import (
+    MADE_RUNS,
+    WITH_BASELINE,
+    MadeRun,
+    is_log,
+    load_comparison,
+    load_runs,
+    refuse_reading,
+)
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.results import kind_of, present, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.recorded_tcp import LACKING_TOOL
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.solved_targets.given_targets import TargetsLike
+from urmpipe_pipeline.sources import Held, TableLike, held_of, is_table
 from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
 from urmpipe_pipeline.tables.table_csv import write_table
 
-Operand = PathLike | MadeRun
+Operand = PathLike | TableLike | MadeRun | Simulation
 
 EARLIER = Hint("baseline", None, "names one")
 
-OPERANDS = f"a log, a path, a recording, a Run, SolvedTargets or PlannedPath; {WRITTEN_FIRST}"
+OPERANDS = (
+    "a log, a path, a recording, a DataFrame or Arrow table, a Run, SolvedTargets, PlannedPath or Simulation;"
+    " arrays are ingested first: urmpipe.ingest(t=t, q=q)"
+)
 
 
 @public_reading(Reading)
@@ -67,6 +79,7 @@ def compare(
     sync: SyncOption | None = None,
     align: AlignMode = "none",
     sides: tuple[str, str] | None = None,
+    block: str | Sequence[str] | None = None,
     diagnose: bool = False,
     iso: bool = False,
     cycles: Cycles | None = None,
@@ -87,9 +100,9 @@ def compare(
     """Hold logs against a reference, and write what is named: all or none. docs/python.md has the keywords.
 
     Args:
-        reference: A path, a log, a recording or a run; alone, held against the TCP that it recorded itself.
-            With a `baseline` alone: a comparison, which stands as it was made.
-        logs: What to judge: logs, recordings and runs, or one of them.
+        reference: A path, a log, a recording, a run or a simulation; alone, held against the TCP that it
+            recorded itself. With a `baseline` alone: a comparison, which stands as it was made.
+        logs: What to judge: logs, recordings, runs and simulations, or one of them.
         robot: The arm; a recording or a run that has another one is computed anew with it.
         base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
         tool: The tool centre point in the frame of the arm's tip, likewise.
@@ -106,6 +119,8 @@ def compare(
         align: How a log is moved in space first: none, start, rigid, tool or base+tool.
         sides: Two words in the names of the columns of one log, such as ("target", "actual"): what was asked
             for is the reference of what was done; "rest" for the columns without the other word.
+        block: The block of a simulation whose motion is meant; of several simulations one for all, or one for
+            each in their order; default: the only block that has a motion.
         diagnose: Whether the `diagnosis` of each run says why it deviates. Base and tool are causes then: not
             with `align`.
         iso: Whether the logs are the cycles of a test after ISO 9283, or one log in which the motion repeats:
@@ -133,7 +148,9 @@ def compare(
 
     Source: [UrmArm2021]_ eq. 19-23.
     """
-    operands = _operands(reference, one_or_many(logs))
+    several = one_or_many(logs)
+    operands = operands_of({"reference": [reference]} | ({"logs": several} if several else {}), Comparison)
+    reference = operands[0]
     kept = [*_files([*operands, baseline]), *map_files(reading), *paths(inputs)]
     outputs: dict[OutputKind, PathLike | None] = {
         "recording": output, "junit": junit, "statistics": csv,
@@ -153,7 +170,7 @@ def compare(
         earlier = None if baseline is None else _earlier(baseline)
         load = partial(
             load_runs, sides=sides, robot=given.arm, read=given.options, tsp=tsp, derivative=derivative,
-            judged=() if diagnose else (WITH_BASELINE,),
+            block=block, judged=() if diagnose else (WITH_BASELINE,),
         )  # fmt: skip
         made = None if operands[1:] or earlier is None else _made_before(reference, output)
         made = made or _compared(operands, load, options)
@@ -169,11 +186,26 @@ def compare(
         return recorded(result, output, kept, progress)
 
 
-def _operands(reference: Operand | Comparison, logs: Sequence[Operand]) -> list[Any]:
-    """Return all that is compared; raise an `OptionError` with everything that is no operand."""
-    given = {"reference": [reference]} | ({"logs": logs} if logs else {})
-    for_each(lambda named: refuse_others(*named, (*MADE_RUNS, Comparison), OPERANDS), given.items())
-    return [reference, *logs]
+def operands_of(given: Mapping[str, Sequence[Any]], *further: type) -> list[Any]:
+    """Return what was given by keyword, tables as logs called so.
+
+    Args:
+        given: Operands by keyword.
+        *further: What is allowed besides what stands for a run.
+
+    Raises:
+        OptionError: With everything that is no operand.
+    """
+    kinds = (*MADE_RUNS, Simulation, Held, *further)
+    named = {name: list(_with_tables(name.removesuffix("s"), operands)) for name, operands in given.items()}
+    for_each(lambda one: refuse_others(*one, kinds, OPERANDS), named.items())
+    return [one for operands in named.values() for one in operands]
+
+
+def _with_tables(name: str, operands: Sequence[Any]) -> Iterator[Any]:
+    """Yield operands, the tables among them as logs with this name, and a number if there are several."""
+    for k, one in enumerate(operands, start=1):
+        yield held_of(one, f"{name} {k}" if len(operands) > 1 else name) if is_table(one) else one
 
 
 def _allowed(tolerance: float | str | Mapping[str, float] | None, *, iso: bool) -> Mapping[str, float]:
@@ -197,11 +229,9 @@ def _with_unit(tolerance: float | str | Mapping[str, float] | None) -> frozenset
 
 def _refuse_unused(operands: Sequence[Operand | Comparison], given: Mapping[str, Any]) -> None:
     """Raise an `OptionError` with all that says how logs are read, if every operand was ingested before."""
-    unused = [name for name, value in given.items() if value not in (None, False)]
-    if unused and not any(isinstance(one, (str, Path)) and is_log(Path(one)) for one in operands):
-        found = "found with what was ingested before"
-        allowed = "with a log; a run or a recording stands as `ingest` made it"
-        raise OptionError(*(Finding(found, parameter=name, allowed=allowed) for name in unused))
+    logs = (Path(one) if isinstance(one, str) else one for one in operands)
+    if not any(map(is_log, logs)):
+        refuse_reading(given)
 
 
 def _noise_level(
@@ -219,8 +249,8 @@ def _noise_level(
 
 
 def _compared(
-    operands: Sequence[Operand | Comparison],
-    load: Callable[[Sequence[Path | MadeRun]], list[Run]],
+    operands: Sequence[Path | str | Held | MadeRun | Simulation | Comparison],
+    load: Callable[[Sequence[Path | Held | MadeRun | Simulation]], list[Run]],
     options: CompareOptions,
 ) -> Comparison:
     """Return the comparison of some logs with a reference, or of one log with what it recorded itself."""

@@ -7,17 +7,15 @@ from dataclasses import replace
 from inspect import unwrap
 from typing import Unpack
 
-from urmpipe.api.compare import OPERANDS, Operand, compare
+from urmpipe.api.compare import Operand, compare, operands_of
 from urmpipe.arm_placing import Frame, Robot
-from urmpipe.keyword_checks import PathLike, public_reading, refuse_others
+from urmpipe.keyword_checks import PathLike, public_reading
 from urmpipe.reading import Reading
-from urmpipe_models.errors import for_each
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.comparison.compare import Tcp
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.diagnosis.result import Diagnosis
-from urmpipe_pipeline.operands import MADE_RUNS
 from urmpipe_pipeline.runs.derivatives import Method
 
 
@@ -37,6 +35,7 @@ def diagnose(
     tcp: Tcp = "fk",
     sync: SyncOption = "start",
     sides: tuple[str, str] | None = None,
+    block: str | Sequence[str] | None = None,
     strict: bool = False,
     output: PathLike | None = None,
     inputs: Sequence[PathLike] = (),
@@ -46,9 +45,9 @@ def diagnose(
     """Say why a log deviates from its reference: the causes that make both agree. docs/diagnose.md has them.
 
     Args:
-        reference: A path, a log, a recording or a run; alone, a log that is held against the TCP that it
-            recorded itself.
-        log: What is diagnosed: a log, a recording or a run.
+        reference: A path, a log, a recording, a run or a simulation; alone, a log that is held against the
+            TCP that it recorded itself.
+        log: What is diagnosed: a log, a recording, a run or a simulation.
         robot: The arm; a recording or a run that has another one is computed anew with it.
         base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
         tool: The tool centre point in the frame of the arm's tip, likewise.
@@ -60,6 +59,7 @@ def diagnose(
         tcp: Where a log was: fk or recorded.
         sync: How the clocks are put together first: start, auto, or t_reference - t_log in [s].
         sides: Two words in the names of the columns of one log, such as ("target", "actual").
+        block: The block of a simulation whose motion is meant, as of `compare`.
         strict: Whether a warning is an error.
         output: The recording (.rrd) to write: that of the comparison, with its diagnosis.
         inputs: Files besides the operands that are never replaced.
@@ -70,12 +70,12 @@ def diagnose(
         UrmpipeError: With everything that is wrong with the input or the output.
     """
     operands = {"reference": [reference]} | ({} if log is None else {"log": [log]})
-    for_each(lambda named: refuse_others(*named, MADE_RUNS, OPERANDS), operands.items())
+    reference, *logs = operands_of(operands)
     made: Comparison = unwrap(
         compare
     )(  # without its checks of keywords and its warnings, which are given here
         reference,
-        () if log is None else [log],
+        logs,
         robot,
         base=base,
         tool=tool,
@@ -87,6 +87,7 @@ def diagnose(
         tcp=tcp,
         sync=sync,
         sides=sides,
+        block=block,
         diagnose=True,
         strict=strict,
         output=output,

@@ -117,7 +117,8 @@ def compare(
 ) -> int:
     """Hold logs against a reference: deviation, statistics, verdict.
 
-    REFERENCE is a path (t, x, y, z), a log, or a recording; so is each LOG. With REFERENCE alone, the
+    REFERENCE is a path (t, x, y, z), a log, or a recording; so is each LOG. Of the recording of a
+    simulation, --block names the block whose motion is meant. With REFERENCE alone, the
     forward kinematics of that log are held against the tool centre point that it recorded itself. A
     folder stands for the files of one log. With --sides, REFERENCE holds what was asked for and what was
     done. With --baseline, REFERENCE alone may be the recording of a
@@ -132,6 +133,7 @@ def compare(
       urmpipe compare path.csv log.csv --robot urm6 --junit v.xml --csv v.csv
       urmpipe compare path.csv a.csv b.csv --robot urm6 --diagnose
       urmpipe compare path.csv test.csv --robot urm6 --iso --tolerance AP=1mm
+      urmpipe compare path.csv simulation.rrd --block arm
       urmpipe compare today.rrd --baseline released.rrd --noise 5um
 
     Exit codes: 0 within tolerance and not worse than the baseline, 1 not so, 2 bad input or usage.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
+from urmpipe.options.given import for_logs
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import log_options
 from urmpipe_models.errors import Finding, OptionError
@@ -39,7 +40,10 @@ if TYPE_CHECKING:
 )
 @log_options
 @output_options
+@click.pass_context
 def ingest(
+    ctx: click.Context,
+    /,
     logs: tuple[Path, ...],
     output: Path | None,
     explain: bool,
@@ -49,7 +53,7 @@ def ingest(
     """Turn one log into a recording: checked, repolarized, with the arm's kinematics.
 
     Several files are one log whose source writes one a plot (SolidWorks); a folder stands for the
-    files in it.
+    files in it. Of a recording it shows the run inside.
 
     \b
     Examples:
@@ -60,10 +64,14 @@ def ingest(
       urmpipe ingest log.csv --robot ur5e --write-map lab.toml
       urmpipe ingest next.csv --map lab.toml
     """
+    from urmpipe_pipeline.operands import is_log
+
     if explain and output:
         found = f"{output} with explain, which writes no recording"
         raise OptionError(Finding(parameter="output", found=found, allowed="one of both"))
-    target = None if explain else output or Path(default_name(logs))
+    options, _ = for_logs(ctx, logs, options)
+    alone = explain or (output is None and not any(map(is_log, logs)))  # a recording is one already
+    target = None if alone else output or Path(default_name(logs))
     replaces = target is not None and target.exists()
     with terminal.progress(f"Writing {target}", shown=target is not None) as progress:
         run = urmpipe.ingest(logs, output=target, progress=progress, **options)

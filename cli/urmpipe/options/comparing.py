@@ -87,8 +87,16 @@ SIDES_OPTION = click.option(
     help="Both sides of one log, by words in the names of its columns: target,actual; desired,actual;"
     " commanded,measured. rest: the columns without the other word.",
 )
+BLOCK_OPTION = click.option(
+    "--block",
+    metavar="NAME",
+    multiple=True,
+    callback=lambda ctx, param, names: names or None,
+    help="Of a simulation: the block whose motion is meant; of several once for all, or once for each in"
+    " their order [default: the only block that has a motion].",
+)
 
 
 def comparing_options(command: Command) -> Command:
-    """Add what is allowed, where a log was, how the clocks are put together, and the sides of one log."""
-    return with_options(command, TOLERANCE_OPTION, TCP_OPTION, SYNC_OPTION, SIDES_OPTION)
+    """Add what is allowed, where a log was, how clocks are put together, sides of a log and blocks."""
+    return with_options(command, TOLERANCE_OPTION, TCP_OPTION, SYNC_OPTION, SIDES_OPTION, BLOCK_OPTION)

@@ -86,13 +86,18 @@ UNTIMED = (
 )
 TABLE = (
     *UNTIMED,
-    click.option("--time", metavar="COLUMN", help="The time column."),
+    click.option("--time", metavar="[FILE:]COLUMN", help="The time column; none if there is none."),
     _unit_option("Unit of angles whose names tell none (rad, deg), or of one column."),
 )
 ROWS = (
     click.option("--source", metavar="NAME", help="Who wrote the log: coppeliasim, solidworks, ..."),
     click.option("--joints", type=NamesType(), help="The joint columns, in the robot's order."),
     *TABLE,
+    click.option(
+        "--layout",
+        metavar="table|transposed|flat:N|flat-by-joint:N",
+        help="What rows are: samples, joints, or numbers one by one, N a sample [default: table].",
+    ),
     click.option("--period", type=DURATION, help="Period of a log without a time column [default: 5ms]."),
     click.option("--skip-bad", is_flag=True, help="Leave out rows that cannot be read, up to 1 %."),
 )
@@ -122,8 +127,8 @@ JOINTS = (
 )
 
 OF_LOGS = {
-    "log_map", "rotation", "delimiter", "decimal", "time", "unit", "source", "joints", "period", "skip_bad",
-    "interval", "repair", "poses", "measured", "tsp", "derivative",
+    "log_map", "rotation", "delimiter", "decimal", "time", "unit", "source", "joints", "layout", "period",
+    "skip_bad", "interval", "repair", "poses", "measured", "tsp", "derivative",
 }  # fmt: skip
 """Parameters that say how a log becomes a run: a recording is one already."""
 

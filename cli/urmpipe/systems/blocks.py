@@ -23,6 +23,7 @@ from urmpipe_fmus.table import Table
 from urmpipe_models.errors import Finding, OptionError, UrmpipeError, shown
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import row_clock
+from urmpipe_pipeline.simulations.simulation import SLOW
 
 if TYPE_CHECKING:
     from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from urmpipe_models.arrays import IntArray
     from urmpipe_models.chains.chain import Chain
 
-ON_PYTHON = "on-python"
+ON_PYTHON = SLOW
 """The kind of the warning that no native FMUs can be built; it is told before the first step, too."""
 
 CHAIN, METER = "kinematic_chain", "delta_meter"
@@ -86,7 +87,7 @@ class Blocks:
         self._meet(system.step or self.period or STEP)
         if self._slow and self.units:
             said = f"the units run on Python, a hundred times slower than native ones: {self._slow}"
-            self.warnings.append(LogWarning(ON_PYTHON, said))
+            self.warnings.append(LogWarning(SLOW, said))
             self._told(said)
 
     def make(self, block: Block) -> Path:

@@ -26,7 +26,7 @@ from urmpipe_pipeline.presentation.exports import (
     columns_of,
 )
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.file_columns import file_table
+from urmpipe_pipeline.runs.file_columns import file_roles, file_table
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.text import encodable
 
@@ -40,6 +40,8 @@ def exports(run: Run) -> Exports:
         "tsp": run.tsp if run.timed else None,
         "clock_start_ns": run.log.clock_start_ns if run.timed else None,
         "repolarizations": len(run.repolarizations),
+        "columns": file_roles(run.log),
+        "rotation_form": run.log.rotation_form,
     }
     rows = {
         "grid": Rows(partial(grid_table, run), lambda table: _grid_fields(run)),

@@ -39,7 +39,7 @@ def file_table(log: JointLog) -> ExportTable:
         hint = Hint("rows", "grid", "writes what was made of it")
         said = "the log was not read from a file"
         raise RecordingError(Finding(said, about=log.name, hints=(hint,)))
-    kept = sorted((c for c in log.columns if _kept(log, c)), key=lambda column: column.number)
+    kept = _kept_columns(log)
     names = _names(kept)
     clock_ns = log.clock_start_ns + log.t_ns
     timed = [column.unit for column in kept if column.role == "time"]
@@ -50,6 +50,17 @@ def file_table(log: JointLog) -> ExportTable:
     ]
     lost, unsaid = tuple(_lost(log, kept)), tuple(_unsaid_units(kept))
     return ExportTable(tuple(columns), clock_ns if timed else None, lost, unsaid)
+
+
+def file_roles(log: JointLog) -> dict[str, tuple[Role, int]]:
+    """Return what each column of `file_table` holds, and its place among those of this role, by its name."""
+    kept = _kept_columns(log)
+    return {name: (column.role, column.index) for name, column in zip(_names(kept), kept, strict=True)}
+
+
+def _kept_columns(log: JointLog) -> list[LogColumn]:
+    """Return the columns of the file whose values the log holds, in its order."""
+    return sorted((c for c in log.columns if _kept(log, c)), key=lambda column: column.number)
 
 
 def _as_told(log: JointLog, clock_ns: IntArray, timed: Sequence[str]) -> IntArray:
@@ -97,7 +108,7 @@ def _lost(log: JointLog, kept: Sequence[LogColumn]) -> Iterator[LogWarning]:
         if warning.kind == "clock-rebuilt":
             said = f"the file's own times, which were not kept: {warning.message}"
             yield LogWarning("not-exported", said, warning.row)
-        elif warning.kind in ("skipped-row", "other-lines"):
+        elif warning.kind in ("skipped-row", "end-rows", "other-lines"):
             yield LogWarning("not-exported", warning.message, warning.row)
     form = next((one for one in log.inferences if one.kind == ZONED), None)
     if form and any(one.unit == DATE for one in kept):

@@ -28,7 +28,7 @@ from urmpipe_pipeline.runs.results import RowJoints, Run
 from urmpipe_pipeline.runs.robot_inference import infer_robot
 from urmpipe_pipeline.runs.torque_noise import SMOOTHED, noise_warnings
 from urmpipe_pipeline.runs.torques import CHECK_LOG, MOVE_SLOWER, beyond_efforts, torques_of_log
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import Held, ReadOptions
 from urmpipe_pipeline.sources.clocks.clock import unused_for_poses, unused_period
 from urmpipe_pipeline.sources.read import read_numbers
 
@@ -43,7 +43,7 @@ EULER_SINGULAR = "euler-singular"
 
 @np.errstate(over="ignore", invalid="ignore")  # huge numbers in a log: their squares and steps are infinite
 def ingest_log(
-    files: Sequence[Path],
+    files: Sequence[Path | Held],
     *,
     robot: Chain | None = None,
     read: ReadOptions | None = None,
@@ -57,7 +57,7 @@ def ingest_log(
     taken through the robot's kinematics.
 
     Args:
-        files: The log's file, or its files if its source writes one a plot.
+        files: The log's file, or its files if its source writes one a plot; or a table in memory.
         robot: The arm, with base and tool; None for the one that the log singles out, if it does.
         read: How to read the file where it cannot tell by itself.
         tsp: Period of the grid in [s]; default: the log's own.

@@ -15,7 +15,7 @@ from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_models.orientation import NAMES, angles
 from urmpipe_models.spelling import Voice
-from urmpipe_pipeline.joint_log import JointLog, LogWarning, seconds
+from urmpipe_pipeline.joint_log import OWN, JointLog, LogWarning, seconds
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
@@ -202,7 +202,17 @@ class Run(Result):
             )[:kinds]:  # fmt: skip
                 columns |= {f"{name}{axis}": values[:, i] for i, axis in enumerate("xyz")}
             columns |= {name: self.tcp.euler_zyx[:, i] for i, name in enumerate(("rz", "ry", "rx"))}
-        return pd.DataFrame(columns)
+        frame = pd.DataFrame(columns)
+        frame.attrs[OWN] = {"units": self._units()}
+        return frame
+
+    def _units(self) -> dict[str, str]:
+        """Return the units by which `ingest` reads its table again."""
+        units = {"t": "s"} if self.timed else {}
+        for prefix, order in (("", ""), ("d_", "/s"), ("dd_", "/s2")):
+            joints = zip(self.log.joints, self.joint_units, strict=True)
+            units |= {f"{prefix}{name}": unit + order for name, unit in joints}
+        return units | {f"p{axis}": "m" for axis in "xyz"} | dict.fromkeys(("rz", "ry", "rx"), "rad")
 
     def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the object that `urmpipe ingest --json` prints."""

@@ -28,6 +28,9 @@ from urmpipe_pipeline.simulations.energy import ENERGIES, EnergyBalance, energy_
 if TYPE_CHECKING:
     import pandas as pd
 
+SLOW = "on-python"
+"""The kind of the warning that a simulation ran slowly, which says nothing about its values."""
+
 ValueType = Literal["Real", "Integer", "Boolean"]
 
 BlockKind = Literal["unit", "file", "fmu"]

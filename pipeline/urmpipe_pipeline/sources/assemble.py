@@ -28,6 +28,7 @@ from urmpipe_pipeline.sources.checks import gaps, missing_samples, refuse_empty
 from urmpipe_pipeline.sources.clocks.chosen import EXPONENTS
 from urmpipe_pipeline.sources.clocks.clock import even_clock
 from urmpipe_pipeline.sources.clocks.clock_columns import like_a_time
+from urmpipe_pipeline.sources.clocks.clock_units import LONGEST, SHORTEST
 from urmpipe_pipeline.sources.columns.blocks import SURE, period_of, rounded_period
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of
 from urmpipe_pipeline.sources.columns.roles import Roles
@@ -272,7 +273,7 @@ def _by_rates(
     told = [(q.unit, v.unit) for q, v in zip(roles.joints, roles.rates, strict=True)]
     ratio = np.array([v.factor / q.factor if q and v else 1.0 for q, v in told])
     found = period_of(joints, rates * ratio)
-    if found is None:
+    if found is None or not SHORTEST <= found[0] <= LONGEST:
         return None
     period, correlation = rounded_period(found[0]), found[1]
     t_ns, _, _ = even_clock(content.rows, period)

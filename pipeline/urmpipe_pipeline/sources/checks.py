@@ -13,8 +13,9 @@ from urmpipe_models.messages import Hint
 from urmpipe_pipeline.gaps import GAP, gaps_behind
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
+from urmpipe_pipeline.sources.clocks.chosen import EVEN, EXPONENTS, OTHER_TIME
+from urmpipe_pipeline.sources.clocks.chunks import Spread, spread_over_chunks
 from urmpipe_pipeline.sources.clocks.clock import Clock
-from urmpipe_pipeline.sources.clocks.clock_units import EVEN, EXPONENTS
 from urmpipe_pipeline.sources.clocks.quantised import behind_repeated
 from urmpipe_pipeline.sources.tables.numbers import NO_TIME, SHOWN_FINDINGS, UNREADABLE, Numbers
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
@@ -32,7 +33,15 @@ MOST_SKIPPED = 0.01
 
 FEW_REPEATS = 5
 MANY_REPEATS = 0.1
-"""More repeats than these few, and than this share of the rows, are one finding: the clock is too coarse."""
+"""More repeats than these few, and than this share of the rows, are one finding: the clock is too coarse.
+More steps backwards are as well: the column is no clock."""
+
+SPREAD = "clock-spread"
+"""The kind of the warning about stamps that several rows share."""
+
+INCREASING = "times that increase from row to row"
+_TOO_COARSE = "found {now} again, as {rows} repeat a time: too coarse for a clock to be rebuilt"
+_NO_CLOCK = "found {now} after {before}, as {rows} run backwards: no clock"
 
 SHOWN_GAPS = 10
 """Gaps that are told with their rows; the others are counted."""
@@ -90,6 +99,37 @@ def rebuilt(numbers: Numbers) -> Numbers:
     return replace(numbers, clock=clock.t_ns, inferences=found_out, warnings=warned)
 
 
+def spread(numbers: Numbers) -> Numbers:
+    """Return the numbers with the times of chunks of rows spread over these, where many share a stamp."""
+    times = numbers.clock
+    if times is None or len(times) < 2 or times.min() <= UNREADABLE:
+        return numbers
+    steps = np.diff(times)
+    if steps.min() != 0 or not _many(int(np.count_nonzero(steps == 0)), len(times)):
+        return numbers
+    found = spread_over_chunks(times)
+    return numbers if found is None else _with_spread(numbers, found)
+
+
+def _with_spread(numbers: Numbers, found: Spread) -> Numbers:
+    """Return the numbers with spread times, and what that rests on."""
+    end, side = ("first", "behind") if found.first else ("last", "before")
+    why = f"the number of rows goes with the time {side} it" if found.evident else "assumed"
+    seen = f"up to {found.largest} rows share a time, {found.chunks} times in {len(found.t_ns)} rows"
+    told = f"each is taken as that of the {end} of its rows ({why})"
+    done = f"spread over the rows, about {found.period / 1e9:.6g} s apart"
+    inference = Inference("clock", done, f"{seen}; {told}", hints=EVEN)
+    taken = "" if found.evident else f"a time that rows share is that of the {end} one"
+    warning = LogWarning(SPREAD, f"{seen}: {done}; {told}", hints=EVEN, assumption=taken, role="time")
+    found_out, warned = (*numbers.inferences, inference), (*numbers.warnings, warning)
+    return replace(numbers, clock=found.t_ns, inferences=found_out, warnings=warned)
+
+
+def _many(count: int, rows: int) -> bool:
+    """Return whether so many rows repeat a time, or run backwards, that they are no single faults."""
+    return count > max(FEW_REPEATS, MANY_REPEATS * rows)
+
+
 def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: Clock) -> list[Finding]:
     """Return everything that is wrong with the rows of a table, in the order of its lines.
 
@@ -103,10 +143,17 @@ def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: C
     file = layout.file
     placed = zip(wrong, rows_in_file, strict=True)
     here = (replace(one, file=file, line=lines.get(row), row=row) for one, row in placed)
-    findings = sorted((*numbers.findings, *here), key=lambda one: one.line or 0)[:SHOWN_FINDINGS]
+    read = (_with_other_time(one, clock) for one in numbers.findings)
+    findings = sorted((*read, *here), key=lambda one: one.line or 0)[:SHOWN_FINDINGS]
     if total > len(findings):
         findings.append(Finding(f"{total - len(findings)} more findings", file=file))
     return findings
+
+
+def _with_other_time(finding: Finding, clock: Clock) -> Finding:
+    """Return a finding, of a cell of the clock with what to give for another time."""
+    of_clock = finding.column in [column.header for column in clock.columns] and not finding.hints
+    return replace(finding, hints=OTHER_TIME) if of_clock else finding
 
 
 def missing_samples(groups: Iterable[tuple[FloatArray, Sequence[str]]]) -> list[LogWarning]:
@@ -162,20 +209,22 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[Finding]:
     valid = np.flatnonzero(times > UNREADABLE)
     steps = np.diff(times[valid])
     begins = _second_logs(times[valid], steps)
-    repeats = np.flatnonzero(steps == 0)
-    if len(repeats) > max(FEW_REPEATS, MANY_REPEATS * len(times)):
-        row = int(valid[repeats[0] + 1])
-        shown = clock.shown(int(times[row]))
-        said = f"found {shown} again, as {len(repeats)} of {len(times)} rows repeat a time"
-        said = f"{said}: too coarse for a clock to be rebuilt, allowed: times that increase from row to row"
-        yield Finding(said, row=row + 1, column=name, hints=EVEN)
-        repeats = repeats[:0]
-    for k in sorted([*repeats.tolist(), *np.flatnonzero(steps < 0).tolist()]):
+    single = []
+    for is_wrong, what in ((steps == 0, _TOO_COARSE), (steps < 0, _NO_CLOCK)):
+        wrong = np.flatnonzero(is_wrong)
+        if not _many(len(wrong), len(times)):
+            single += wrong.tolist()
+            continue
+        row = int(valid[wrong[0] + 1])
+        now, before = (clock.shown(int(times[valid[wrong[0] + k]])) for k in (1, 0))
+        said = what.format(now=now, before=before, rows=f"{len(wrong)} of {len(times)} rows")
+        yield Finding(f"{said}, allowed: {INCREASING}", row=row + 1, column=name, hints=EVEN)
+    for k in sorted(single):
         now, before = (clock.shown(int(times[valid[i]])) for i in (k + 1, k))
         found = f"found {now} again" if steps[k] == 0 else f"found {now} after {before}"
         again = ": a second log begins here, from about the same time" if k in begins else ""
-        said = f"{found}, allowed: times that increase from row to row{again}"
-        yield Finding(said, row=int(valid[k + 1]) + 1, column=name)
+        said = f"{found}, allowed: {INCREASING}{again}"
+        yield Finding(said, row=int(valid[k + 1]) + 1, column=name, hints=OTHER_TIME)
 
 
 def unknown_times(numbers: Numbers, clock: Clock) -> Iterable[Finding]:
@@ -184,16 +233,19 @@ def unknown_times(numbers: Numbers, clock: Clock) -> Iterable[Finding]:
         return
     name = clock.columns[0].header
     for index in np.flatnonzero(numbers.clock == NO_TIME).tolist():
-        yield Finding("found no time, allowed: a time in every row", row=index + 1, column=name)
+        said = "found no time, allowed: a time in every row"
+        yield Finding(said, row=index + 1, column=name, hints=OTHER_TIME)
     for index in np.flatnonzero(numbers.clock == UNREADABLE).tolist():
         text = " ".join(cells.text(index).strip() for cells in numbers.texts)
         said = f"found {text[:LONGEST_CELL]!r}, allowed: times as in the other rows"
-        yield Finding(said, row=index + 1, column=name)
+        yield Finding(said, row=index + 1, column=name, hints=OTHER_TIME)
 
 
 def _folds(times: IntArray, clock: Clock) -> Iterable[Finding]:
     """Yield where numbers go on as times of day written hhmmss do: 101159 is followed by 101200."""
-    if clock.told or clock.unit not in EXPONENTS or len(times) < 3 or times.min() <= UNREADABLE:
+    if clock.told or clock.lasts or clock.unit not in EXPONENTS:
+        return
+    if len(times) < 3 or times.min() <= UNREADABLE:
         return
     one = 10 ** EXPONENTS[clock.unit]
     steps = np.diff(times)
@@ -210,6 +262,7 @@ def _folds(times: IntArray, clock: Clock) -> Iterable[Finding]:
     hints = (
         Hint("", does="write it as hh:mm:ss"),
         *unit_hints(clock.columns[:1], clock.unit, "takes it as no time of day"),
+        *OTHER_TIME,
     )
     yield Finding(said, row=row + 2, column=clock.columns[0].header, hints=hints)
 

@@ -17,17 +17,19 @@ from urmpipe_pipeline.sources.checks import (
     find_errors,
     may_skip,
     rebuilt,
+    spread,
     trimmed,
     without_unread,
 )
+from urmpipe_pipeline.sources.clocks.durations import summed
 from urmpipe_pipeline.sources.clocks.text_times import timed
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.poses import as_poses
 from urmpipe_pipeline.sources.tables.numbers import Numbers
+from urmpipe_pipeline.sources.tables.padding import without_padding
 from urmpipe_pipeline.sources.tables.row_reader import first_left_out, lines_of_rows
-from urmpipe_pipeline.sources.tables.table import read_table
 from urmpipe_pipeline.text import counted
 
 
@@ -92,7 +94,7 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
     """Return the numbers of one table; raise what is wrong with them."""
     layout, clock = plan.tables.layouts[table], plan.clocks[table]
     places = [column.index for column in columns]
-    numbers = read_table(layout, places, clock.parts)
+    numbers = plan.tables.whole[table].table(places, clock.parts)
     unread = f"{len(numbers.unread)} of {len(numbers.values)} rows cannot be read"
     too_many, warnings, file = None, [], layout.file
     if numbers.left_out and layout.form is not None:
@@ -107,14 +109,18 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
         too_many = Finding(unread, file, parameter="skip_bad", allowed=f"{MOST_SKIPPED:.0%} of them")
     elif may_skip(numbers):
         too_many = Finding(unread, file, hints=(Hint("skip_bad", True, "leaves them out"),))
-    numbers = as_poses(plan, columns, rebuilt(trimmed(timed(layout, clock.parts, numbers))))
+    numbers = trimmed(timed(layout, clock.parts, numbers))
+    numbers, padding = without_padding(numbers, lambda: plan.tables.whole[table].read.values)
+    if clock.lasts:
+        numbers = summed(numbers, clock.columns[0].name)
+    numbers = spread(as_poses(plan, columns, rebuilt(numbers)))
     if not len(numbers.values) and not numbers.findings:
         message = "found no row with a time or a number in the columns that are used, allowed: at least one"
         raise LogError(Finding(message, file))
     findings = find_errors(layout, numbers, [column.header for column in columns], clock)
     if findings:
         raise LogError(*findings, *([too_many] if too_many else []))
-    return replace(numbers, warnings=(*warnings, *numbers.warnings))
+    return replace(numbers, warnings=(*warnings, *padding, *numbers.warnings))
 
 
 def _with_times(plan: Plan, main: Numbers, skip_bad: bool) -> Numbers:

@@ -17,7 +17,7 @@ from urmpipe_models.messages import one_line
 from urmpipe_models.orientation import FORMS
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, Role
 from urmpipe_pipeline.outputs import MAP_HEADER
-from urmpipe_pipeline.sources.clocks.time_file import TIME_FILE
+from urmpipe_pipeline.sources.clocks.time_file import TIME_FILE, named_file
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.units.rotation import PURE
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
@@ -65,8 +65,9 @@ def read_map(path: Path) -> LogMap:
     columns = [_joint(joint, units) for joint in joints]
     names = tuple(name for _, name, _, _ in columns)
     intervals = zip(names, (_interval(joint) for joint in joints), strict=True)
-    time = _given(clock, "column", clock.text)
-    _note_unit(clock, time or None, units)
+    time = _time_beside(path, _given(clock, "column", clock.text))
+    apart = named_file(time)
+    _note_unit(clock, apart[1] if apart else time or None, units)
     robot = _given(table, "robot", table.text)
     position = _given(tcp, "position", tcp.texts) or ()
     orientation = _given(tcp, "orientation", tcp.texts) or ()
@@ -76,6 +77,7 @@ def read_map(path: Path) -> LogMap:
             source=_given(table, "source", table.text),
             delimiter=_given(table, "delimiter", table.text),
             decimal=_given(table, "decimal", table.text),
+            layout=_given(table, "layout", table.text),
             time=time,
             period=_given(clock, "period", clock.number),
             joints=tuple(column for column, _, _, _ in columns),
@@ -126,11 +128,13 @@ def map_of(
         "source": log.source,
         "delimiter": found.get("delimiter"),
         "decimal": {"point": ".", "comma": ","}.get(found.get("decimal sign", "")),
+        "layout": found.get("layout"),
         "robot": robot,
         "base": list(base) or None,
         "tool": list(tool) or None,
     }
-    lines = [MAP_HEADER, "", *toml_lines(top), "", "[clock]", *toml_lines(_clock(log, found))]
+    clock = _clock(log, found, asked.get("time"))
+    lines = [MAP_HEADER, "", *toml_lines(top), "", "[clock]", *toml_lines(clock)]
     lines += ["", *CORRECTIONS] if log.joints else []
     for column, name in zip(_of(log, "joint"), log.joints, strict=True):
         said: dict[str, Any] = {"column": _called(log, column), "name": name}
@@ -149,8 +153,8 @@ def map_of(
         lines += ["", "[tcp]", *toml_lines(said | ({"measured": True} if log.measured else {}))]
     measured = [column for column in (*position, *orientation) if column.unit != PURE.name]
     units = {_called(log, column): column.unit for column in measured if not column.doubt}
-    clock = {name for c in _of(log, "time") for name in (c.name, c.header, str(c.number)) if name}
-    units |= {name: unit for name, unit in asked.get("unit", {}).items() if name in clock}
+    timed = {name for c in _of(log, "time") for name in (c.name, c.header, str(c.number)) if name}
+    units |= {name: unit for name, unit in asked.get("unit", {}).items() if name in timed}
     told = [f"{toml_text(one)} = {toml_text(unit)}" for one, unit in units.items()]
     told += [_assumed(toml_text(_called(log, c)), c.unit, c.doubt) for c in measured if c.doubt]
     lines += ["", "[units]", *told] if told else []
@@ -202,6 +206,12 @@ def _beside(path: Path, robot: str) -> str:
     return str(path.parent / robot) if Path(robot).suffix else robot
 
 
+def _time_beside(path: Path, time: str | None) -> str | None:
+    """Return a time column; of FILE:COLUMN the file as seen from the map's folder."""
+    beside = f"{path.parent / time}" if time else None
+    return beside if named_file(beside) else time
+
+
 def _of(log: JointLog, role: Role) -> list[LogColumn]:
     return [column for column in log.columns if column.role == role]
 
@@ -217,8 +227,10 @@ def _assumed(key: str, unit: str, doubt: str) -> str:
     return f"# {key} = {toml_text(unit)}  # {one_line(doubt)}"
 
 
-def _clock(log: JointLog, found: Mapping[str, str]) -> dict[str, Any]:
+def _clock(log: JointLog, found: Mapping[str, str], given: str | None = None) -> dict[str, Any]:
     """Return what the table of the clock says; a stamp in halves and a file of times are found by themselves.
+
+    A file whose column was named as the time stands there with its whole path.
 
     The unit is left out where the cells or the name of the column say it, and where it or the period is only
     assumed: read by a map that would be given.
@@ -231,8 +243,10 @@ def _clock(log: JointLog, found: Mapping[str, str]) -> dict[str, Any]:
     if not columns:
         return {"column": "none", "period": None if assumed else log.period or None}
     apart = any(one.kind == TIME_FILE for one in log.inferences)
-    if len(columns) > 1 or apart:
+    file = named_file(given)
+    if len(columns) > 1 or (apart and not file):
         return {}
     named = vocabulary().unit(split_unit(columns[0].header)[1] or "") is not None
     unit = None if named or assumed else found.get("unit of the time")
-    return {"column": _called(log, columns[0]), "unit": unit}
+    column = f"{file[0].resolve()}:{file[1]}" if apart and file else _called(log, columns[0])
+    return {"column": column, "unit": unit}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from numbers import Real
@@ -23,7 +24,10 @@ class ReadOptions:
         source: Name of the source, as `source_names` lists them.
         delimiter: Sign between cells, or comma, semicolon, tab, spaces, bar.
         decimal: Decimal sign, or point, comma.
-        time: Name or number (from 1) of the time column; "none" if there is none.
+        layout: What a row of the table is: "table" a sample, "transposed" a joint; of a flat array, sample by
+            sample or joint by joint, "flat:N" or "flat-by-joint:N" with N numbers a sample.
+        time: Name or number (from 1) of the time column; FILE:COLUMN of one in another file, with as many
+            rows; "none" if there is none.
         joints: Names or numbers (from 1) of the joint columns, in the robot's order.
         names: What to call the joints, in the same order; by default as their columns.
         signs: 1 or -1 for each joint: -1 where the file counts against the robot's axis.
@@ -50,6 +54,7 @@ class ReadOptions:
     source: str | None = None
     delimiter: str | None = None
     decimal: str | None = None
+    layout: str | None = None
     time: str | None = None
     joints: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
@@ -125,6 +130,11 @@ def _is_interval(value: Any) -> bool:
     return _are(_is_number)(value) and len(value) == 2
 
 
+def _is_layout(value: Any) -> bool:
+    return isinstance(value, str) and re.fullmatch(_LAYOUTS, value) is not None
+
+
+_LAYOUTS = r"table|transposed|flat(-by-joint)?:[1-9]\d*"
 _TEXT = (_is_word, "a text, not empty")
 _COLUMNS = (_are(_is_column), COLUMNS)
 _FLAG = (lambda value: isinstance(value, bool), "True or False")
@@ -133,7 +143,8 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "source": _TEXT,
     "delimiter": _TEXT,
     "decimal": _TEXT,
-    "time": (lambda value: _is_column(value) and value != "", "a column by name or number"),
+    "layout": (_is_layout, "table, transposed, flat:N or flat-by-joint:N, with N numbers a sample"),
+    "time": (lambda value: _is_column(value) and value != "", "a column by name or number, or FILE:COLUMN"),
     "joints": _COLUMNS,
     "names": (_are(_is_column), "a list of names, such as ['q1', 'q2']"),
     "signs": (_are(_is_number), "a list of 1 or -1, such as [1, -1]"),

@@ -22,6 +22,7 @@ from urmpipe_pipeline.sources.columns.own_log import own_joints, written_roles
 from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_header
 from urmpipe_pipeline.sources.columns.roles import Roles, assign, joint_inference
 from urmpipe_pipeline.sources.columns.sides import of_side
+from urmpipe_pipeline.sources.columns.simulated import joints_of_blocks
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH, Tables
 from urmpipe_pipeline.sources.vocabulary import Patterns, Unit
@@ -135,6 +136,8 @@ def _roles(
     given = options.joints or options.position or options.measured or options.source or options.side
     if len(tables.layouts) == 1 and not given and (written := written_roles(columns, main, robot)) is not None:
         return written
+    if not given and (signals := joints_of_blocks(columns, main, robot)) is not None:
+        return signals
     if main.header is None and not several:
         return without_header(
             columns, tables.layouts, options, robot, tables.whole, path=options.source == PATH

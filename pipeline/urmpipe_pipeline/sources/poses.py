@@ -16,6 +16,7 @@ from urmpipe_models.messages import Hint
 from urmpipe_models.repolarizer import FULL_TURN
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.clocks.clock import PAPER_PERIOD
+from urmpipe_pipeline.sources.clocks.clock_columns import GIVEN
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, Numbers
@@ -65,6 +66,8 @@ def as_poses(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> Numbers
 
 def _evidence(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> str:
     """Return why the rows of a table are still poses; empty if they are not, or it cannot be told."""
+    if plan.poses is None and _written_untimed(plan):
+        return "urmpipe wrote them without times"
     joints = [columns.index(joint) for joint in plan.roles.joints if joint in columns]
     count = len(numbers.values)
     if plan.poses is False or not joints or len(joints) < len(plan.roles.joints) or count < LEAST_ROWS:
@@ -87,6 +90,13 @@ def _evidence(plan: Plan, columns: Sequence[Column], numbers: Numbers) -> str:
     if numbers.clock is None:
         return f"no clock, and {said}"
     return _label(plan, numbers.clock[rows[:2, known]], size, said)
+
+
+def _written_untimed(plan: Plan) -> bool:
+    """Return whether urmpipe wrote joints without times: it does so of still poses alone."""
+    known, clock = plan.tables.known, plan.clock
+    named = any(one.evidence == GIVEN for one in clock.inferences)  # left out on request
+    return known is not None and known.own and bool(plan.roles.joints) and not (clock.columns or named)
 
 
 def _label(plan: Plan, times: IntArray, size: FloatArray, said: str) -> str:

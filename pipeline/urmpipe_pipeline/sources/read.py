@@ -5,19 +5,22 @@ from __future__ import annotations
 import os.path
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_pipeline.joint_log import JointLog, SourceFile
 from urmpipe_pipeline.sources.assemble import assemble, recorded
+from urmpipe_pipeline.sources.clocks.time_file import named_file
 from urmpipe_pipeline.sources.content import Content, read_content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
 from urmpipe_pipeline.sources.tables.held import Held, fingerprint_of
-from urmpipe_pipeline.sources.tables.opening import open_tables
+from urmpipe_pipeline.sources.tables.opening import Tables, open_tables
+from urmpipe_pipeline.sources.tables.own_tables import roles_of
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.sources.units.kinematic_units import Recorded
+from urmpipe_pipeline.sources.vocabulary import key, split_unit, vocabulary
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,8 +57,11 @@ def read_numbers(
     """Return the numbers of a log; arguments and errors are those of `read_log`."""
     options = options or ReadOptions()
     tables = open_tables(files, options)
+    options = _with_own_clock(tables, options)
     with ThreadPoolExecutor(max_workers=1) as beside:
-        hashed = [beside.submit(_fingerprint, file) for file in files]
+        named = named_file(options.time)
+        used = [*files, named[0]] if named else files
+        hashed = [beside.submit(_fingerprint, file) for file in used]
         plan = make_plan(tables, options, robot)
         content = read_content(plan, skip_bad=options.skip_bad)
         return Reading(plan, content, options, _name(files), tuple(future.result() for future in hashed))
@@ -77,6 +83,16 @@ def read_log(
         OptionError: If an option's value makes no sense.
     """
     return read_numbers(files, options, robot).log(robot)
+
+
+def _with_own_clock(tables: Tables, options: ReadOptions) -> ReadOptions:
+    """Return the options with the clock of a file of ours that is not called like one."""
+    times = [k for k, role in roles_of(tables.layouts[0]).items() if role == "time"]
+    if options.time is not None or len(tables.layouts) != 1 or len(times) != 1:
+        return options
+    name = key(split_unit(tables.layouts[0].names[times[0]])[0])
+    called = any(pattern.search(name) for pattern in vocabulary().time)
+    return options if called else replace(options, time=str(times[0] + 1))
 
 
 def _fingerprint(file: Path | Held) -> SourceFile:

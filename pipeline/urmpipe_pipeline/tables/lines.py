@@ -20,7 +20,8 @@ SLICE = 65_536
 TAIL = 1 << 16
 """The last line stands within so many bytes of the end."""
 
-TUM_HEAD = f"# {EXPORT_HEADER}: t [s] x y z [m] qx qy qz qw\n"
+TUM_HEAD = f"# {EXPORT_HEADER}\n# t[s] x[m] y[m] z[m] qx qy qz qw\n"
+"""The names and units of a trajectory's columns, by which it is read back; a unit has no space before it."""
 
 
 def write_csv(table: ExportTable, path: Path) -> list[str]:

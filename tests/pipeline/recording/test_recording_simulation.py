@@ -9,17 +9,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from asserting import refusal
 from recorded import columns
 from same_results import assert_same
-from urmpipe_models.errors import RecordingError
+from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
-from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_runs
+from urmpipe_pipeline.operands import load_comparison, load_runs
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording.store import SLICE
 from urmpipe_pipeline.results import read_recording, write_recording
@@ -95,11 +95,22 @@ def test_rerun_finds_nothing_wrong(make_simulation: MakeSimulation, tmp_path: Pa
     assert "1 file verified without error" in done.stdout + done.stderr
 
 
-def test_a_simulation_is_nothing_to_compare(make_simulation: MakeSimulation, tmp_path: Path) -> None:
-    path = write_recording(make_simulation(5), tmp_path / "a.rrd")
-    with pytest.raises(RecordingError) as caught:
-        load_runs([path])
-    assert str(caught.value) == f"{path}: {SIMULATION}"
+def test_the_recording_of_a_simulation_is_compared_as_it_is(
+    make_simulation: MakeSimulation, tmp_path: Path
+) -> None:
+    simulation = make_simulation(5)
+    path = write_recording(simulation, tmp_path / "a.rrd")
+    for run in load_runs([path, simulation], block="chain"):
+        np.testing.assert_array_equal(run.q, simulation.arms[0].q)
+    assert [one.log.name for one in load_runs([path, simulation], block=["log", "chain"])] == [
+        "log-to-delta (log)", "log-to-delta (chain)",
+    ]  # fmt: skip
+    assert refusal(LogError, load_runs, [path]) == (
+        f'{path}: found 2 blocks with a motion, allowed: one; use block="chain" or block="log"'
+    )
+    for blocks in (["a", "b"], ["chain", "log", "chain"]):
+        refused = refusal(OptionError, load_runs, [path], block=blocks)
+        assert refused.startswith("block: found 'a'") or "with 1 simulation, allowed: a block" in refused
     assert load_comparison(path) is None
 
 

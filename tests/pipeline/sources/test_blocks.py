@@ -37,7 +37,7 @@ class Motion:
         self.qd = (width * rate * np.cos(angle)).sum(axis=1)
         self.qdd = (-width * rate**2 * np.sin(angle)).sum(axis=1)
         self.temp = np.empty_like(self.q)
-        self.tau = 9.0 * np.cos(self.q) + rng.uniform(0.5, 4.0, joints) * self.qd
+        self.tau = 9.0 * np.cos(self.q) + np.linspace(0.5, 4.0, joints) * self.qd
 
     def table(self, blocks: str) -> FloatArray:
         """Return blocks side by side, as "tau q qd"."""
@@ -123,7 +123,7 @@ def test_columns_that_turn_too_far_for_an_arm_are_asked_about_before_units(
 
 @given(seed=st.integers(0, 10_000), joints=st.integers(3, 7), order=st.permutations(["q", "tau", "temp"]))
 def test_what_are_no_rates_proves_nothing(seed: int, joints: int, order: Sequence[str]) -> None:
-    """Torques hold a part that goes with the rate, another for each joint: the periods differ."""
+    """Torques hold a part that goes with the rate, of another size for each joint: the periods differ."""
     motion = Motion(joints, seed)
     motion.temp = 40.0 + np.outer(1.0 - np.exp(-motion.t / 3.0), 1.0 + np.arange(joints))
     assert not proved_blocks(motion.table(" ".join(order)), joints)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import INCREASE, OTHER_TIME
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
@@ -18,7 +19,6 @@ Wrong = Callable[..., list[str]]
 Arm = Callable[..., Chain]
 
 NUMBER = "allowed: a number, or an empty, Null or NaN cell where a sample is missing"
-INCREASE = "allowed: times that increase from row to row"
 
 
 def test_all_findings_at_once(wrong: Wrong, arm: Arm) -> None:
@@ -41,10 +41,10 @@ soon,1,2,e
         f"log.csv:4, column q1: found 'x', {NUMBER}",
         "log.csv:5, column q2: found inf, allowed: finite numbers",
         f"log.csv:5, column t: found 0.05 s again, {INCREASE}",
-        "log.csv:6, column t: found no time, allowed: a time in every row",
+        f"log.csv:6, column t: found no time, allowed: a time in every row{OTHER_TIME}",
         "log.csv:8: found 5 cells, allowed: 4",
         "log.csv:9: found 'a,note,by,hand', allowed: a row of numbers",
-        "log.csv:10, column t: found 'soon', allowed: a number in every row",
+        f"log.csv:10, column t: found 'soon', allowed: a number in every row{OTHER_TIME}",
         f"log.csv:11, column q2: found '1_000', {NUMBER}",
         "log.csv:12, column q1: found -inf, allowed: finite numbers",
         f"log.csv:12, column t: found 0.5 s again, {INCREASE}",

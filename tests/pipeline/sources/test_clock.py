@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from asserting import INCREASE, OTHER_TIME
 from urmpipe_pipeline.joint_log import JointLog
 
 Read = Callable[..., JointLog]
@@ -95,7 +96,7 @@ def test_steps_that_may_be_two_units_are_asked_for(wrong: Wrong, read: Read) -> 
     text = clocked("t", "0", "600", "1200")
     assert wrong(text) == [
         'log.csv:2, column t: found steps of 600, which may be ms or us; unit={"t": "ms"} or'
-        ' unit={"t": "us"} says which'
+        f' unit={{"t": "us"}} says which{OTHER_TIME}'
     ]
     assert read(text, unit={"t": "us"}).t_ns.tolist() == [0, 600_000, 1_200_000]
 
@@ -200,11 +201,11 @@ def test_times_that_64_bits_cannot_hold(wrong: Wrong, read: Read) -> None:
     text = clocked("t [s]", "133500000000000000", "133500000000050000")
     assert wrong(text) == [
         'log.csv:2, column t [s]: found 1.335e+17 s, allowed: times within 146 years of 0; unit={"t":'
-        ' "ns"} reads them so'
+        f' "ns"}} reads them so{OTHER_TIME}'
     ]
     assert read(text, unit={"t": "ns"}).t_ns.tolist() == [0, 50_000]
     assert wrong(clocked("t [s]", "0", "1", "1e30")) == [
-        "log.csv:4, column t [s]: found '1e30', allowed: a number in every row"
+        f"log.csv:4, column t [s]: found '1e30', allowed: a number in every row{OTHER_TIME}"
     ]
 
 
@@ -246,8 +247,7 @@ def test_irregular_repeats_are_one_error(wrong: Wrong) -> None:
     rows = [0, 0, 0, 1, 1, 1, 1, 1, 1, 2, 3, 3, 3, 3]
     assert wrong(clocked("t [s]", *map(str, rows))) == [
         "log.csv:3, column t [s]: found 0 s again, as 10 of 14 rows repeat a time: too coarse for a"
-        ' clock to be rebuilt, allowed: times that increase from row to row; time="none" leaves the'
-        " time column out; period=SECONDS sets the time between rows then"
+        f" clock to be rebuilt, {INCREASE}; period=SECONDS sets the time between rows then"
     ]
 
 
@@ -255,7 +255,7 @@ def test_one_repeat_stays_an_error(wrong: Wrong) -> None:
     times = [0.005 * k for k in range(50)]
     times[20] = times[19]
     assert wrong(clocked("t", *(f"{time:.3f}" for time in times))) == [
-        "log.csv:22, column t: found 0.095 s again, allowed: times that increase from row to row"
+        f"log.csv:22, column t: found 0.095 s again, {INCREASE}"
     ]
 
 
@@ -269,26 +269,29 @@ def test_a_counter_since_boot_is_not_taken_for_unix_time(
     text = clocked("time", *(str(start + k * step) for k in range(4)))
     found = f"found times of our years in steps of {step:g}, which may be {units[0]} or {units[1]}"
     asked = " or ".join(f'unit={{"time": "{unit}"}}' for unit in units)
-    assert wrong(text) == [f"log.csv:2, column time: {found}; {asked} says which"]
+    assert wrong(text) == [f"log.csv:2, column time: {found}; {asked} says which{OTHER_TIME}"]
     assert read(text, unit={"time": units[1]}).period == 0.005
 
 
 def test_minutes_days_and_dates_in_numbers_are_not_taken_for_seconds(read: Read, wrong: Wrong) -> None:
     minutes = clocked("Time [min]", "0", "0.1", "0.2")
-    hint = 'convert the times; time="none" leaves the time column out; period=SECONDS sets the time between'
-    hint += " rows then"
-    said = f"found the unit 'min', allowed: s, ms, us, ns; {hint}"
+    even = f"{OTHER_TIME}; period=SECONDS sets the time between rows then"
+    said = f"found the unit 'min', allowed: s, ms, us, ns; convert the times{even}"
     assert wrong(minutes) == [f"log.csv:2, column Time [min]: {said}"]
     assert read(minutes, time="none", period=6.0).period == 6.0
     excel = clocked("Time", *(f"{44297.5 + k * 0.005 / 86400:.12f}" for k in range(4)))
-    said = "found steps of 5.79e-08, as of days or hours, allowed: times in s, ms, us, ns"
-    hint = 'convert them; unit={"Time": "s"} takes them as they are'
-    assert wrong(excel) == [f"log.csv:2, column Time: {said}; {hint}"]
+    said = "found 44297.5 in steps of 5.79e-08, as Excel's days since 1900, allowed: times in s, ms, us, ns"
+    hint = "convert them: (t - 25569) * 86400 is Unix time in s"
+    as_s = 'unit={"Time": "s"} takes them as they are'
+    assert wrong(excel) == [f"log.csv:2, column Time: {said}; {hint}; {as_s}{even}"]
+    hours = clocked("Time", *(f"{10.5 + k * 0.005 / 3600:.12f}" for k in range(4)))
+    said = "found steps of 1.39e-06, as of days or hours, allowed: times in s, ms, us, ns; convert them"
+    assert wrong(hours) == [f"log.csv:2, column Time: {said}; {as_s}{even}"]
     assert read(excel, unit={"Time": "s"}).units["Time"] == "s"
     date = clocked("Time", "20211311222721.0", "20211311222721.5")  # of the 13th month
     said = "found 2.02113e+13 s, allowed: times within 146 years of 0"
     hint = "a date is read if it is written as 2021-04-11 22:27:21.5"
-    assert wrong(date) == [f"log.csv:2, column Time: {said}; {hint}"]
+    assert wrong(date) == [f"log.csv:2, column Time: {said}; {hint}{OTHER_TIME}"]
 
 
 def test_a_clock_of_more_than_5_khz_is_said_to_be_assumed(read: Read) -> None:
@@ -306,7 +309,7 @@ def test_times_of_day_in_numbers_are_refused_where_they_leap(
 ) -> None:
     text = clocked("Time", *times)
     said = f"found {times[2]} after {times[1]}, as a time of day hhmmss goes on, allowed: a clock of one unit"
-    hint = 'write it as hh:mm:ss; unit={"Time": "s"} takes it as no time of day'
+    hint = f'write it as hh:mm:ss; unit={{"Time": "s"}} takes it as no time of day{OTHER_TIME}'
     assert wrong(text) == [f"log.csv:4, column Time: {said}; {hint}"]
     assert read(text, unit={"Time": "s"}).t[1:].tolist()[0] == 1.0
 

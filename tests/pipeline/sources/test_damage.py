@@ -11,6 +11,7 @@ import pytest
 from hypothesis import Phase, assume, example, given, settings
 from hypothesis import strategies as st
 
+from asserting import INCREASE, OTHER_TIME
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.joint_log import JointLog
@@ -125,7 +126,6 @@ def test_a_file_reads_the_same_in_blocks_of_any_size(content: bytes, options: Re
         assert outcome(path, options) == whole
 
 
-INCREASE = "allowed: times that increase from row to row"
 
 
 def rows(count: int, start: float = 0.0) -> list[str]:
@@ -183,8 +183,8 @@ def test_a_byte_of_no_text_has_a_line(wrong: Wrong) -> None:
 
 def test_a_clock_that_begins_again_begins_a_second_log(wrong: Wrong) -> None:
     assert wrong(joined(*rows(100), *rows(30))) == [
-        f"log.csv:102, column t: found 0 s after 0.99 s, {INCREASE}:"
-        " a second log begins here, from about the same time"
+        "log.csv:102, column t: found 0 s after 0.99 s, allowed: times that increase from row to row:"
+        f" a second log begins here, from about the same time{OTHER_TIME}"
     ]
     assert wrong(joined(*rows(100), *rows(30, 0.5))) == [
         f"log.csv:102, column t: found 0.5 s after 0.99 s, {INCREASE}"

@@ -46,7 +46,8 @@ def test_rows_of_ros2_with_a_message_among_them(wrong: Wrong, read: Read, at: in
     ]
     many = [line.replace("17400", f"{17400 + k // 20}", 1) for k, line in enumerate(lines * 10)]
     assert sound.joints[0].startswith("position.")
-    assert "found 1 cell ('[WARN] late')" in wrong(with_line(many, at + 40, "[WARN] late"))[0]
+    said = "\n".join(wrong(with_line(many, at + 40, "[WARN] late")))
+    assert "found 1 cell ('[WARN] late')" in said
 
 
 def test_the_first_row_of_another_publisher_is_named(wrong: Wrong) -> None:
@@ -112,15 +113,15 @@ def test_a_damaged_time_without_a_header_is_asked_for_and_no_joint(
     assert read("\n".join(lines)).joints == ("q1", "q2")
     rest = lines[at - 1].partition(",")[2]
     assert wrong(with_line(lines, at, f"{cell},{rest}")) == [
-        f"log.csv:{at}: found {cell!r} in a first column of otherwise even steps, which may be {MAY_BE}"
+        f"log.csv:{at}: found {cell!r} in a first column that otherwise increases, which may be {MAY_BE}"
     ]
 
 
-def test_joints_that_run_evenly_together_are_no_damaged_clock(read: Read) -> None:
+def test_of_columns_that_run_evenly_together_each_may_be_the_time(read: Read, wrong: Wrong) -> None:
     lines = text(np.c_[1 + K / 100, 2 + K / 50])
-    assert read("\n".join(lines)).joints == ("q1", "q2")
-    lines[20] = "1.207,2.41"
-    assert read("\n".join(lines)).joints == ("q1", "q2")
+    assert wrong("\n".join(lines))[0].startswith("log.csv:1: found columns 1, 2, which increase")
+    assert read("\n".join(lines), time="none").joints == ("q1", "q2")
+    assert read("\n".join(lines), time="2").joints == ("q1",)
 
 
 def test_joints_whose_values_have_length_1_in_most_rows_hide_no_orientation(read: Read) -> None:

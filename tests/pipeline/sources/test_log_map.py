@@ -148,7 +148,7 @@ position = "x"
         " quat_wxyz, matrix (did you mean zyz?)",
         "lab.toml: key tool: found 2 numbers, allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad",
         "lab.toml: key delimeter: unknown (did you mean delimiter?); allowed: clock, tcp, joints, units,"
-        " robot, source, delimiter, decimal, base, tool",
+        " robot, source, delimiter, decimal, layout, base, tool",
         "lab.toml: key clock.colum: unknown (did you mean column?); allowed: column, unit, period, poses",
     ]
 

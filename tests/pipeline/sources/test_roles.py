@@ -207,7 +207,9 @@ def test_a_missing_name_is_named(wrong: Wrong, arm: Arm) -> None:
         f"{found} 6 for robot arm; record the missing one; {OPTION}"
     ]
     assert wrong(table(["t", *names])) == [
-        f"{found} such as q1, q2, ... or J1, J2, ...; record the missing one; {OPTION}"
+        f"{found} such as q1, q2, ... or J1, J2, ...; record the missing one;"
+        ' joints=["shoulder_pan", "shoulder_lift", "wrist_1", "wrist_2", "wrist_3"] takes these;'
+        f" {OPTION}"
     ]
     own = ["base_yaw", "lower_arm", "upper_arm", "hand"]
     assert wrong(table(["t", *own[:3]]), arm(4, names=tuple(own))) == [

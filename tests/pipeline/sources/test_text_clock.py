@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from asserting import INCREASE, OTHER_TIME
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import read_log
 from urmpipe_pipeline.sources.clocks.text_times import known_forms, timed
@@ -169,14 +170,14 @@ def test_an_order_that_nothing_tells_is_asked_for(read: Read, wrong: Wrong) -> N
     assert wrong(text) == [
         "log.csv:2, column timestamp: found '01/02/2021 23:59:59', which may be date and time, day"
         ' first or date and time, month first; unit={"timestamp": "dmy"} or unit={"timestamp": "mdy"}'
-        " says which"
+        f" says which{OTHER_TIME}"
     ]
     assert read(text, unit={"timestamp": "dmy"}).t_ns.tolist() == [0, 2 * SECOND, DAY + 3 * SECOND]
     assert read(text, unit={"timestamp": "mdy"}).clock_start_ns == unix(2021, 1, 2, 23, 59, 59)
     header = text.replace("timestamp", "Date (dd/mm/yyyy)")
     assert read(header).t_ns.tolist() == [0, 2 * SECOND, DAY + 3 * SECOND]
     assert wrong(text, unit={"timestamp": "ms"}) == [
-        "unit: found ms for the time 'timestamp', allowed: dmy, mdy"
+        f"unit: found ms for the time 'timestamp', allowed: dmy, mdy{OTHER_TIME}"
     ]
 
 
@@ -192,8 +193,7 @@ def test_a_wrong_row_does_not_change_what_its_neighbours_mean(wrong: Wrong) -> N
     cells = [f"10:11:{33 + k // 200}:{k % 200 * 5000}" for k in range(600)]
     cells[300] = "10:11:33:0"
     assert wrong(clocked(*cells, name="Time")) == [
-        "log.csv:302, column Time: found 10:11:33 after 10:11:34.495,"
-        " allowed: times that increase from row to row"
+        f"log.csv:302, column Time: found 10:11:33 after 10:11:34.495, {INCREASE}"
     ]
 
 
@@ -208,7 +208,7 @@ def test_digits_behind_a_colon_that_nothing_tells_are_asked_for(read: Read, wron
     assert wrong(text) == [
         "log.csv:2, column Time: found '10:11:32:100', which may be time of day, decimals behind the"
         ' last colon or time of day, microseconds behind the last colon; unit={"Time": "s"} or'
-        ' unit={"Time": "us"} says which'
+        f' unit={{"Time": "us"}} says which{OTHER_TIME}'
     ]
     assert read(text, unit={"Time": "us"}).t_ns.tolist() == [0, 5 * US, 10 * US]
     assert read(text, unit={"Time": "ms"}).t_ns.tolist() == [0, 5 * MS, 10 * MS]
@@ -221,7 +221,7 @@ def test_midnight(read: Read, wrong: Wrong) -> None:
         ("1", "there the time of day falls back by nearly 24 h: the next day begins")
     ]
     assert wrong(clocked("12:00:00", "12:00:01", "11:59:59", name="Time")) == [
-        "log.csv:4, column Time: found 11:59:59 after 12:00:01, allowed: times that increase from row to row"
+        f"log.csv:4, column Time: found 11:59:59 after 12:00:01, {INCREASE}"
     ]
 
 
@@ -251,14 +251,13 @@ def test_a_clock_without_a_name_or_a_header(read: Read) -> None:
 def test_cells_that_are_no_times_are_all_told(wrong: Wrong) -> None:
     text = clocked("2021-04-11 22:27:21", "2021-02-30 22:27:22", "2021-04-11 24:27:22", "", "soon",
                    "2021-04-11 22:27:20", "2021-04-11 22:27:26")  # fmt: skip
-    like = "allowed: times as in the other rows"
+    like = f"allowed: times as in the other rows{OTHER_TIME}"
     expected = [
         f"log.csv:3, column timestamp: found '2021-02-30 22:27:22', {like}",
         f"log.csv:4, column timestamp: found '2021-04-11 24:27:22', {like}",
-        "log.csv:5, column timestamp: found no time, allowed: a time in every row",
+        f"log.csv:5, column timestamp: found no time, allowed: a time in every row{OTHER_TIME}",
         f"log.csv:6, column timestamp: found 'soon', {like}",
-        "log.csv:7, column timestamp: found 2021-04-11 22:27:20 after 2021-04-11 22:27:21,"
-        " allowed: times that increase from row to row",
+        f"log.csv:7, column timestamp: found 2021-04-11 22:27:20 after 2021-04-11 22:27:21, {INCREASE}",
     ]
     assert wrong(text) == expected
     assert wrong(text.replace("-11 22:27:26,0,1", "-11 22:27:26,x,1"))[:5] == expected
@@ -267,7 +266,7 @@ def test_cells_that_are_no_times_are_all_told(wrong: Wrong) -> None:
 def test_text_that_is_no_clock_is_refused(wrong: Wrong) -> None:
     assert wrong(clocked("yesterday", "today")) == [
         "log.csv:2, column timestamp: found 'yesterday', allowed: numbers in s, ms, us or ns,"
-        " or times such as 2021-04-11 22:27:21.573, 22:27:21.573, 0.005 sec"
+        f" or times such as 2021-04-11 22:27:21.573, 22:27:21.573, 0.005 sec{OTHER_TIME}"
     ]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asserting import refusal
+from asserting import INCREASE, OTHER_TIME, refusal
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import ReadOptions, read_log
@@ -76,20 +76,19 @@ def test_what_is_wrong_with_the_times_is_told(write: Write) -> None:
     joints, clock = write(JOINTS, "q.csv"), write("0,0.01,0.005\n", "time.csv")
     with pytest.raises(LogError) as caught:
         read(joints, clock)
-    assert str(caught.value) == (
-        f"{clock}:1, column 1: found 0.005 s after 0.01 s, allowed: times that increase from row to row"
-    )
+    assert str(caught.value) == (f"{clock}:1, column 1: found 0.005 s after 0.01 s, {INCREASE}")
     clock = write("0,soon,0.005\n", "time.csv")
     with pytest.raises(LogError) as caught:
         read(joints, clock)
-    assert str(caught.value) == f"{clock}:1, column 1: found 'soon', allowed: a number in every row"
+    said = "found 'soon', allowed: a number in every row"
+    assert str(caught.value) == f"{clock}:1, column 1: {said}{OTHER_TIME}"
 
 
 def test_two_clocks_are_one_too_many(write: Write) -> None:
     joints, clock = write("t,q1,q2\n0,1,2\n1,2,3\n", "q.csv"), write("0\n0.005\n", "time.csv")
     assert refusal(LogError, read, joints, clock) == (
         f"{joints}:1, column t: found a time here and in time.csv, allowed: one clock;"
-        " time=COLUMN says which column"
+        ' time=COLUMN says which column; time="none" leaves both out'
     )
 
 

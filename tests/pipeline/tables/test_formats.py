@@ -136,8 +136,8 @@ def test_a_mat_file_says_what_it_is_and_stays_one(run: Run, tmp_path: Path) -> N
 
 def test_tum_of_the_grid_is_the_pose_by_forward_kinematics(run: Run, tmp_path: Path) -> None:
     path = write(run, tmp_path / "a.tum", "tum")
-    first, *lines = path.read_text().splitlines()
-    assert first == "# urmpipe export: t [s] x y z [m] qx qy qz qw"
+    first, names, *lines = path.read_text().splitlines()
+    assert (first, names) == ("# urmpipe export", "# t[s] x[m] y[m] z[m] qx qy qz qw")
     assert lines[0].startswith("1700000000.123456789 ")
     assert lines[39].startswith("1700000000.513456789 ")
     rows = np.loadtxt(path)

@@ -84,7 +84,7 @@ class Form:
         pattern: What a whole cell looks like.
         timed: Whether a cell holds a time, not the date alone.
         keys: The units that ask for it where its cells may be of another form as well.
-        tail: What the digits behind a third colon count: s (decimals), ms or us.
+        tail: What the digits behind a third colon count: s (decimals), ms or us; ns behind whole seconds.
         last: Whether it is tried only if the clock runs backwards in every other form.
     """
 
@@ -118,6 +118,8 @@ class Form:
         """
         if parts.text("word"):
             return _length(parts)
+        if self.tail == "ns":
+            return parts.number("whole") * SECOND_NS + parts.number("count"), np.ones(len(parts.cells), bool)
         time, valid = _time(parts, self.tail)
         if not self.dated:
             days = parts.number("days")
@@ -242,15 +244,54 @@ FORMS: Sequence[Form] = (*_dates(), *_times())
 """All forms, the usual ones first."""
 
 
+_DENSE_TAIL = r"(?:[.,](?P<decimals>\d{1,9})|(?P<count>\d{3}|\d{6}))?"
+
 DENSE_DATE = Form(
     "date and time, digits alone",
     DATE,
     _compiled(
-        r"(?P<year>\d{4})(?P<month>\d\d)(?P<day>\d\d)"
-        rf"(?P<hour>\d\d){_MINUTES}(?P<second>\d\d){_DECIMALS}"
+        r"(?P<year>(?:19[7-9]|20\d)\d)(?P<month>\d\d)(?P<day>\d\d)"
+        rf"(?P<hour>\d\d){_MINUTES}(?P<second>\d\d){_DENSE_TAIL}"
     ),
 )
 """The form of a number that is a date, YYYYMMDDhhmmss: taken where a whole column holds nothing else."""
+
+DENSE_DAY = Form(
+    "date, digits alone",
+    DATE,
+    _compiled(r"(?P<year>(?:19[7-9]|20\d)\d)(?P<month>\d\d)(?P<day>\d\d)(?:\.0*)?"),
+    timed=False,
+)
+"""The form of a number that is a day, YYYYMMDD, beside a time of day."""
+
+DENSE_TIME = Form(
+    "time of day, digits alone",
+    TIME_OF_DAY,
+    _compiled(
+        r"(?P<hour>\d{0,2}?)(?P<minute>\d{0,2}?)(?P<second>\d{1,2})"
+        r"(?:[.,](?P<decimals>\d{1,9})|(?<=\d{6})(?P<count>\d{3}|\d{6}))?"
+    ),
+)
+"""The form of a number that is a time of day, hhmmss, beside a day; zeros before it may be missing."""
+
+UNPADDED_NS = Form(
+    "seconds, and nanoseconds not zero-padded behind the point",
+    LENGTH,
+    _compiled(r"(?P<whole>\d{1,10})[.,](?P<count>0|[1-9]\d{0,8})"),
+    tail="ns",
+)
+"""The form of a number that is seconds and nanoseconds: 7.5000000 is 7 s and 5 ms."""
+
+
+IN_DIGITS = (DENSE_DATE, DENSE_DAY, DENSE_TIME)
+"""Forms of numbers, which may be written with an exponent."""
+
+
+def in_digits(cell: str) -> str:
+    """Return a number with an exponent without one: 2.0200714163904e+13 as 20200714163904."""
+    if "e" not in cell.lower():
+        return cell
+    return np.format_float_positional(float(cell.replace(",", ".")), trim="-")
 
 
 def looks_like_a_clock(cell: str) -> bool:

@@ -13,15 +13,25 @@ from urmpipe_models.arrays import IntArray
 from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, Inference, LogWarning
-from urmpipe_pipeline.sources.cells.cell import LONGEST_NS, is_missing
+from urmpipe_pipeline.sources.cells.cell import LONGEST_NS
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
-from urmpipe_pipeline.sources.cells.text_clock import DATE, DENSE_DATE, SECOND_NS, TIME_OF_DAY
+from urmpipe_pipeline.sources.cells.text_clock import (
+    DATE,
+    DENSE_DATE,
+    SECOND_NS,
+    TIME_OF_DAY,
+    UNPADDED_NS,
+    Form,
+)
+from urmpipe_pipeline.sources.clocks.chosen import EXPONENTS, OTHER_TIME, Chosen
 from urmpipe_pipeline.sources.clocks.clock_columns import time_columns
-from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS, unit_of
+from urmpipe_pipeline.sources.clocks.clock_units import unit_of
+from urmpipe_pipeline.sources.clocks.digits import all_are
+from urmpipe_pipeline.sources.clocks.steps import steps_of
 from urmpipe_pipeline.sources.clocks.text_times import known_forms, read_cells
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.options import ReadOptions
-from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, ClockColumn
+from urmpipe_pipeline.sources.tables.numbers import ClockColumn
 from urmpipe_pipeline.sources.tables.opening import Tables
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit
@@ -37,10 +47,6 @@ _DATES = (19_700_101_000_000, 21_000_101_000_000)
 """Dates written as numbers, YYYYMMDDhhmmss."""
 
 
-_OTHER_TIME = (Hint("time"), Hint("time", "none"))
-"""What to give for another time column."""
-
-
 @dataclass(frozen=True, slots=True)
 class Clock:
     """The clock of one table.
@@ -53,6 +59,7 @@ class Clock:
         inferences: What was found out.
         warnings: What a person should know.
         by_source: Whether the source told that unit.
+        lasts: Whether each row has a duration, and the times are their sum.
     """
 
     columns: tuple[Column, ...] = ()
@@ -62,6 +69,7 @@ class Clock:
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
     by_source: bool = False
+    lasts: bool = False
 
     @property
     def exponent(self) -> int:
@@ -116,13 +124,12 @@ def find_clocks(
     for table, layout in enumerate(tables.layouts):
         own = [column for column in columns if column.table == table]
         chosen = time_columns(own, layout, options, joints, tables.whole[table])
-        clocks.append(clock_of(*chosen, layout, tables.known, units, label=options.poses))
+        clocks.append(clock_of(chosen, layout, tables.known, units, label=options.poses))
     return tuple(clocks)
 
 
 def clock_of(
-    chosen: tuple[Column, ...],
-    why: str,
+    chosen: Chosen,
     layout: Layout,
     source: KnownSource | None,
     units: Mapping[int, Unit],
@@ -135,50 +142,65 @@ def clock_of(
         LogError: If the time is text in no form that is known, or its unit cannot be told.
         OptionError: If its unit is given as one that is no time.
     """
-    if not chosen:
-        return Clock(inferences=(Inference("time column", "none", why, hints=_OTHER_TIME),))
-    names = tuple(column.name for column in chosen)
-    found = Inference("time column", " and ".join(names), why, columns=names, hints=_OTHER_TIME)
+    columns = chosen.columns
+    if not columns:
+        return Clock(inferences=(Inference("time column", "none", chosen.why, hints=OTHER_TIME),))
+    names = tuple(column.name for column in columns)
+    found = Inference("time column", " and ".join(names), chosen.why, columns=names, hints=OTHER_TIME)
     if label:
-        return Clock(chosen, inferences=(found,))
-    if chosen[0].text or _is_dense(chosen[0], layout, source, units):
-        parts = tuple(_text_part(column, layout, units) for column in chosen)
-        return Clock(chosen, parts, _unit_of(parts[0]), inferences=(found,))
-    if len(chosen) == 2:
-        both = (ClockColumn(chosen[0].index, 9), ClockColumn(chosen[1].index, 0))
-        return Clock(chosen, both, "s", inferences=(found,))
-    time = chosen[0]
-    unit, evidence, warnings = unit_of(time, layout, source, units)
+        return Clock(columns, inferences=(found,))
+    time = columns[0]
+    forms = chosen.forms or _forms_of_numbers(time, layout, source, units)
+    if forms and not any(column.text for column in columns):
+        parts = tuple(ClockColumn(c.index, forms=(form,)) for c, form in zip(columns, forms, strict=True))
+        return Clock(columns, parts, _unit_of(parts[0]), inferences=(found,))
+    if time.text:
+        parts = tuple(_text_part(column, layout, units) for column in columns)
+        return Clock(columns, parts, _unit_of(parts[0]), inferences=(found,))
+    if chosen.rest is not None:
+        parts = (ClockColumn(time.index, EXPONENTS["s"]), ClockColumn(columns[1].index, chosen.rest))
+        return Clock(columns, parts, "s", inferences=(found,))
+    unit, evidence, warnings = unit_of(time, layout, source, units, lasts=chosen.lasts)
     _refuse_ages(time, layout, unit)
     parts = (ClockColumn(time.index, EXPONENTS[unit]),)
     other = (Hint("unit", {time.called: "s" if unit != "s" else "ms"}),)
     said = (found, Inference("unit of the time", unit, evidence, columns=names, hints=other))
     told = time.number in units or time.unit is not None
     by_source = not told and source is not None and "time" in source.units
-    return Clock(chosen, parts, unit, told, said, warnings, by_source)
+    return Clock(columns, parts, unit, told, said, warnings, by_source, chosen.lasts)
 
 
-def _is_dense(column: Column, layout: Layout, source: KnownSource | None, units: Mapping[int, Unit]) -> bool:
-    """Return whether a column of numbers whose unit nobody tells holds dates: 20210411222721.5."""
+def _forms_of_numbers(
+    column: Column, layout: Layout, source: KnownSource | None, units: Mapping[int, Unit]
+) -> tuple[Form, ...]:
+    """Return the form of numbers whose unit nobody tells and that are dates, or seconds with nanoseconds.
+
+    20210411222721.5 is a date. 7.5000000 is 7 s and 5 ms where the numbers run backwards and so they do not.
+    """
     told = column.number in units or column.unit_text or (source is not None and "time" in source.units)
-    times = () if told else layout.numbers(column.index)
-    cells = TextCells.of([cell for cell in layout.cells(column.index) if not is_missing(cell)])
-    dated = bool(times) and all(_DATES[0] <= time < _DATES[1] for time in times)
-    return dated and bool((read_cells(cells, DENSE_DATE) > UNREADABLE).all())
+    if told or column.text:
+        return ()
+    if all_are(DENSE_DATE, column, layout):
+        return (DENSE_DATE,)
+    backwards = min(steps_of(layout.numbers(column.index)), default=0.0) < 0
+    if layout.held is not None or not backwards or not all_are(UNPADDED_NS, column, layout):
+        return ()
+    times = read_cells(TextCells.of(layout.cells(column.index)), UNPADDED_NS)
+    return (UNPADDED_NS,) if (np.diff(times) > 0).all() else ()
 
 
 def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> ClockColumn:
     """Return a column of text for the reader: the forms that it may have."""
     cells, given = layout.cells(column.index), units.get(column.number)
-    forms = known_forms(cells) if column.text else (DENSE_DATE,)
+    forms = known_forms(cells)
     if not forms:
-        raise layout.error(f"found {shown(cells[0])}, allowed: {FORMS_TOLD}", column.header)
+        raise layout.error(f"found {shown(cells[0])}, allowed: {FORMS_TOLD}", column.header, *OTHER_TIME)
     wanted = given or column.unit
     asked = tuple(form for form in forms if wanted is not None and wanted.name in form.keys)
     if given is not None and not asked:
         keys = ", ".join(dict.fromkeys(key for form in forms for key in form.keys)) or "none"
         found = f"{given.name} for the time {shown(column.name)}"
-        raise OptionError(Finding(parameter="unit", found=found, allowed=keys))
+        raise OptionError(Finding(parameter="unit", found=found, allowed=keys, hints=OTHER_TIME))
     return ClockColumn(column.index, forms=asked or forms)
 
 
@@ -190,7 +212,7 @@ def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
             if unit == "s" and _DATES[0] <= value < _DATES[1]:
                 hint = Hint("", does="a date is read if it is written as 2021-04-11 22:27:21.5")
             message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
-            raise layout.error(message, time.header, hint)
+            raise layout.error(message, time.header, hint, *OTHER_TIME)
 
 
 def unused_period(keyword: str) -> LogWarning:
@@ -232,7 +254,8 @@ def even_clock(
     if period is not None:
         return times, (Inference("period", f"{step:g} s", "given as an option", hints=(Hint("period"),)),), []
     hints = [Hint("period", None, "sets another time between rows")]
-    hints += [Hint("time", like, "takes this column as the time: it always increases")] if like else []
+    always = Hint("time", like, "takes this column as the time: it always increases")
+    hints.append(always if like else OTHER_TIME[0])
     said = "no time column: the rows are taken as 5 ms apart"
     assumed = "the rows are 5 ms apart"
     warning = LogWarning(ASSUMED_PERIOD, said, hints=tuple(hints), assumption=assumed, role="time")

@@ -7,14 +7,13 @@ from collections.abc import Mapping
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.sources.clocks.clock_columns import steps_of
+from urmpipe_pipeline.sources.clocks.chosen import EVEN, EXPONENTS, OTHER_TIME
+from urmpipe_pipeline.sources.clocks.halves import EPOCH
+from urmpipe_pipeline.sources.clocks.steps import steps_of
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.units.unit_hints import unit_hints
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit, vocabulary
-
-EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
-"""Powers of ten from a unit to [ns]."""
 
 SHORTEST, LONGEST = 0.0005, 1.0
 """Usual periods of a log in [s]: they tell the unit of a clock that does not say it."""
@@ -22,22 +21,43 @@ SHORTEST, LONGEST = 0.0005, 1.0
 _UNUSUAL, _IMPOSSIBLE = 0.0002, 1e-5
 """Periods in [s] below which a log is unusual, and below which no joint is sampled: days or hours look so."""
 
-_EPOCH = (946_684_800.0, 4_102_444_800.0)  # 2000 to 2100 as Unix time in [s]
+_DAYS = {
+    "Excel's days since 1900": ((36_526.0, 73_051.0), "(t - 25569) * 86400 is Unix time in s"),
+    "MATLAB's datenum in days": ((730_486.0, 767_011.0), "(t - 719529) * 86400 is Unix time in s"),
+    "Julian days": ((2_451_544.5, 2_488_069.5), "(t - 2440587.5) * 86400 is Unix time in s"),
+}
+"""2000 to 2100 as some count days, and what makes a Unix time of them."""
+
+_TICKS = {
+    ".NET's ticks of 100 ns": ((6.308e17, 6.624e17), "(t - 621355968000000000) / 10 is Unix time in us"),
+    "Windows' ticks of 100 ns": ((1.259e17, 1.575e17), "(t - 116444736000000000) / 10 is Unix time in us"),
+}
+"""The same in ticks."""
+
+_SECONDS_A_DAY = 86_400.0
 
 _UNITS = ", ".join(EXPONENTS)
-
-EVEN = (
-    Hint("time", "none", "leaves the time column out"),
-    Hint("period", None, "sets the time between rows then"),
-)
-"""What to give where a time column is of no use."""
 
 Found = tuple[str, str, tuple[LogWarning, ...]]
 """A unit, why, and what a person should know."""
 
 
-def unit_of(time: Column, layout: Layout, source: KnownSource | None, units: Mapping[int, Unit]) -> Found:
+def unit_of(
+    time: Column,
+    layout: Layout,
+    source: KnownSource | None,
+    units: Mapping[int, Unit],
+    *,
+    lasts: bool = False,
+) -> Found:
     """Return the unit of a time column, why, and a warning if it is assumed.
+
+    Args:
+        time: The column.
+        layout: How its table is written.
+        source: What is known of the source.
+        units: Units given by the user, by the column's number.
+        lasts: Whether it holds durations, not times.
 
     Raises:
         LogError: If it is a unit that is not read, or cannot be told.
@@ -47,23 +67,24 @@ def unit_of(time: Column, layout: Layout, source: KnownSource | None, units: Map
     if given is not None:
         if given.name not in EXPONENTS:
             found = f"{given.name} for the time {shown(time.name)}"
-            raise OptionError(Finding(parameter="unit", found=found, allowed=_UNITS))
+            raise OptionError(Finding(parameter="unit", found=found, allowed=_UNITS, hints=OTHER_TIME))
         return given.name, "given as an option", ()
-    if time.unit is not None and time.unit.name in EXPONENTS:
-        return time.unit.name, "its name", ()
+    named = time.unit or vocabulary().unit(time.key)  # "seconds" has no other name
+    if named is not None and named.name in EXPONENTS:
+        return named.name, "its name", ()
     if time.unit_text is not None and time.unit_text.lower() in vocabulary().long_times:
         message = f"found the unit {shown(time.unit_text)}, allowed: {_UNITS}; convert the times"
         raise layout.error(message, time.header, *EVEN)
     if source is not None and "time" in source.units:
         return source.units["time"].name, f"{source.name} writes {source.units['time'].name}", ()
-    return _by_values(time, layout)
+    return _by_values(time, layout, lasts=lasts)
 
 
-def _by_values(time: Column, layout: Layout) -> Found:
-    """Tell the unit by the year that the times give, or else by their steps."""
+def _by_values(time: Column, layout: Layout, *, lasts: bool) -> Found:
+    """Tell the unit by the year that the times give, or else by their steps; durations are steps."""
     times = layout.numbers(time.index)
-    start = times[0] if times else 0.0
-    steps = sorted(step for step in steps_of(times) if step > 0)
+    start = 0.0 if lasts or not times else times[0]
+    steps = sorted(step for step in (times if lasts else steps_of(times)) if step > 0)
     step = steps[len(steps) // 2] if steps else 0.0
     likely = [u for u, e in EXPONENTS.items() if SHORTEST < step * 10.0 ** (e - 9) <= LONGEST]
     epoch = _since_1970(start, step)
@@ -71,6 +92,7 @@ def _by_values(time: Column, layout: Layout) -> Found:
         return epoch, "it counts from 1970, so as Unix time it is of our years", ()
     if epoch is not None:
         raise _question(time, layout, f"times of our years in steps of {step:g}", [epoch, *likely])
+    _refuse_other_epochs(time, layout, start, step)
     if step <= SHORTEST:
         return _short(time, layout, step)
     evidence = f"its steps of {step:g}"
@@ -81,11 +103,23 @@ def _by_values(time: Column, layout: Layout) -> Found:
     raise _question(time, layout, f"steps of {step:g}", likely or list(EXPONENTS))
 
 
+def _refuse_other_epochs(time: Column, layout: Layout, start: float, step: float) -> None:
+    """Raise if times of our years count days, or ticks of 100 ns, from another year than 1970."""
+    in_days = 0.0 < step * _SECONDS_A_DAY <= 20 * LONGEST
+    in_ticks = SHORTEST < step * 1e-7 <= 20 * LONGEST
+    kinds = (_DAYS if in_days else {}) | (_TICKS if in_ticks else {})
+    for kind, ((first, last), cure) in kinds.items():
+        if first <= start <= last:
+            message = f"found {start:.15g} in steps of {step:.3g}, as {kind}, allowed: times in {_UNITS}"
+            hints = unit_hints([time], "s" if in_days else "ns", "takes them as they are")
+            raise layout.error(f"{message}; convert them: {cure}", time.header, *hints, *EVEN)
+
+
 def _since_1970(start: float, step: float) -> str | None:
     """Return the unit in which a time is a Unix time of our years, if there is one."""
     for unit, exponent in EXPONENTS.items():
         scale = 10.0 ** (exponent - 9)
-        if _EPOCH[0] <= start * scale <= _EPOCH[1] and step * scale <= 20 * LONGEST:
+        if EPOCH[0] <= start * scale <= EPOCH[1] and step * scale <= 20 * LONGEST:
             return unit
     return None
 
@@ -95,17 +129,17 @@ def _short(time: Column, layout: Layout, step: float) -> Found:
     if 0 < step < _IMPOSSIBLE:
         said = f"found steps of {step:.3g}, as of days or hours, allowed: times in {_UNITS}"
         hints = unit_hints([time], "s", "takes them as they are")
-        raise layout.error(f"{said}; convert them", time.header, *hints)
+        raise layout.error(f"{said}; convert them", time.header, *hints, *EVEN)
     return "s", "the usual unit", (_assumed(time, step),) if 0 < step < _UNUSUAL else ()
 
 
 def _assumed(time: Column, step: float) -> LogWarning:
     said = f"the time {shown(time.name)} steps by {step:.6g}: taken as s"
-    hints, taken = unit_hints([time], "s", "confirms it"), "the times are in s"
+    hints, taken = (*unit_hints([time], "s", "confirms it"), *OTHER_TIME), "the times are in s"
     return LogWarning("assumed-unit", said, hints=hints, assumption=taken, role="time")
 
 
 def _question(time: Column, layout: Layout, found: str, units: list[str]) -> LogError:
     """Ask which of some units is meant."""
-    hints = (Hint("unit", {time.called: unit}, "says which") for unit in units)
+    hints = (*(Hint("unit", {time.called: unit}, "says which") for unit in units), *OTHER_TIME)
     return layout.error(f"found {found}, which may be {' or '.join(units)}", time.header, *hints)

@@ -15,9 +15,18 @@ from urmpipe_models.arrays import IntArray
 from urmpipe_models.errors import LogError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference
-from urmpipe_pipeline.sources.cells.cell import is_missing
+from urmpipe_pipeline.sources.cells.cell import is_missing, is_number
 from urmpipe_pipeline.sources.cells.text_cells import Bytes, TextCells
-from urmpipe_pipeline.sources.cells.text_clock import DAY_NS, FORMS, TIME_OF_DAY, Form, Parts
+from urmpipe_pipeline.sources.cells.text_clock import (
+    DAY_NS,
+    FORMS,
+    IN_DIGITS,
+    TIME_OF_DAY,
+    Form,
+    Parts,
+    in_digits,
+)
+from urmpipe_pipeline.sources.clocks.chosen import OTHER_TIME
 from urmpipe_pipeline.sources.tables.numbers import NO_TIME, REPORTED, UNREADABLE, ClockColumn, Numbers
 from urmpipe_pipeline.sources.tables.sniff import Layout
 
@@ -39,13 +48,23 @@ def timed(layout: Layout, parts: Sequence[ClockColumn], numbers: Numbers) -> Num
     """
     if not numbers.texts:
         return numbers
-    readings, evidence = read_columns(numbers.texts, [part.forms for part in parts])
+    texts = [_in_digits(cells, part) for cells, part in zip(numbers.texts, parts, strict=True)]
+    readings, evidence = read_columns(texts, [part.forms for part in parts])
     if len(readings) > 1:
         raise _question(layout, parts, readings)
     reading = readings[0]
     if numbers.clock is not None:
         reading.times[numbers.clock == REPORTED] = REPORTED
     return replace(numbers, clock=reading.times, inferences=_said(reading, numbers.texts, evidence))
+
+
+def _in_digits(cells: TextCells, part: ClockColumn) -> TextCells:
+    """Return the cells of a column of dates in digits without the exponents of numbers."""
+    if part.forms[0] not in IN_DIGITS or not np.isin(cells.data, list(b"eE")).any():
+        return cells
+    texts = [cells.text(row).strip() for row in range(len(cells))]
+    numbers = [is_number(text, ".") or is_number(text, ",") for text in texts]
+    return TextCells.of(in_digits(text) if n else text for text, n in zip(texts, numbers, strict=True))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -174,7 +193,7 @@ def _question(layout: Layout, parts: Sequence[ClockColumn], readings: Sequence[R
     column = layout.names[parts[place].column]
     cell = layout.cells(parts[place].column)[0]
     hints = (Hint("unit", {column: key}, "says which") for key in keys)
-    return layout.error(f"found {shown(cell)}, which may be {names}", column, *hints)
+    return layout.error(f"found {shown(cell)}, which may be {names}", column, *hints, *OTHER_TIME)
 
 
 def read_cells(cells: TextCells, form: Form) -> IntArray:

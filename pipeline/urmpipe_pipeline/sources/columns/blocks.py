@@ -19,6 +19,9 @@ from urmpipe_models.arrays import BoolArray, FloatArray
 CORRELATED = 0.9
 """Steps and rates of one joint correlate so: of measured rates 0.97 was seen, of torques and speeds less."""
 
+UNRELATED = 0.5
+"""Columns that correlate less are clearly no joint and its rate."""
+
 ONE_PERIOD = 0.15
 """The periods that the joints of a block tell differ by this share of their median at the most."""
 
@@ -82,8 +85,13 @@ def proved_blocks(values: FloatArray, count: int | None) -> list[Block]:
         return []
     sizes = [count] if count else range(min(MOST_JOINTS, columns // 2), 1 if columns == 4 else 2, -1)
     for size in sizes:
-        tried = (evidence.block(*ranges) for ranges in _pairs_of_ranges(columns, size))
-        proved = [block for block in tried if block and (count or _tiles(block, columns))]
+        alone = bool(count) and columns % size == 0
+        tried = (
+            evidence.block(*ranges)
+            for ranges in _pairs_of_ranges(columns, size)
+            if not alone or _tile(*ranges)
+        )
+        proved = [block for block in tried if block and (count or evidence.is_whole(block))]
         if proved:
             best = max(block.weakest for block in proved)
             proved = [block for block in proved if block.weakest >= best - ALIKE]
@@ -92,10 +100,9 @@ def proved_blocks(values: FloatArray, count: int | None) -> list[Block]:
     return []
 
 
-def _tiles(block: Block, columns: int) -> bool:
-    """Return whether blocks of its kind fill all columns, up to some behind them."""
-    joints = block.joints
-    return joints.start % len(joints) == 0 if joints.step == 1 else len(joints) * joints.step == columns
+def _tile(joints: range, rates: range) -> bool:
+    """Return whether blocks side by side begin at multiples of their size; those in turns always do."""
+    return joints.step > 1 or (joints.start % len(joints) == 0 and rates.start % len(joints) == 0)
 
 
 def period_of(q: FloatArray, rates: FloatArray) -> tuple[float, float] | None:
@@ -164,7 +171,8 @@ class _Evidence:
             correlation = (cross - count * step * mean) / np.sqrt(np.maximum(about[0] * about[1], 0.0))
             period = cross / squares
         size = np.sqrt((clean**2).sum(axis=0))
-        return cls(*(np.nan_to_num(one, posinf=0.0, neginf=0.0) for one in (correlation, period)), size)
+        correlation, period = (np.nan_to_num(one, posinf=0.0, neginf=0.0) for one in (correlation, period))
+        return cls(correlation, period, size)
 
     def block(self, joints: range, rates: range) -> Block | None:
         """Return joints and their rates as a block if all that move agree, with one period; else None."""
@@ -178,6 +186,25 @@ class _Evidence:
         if (np.abs(periods - usual) > ONE_PERIOD * usual).any():
             return None
         return Block(joints, rates, usual, float(np.median(agree)), float(agree.min()))
+
+    def is_whole(self, block: Block) -> bool:
+        """Return whether a block is no part of a larger one, and others of its size may stand beside it.
+
+        Blocks side by side begin at multiples of their size, as do their rates. A block of three whose rates
+        stand six columns away may be half of one of six, unless some of the others are clearly no rates.
+        """
+        joints, rates, columns = block.joints, block.rates, len(self.size)
+        if joints.step > 1:
+            return len(joints) * joints.step == columns
+        if not _tile(joints, rates):
+            return False
+        shift = rates.start - joints.start
+        start = joints.start // abs(shift) * abs(shift)
+        q = np.arange(start, start + abs(shift))
+        if len(q) == len(joints) or min(start, start + shift) < 0 or max(q[-1], q[-1] + shift) >= columns:
+            return True
+        moved = self.size[q] > RESTS * self.size[q].max()
+        return bool((self.correlation[q, q + shift][moved] < UNRELATED).any())
 
     def rates_among(self, block: Block) -> int:
         """Return how many joints of a block are the rate of another column, as far away as their own is."""

@@ -121,7 +121,8 @@ def _sharing_a_mark(still: Sequence[Column], having: Sequence[Column] = ()) -> t
             if word in vocabulary().marks:
                 for key_of in ((word, place), (word, place - len(words))):
                     alike.setdefault(key_of, []).append(column)
-    return tuple(max((some for some in alike.values() if {*having} <= {*some}), key=len, default=()))
+    whole = [some for some in alike.values() if {*having} <= {*some}]
+    return tuple(sorted(whole, key=len)[-1]) if whole else ()
 
 
 def _refuse_half(

@@ -177,7 +177,7 @@ def matrix_pose(columns: Sequence[Column], layouts: Sequence[Layout], *, some: b
 
 
 def transform_pose(columns: Sequence[Column], values: FloatArray, *, some: bool = False) -> Pose | None:
-    """Return the pose that 16 or 12 columns hold by their values, shape (n, columns); see `matrix_pose`."""
+    """Return the pose that 16 or 12 columns hold, by their values in the file's units, shape (n, columns)."""
     for order, entries in _ORDERS[: 1 if len(columns) == 12 else 2]:
         if _enough(_are_transforms(values, entries), some=some):
             position, turned = entries[:3, 3].tolist(), entries[:3, :3].ravel().tolist()

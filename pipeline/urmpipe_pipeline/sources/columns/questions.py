@@ -17,19 +17,25 @@ _SIDES = (frozenset(("left", "l")), frozenset(("right", "r")))
 UNKNOWN = "columns that are known to be joints"
 """What is allowed where nothing tells which columns they are."""
 
-MOST_ANSWERS = 4
+MOST_ANSWERS = 6
 """Groups of columns that a question offers."""
 
 
 def take(columns: Sequence[Column], does: str = "takes these") -> Hint:
-    """Return the hint that takes columns as the joints."""
-    return Hint("joints", [column.called for column in columns], does)
+    """Return the hint that takes columns as the joints: by number where a name has a comma, or repeats."""
+    names = [column.called for column in columns]
+    alone = all("," not in name and names.count(name) == 1 for name in names)
+    return Hint("joints", names if alone else [str(column.number) for column in columns], does)
 
 
-def by_side(columns: Sequence[Column]) -> list[Sequence[Column]]:
-    """Return columns of a left and a right arm apart; all together if there are no such two."""
+def by_side(columns: Sequence[Column]) -> Sequence[Sequence[Column]]:
+    """Return the columns of a left and a right arm apart; all together if there are no such two."""
     sides = [[column for column in columns if column.words & words] for words in _SIDES]
-    return sides if all(sides) else [columns]
+    names = [
+        {"_".join(w for w in one.key.split("_") if w not in words) for one in side}
+        for side, words in zip(sides, _SIDES, strict=True)
+    ]
+    return sides if names[0] and names[0] == names[1] and "" not in names[0] else [columns]
 
 
 def which_joints(

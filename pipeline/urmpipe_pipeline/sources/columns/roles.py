@@ -26,7 +26,7 @@ from urmpipe_pipeline.sources.columns.joint_names import (
     some_named,
 )
 from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, with_form
-from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, OTHER_ROBOT, by_side, which_joints
+from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, OTHER_ROBOT, by_side, take, which_joints
 from urmpipe_pipeline.sources.columns.tcp_like import about_odd_rows, about_tcp
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -227,9 +227,10 @@ def _path(
     found, missing = some_named(numeric, robot)
     if found:
         spare = [column for column in numeric if column not in found]
-        hints = cure(len(missing), spare, len(robot.coordinates) if robot else None)
+        record, other = cure(len(missing), spare, len(robot.coordinates) if robot else None)
         lacking = f"found joint columns {listed(found)} and none for {', '.join(missing)}, allowed: {need}"
-        raise LogError(Finding(lacking, file=file, hints=hints))
+        answers = () if robot else (take(found),)
+        raise LogError(Finding(lacking, file=file, hints=(record, *answers, other)))
     raise which_joints(file, f"no joint columns in {listed(columns)}", _may_be(numeric, robot), need)
 
 

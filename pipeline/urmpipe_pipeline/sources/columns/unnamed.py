@@ -11,7 +11,7 @@ import numpy as np
 from urmpipe_models.arrays import BoolArray, FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.messages import Hint
-from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS, proved_blocks
+from urmpipe_pipeline.sources.columns.blocks import SURE, proved_blocks
 from urmpipe_pipeline.sources.columns.columns import Column, listed
 from urmpipe_pipeline.sources.columns.questions import UNKNOWN, which_joints
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -23,8 +23,14 @@ TWO_TURNS = 720.0, 2.0 * math.tau
 SELDOM = 0.2
 """A column that moves in a smaller share of the rows than others do, by this factor, may be a gripper's."""
 
-USUAL = 6
-"""Joints that most arms have."""
+MOST_UNASKED = 7
+"""So many columns without names are joints where no robot tells how many there are; more may be blocks."""
+
+FEW = 3
+"""So few joints may go on as others say by chance, where no robot tells how many there are."""
+
+USUAL = (6, 7, 5, 4, 3)
+"""How many joints arms have, the usual first."""
 
 Found = tuple[tuple[Column, ...], tuple[Column, ...], str]
 """Joints, their rates, and why."""
@@ -44,12 +50,12 @@ def joints_among(free: Sequence[Column], layout: Layout, whole: Whole | None, ro
         return tuple(free), (), f"no header: joints in order{', as many as the robot has' if robot else ''}"
     values = whole.values([column.index for column in free])
     blocks = proved_blocks(values, count)
-    if len(blocks) == 1:
+    if len(blocks) == 1 and (count or len(blocks[0].joints) > FEW or blocks[0].weakest >= SURE):
         joints, rates = (tuple(free[k] for k in some) for some in (blocks[0].joints, blocks[0].rates))
         alike = f"steps and rates correlate by {blocks[0].correlation:.3g}"
         return joints, rates, f"columns {listed(rates)} are their rates: {alike}"
     odd = unlike_joints(values)
-    if not blocks and count is None and len(free) <= MOST_JOINTS and not odd.any():
+    if not blocks and count is None and len(free) <= MOST_UNASKED and not odd.any():
         return tuple(free), (), "no header: joints in order"
     groups = [[free[k] for k in block.joints] for block in blocks] or _groups(free, odd, count)
     others = [column for column, is_odd in zip(free, odd, strict=True) if is_odd]
@@ -79,15 +85,16 @@ def unlike_joints(values: FloatArray) -> BoolArray:
 
 
 def _groups(free: Sequence[Column], odd: BoolArray, count: int | None) -> list[Sequence[Column]]:
-    """Return the columns that may be all joints: those between odd ones, either half, the first, all."""
-    together = [
+    """Return the columns that may be all joints: those between odd ones, or blocks of one size."""
+    runs = [
         [free[k] for k, _ in run]
-        for is_odd, run in groupby(enumerate(odd), lambda pair: pair[1])
+        for is_odd, run in groupby(enumerate(odd), lambda pair: bool(pair[1]))
         if not is_odd
     ]
-    near = sorted((run for run in together if len(run) > 1 and len(run) < len(free)), key=len, reverse=True)
+    near = sorted((run for run in runs if 1 < len(run) < len(free)), key=len, reverse=True)
     if count:
         return [run for run in (*near, free[:count], free[-count:]) if len(run) == count]
-    half = len(free) // 2
-    halves = [free[:half], free[half:]] if len(free) == 2 * half > USUAL else []
-    return [*halves, *near[:1], *([] if halves else [free[:USUAL]]), free]
+    sizes = [size for size in USUAL if len(free) % size == 0]
+    size = sizes[0] if sizes else min(USUAL[0], len(free))
+    blocks = [free[k : k + size] for k in range(0, len(free) if sizes else 1, size)]
+    return [*near[:1], free] if len(free) <= MOST_UNASKED else [*blocks, *near[:1], free]

@@ -28,6 +28,7 @@ Value = str | list[str]
 CLOSING = {"[": "]", "(": ")"}
 _WORDS = re.compile(r"\b(?:\w+\.)?(?:float|int)\d+(?=\()")
 _INNER = re.compile(r"[^\s,;\[\]()]+")
+_BROKEN = re.compile(rb"\n\r?\n[ \t]")
 _SHOWN = 40
 _MARK = "\x01"
 _MARKERS = bytes((*range(1, 9), *range(14, 32)))
@@ -179,6 +180,8 @@ class Form:
             block = block.replace(word.encode(encoding), b"")
         left_out = 0
         if self.continued:
+            if _BROKEN.search(block):  # read row by row, an array does not go on behind a blank line
+                raise UnfitError
             for end in (b"\r\n", b"\n"):
                 block = block.replace(end + b" ", b"  ").replace(end + b"\t", b"  ")
         if self.labels:

@@ -6,20 +6,46 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 import pyarrow as pa
+from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.joint_log import SourceFile
-from urmpipe_pipeline.sources.cells.cell import LONGEST_NS, to_nanoseconds
+from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_models.errors import Finding, LogError, shown
+from urmpipe_pipeline.joint_log import Inference, SourceFile
+from urmpipe_pipeline.sources.cells.cell import LONGEST_NS, is_text, to_float, to_nanoseconds
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
-from urmpipe_pipeline.sources.tables.numbers import NO_TIME, UNREADABLE, ClockColumn, Numbers
+from urmpipe_pipeline.sources.tables import numpy_columns
+from urmpipe_pipeline.sources.tables.column_facts import UNIT, is_number
+from urmpipe_pipeline.sources.tables.numbers import (
+    NO_TIME,
+    SHOWN_FINDINGS,
+    UNREADABLE,
+    ClockColumn,
+    Numbers,
+    RowFault,
+)
+from urmpipe_pipeline.sources.tables.row_reader import MAY_BE_MISSING
 from urmpipe_pipeline.sources.tables.sniff import SAMPLED_LINES, Layout
 from urmpipe_pipeline.sources.tables.text import Segment
+from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 _DIGITS = 38
 """Digits that a decimal of 128 bits holds."""
+
+_DECIMALS = _DIGITS // 2
+"""Those of them that stand behind the point."""
+
+_SMALL = 0.01
+"""Doubles of this size or more have no more decimals than that: 17 digits are theirs."""
+
+
+_HALF, _ULPS = 0.5, 4
+"""A product of two doubles is less than so many units of its last place off that of the decimals."""
+
+Number = TypeVar("Number", np.float64, np.int64, np.uint64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,15 +54,17 @@ class Held:
 
     Attributes:
         name: What the log is called, in the place of a file's stem.
-        columns: The columns, an Arrow table: of numbers, texts, dates or lengths of time.
+        columns: The columns, an Arrow table; units and roles may stand in the metadata of its fields.
         named: Whether its columns have names; without them they are known by number, from 1.
         path: The file that it was read from; None of an object in memory.
+        inferences: What was found out about it.
     """
 
     name: str
     columns: pa.Table
     named: bool = True
     path: Path | None = None
+    inferences: tuple[Inference, ...] = ()
 
     @property
     def place(self) -> Path:
@@ -45,76 +73,144 @@ class Held:
 
 
 def layout_of(held: Held) -> Layout:
-    """Return a table in memory as one that is written somewhere: its first rows as a CSV file has them."""
-    table = held.columns
+    """Return a table in memory as one that is written somewhere: its first rows as a CSV file has them.
+
+    Raises:
+        LogError: If it has no row, or no column of numbers.
+    """
+    from urmpipe_pipeline.sources.tables.arrow_columns import plain_table  # its imports take long
+
+    table = plain_table(held.columns, str(held.place))
+    _refuse_empty(held, table)
     columns = [_texts(column.slice(0, SAMPLED_LINES)).to_pylist() for column in table.columns]
     sample = tuple(tuple(cell or "" for cell in row) for row in zip(*columns, strict=True))
     names = tuple(table.column_names) if held.named else tuple(str(k + 1) for k in range(table.num_columns))
+    units = tuple((field.metadata or {}).get(UNIT, b"").decode() for field in table.schema)
+    known = tuple(unit if vocabulary().unit(unit) else "" for unit in units)
     return Layout(
         segment=Segment(held.place, "", 0, 0, 1, ""),
         delimiter=",",
         decimal=".",
         names=names,
-        units=(),
+        units=known if any(known) else (),
         header=1 if held.named else None,
         first_line=2 if held.named else 1,
         offset=0,
         sample=sample,
-        inferences=(),
+        inferences=held.inferences,
         held=table,
     )
 
 
+def _refuse_empty(held: Held, table: pa.Table) -> None:
+    """Raise a `LogError` if a table has no row, or none of its columns holds a number."""
+    file = str(held.place)
+    if not held.columns.num_rows or not held.columns.num_columns:
+        raise LogError(Finding("found a table without rows, allowed: a row a sample", file))
+    first = (_texts(column.slice(0, SAMPLED_LINES)).to_pylist() for column in table.columns)
+    if all(is_text(cell, ".") for cells in first for cell in cells if cell):
+        names = ", ".join(map(str, held.columns.column_names[:8]))
+        raise LogError(Finding(f"found no number in {names}, allowed: a column a joint", file))
+
+
 def fingerprint_of(held: Held) -> SourceFile:
-    """Return the name of a table in memory, and hash and length of its numbers as bytes."""
-    digest, size = hashlib.sha256(), 0
-    for column in held.columns.columns:
-        for chunk in column.chunks:
-            for buffer in filter(None, chunk.buffers()):
-                digest.update(buffer)
-                size += buffer.size
-    return SourceFile(held.name, digest.hexdigest(), size)
+    """Return the name of a table in memory, and hash and length of its columns as Arrow streams them."""
+    sink = _Hashing()
+    table = held.columns.combine_chunks()
+    with pa.ipc.new_stream(pa.PythonFile(sink, "w"), table.schema.remove_metadata()) as stream:
+        stream.write_table(table.replace_schema_metadata(None))
+    return SourceFile(held.name, sink.digest.hexdigest(), sink.size)
+
+
+class _Hashing:
+    """A file of which only hash and length are kept."""
+
+    closed = False
+
+    def __init__(self) -> None:
+        self.digest, self.size = hashlib.sha256(), 0
+
+    def write(self, data: bytes) -> int:
+        """Take some bytes."""
+        self.digest.update(data)
+        self.size += len(data)
+        return len(data)
+
+    def flush(self) -> None:
+        """Keep nothing back."""
 
 
 def read_held(layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn]) -> Numbers:
     """Return the numbers of some columns of a table in memory; arguments as those of `read_table`."""
     table = layout.held
     values = np.empty((table.num_rows, len(columns)))
+    faults: dict[int, list[RowFault]] = {}
     for j, column in enumerate(columns):
-        values[:, j] = numbers_of(table.column(column))
-    texts = tuple(_text_cells(table.column(part.column)) for part in clock if part.forms)
+        values[:, j], wrong = numbers_of(table.column(column))
+        for row, text in wrong.items():
+            said = f"found {shown(text)}, allowed: {MAY_BE_MISSING}"
+            faults.setdefault(row, []).append(RowFault(said, (layout.names[column],)))
+    findings = tuple(
+        Finding(fault.said, layout.file, row=row + 1, column=fault.columns[0])
+        for row in sorted(faults)[:SHOWN_FINDINGS]
+        for fault in faults[row]
+    )
+    found = (findings[:SHOWN_FINDINGS], sum(map(len, faults.values())), (), faults)
     if not clock:
-        return Numbers(values, None)
+        return Numbers(values, None, *found)
+    texts = tuple(_text_cells(table.column(part.column)) for part in clock if part.forms)
     times = np.zeros(table.num_rows, dtype=np.int64)
     for part in () if texts else clock:
         own = _nanoseconds(table.column(part.column), part.exponent)
         times = np.where((own <= UNREADABLE) | (times <= UNREADABLE), np.minimum(own, times), times + own)
-    return Numbers(values, times, texts=texts)
+    return Numbers(values, times, *found, texts=texts)
 
 
-def numbers_of(column: pa.ChunkedArray) -> FloatArray:
-    """Return a column as numbers, NaN where there is none, shape (n,); of texts those that they spell."""
-    kind = column.type
-    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)):
-        if not (pa.types.is_string(kind) or pa.types.is_large_string(kind)):
-            return np.full(len(column), np.nan)
-        import pyarrow.compute as pc
+def numbers_of(column: pa.ChunkedArray) -> tuple[FloatArray, dict[int, str]]:
+    """Return a column as numbers, NaN where there is none, shape (n,), and the texts by row that are none."""
+    if is_number(column.type):
+        double = pa.types.is_float64(column.type)
+        numbers, missing = _values(column if double else column.cast(pa.float64(), safe=False), np.float64)
+        numbers[missing] = np.nan
+        return numbers, {}
+    texts = column.to_pylist()
+    found = [np.nan if text is None else to_float(text, ".") for text in texts]
+    wrong = {row: texts[row] for row, value in enumerate(found) if value is None}
+    return np.array([np.nan if value is None else value for value in found], dtype=np.float64), wrong
 
-        trimmed = pc.utf8_trim_whitespace(column)
-        numeric = pc.match_substring_regex(trimmed, r"^[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?$")
-        column = pc.if_else(numeric, trimmed, None)
-    numbers = column.cast(pa.float64())
-    return np.asarray(numbers.to_numpy(zero_copy_only=False), dtype=np.float64)
+
+def _values(column: pa.ChunkedArray, kind: type[Number]) -> tuple[NDArray[Number], BoolArray]:
+    """Return the values of a column of this type, shape (n,), and which of them are missing.
+
+    Its buffers are read as they are: pyarrow's own way imports pandas.
+    """
+    values, missing = np.zeros(len(column), dtype=kind), np.zeros(len(column), dtype=np.bool_)
+    end = 0
+    for chunk in filter(len, column.chunks):
+        start, end = end, end + len(chunk)
+        inside = slice(chunk.offset, chunk.offset + len(chunk))
+        there, numbers = chunk.buffers()
+        values[start:end] = np.frombuffer(numbers, dtype=kind)[inside]
+        if chunk.null_count:
+            bits = np.unpackbits(np.frombuffer(there, dtype=np.uint8), bitorder="little")
+            missing[start:end] = bits[inside] == 0
+    return values, missing
 
 
 def _texts(column: pa.ChunkedArray) -> pa.ChunkedArray:
-    """Return a column as a CSV file has it: the shortest digits that are its numbers'."""
-    return column.cast(pa.string())
+    """Return a column as a CSV file has it: of numbers the shortest digits that are theirs."""
+    from urmpipe_pipeline.sources.tables.arrow_columns import number_texts
+
+    return number_texts(column) if is_number(column.type) else column
 
 
 def _text_cells(column: pa.ChunkedArray) -> TextCells:
     """Return a column of text as cells; empty ones where there is no value."""
-    return TextCells.of(cell or "" for cell in _texts(column).to_pylist())
+    texts = _texts(column).cast(pa.large_string()).fill_null("").combine_chunks()
+    _, offsets, data = texts.buffers()
+    starts = np.frombuffer(offsets, dtype=np.int64)[texts.offset : texts.offset + len(texts) + 1]
+    signs = np.frombuffer(data, dtype=np.uint8) if data else np.empty(0, dtype=np.uint8)
+    return TextCells(signs, starts)
 
 
 def _nanoseconds(column: pa.ChunkedArray, exponent: int) -> IntArray:
@@ -122,28 +218,55 @@ def _nanoseconds(column: pa.ChunkedArray, exponent: int) -> IntArray:
 
     NO_TIME where there is no value, UNREADABLE where it is no time that 64 bits hold.
     """
-    missing = np.asarray(column.is_null(nan_is_null=True))
     if pa.types.is_integer(column.type):
-        whole = np.asarray(column.fill_null(0).to_numpy(), dtype=np.int64)
-        far = np.abs(whole) >= LONGEST_NS // 10**exponent
-        return np.where(missing, NO_TIME, np.where(far, UNREADABLE, whole * 10**exponent))
-    far = np.abs(numbers_of(column)) * 10.0**exponent
-    readable = ~missing & (far < LONGEST_NS)
+        unsigned = pa.types.is_uint64(column.type)
+        whole, missing = (
+            _values(column, np.uint64) if unsigned else _values(column.cast(pa.int64()), np.int64)
+        )
+        far = np.abs(whole.astype(np.float64)) * 10.0**exponent >= LONGEST_NS
+        times = np.where(far | missing, 0, whole).astype(np.int64) * 10**exponent
+        return np.where(missing, NO_TIME, np.where(far, UNREADABLE, times))
+    values, wrong = numbers_of(column)
+    missing = np.isnan(values)
+    missing[list(wrong)] = False
+    readable = np.abs(values) * 10.0**exponent < LONGEST_NS
     times = np.where(missing, NO_TIME, UNREADABLE)
-    times[readable] = _rounded(column.filter(pa.array(readable)), exponent)
+    times[readable] = _rounded(_at(column, readable), values[readable], exponent)
     return times
 
 
-def _rounded(column: pa.ChunkedArray, exponent: int) -> IntArray:
-    """Return finite numbers times ten to a power, rounded once, half to even, from their shortest digits."""
+def _rounded(column: pa.ChunkedArray, values: FloatArray, exponent: int) -> IntArray:
+    """Return finite numbers times ten to a power, rounded once, half to even, from their shortest digits.
+
+    A product of doubles is rounded, too: where it may be on the other side of a half, the digits decide.
+    """
+    product = values * 10.0**exponent
+    near = np.rint(product)
+    sure = np.abs(product - near) + _ULPS * np.spacing(np.abs(product)) < _HALF
+    sure &= pa.types.is_float64(column.type)
+    result = near.astype(np.int64)
+    if not sure.all():
+        result[~sure] = _by_digits(_at(column, ~sure), values[~sure], exponent)
+    return result
+
+
+def _by_digits(column: pa.ChunkedArray, values: FloatArray, exponent: int) -> IntArray:
+    """Return numbers times ten to a power, rounded once, half to even, from their shortest digits."""
     import pyarrow.compute as pc
 
+    small = (np.abs(values) < _SMALL) | (not is_number(column.type))  # any decimals, or spelled in any way
+    result = np.empty(len(values), dtype=np.int64)
     texts = column.cast(pa.string())
-    try:
-        exact = texts.cast(pa.decimal128(_DIGITS, _DIGITS // 2))
-    except pa.ArrowInvalid:  # more decimals than that: many of them behind zeros
-        return np.array([to_nanoseconds(text, ".", exponent) for text in texts.to_pylist()], dtype=np.int64)
+    few = _at(texts, small).to_pylist()
+    result[small] = [to_nanoseconds(text, ".", exponent) or 0 for text in few]
+    exact = _at(texts, ~small).cast(pa.decimal128(_DIGITS, _DECIMALS))
     rounded = pc.round(exact, ndigits=exponent, round_mode="half_to_even")
     fixed = rounded.cast(pa.decimal128(_DIGITS, exponent)).combine_chunks()
     words = np.frombuffer(fixed.buffers()[1], dtype="<i8").reshape(-1, 2)
-    return words[fixed.offset : fixed.offset + len(fixed), 0]  # the low word of two: they fit
+    result[~small] = words[fixed.offset : fixed.offset + len(fixed), 0]  # the low word of two: they fit
+    return result
+
+
+def _at(column: pa.ChunkedArray, rows: BoolArray) -> pa.ChunkedArray:
+    """Return some rows of a column."""
+    return column if rows.all() else column.take(numpy_columns.column(np.flatnonzero(rows)))

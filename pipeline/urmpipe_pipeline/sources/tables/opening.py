@@ -9,16 +9,20 @@ from typing import TypeAlias
 
 from urmpipe_models.errors import Finding, OptionError, for_each, shown
 from urmpipe_models.messages import Hint
-from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.joint_log import OWN, Inference
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables import coppeliasim
 from urmpipe_pipeline.sources.tables.arrays import sniff_arrays
 from urmpipe_pipeline.sources.tables.conflict import refuse_among_rows, refuse_conflict
 from urmpipe_pipeline.sources.tables.held import Held, layout_of
 from urmpipe_pipeline.sources.tables.labels import sniff_labels
+from urmpipe_pipeline.sources.tables.own_tables import in_si
+from urmpipe_pipeline.sources.tables.padding import without_end_rows
+from urmpipe_pipeline.sources.tables.programs.program_text import read_program
 from urmpipe_pipeline.sources.tables.ros2 import with_names
 from urmpipe_pipeline.sources.tables.sniff import Layout, across, sniff
 from urmpipe_pipeline.sources.tables.text import Segment, open_text
+from urmpipe_pipeline.sources.tables.turned import turned
 from urmpipe_pipeline.sources.tables.typed_files import read_typed
 from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.vocabulary import KnownSource, vocabulary
@@ -95,22 +99,34 @@ def open_tables(files: Sequence[Path | Held], options: ReadOptions, sniff_plain:
     )
     if len(files) > 1:
         layouts = [across(layout) for layout in layouts]
+    layouts = _shaped(layouts, options) if sniff_plain is sniff else layouts
     titles = tuple(title for title, _ in titled)
     names = _names(layouts)
     known, why = _known(names, options.source, titles if forced else ())
+    if known is None and options.source is None and all(map(in_si, layouts)):
+        known, why = vocabulary().source(OWN), "what its columns are called, and their units"
     name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
     said = Inference("source", name, why, hints=(Hint("source"),))
-    foreign = known is not None and bool(known.columns) and not known.wrote(names)
+    foreign = known is not None and bool(known.columns and options.source) and not known.wrote(names)
     foreign = not graphs if options.source == COPPELIASIM else foreign
     said_of_all, whole = (*_encoding(texts[:1]), said), tuple(map(Whole, layouts))
     return Tables(name, known, tuple(layouts), titles, said_of_all, foreign, whole)
 
 
 def _opened(one: Path | Held, options: ReadOptions) -> Segment | Held:
-    """Return a table as it is in memory, a file of typed columns read, any other as text."""
+    """Return a table as it is in memory, a file of typed columns or a program read, any other as text."""
     if isinstance(one, Held):
         return one
-    return read_typed(one) or open_text(one, any_suffix=options.source is not None)
+    if (typed := read_typed(one)) is not None:
+        return typed
+    text = open_text(one, any_suffix=options.source is not None)
+    return read_program(text, options) or text
+
+
+def _shaped(layouts: Sequence[Layout], options: ReadOptions) -> list[Layout]:
+    """Return tables with a row a sample, and none of those that end a log in what is sampled of them."""
+    alone = len(layouts) == 1
+    return for_each(lambda one: without_end_rows(turned(one, options.layout, alone=alone)), layouts)
 
 
 def _encoding(texts: Sequence[Segment]) -> Iterator[Inference]:

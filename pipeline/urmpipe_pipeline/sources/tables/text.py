@@ -26,6 +26,8 @@ _BYTE_ORDER_MARKS = (
 LOGS = (".csv", ".txt", ".tsv", ".dat", ".log", ".rrd")
 """How most logs are called, and their recordings."""
 
+_WRITTEN = ("csv", "npz")  # what the commands write that make tables of containers
+
 COMMENTS = ("#", "%", "//")
 _TITLE_LINES = 2  # a binary file may begin with as many lines of text
 _CONTROL = bytes(set(range(32)) - set(b"\t\n\v\f\r\x1a\x1b"))
@@ -63,6 +65,12 @@ class Segment:
             raw = file.read(min(HEAD_BYTES, end - start))
         head = _decoded_head(raw, self.encoding, whole=end - start <= HEAD_BYTES)
         return replace(self, start=start, end=end, first_line=first_line, head=head)
+
+    def text(self) -> str:
+        """Return all of it."""
+        with self.path.open("rb") as file:
+            file.seek(self.start)
+            return file.read(self.end - self.start).decode(self.encoding, _errors(self.encoding))
 
     def lines(self) -> Iterator[tuple[int, str]]:
         """Yield each line with its number in the file, without its end."""
@@ -115,16 +123,13 @@ def open_text(path: Path, *, any_suffix: bool = False) -> Segment:
             it), or binary.
     """
     size = _size(path)
+    if size == 0:
+        raise LogError(Finding("found an empty file, allowed: a table with a row a sample", file=str(path)))
     with path.open("rb") as file:
         raw = file.read(HEAD_BYTES)
     container = _container(path, raw, any_suffix)
     if container is not None:
-        hints = (Hint(name, None, does) for name, does in container.parameters.items())
-        advice = Hint("", does=container.advice.format(file=path.name))
-        found = f"found {container.what}, allowed: a text table"
-        raise LogError(Finding(found, str(path), hints=(*([advice] if advice.does else []), *hints)))
-    if size == 0:
-        raise LogError(Finding("found an empty file, allowed: a table with a row a sample", file=str(path)))
+        raise LogError(_about(container, path))
     mark, encoding = _encoding(raw)
     if encoding is None:
         raise LogError(_no_text(path, raw))
@@ -142,7 +147,9 @@ def fingerprint(path: Path) -> SourceFile:
 def _size(path: Path) -> int:
     try:
         if path.is_dir():
-            raise LogError(Finding("found a folder, allowed: a file", file=str(path)))
+            bag = (path / "metadata.yaml").is_file() and _container(path / "*.db3", b"", any_suffix=False)
+            found = Finding("found a folder, allowed: a file", file=str(path))
+            raise LogError(_about(bag, path) if bag else found)
         with path.open("rb"):
             return path.stat().st_size
     except FileNotFoundError:
@@ -152,11 +159,29 @@ def _size(path: Path) -> int:
 
 
 def _container(path: Path, raw: bytes, any_suffix: bool) -> Container | None:
-    """Return what a file is if it is no text: by its suffix, or by its first bytes where the suffix lies."""
-    for container in vocabulary().containers:
-        if path.suffix.lower() in container.suffixes and not any_suffix:
-            return container
-    return next((c for c in vocabulary().containers if raw.startswith(c.magic)), None)
+    """Return what a file is if it is no text: by suffix and first bytes, by its suffix, or by its bytes."""
+    known, name = vocabulary().containers, path.name.lower()
+    ends = [max((len(end) for end in one.suffixes if name.endswith(end)), default=0) for one in known]
+    longest = 0 if any_suffix else max(ends)
+    suffixed = [one for one, end in zip(known, ends, strict=True) if end == longest > 0]
+    lone = b"\n" not in raw.strip()
+    begun = [one for one in known if raw.startswith(one.magic + (one.lone if lone else ()))]
+    both = [one for one in suffixed if one in begun]
+    return next(iter((*both, *suffixed, *begun)), None)
+
+
+def _about(container: Container, path: Path) -> Finding:
+    """Return what is said of a container: what it is, and the command that writes its table."""
+    names = {"{file}": path.as_posix()}
+    names |= {
+        f"{{{kind}}}": f"log.{kind}" if path.name != f"log.{kind}" else f"table.{kind}" for kind in _WRITTEN
+    }
+    advice = container.advice
+    for sign, name in names.items():
+        advice = advice.replace(sign, name)
+    hints = (Hint(name, None, does) for name, does in container.parameters.items())
+    found = f"found {container.what}, allowed: a text table"
+    return Finding(found, str(path), hints=(*([Hint("", does=advice)] if advice else []), *hints))
 
 
 def _no_text(path: Path, raw: bytes) -> Finding:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray
 from urmpipe_pipeline.sources.cells.cell import is_missing, is_text
-from urmpipe_pipeline.sources.tables.numbers import Numbers
+from urmpipe_pipeline.sources.tables.numbers import ClockColumn, Numbers
+from urmpipe_pipeline.sources.tables.padding import end_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.table import read_table
 
@@ -37,13 +39,42 @@ class Whole:
 
     @cached_property
     def numbers(self) -> Numbers:
-        """Their numbers in the file's own units, shape (n, columns), with what is wrong with them."""
+        """Their numbers in the file's own units, shape (n, columns), with what is wrong with them.
+
+        Rows at the end that hold no sample are left out.
+        """
+        ends = end_rows(self.read.values)
+        return self.read.at(slice(-ends)) if ends else self.read
+
+    @cached_property
+    def read(self) -> Numbers:
+        """The same with all rows."""
         return read_table(self.layout, self.columns, ())
+
+    def table(self, columns: Sequence[int], clock: Sequence[ClockColumn]) -> Numbers:
+        """Return the numbers of some columns with those of the clock, as `read_table` does.
+
+        They are those that were looked at already, if nothing was wrong with them: then the exact text of the
+        clock alone is read again.
+        """
+        known = self.__dict__.get("read")
+        if known is None or known.findings or known.left_out or not set(columns) <= set(self.columns):
+            return read_table(self.layout, columns, clock)
+        times = read_table(self.layout, (), clock) if clock else known
+        if times.findings or len(times.values) != len(known.values):
+            return read_table(self.layout, columns, clock)
+        places = [self.columns.index(column) for column in columns]
+        whole = places == list(range(len(self.columns)))
+        return replace(times, values=known.values if whole else known.values.take(places, axis=1))
 
     def values(self, columns: Sequence[int]) -> FloatArray:
         """Return some of them, shape (n, columns); NaN where a cell or a row is missing or wrong."""
-        places = [self.columns.index(column) for column in columns]
-        return self.numbers.values[:, places]
+        numbers = self.numbers.values
+        values = np.full((len(numbers), len(columns)), np.nan)
+        for place, column in enumerate(columns):
+            if column in self.columns:
+                values[:, place] = numbers[:, self.columns.index(column)]
+        return values
 
     @cached_property
     def increasing(self) -> BoolArray:

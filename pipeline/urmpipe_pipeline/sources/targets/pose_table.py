@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import FORMS, RotationForm, width
 from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.sources.clocks.time_file import named_file
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of, listed
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
@@ -91,6 +92,9 @@ def read_pose_table(
         OptionError: If an option's value makes no sense.
     """
     further = further or {}
+    if named_file(options.time):
+        allowed = "a column of the table of targets"
+        raise OptionError(Finding(parameter="time", found=shown(options.time or ""), allowed=allowed))
     asked, length = _plain_length(replace(options, joints=(), names=(), signs=(), offsets=()))
     tables = open_tables([file], asked, partial(sniff_targets, position=asked.position))
     names = {name: one.patterns for name, one in further.items()}

@@ -18,6 +18,7 @@ from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import RotationForm, angles
 from urmpipe_pipeline.joint_log import Inference, LogWarning, Role
 from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS
 from urmpipe_pipeline.sources.units.doubts import assumed, contradiction, doubt, not_reached
 from urmpipe_pipeline.sources.units.kinematic_units import KinematicUnits
 from urmpipe_pipeline.sources.units.told import GIVEN, Tellers, Told
@@ -302,9 +303,12 @@ class UnitFinder:
         largest, fast = peak(values), too_fast(values, t_ns, bounds)
         if not fast and largest > MOST_TURNS * math.tau:
             message = f"found values up to {largest:.6g} in {names} and no unit, allowed: rad or deg"
-            unnamed = len(columns) == 3 and all(column.header.isdigit() for column in columns)
+            unnamed = all(column.header.isdigit() for column in columns)
             hints = [Hint("unit", {"": name}, "says which") for name in ("rad", "deg")]
-            hints += [Hint("source", "path", "reads them as x, y, z")] if unnamed else []
+            hints += (
+                [Hint("source", "path", "reads them as x, y, z")] if unnamed and len(columns) == 3 else []
+            )
+            hints += [NAME_JOINTS] if unnamed else []
             raise LogError(Finding(message, self.tellers.file, hints=tuple(hints)))
         unit = deg if fast else rad
         hints = [Hint("unit", {"": OTHER_UNIT[unit.name]}, "reads them otherwise")]

@@ -1,0 +1,104 @@
+"""Tables in Python: a DataFrame of pandas, or what hands itself over as Arrow, as a table in memory."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
+
+import pyarrow as pa
+
+from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.own_tables import MARK, attributes_of, of_result
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class TableLike(Protocol):
+    """A DataFrame of pandas, a table of Arrow, or another table that hands itself over as Arrow."""
+
+    @property
+    def columns(self) -> Any:
+        """Its columns, or their names."""
+
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
+        """Return itself as a stream of Arrow."""
+
+
+def is_table(value: object) -> TypeGuard[TableLike]:
+    """Return whether a value is a table: a DataFrame, a table of Arrow, or another that becomes one."""
+    return hasattr(value, "columns") and hasattr(value, "__arrow_c_stream__")
+
+
+def held_of(table: Any, name: str) -> Held:
+    """Return a table of Python as one in memory.
+
+    Of a DataFrame an index that may be a time becomes the first column: dates, lengths of time, texts,
+    floats, and whole numbers with a name. Two levels of names are GROUP/NAME.
+
+    Args:
+        table: What `is_table` takes.
+        name: What to call the log.
+    """
+    if not _is_frame(table):
+        arrow = pa.table(table)
+        return Held(name, of_result(index_first(arrow), attributes_of(arrow.schema.metadata)))
+    columns = [*_index(table), *((_name(column), table.iloc[:, k]) for k, column in enumerate(table.columns))]
+    arrays = [_array(values) for _, values in columns]
+    arrow = pa.Table.from_arrays(arrays, names=[label for label, _ in columns])
+    told = table.attrs.get(MARK) or {}
+    return Held(name, of_result(arrow, told), named=not _is_numbered(table.columns))
+
+
+def _is_frame(table: object) -> TypeGuard[pd.DataFrame]:
+    pandas = sys.modules.get("pandas")
+    return pandas is not None and isinstance(table, pandas.DataFrame)
+
+
+def _is_numbered(index: pd.Index) -> bool:
+    """Return whether an index only counts."""
+    import pandas as pd
+
+    return isinstance(index, pd.RangeIndex)
+
+
+def _index(frame: pd.DataFrame) -> Iterator[tuple[str, pd.Series]]:
+    """Yield the levels of an index that may be a time, with their names."""
+    for k in range(frame.index.nlevels):
+        level = frame.index.get_level_values(k)
+        counts = level.dtype.kind in "iub" and level.name is None
+        if not (_is_numbered(level) or counts):
+            yield "" if level.name is None else str(level.name), level.to_series()
+
+
+def _name(label: Any) -> str:
+    """Return the name of a column; of several levels GROUP/NAME, as of two header lines."""
+    if not isinstance(label, tuple):
+        return str(label)
+    return "/".join(str(part) for part in label if str(part))
+
+
+def _array(values: pd.Series) -> pa.Array:
+    """Return a column as an Arrow array; what holds values of many kinds as their texts."""
+    try:
+        return pa.array(values, from_pandas=True)
+    except (pa.ArrowException, TypeError, ValueError):
+        missing = values.isna()
+        texts = [None if lacks else str(value) for value, lacks in zip(values, missing, strict=True)]
+        return pa.array(texts, pa.string())
+
+
+def index_first(table: pa.Table) -> pa.Table:
+    """Return a table that pandas made with its index in front, without a name where that has none."""
+    text = (table.schema.metadata or {}).get(b"pandas")
+    told = json.loads(text).get("index_columns", []) if text else []
+    index = [name for name in told if isinstance(name, str) and name in table.column_names]
+    others = [name for name in table.column_names if name not in index]
+    if not index or len(set(table.column_names)) < table.num_columns:
+        return table
+    moved = table.select([*index, *others])
+    return moved.rename_columns(
+        ["" if name.startswith("__index_level_") else name for name in moved.column_names]
+    )

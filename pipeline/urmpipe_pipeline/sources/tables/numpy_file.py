@@ -1,0 +1,143 @@
+"""NumPy files: a table of two dimensions, or arrays of one length by name."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import IO, Any, TypeAlias
+from zipfile import BadZipFile, ZipFile
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.messages import Hint
+from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.numpy_columns import column
+
+_NPY = b"\x93NUMPY"
+_SHOWN = 6
+"""Arrays that are named where their lengths differ."""
+
+Array: TypeAlias = npt.NDArray[Any]
+
+
+def read_numpy(path: Path) -> Held:
+    """Return the table of a .npy or .npz file. Objects are not loaded: that would run code of the file.
+
+    Raises:
+        LogError: If the file is damaged, holds no table, or arrays of different lengths.
+    """
+    try:
+        arrays = dict(_arrays(path))
+    except (OSError, ValueError, EOFError, BadZipFile, NotImplementedError, RuntimeError) as error:
+        reason = str(error).splitlines()[0].rstrip(".")
+        raise LogError(Finding(f"cannot be read: {reason}", file=str(path))) from None
+    tables = {name: array for name, array in arrays.items() if array is not None and _is_table(array)}
+    if not tables:
+        raise LogError(_no_table(path, arrays))
+    _refuse_lengths(path, tables)
+    named = "" not in tables or bool(tables[""].dtype.names)
+    columns = pa.table({name: column(values) for name, values in _columns(tables)})
+    return Held(path.stem, columns, named=named, path=path)
+
+
+def _arrays(path: Path) -> Iterator[tuple[str, Array | None]]:
+    """Yield the arrays of a file by name, without one if it is no archive; None of one of objects."""
+    with path.open("rb") as file:
+        if file.read(len(_NPY)) == _NPY:
+            file.seek(0)
+            yield "", _array(file, file)
+            return
+    with ZipFile(path) as archive:
+        for member in archive.namelist():
+            with archive.open(member) as header, archive.open(member) as data:
+                yield member.removesuffix(".npy"), _array(header, data)
+
+
+def _array(header: IO[bytes], data: IO[bytes]) -> Array | None:
+    """Return an array, its header read before from the same bytes; None of one of objects."""
+    version = np.lib.format.read_magic(header)
+    read_header = (
+        np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    )
+    _, _, kind = read_header(header)
+    if kind.hasobject:
+        return None
+    if data is header:
+        data.seek(0)
+    return np.asarray(np.lib.format.read_array(data, allow_pickle=False))
+
+
+def _no_table(path: Path, arrays: Mapping[str, Array | None]) -> Finding:
+    """Return what is said of a file without a table; of one of Python's objects with a command."""
+    shapes = (f"{name or 'an array'} {array.shape}" for name, array in arrays.items() if array is not None)
+    if (shown := ", ".join(shapes)) or "" not in arrays:
+        allowed = "numbers in one or two dimensions, a row a sample"
+        return Finding(file=str(path), found=shown or "no array of numbers", allowed=allowed)
+    command = (
+        f"python -c \"import numpy; numpy.savez('{_written(path)}',"
+        f" **dict(numpy.load('{path.as_posix()}', allow_pickle=True).item()))\""
+    )
+    hint = Hint("", does=f"only if you trust it, since loading it runs its code: {command}")
+    return Finding(file=str(path), found="a Python object", allowed="arrays of numbers", hints=(hint,))
+
+
+def _written(path: Path) -> str:
+    return "log.npz" if path.name != "log.npz" else "table.npz"
+
+
+def _is_table(array: Array) -> bool:
+    """Return whether an array is rows: of numbers, dates or lengths of time, or of fields by name."""
+    rows = array.dtype.names is not None or array.dtype.kind in "biufmM"
+    return rows and array.ndim in (1, 2) and array.size > 1
+
+
+def _refuse_lengths(path: Path, tables: Mapping[str, Array]) -> None:
+    """Raise if arrays have different lengths, with a command that keeps those of one."""
+    lengths = Counter[int]()
+    for array in tables.values():
+        lengths[len(array)] += array.size
+    if len(lengths) == 1:
+        return
+    shown = ", ".join(f"{name} {array.shape}" for name, array in list(tables.items())[:_SHOWN])
+    more = f" and {len(tables) - _SHOWN} more" if len(tables) > _SHOWN else ""
+    keep = f"len(f[k]) == {lengths.most_common(1)[0][0]}"
+    wide = next((name for name, array in tables.items() if array.ndim == 2 and "/" in name), "")
+    folder = next((one for one in _folders(wide) if len(_lengths_in(one, tables)) == 1), None)
+    keep = keep if folder is None else f"k.startswith('{folder}')"
+    if folder is None:
+        keep = f"f[k].ndim and {keep}"
+    command = (
+        f"python -c \"import numpy; f = numpy.load('{path.as_posix()}');"
+        f" numpy.savez('{_written(path)}', **{{k: f[k] for k in f if {keep}}})\""
+    )
+    hint = Hint("", does=f"to keep those of one length: {command}")
+    raise LogError(Finding(file=str(path), found=shown + more, allowed="arrays of one length", hints=(hint,)))
+
+
+def _folders(name: str) -> Iterator[str]:
+    """Yield the folders that a name stands in, the outermost first."""
+    parts = name.split("/")[:-1]
+    yield from ("/".join(parts[: k + 1]) + "/" for k in range(len(parts)))
+
+
+def _lengths_in(folder: str, tables: Mapping[str, Array]) -> set[int]:
+    return {len(array) for name, array in tables.items() if name.startswith(folder)}
+
+
+def _columns(tables: Mapping[str, Array]) -> Iterator[tuple[str, Array]]:
+    """Yield the columns by name; those of an array of several are numbered from 1, as the reader has them."""
+    last = [name.split("/")[-1] for name in tables]
+    for name, array in tables.items():
+        short = name.split("/")[-1] if len(set(last)) == len(last) else name
+        if array.dtype.names is not None:
+            fields = {field: array[field].reshape(len(array), -1) for field in array.dtype.names}
+            yield from _columns({field: one for field, one in fields.items() if _is_table(one)})
+            continue
+        matrix = array.reshape(len(array), -1)
+        for k, values in enumerate(matrix.T, start=1):
+            alone = matrix.shape[1] == 1
+            yield short if alone and short else f"{short}_{k}".removeprefix("_"), values

@@ -1,0 +1,279 @@
+"""What is no text: one line that says what it is, with a command whose table is read."""
+
+from __future__ import annotations
+
+import bz2
+import gzip
+import json
+import lzma
+import os
+import pickle
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import tarfile
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pytest
+import xlwt
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
+from rosbags.typesys import Stores, get_typestore
+
+from asserting import refusal
+from urmpipe_models.errors import LogError
+from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources.vocabulary import vocabulary
+
+Write = Callable[[Path], object]
+Wrong = Callable[..., list[str]]
+
+ROWS = 60
+T = np.arange(ROWS) * 0.01
+Q = 0.5 * np.sin(2 * np.pi * 0.7 * T[:, None] + np.arange(6))  # rad, six joints that all turn back
+TABLE = pd.DataFrame({"t [s]": T, **{f"q{k + 1} [rad]": Q[:, k] for k in range(6)}})
+CSV = TABLE.to_csv(index=False).encode()
+EPOCH = 1_700_000_000
+
+
+def records() -> list[dict[str, float]]:
+    return [{str(name): float(value) for name, value in row.items()} for _, row in TABLE.iterrows()]
+
+
+def joint_states(store: Any, **header: int) -> Iterator[tuple[int, Any]]:
+    """Yield the log as messages; between two of them one of a gripper, on the same topic."""
+    state, head, time = (
+        store.types[name]
+        for name in ("sensor_msgs/msg/JointState", "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
+    )
+    names, none = [f"joint_{k + 1}" for k in range(6)], np.empty(0)
+    for k in range(ROWS):
+        stamp = EPOCH * 10**9 + k * 10_000_000
+        at = head(stamp=time(sec=stamp // 10**9, nanosec=stamp % 10**9), frame_id="", **header)
+        yield stamp, state(header=at, name=names, position=Q[k], velocity=none, effort=none)
+        yield stamp, state(header=at, name=["finger"], position=np.zeros(1), velocity=none, effort=none)
+
+
+def ros1_bag(path: Path) -> None:
+    kind, store = "sensor_msgs/msg/JointState", get_typestore(Stores.ROS1_NOETIC)
+    with Ros1Writer(path) as bag:
+        topic = bag.add_connection("/joint_states", kind, typestore=store)
+        for stamp, message in joint_states(store, seq=0):
+            bag.write(topic, stamp, store.serialize_ros1(message, kind))
+
+
+def ros2_bag(path: Path) -> None:
+    """Write a bag in a folder beside the file, and bring its storage to where the file shall be."""
+    kind, store = "sensor_msgs/msg/JointState", get_typestore(Stores.ROS2_HUMBLE)
+    folder = path.parent / "bag"
+    plugin = StoragePlugin.MCAP if path.suffix == ".mcap" else StoragePlugin.SQLITE3
+    with Ros2Writer(folder, version=8, storage_plugin=plugin) as bag:
+        topic = bag.add_connection("/joint_states", kind, typestore=store)
+        for stamp, message in joint_states(store):
+            bag.write(topic, stamp, store.serialize_cdr(message, kind))
+    shutil.copy(folder / f"bag{path.suffix}", path)
+
+
+def mat_73(path: Path) -> None:
+    """Write what MATLAB's save -v7.3 writes: a header, arrays by columns, their classes as attributes."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        for name, values in {"t": T[:, None], "q": Q, "n": np.array([[3.0]])}.items():
+            file.create_dataset(name, data=values.T).attrs["MATLAB_class"] = np.bytes_(b"double")
+        text = file.create_dataset("robot", data=np.array([[117], [114], [53]], dtype=np.uint16))
+        text.attrs["MATLAB_class"] = np.bytes_(b"char")
+        file.create_dataset("#refs#/a", data=np.zeros((2, 1))).attrs["MATLAB_class"] = np.bytes_(b"double")
+    with path.open("r+b") as raw:
+        raw.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(116) + bytes(8) + b"\x00\x02IM")
+
+
+def hdf5(path: Path) -> None:
+    """Write a demonstration as ALOHA does."""
+    with h5py.File(path, "w") as file:
+        file["observations/qpos"], file["observations/t"] = Q, T
+        file["observations/images/top"] = np.zeros((ROWS, 4, 4, 3), dtype=np.uint8)
+        file["version"] = 1
+
+
+def ulog(path: Path) -> None:
+    """Write a ULog file: header, format and messages. Source: PX4 guide, ULog file format."""
+
+    def message(kind: bytes, body: bytes) -> bytes:
+        return struct.pack("<Hc", len(body), kind) + body
+
+    with path.open("wb") as file:
+        file.write(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0) + message(b"B", bytes(40)))
+        file.write(message(b"F", b"joints:uint64_t timestamp;double[6] q;"))
+        file.write(message(b"A", struct.pack("<BH", 0, 0) + b"joints"))
+        for t, q in zip(T, Q, strict=True):
+            file.write(message(b"D", struct.pack("<HQ6d", 0, round(t * 1e6), *q)))
+
+
+def tar(path: Path) -> None:
+    (path.parent / "log.csv").write_bytes(CSV)
+    with tarfile.open(path, "w:gz") as archive:
+        archive.add(path.parent / "log.csv", "log.csv")
+    (path.parent / "log.csv").unlink()
+
+
+def zipped(path: Path) -> None:
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("log.csv", CSV)
+
+
+def objects(path: Path) -> None:
+    np.save(path, {"t": T, "q": Q}, allow_pickle=True)  # type: ignore[arg-type]
+
+
+def old_workbook(path: Path) -> None:
+    book = xlwt.Workbook()
+    sheet = book.add_sheet("log")
+    for j, name in enumerate(TABLE.columns):
+        sheet.write(0, j, name)
+        for i, value in enumerate(TABLE[name], start=1):
+            sheet.write(i, j, float(value))
+    book.save(path)
+
+
+ARRAYS = {"t": T, "q": Q}
+WRITERS: Mapping[str, Write] = {
+    "a.v7.3.mat": mat_73,
+    "a.hdf5": hdf5,
+    "my log.xlsx": lambda path: TABLE.to_excel(path, index=False),
+    "a.ods": lambda path: TABLE.to_excel(path, index=False),
+    "a.xls": old_workbook,
+    "a.bag": ros1_bag,
+    "a.mcap": ros2_bag,
+    "a.db3": ros2_bag,
+    "a.json": lambda path: path.write_text(json.dumps(records())),
+    "records.txt": lambda path: path.write_text(json.dumps(records(), indent=1)),
+    "columns.json": lambda path: path.write_text(json.dumps(TABLE.to_dict("list"))),
+    "log.csv": lambda path: path.write_text(json.dumps(records())),
+    "a.pkl": lambda path: path.write_bytes(pickle.dumps(ARRAYS)),
+    "frame.pkl": TABLE.to_pickle,
+    "objects.npy": objects,
+    "a.ulg": ulog,
+    "a.tar.gz": tar,
+    "a.zip": zipped,
+    "a.gz": lambda path: path.write_bytes(gzip.compress(CSV)),
+    "log.csv.bz2": lambda path: path.write_bytes(bz2.compress(CSV)),
+    "a.xz": lambda path: path.write_bytes(lzma.compress(CSV)),
+    "a.zst": lambda path: path.write_bytes(pa.compress(CSV, "zstd", asbytes=True)),
+}
+COMMAND = re.compile(r"(?:python -|ulog2csv ).*?(?= \(with a password|$)")
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_the_command_for_a_format_writes_a_table_that_is_read(name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    WRITERS[name](path)
+    said = refusal(LogError, read_log, [path])
+    command = COMMAND.search(said)
+    assert command is not None, said
+    before = {file: file.stat().st_mtime_ns for file in tmp_path.iterdir()}
+    env = {**os.environ, "PATH": os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))}
+    subprocess.run(command[0], shell=True, cwd=tmp_path, env=env, check=True, capture_output=True)
+    (written,) = [file for file in tmp_path.iterdir() if file not in before]
+    assert path.stat().st_mtime_ns == before[path]  # the file itself is left as it is
+    log = read_log([written], ReadOptions(unit={"": "rad"}))
+    kept = (
+        1e-15 if path.suffix in (".xlsx", ".ods", ".xls") else 0.0
+    )  # spreadsheets keep 15 digits, others all
+    np.testing.assert_allclose(log.q, Q, rtol=kept, atol=0)
+    np.testing.assert_allclose(log.t_ns, T * 1e9, atol=1.0)  # times are whole ns
+    assert log.period == 0.01
+
+
+def test_every_container_has_a_command_that_runs_here() -> None:
+    """But for what MATLAB or Excel alone read, and what is no log."""
+    others = ("MATLAB file", "password", "Simulink", "robot", "TOML", "picture", "PDF", "Parquet")
+    names = [*WRITERS, "a.mcap"]
+    for one in vocabulary().containers:
+        suffixed = any(name.lower().endswith(one.suffixes) for name in names) or "JSON" in one.what
+        assert suffixed or any(word in one.what for word in others), one.what
+
+
+def test_a_folder_that_is_a_bag(tmp_path: Path) -> None:
+    ros2_bag(tmp_path / "a.db3")
+    said = refusal(LogError, read_log, [tmp_path / "bag"])
+    assert said.startswith(
+        f"{tmp_path}/bag: found a ROS bag, allowed: a text table; with pip install rosbags: "
+    )
+    assert f"pathlib.Path('{tmp_path}/bag')" in said
+
+
+@pytest.mark.parametrize(
+    ("name", "head", "what"),
+    [
+        ("a.xlsx", b"PK\x03\x04\x14\x00", "an Excel workbook"),
+        ("a.xlsx", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an Excel workbook with a password"),
+        ("a.xls", b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", "an old Excel workbook"),
+        ("a.csv", b"PK\x03\x04\x14\x00", "an Excel workbook"),
+        ("a.zip", b"PK\x03\x04\x14\x00\x01\x00", "a zip archive"),
+        ("a.mat", b"MATLAB 7.3 MAT-file, Platform", "a MATLAB file of version 7.3"),
+        ("a.txt", b"\x89HDF\r\n\x1a\n", "an HDF5 file"),
+        ("A.XLSX", b"t,q1\n0,1\n", "an Excel workbook"),
+        ("a.txt", b"#ROSBAG V2.0\n", "a ROS bag"),
+        ("a.txt", b"\xff\xd8\xff\xe0\x00\x10JFIF", "a picture"),
+        ("a.pdf", b"%PDF-1.7\n", "a PDF"),
+        ("a.slx", b"PK\x03\x04\x14\x00", "a Simulink model"),
+    ],
+)
+def test_known_by_suffix_and_first_bytes(wrong: Wrong, name: str, head: bytes, what: str) -> None:
+    (said,) = wrong(head, name=name)
+    assert said.startswith(f"{name}: found {what}, allowed: a text table; ")
+
+
+@pytest.mark.parametrize("name", ["a.xlsx", "a.bag", "a.npz", "a.mat", "a.json", "a.csv"])
+def test_an_empty_file_is_empty_whatever_it_is_called(wrong: Wrong, name: str) -> None:
+    assert wrong(b"", name=name) == [f"{name}: found an empty file, allowed: a table with a row a sample"]
+
+
+def test_numpy_files_are_read(tmp_path: Path) -> None:
+    fields = np.zeros(ROWS, dtype=[("t", "f8"), ("q", ">f4", (6,))])
+    fields["t"], fields["q"] = T, Q
+    np.save(tmp_path / "a.npy", np.column_stack([T, Q]))
+    np.save(tmp_path / "b.npy", fields)
+    np.savez(tmp_path / "a.npz", **ARRAYS, robot=np.array("ur5"), other=np.array([{}], dtype=object))
+    np.savez_compressed(tmp_path / "b.npz", **{"run/t": T, "run/q": Q})
+    for name in ("a.npy", "b.npy", "a.npz", "b.npz"):
+        log = read_log([tmp_path / name])
+        single = name == "b.npy"
+        np.testing.assert_allclose(log.q, Q, rtol=2**-24 if single else 0)  # half a unit of the last bit
+        assert (log.period, log.rows) == (0.01, ROWS)
+
+
+def test_arrays_of_different_lengths(tmp_path: Path) -> None:
+    """Demonstrations in one archive: the command keeps the first of them."""
+    path = tmp_path / "log.npz"
+    parts = {"demo_0/q": Q, "demo_0/t": T, "demo_1/q": Q[:9], "demo_1/t": T[:9]}
+    np.savez(path, **parts)
+    command = (
+        f"python -c \"import numpy; f = numpy.load('{path}'); numpy.savez('table.npz',"
+        " **{k: f[k] for k in f if k.startswith('demo_0/')})\""
+    )
+    assert refusal(LogError, read_log, [path]) == (
+        f"{path}: found demo_0/q (60, 6), demo_0/t (60,), demo_1/q (9, 6), demo_1/t (9,), allowed: arrays"
+        f" of one length; to keep those of one length: {command}"
+    )
+    argument = command.removeprefix('python -c "').removesuffix('"')
+    subprocess.run([sys.executable, "-c", argument], cwd=tmp_path, check=True)
+    np.testing.assert_array_equal(read_log([tmp_path / "table.npz"]).q, Q)
+
+
+@pytest.mark.parametrize("name", ["a.npy", "a.npz"])
+@pytest.mark.parametrize("kept", [8, 100, 700])
+def test_truncated_numpy_files(tmp_path: Path, name: str, kept: int) -> None:
+    path = tmp_path / name
+    np.save(path, Q) if name == "a.npy" else np.savez(path, **ARRAYS)
+    path.write_bytes(path.read_bytes()[:kept])
+    assert re.match(rf"{path}: cannot be read: [^\n]+$", refusal(LogError, read_log, [path]))
