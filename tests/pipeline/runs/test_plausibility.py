@@ -246,8 +246,8 @@ def test_nothing_is_said_of_the_bundled_logs(pattern: str) -> None:
     ],
 )
 def test_nothing_is_said_of_sound_real_logs(file: str, robot: str | None) -> None:
-    read = ReadOptions(joints=("1", "2", "3", "4", "5", "6") if "unitree" in file else ())  # it has twelve columns
-    run = ingest_log([SHARED / file], robot=robot and load_robot(robot), read=read)  # type: ignore[arg-type]
+    joints = ("1", "2", "3", "4", "5", "6") if "unitree" in file else ()  # of its twelve columns
+    run = ingest_log([SHARED / file], robot=robot and load_robot(robot), read=ReadOptions(joints=joints))  # type: ignore[arg-type]
     assert KINDS & {w.kind for w in run.warnings} == set()
 
 
