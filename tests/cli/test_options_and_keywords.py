@@ -60,8 +60,8 @@ OPERANDS: dict[str, set[str]] = {
 }
 """Keywords that stand without an option on the command line."""
 
-OF_PYTHON = {"inputs", "progress", "told", "voice", "t"}
-"""Keywords for callbacks, arrays and for who prints."""
+OF_PYTHON = {"inputs", "progress", "told", "voice", "t", "q", "recorded_tcp", "names", "name"}
+"""Keywords for callbacks, arrays and their names, and for who prints."""
 
 OF_COMMANDS = {"as_json", "quiet", "explain", "listed", "write_system", "version"}
 """Options of what is printed instead of a result, or beside it."""

@@ -84,15 +84,22 @@ UNTIMED = (
     ),
     click.option("--decimal", type=OneOf(["point", "comma", ".", ","]), help="The decimal sign."),
 )
-TABLE = (
-    *UNTIMED,
-    click.option("--time", metavar="[FILE:]COLUMN", help="The time column; none if there is none."),
-    _unit_option("Unit of angles whose names tell none (rad, deg), or of one column."),
-)
+
+
+def _of_table(time: str) -> tuple[Callable[[Command], Command], ...]:
+    """Return the options of a table; `time` is what --time takes."""
+    return (
+        *UNTIMED,
+        click.option("--time", metavar=time, help="The time column; none if there is none."),
+        _unit_option("Unit of angles whose names tell none (rad, deg), or of one column."),
+    )
+
+
+TABLE = _of_table("COLUMN")
 ROWS = (
     click.option("--source", metavar="NAME", help="Who wrote the log: coppeliasim, solidworks, ..."),
-    click.option("--joints", type=NamesType(), help="The joint columns, in the robot's order."),
-    *TABLE,
+    click.option("--joints", type=NamesType(), help="The joint columns, in the robot's order; of numbers also 2-7."),
+    *_of_table("[FILE:]COLUMN"),
     click.option(
         "--layout",
         metavar="table|transposed|flat:N|flat-by-joint:N",

@@ -134,7 +134,11 @@ def _roles(
     main = tables.layouts[only or 0]
     several = only is None and len(set(tables.paths)) > 1
     given = options.joints or options.position or options.measured or options.source or options.side
-    if len(tables.layouts) == 1 and not given and (written := written_roles(columns, main, robot)) is not None:
+    if (
+        len(tables.layouts) == 1
+        and not given
+        and (written := written_roles(columns, main, robot)) is not None
+    ):
         return written
     if not given and (signals := joints_of_blocks(columns, main, robot)) is not None:
         return signals

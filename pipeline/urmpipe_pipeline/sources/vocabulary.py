@@ -17,7 +17,8 @@ Patterns = tuple[re.Pattern[str], ...]
 
 _BRACKETS = re.compile(r"^(?P<label>.*?\S)\s*[\[(](?P<inside>[^\[\]()]*)[\])]\s*$")
 _INSIDE = re.compile(
-    r"(?<=[\s_./])(?P<unit>rad|deg)(?P<rate>_?(?:per_)?s(?:ec)?_?(?P<power>2?))?(?=[\s_./][\w])", re.IGNORECASE
+    r"(?<=[\s_./])(?P<unit>rad|deg)(?P<rate>_?(?:per_)?s(?:ec)?_?(?P<power>2?))?(?=[\s_./][\w])",
+    re.IGNORECASE,
 )
 """A unit between other words of a name, perhaps one per second."""
 
@@ -205,7 +206,9 @@ def split_unit(name: str) -> tuple[str, str | None]:
         return match["label"].strip(), match["inside"].strip()
     inside = _INSIDE.search(name.strip())
     if inside:
-        return name.strip(), f"{inside['unit'].lower()}/s{inside['power']}" if inside["rate"] else inside["unit"]
+        return name.strip(), f"{inside['unit'].lower()}/s{inside['power']}" if inside["rate"] else inside[
+            "unit"
+        ]
     word = re.split(r"[\s_./]+", name.strip())[-1]
     known = word.lower() in vocabulary().units and word != name.strip()
     return name.strip(), word if known else None

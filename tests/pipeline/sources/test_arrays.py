@@ -148,9 +148,7 @@ def test_arrays_that_only_together_have_the_right_length(wrong: Wrong) -> None:
 
 def test_times_that_run_backwards_name_the_first_line_of_the_row(wrong: Wrong) -> None:
     rows = [f'{time},"[ 0.1 0.2\n  0.3]"' for time in (0.1, 0.3, 0.2, 0.4)]
-    assert wrong("\n".join(["t,q", *rows])) == [
-        f"log.csv:6, column t: found 0.2 s after 0.3 s, {INCREASE}"
-    ]
+    assert wrong("\n".join(["t,q", *rows])) == [f"log.csv:6, column t: found 0.2 s after 0.3 s, {INCREASE}"]
 
 
 @pytest.mark.parametrize("array", ["[0,1 0,2]", "[0,1; 0,2]"])

@@ -126,8 +126,6 @@ def test_a_file_reads_the_same_in_blocks_of_any_size(content: bytes, options: Re
         assert outcome(path, options) == whole
 
 
-
-
 def rows(count: int, start: float = 0.0) -> list[str]:
     """Rows of a log of two joints at 10 ms."""
     return [f"{start + 0.01 * k:.2f},0.{k % 7},1.{k % 5}" for k in range(count)]

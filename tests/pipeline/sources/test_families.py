@@ -21,7 +21,9 @@ def table(names: str, sign: str = ",") -> str:
     values = [np.round(0.8 * np.sin(T * (1 + 0.3 * k) + k), 6) for k in range(len(columns))]
     if columns[0] in ("t", "time", "timestamp"):
         values[0] = T
-    return "\n".join([sign.join(columns), *(sign.join(map(repr, row)) for row in np.transpose(values).tolist())])
+    return "\n".join(
+        [sign.join(columns), *(sign.join(map(repr, row)) for row in np.transpose(values).tolist())]
+    )
 
 
 @pytest.mark.parametrize(
@@ -33,10 +35,11 @@ def table(names: str, sign: str = ",") -> str:
         ("t angle_rad_base angle_rad_elbow angle_rad_wrist", "2 3 4", ""),
         ("t pos_1 pos_2 vel_1 vel_2 eff_1 eff_2", "2 3", "4 5"),
         # Interbotix
-        ("time waist shoulder elbow forearm_roll wrist_angle wrist_rotate gripper left_finger", "2 3 4 5 6 7", ""),
+        ("time waist shoulder elbow forearm_roll wrist_angle wrist_rotate gripper left_finger",
+         "2 3 4 5 6 7", ""),
         ("time wrist_rotate wrist_angle waist shoulder elbow gripper", "4 5 6 3 2", ""),
         # LeRobot
-        ("timestamp shoulder_pan.pos shoulder_lift.pos elbow_flex.pos wrist_flex.pos wrist_roll.pos gripper.pos",
+        ("time shoulder_pan.pos shoulder_lift.pos elbow_flex.pos wrist_flex.pos wrist_roll.pos gripper.pos",
          "2 3 4 5 6", ""),
         ("timestamp frame_index observation.state_1 observation.state_2 action_1 action_2", "3 4", ""),
         ("timestamp action.a.pos action.b.pos observation.a.pos observation.b.pos", "4 5", ""),
@@ -55,7 +58,8 @@ def table(names: str, sign: str = ",") -> str:
         # simulators
         ("time qpos_0 qpos_1 qvel_0 qvel_1 ctrl_0 ctrl_1", "2 3", "4 5"),
         ("t dof_pos_0 dof_pos_1 dof_vel_0 dof_vel_1", "2 3", "4 5"),
-        ("wrist_1 shoulder upper_arm forearm wrist_2 wrist_3 robotiq_gripper ins_x ins_xr", "2 3 4 1 5 6", ""),
+        ("wrist_1 shoulder upper_arm forearm wrist_2 wrist_3 robotiq_gripper ins_x ins_xr",
+         "2 3 4 1 5 6", ""),
         ("time panda_joint1 panda_joint2 panda_finger_joint1 panda_finger_joint2", "2 3", ""),
     ],
 )  # fmt: skip

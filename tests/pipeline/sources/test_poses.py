@@ -155,9 +155,7 @@ def test_a_damaged_clock_of_a_motion_is_still_an_error(wrong: Wrong) -> None:
     times = [f"{0.01 * k:.2f}" for k in range(300)]
     times[100] = times[99]
     (said,) = wrong(table(smooth(300, 150.0), times), unit={"": "rad", "time": "s"})
-    assert (
-        said == f"log.csv:102, column time: found 0.99 s again, {INCREASE}"
-    )
+    assert said == f"log.csv:102, column time: found 0.99 s again, {INCREASE}"
 
 
 @given(seed=st.integers(0, 2**32), rows=st.integers(3, 300), shortest=st.floats(10.0, 400.0))

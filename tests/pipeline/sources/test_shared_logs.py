@@ -116,7 +116,7 @@ def test_twelve_columns_without_a_header_are_asked_about(arm: Arm, joints: int |
     with pytest.raises(LogError, match="found 12 columns that no header names") as asked:
         read_log([path], robot=robot)
     answer = asked.value.findings[0].hints[0].value
-    assert answer == ["1", "2", "3", "4", "5", "6"]
+    assert answer == ["1-6"]
     log = read_log([path], ReadOptions(joints=tuple(map(str, answer))), robot)
     assert log.q.shape == (2099, 6)
     assert log.q[0, 1] == 0.7844660375193842

@@ -200,7 +200,7 @@ def test_more_columns_without_names_than_joints_are_asked_about(read: Read, arm:
     with pytest.raises(LogError, match="found 4 columns that no header names") as asked:
         read(text, arm(3))
     answers = [hint.value for hint in asked.value.findings[0].hints]
-    assert answers == [["1", "2", "3"], ["2", "3", "4"], None]
+    assert answers == [["1-3"], ["2-4"], None]
     log = read(text, arm(3), joints=answers[0])
     assert log.joints == ("phi1", "phi2", "phi3")
     assert log.q.tolist() == [[0.1, 0.2, 0.3], [0.05, 0.1, 0.5]]

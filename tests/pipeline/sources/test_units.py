@@ -107,7 +107,9 @@ def test_units_given_by_the_user(read: Read, wrong: Wrong, arm: Arm) -> None:
     assert wrong(text, unit={"q1": "s", "t": "s"}) == [
         "column q1: unit: found the unit s (given as an option), allowed: rad, deg, m, mm, cm"
     ]
-    assert wrong(text, unit={"t": "deg"}) == ["unit: found deg for the time 't', allowed: s, ms, us, ns" + OTHER_TIME]
+    assert wrong(text, unit={"t": "deg"}) == [
+        "unit: found deg for the time 't', allowed: s, ms, us, ns" + OTHER_TIME
+    ]
 
 
 def test_a_unit_that_does_not_fit_the_robot(wrong: Wrong, arm: Arm) -> None:

@@ -15,7 +15,7 @@ from urmpipe_pipeline.sources.clocks.chosen import EXPONENTS, Chosen
 from urmpipe_pipeline.sources.clocks.digits import dates_in_digits
 from urmpipe_pipeline.sources.clocks.halves import EPOCH, PERIODS, halves_beside
 from urmpipe_pipeline.sources.clocks.steps import Steps, counts_rows, increases, kind_of_steps, runs_evenly
-from urmpipe_pipeline.sources.columns.columns import Column, columns_called
+from urmpipe_pipeline.sources.columns.columns import Column, chosen_columns
 from urmpipe_pipeline.sources.columns.pose import have_length_1, trailing_matrix, trailing_quaternion
 from urmpipe_pipeline.sources.columns.trajectories import clock_before_pose
 from urmpipe_pipeline.sources.options import ReadOptions
@@ -36,6 +36,9 @@ part of the rows."""
 
 RESTS = 0.1
 """... and rests in this share of the rows at least."""
+
+HARDLY = 20.0
+"""A clock's steps are hardly ever so many times smaller than its mean step; a joint's are while it rests."""
 
 SHOWN = 8
 """Columns that are named in a question."""
@@ -70,7 +73,7 @@ def without_header(
         return Chosen(*poses)
     if len(columns) in (1, joints):
         return None
-    named = {column for text in options.joints for column in columns_called(columns, text)}
+    named = set(chosen_columns(columns, options.joints, parameter="joints"))
     free = [one for one in columns if one not in named and one.index in whole.columns]
     found = dates_in_digits(free, layout) or _epoch(free, layout, whole)
     if found is not None:
@@ -154,6 +157,12 @@ class _Increasing:
         return kind_of_steps(self.values)
 
     @property
+    def hardly_moves(self) -> bool:
+        """Whether a quarter of the steps are much smaller than the mean one, as those of a joint at rest."""
+        steps = np.sort(np.diff(self.values))
+        return bool(steps[len(steps) // 4] < steps.mean() / HARDLY)
+
+    @property
     def may_be_clock(self) -> bool:
         """Whether a clock may increase so."""
         return self.steps != "smooth" or self.values[0] == 0.0
@@ -205,7 +214,7 @@ def _alone(clocks: Sequence[_Increasing], rising: Sequence[_Increasing], whole: 
     one = clocks[0]
     if len(clocks) > 1:
         return None
-    if one.steps == "rough":
+    if one.steps == "rough" and not one.hardly_moves:
         alone = "alone increases" if len(rising) == 1 else "alone increases in steps that jitter"
         return Chosen((one.column,), f"it {alone} through the whole file")
     if one.first and one.steps == "even" and not one.counts and _others_move(one, whole):

@@ -58,7 +58,7 @@ def runs_evenly(times: Sequence[float]) -> bool:
 
 
 def kind_of_steps(values: FloatArray) -> Steps:
-    """Return how numbers that increase do so, shape (n,), of which there are ten or more."""
+    """Return how ten or more numbers of any unit increase, shape (n,)."""
     steps = np.diff(values)
     usual = float(np.median(steps))
     away, change = np.abs(steps - usual), np.abs(np.diff(steps))
@@ -88,7 +88,7 @@ def _last_digit(sizes: FloatArray) -> float:
 
 
 def counts_rows(values: FloatArray, *, any_step: bool) -> bool:
-    """Return whether numbers count rows or frames: whole, from 0 or 1 in steps of 1, or in any same step."""
+    """Return whether numbers in [-], shape (n,), count rows: from 0 or 1 in steps of 1, or of any whole."""
     steps = np.diff(values)
     if (values % 1 != 0).any() or (steps != steps[0]).any():
         return False

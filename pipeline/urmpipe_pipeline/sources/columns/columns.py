@@ -15,6 +15,7 @@ from urmpipe_pipeline.sources.vocabulary import Patterns, Quantity, Unit, key, s
 
 _UNIT_WORDS = re.compile(r"_(rad|deg)(_(per_)?s(ec)?2?)?(?=_|$)")
 _GLUED = re.compile(r"(?<![a-z])q(?=(act|actual|cmd|des|fb|meas|msr|ref|set|target)_?\d)")
+_RANGE = re.compile(r"(?P<first>\d{1,5})-(?P<last>\d{1,5})")
 _NAME_COLUMN = re.compile(r"(?P<before>.*?)name_?(?P<n>\d+)\Z")
 _NUMBERED = re.compile(r"(?P<before>.*?)(position|velocity|effort)_?(?P<n>\d+)\Z")
 
@@ -142,6 +143,24 @@ def columns_called(columns: Sequence[Column], text: str) -> list[Column]:
     exact = [column for column in columns if text in (column.header, column.name)]
     found = exact or [column for column in columns if key(text) == column.key != ""]
     return found or [column for column in columns if text == str(column.number)]
+
+
+def chosen_columns(columns: Sequence[Column], texts: Sequence[str], **place: str) -> tuple[Column, ...]:
+    """Return the columns that the user means by names or numbers, of which 2-7 are six.
+
+    Raises:
+        LogError: If no column or more than one is meant.
+    """
+    return tuple(find_column(columns, one, **place) for text in texts for one in _each(columns, text))
+
+
+def _each(columns: Sequence[Column], text: str) -> Sequence[str]:
+    """Return the numbers that a range means; anything else as it is."""
+    ends = _RANGE.fullmatch(text)
+    if ends is None or columns_called(columns, text):
+        return (text,)
+    first, last = int(ends["first"]), int(ends["last"])
+    return [str(number) for number in range(first, min(last, columns[-1].number + 1) + 1)] or (text,)
 
 
 def columns_named(

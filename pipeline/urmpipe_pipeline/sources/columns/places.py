@@ -12,7 +12,7 @@ from urmpipe_models.errors import Finding, LogError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import width
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
+from urmpipe_pipeline.sources.columns.columns import Column, chosen_columns, listed
 from urmpipe_pipeline.sources.columns.pose import (
     Pose,
     chosen_pose,
@@ -75,7 +75,7 @@ def without_header(
     columns = [column for column in columns if column.header]
     pose = chosen_pose(columns, options)
     if options.joints:
-        joints = tuple(find_column(columns, text, parameter="joints") for text in options.joints)
+        joints = chosen_columns(columns, options.joints, parameter="joints")
         check_count(joints, file, robot)
         return _by_place(joints, columns, robot, GIVEN, pose)
     alone = path_of_poses(columns, whole, options.rotation) if pose is None else None

@@ -17,25 +17,42 @@ _SIDES = (frozenset(("left", "l")), frozenset(("right", "r")))
 UNKNOWN = "columns that are known to be joints"
 """What is allowed where nothing tells which columns they are."""
 
-MOST_ANSWERS = 6
+MOST_ANSWERS = 9
 """Groups of columns that a question offers."""
 
 
 def take(columns: Sequence[Column], does: str = "takes these") -> Hint:
     """Return the hint that takes columns as the joints: by number where a name has a comma, or repeats."""
+    numbers = [column.number for column in columns]
+    if all(column.called == str(column.number) for column in columns) and len(columns) > 1:
+        row = numbers == list(range(numbers[0], numbers[-1] + 1))
+        return Hint("joints", [f"{numbers[0]}-{numbers[-1]}"] if row else [*map(str, numbers)], does)
     names = [column.called for column in columns]
     alone = all("," not in name and names.count(name) == 1 for name in names)
-    return Hint("joints", names if alone else [str(column.number) for column in columns], does)
+    return Hint("joints", names if alone else [*map(str, numbers)], does)
 
 
-def by_side(columns: Sequence[Column]) -> Sequence[Sequence[Column]]:
-    """Return the columns of a left and a right arm apart; all together if there are no such two."""
+def by_arm(columns: Sequence[Column]) -> list[list[Column]]:
+    """Return the columns of several arms apart, whose names differ by a side or by their first word.
+
+    All together if there are no such two.
+    """
     sides = [[column for column in columns if column.words & words] for words in _SIDES]
-    names = [
-        {"_".join(w for w in one.key.split("_") if w not in words) for one in side}
-        for side, words in zip(sides, _SIDES, strict=True)
-    ]
-    return sides if names[0] and names[0] == names[1] and "" not in names[0] else [columns]
+    first: dict[str, list[Column]] = {}
+    for column in columns:
+        first.setdefault(column.key.split("_")[0], []).append(column)
+    for arms in (sides, list(first.values())):
+        names = [frozenset(map(_without_arm, arm)) for arm in arms]
+        if len(arms) > 1 and len(set(names)) == 1 and names[0] and "" not in names[0]:
+            return arms
+    return [list(columns)]
+
+
+def _without_arm(column: Column) -> str:
+    """Return the name of a column without the word that says whose it is: a side, else the first one."""
+    words = column.key.split("_")
+    sides = frozenset().union(*_SIDES)
+    return "_".join([w for w in words if w not in sides] if column.words & sides else words[1:])
 
 
 def which_joints(

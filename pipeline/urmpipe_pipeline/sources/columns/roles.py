@@ -12,7 +12,7 @@ from urmpipe_models.orientation import RotationForm
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import grouped_number
 from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS
-from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
+from urmpipe_pipeline.sources.columns.columns import Column, chosen_columns, listed
 from urmpipe_pipeline.sources.columns.families import families
 from urmpipe_pipeline.sources.columns.joint_names import (
     NamedJoints,
@@ -26,7 +26,7 @@ from urmpipe_pipeline.sources.columns.joint_names import (
     some_named,
 )
 from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, with_form
-from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, OTHER_ROBOT, by_side, take, which_joints
+from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, OTHER_ROBOT, by_arm, take, which_joints
 from urmpipe_pipeline.sources.columns.tcp_like import about_odd_rows, about_tcp
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -105,7 +105,7 @@ def assign(
     file = layouts[0].file
     numeric = [column for column in columns if (path or not column.text) and not column.counts_rows]
     if options.joints or written:
-        joints = written or tuple(find_column(columns, text, parameter="joints") for text in options.joints)
+        joints = written or chosen_columns(columns, options.joints, parameter="joints")
         evidence = "urmpipe wrote them" if written else "given as an option"
         found = NamedJoints(joints, evidence, *family_of(joints))
         pose = chosen_pose(columns, options) or find_pose([c for c in numeric if c not in joints], layouts)
@@ -239,7 +239,7 @@ def _may_be(numeric: Sequence[Column], robot: Chain | None) -> list[Sequence[Col
     about_else = vocabulary().other | vocabulary().outside
     others = [column for column in numeric if not column.words & about_else]
     fits = {len(robot.coordinates)} if robot else range(1, MOST_JOINTS + 1)
-    groups = [*by_side(others), *numbered_alike(others)]
+    groups = [*by_arm(others), *numbered_alike(others)]
     return [group for group in groups if len(group) in fits]
 
 

@@ -29,7 +29,7 @@ MOST_UNASKED = 7
 FEW = 3
 """So few joints may go on as others say by chance, where no robot tells how many there are."""
 
-USUAL = (6, 7, 5, 4, 3)
+USUAL = (6, 7, 5, 4)
 """How many joints arms have, the usual first."""
 
 Found = tuple[tuple[Column, ...], tuple[Column, ...], str]
@@ -57,7 +57,7 @@ def joints_among(free: Sequence[Column], layout: Layout, whole: Whole | None, ro
     odd = unlike_joints(values)
     if not blocks and count is None and len(free) <= MOST_UNASKED and not odd.any():
         return tuple(free), (), "no header: joints in order"
-    groups = [[free[k] for k in block.joints] for block in blocks] or _groups(free, odd, count)
+    groups = [[free[k] for k in block.joints] for block in blocks] + _groups(free, odd, count)
     others = [column for column, is_odd in zip(free, odd, strict=True) if is_odd]
     found = f"{len(free)} columns that no header names"
     found += f", of which {listed(others)} may be no joints" if others else ""
@@ -69,19 +69,22 @@ def joints_among(free: Sequence[Column], layout: Layout, whole: Whole | None, ro
 def unlike_joints(values: FloatArray) -> BoolArray:
     """Return which columns are unlike joints, or unlike the others, shape (columns,).
 
-    They go further than any arm's joint, or than one in rad where most of the others do not; or they move
-    seldom while others do.
+    They go further than any arm's joint, or than one in rad where most of the others do not; they move seldom
+    while others do; or they count.
 
     Args:
         values: The columns in the file's own units, shape (n, columns); NaN where a sample is missing.
     """
     if len(values) < 2:
         return np.zeros(values.shape[1], dtype=bool)
-    size = np.sort(np.abs(values), axis=0)[int(0.9 * (len(values) - 1))]  # NaN counts as the largest
+    size = np.sort(np.abs(values), axis=0)[math.ceil(0.9 * (len(values) - 1))]  # NaN counts as the largest
     in_rad = int(2 * np.count_nonzero(size <= TWO_TURNS[1]) > len(size))
-    moves = (np.diff(values, axis=0) != 0.0).mean(axis=0)
+    steps = np.diff(values, axis=0)
+    moves = (steps != 0.0).mean(axis=0)
+    whole = (values[0] % 1.0 == 0.0) & (steps[0] % 1.0 == 0.0)
+    counts = whole & (steps[0] > 0.0) & (steps == steps[0]).all(axis=0)
     seldom = (moves > 0.0) & (moves < SELDOM * np.median(moves))
-    return np.asarray((size > TWO_TURNS[in_rad]) | seldom)
+    return np.asarray((size > TWO_TURNS[in_rad]) | seldom | (counts & (len(values) > FEW)))
 
 
 def _groups(free: Sequence[Column], odd: BoolArray, count: int | None) -> list[Sequence[Column]]:
@@ -94,7 +97,11 @@ def _groups(free: Sequence[Column], odd: BoolArray, count: int | None) -> list[S
     near = sorted((run for run in runs if 1 < len(run) < len(free)), key=len, reverse=True)
     if count:
         return [run for run in (*near, free[:count], free[-count:]) if len(run) == count]
-    sizes = [size for size in USUAL if len(free) % size == 0]
-    size = sizes[0] if sizes else min(USUAL[0], len(free))
-    blocks = [free[k : k + size] for k in range(0, len(free) if sizes else 1, size)]
-    return [*near[:1], free] if len(free) <= MOST_UNASKED else [*blocks, *near[:1], free]
+    if len(free) <= MOST_UNASKED:
+        return [*near[:1], free]
+    groups = [
+        free[k : k + size]
+        for size in USUAL
+        for k in (range(0, len(free), size) if len(free) % size == 0 else (0,))
+    ]
+    return [*groups, *near[:1], free]

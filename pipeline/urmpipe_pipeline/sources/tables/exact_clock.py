@@ -25,7 +25,7 @@ def exact_times(table: pa.Table, clock: pa.ChunkedArray) -> pa.Table:
 
 
 def decimals(ns: IntArray, exponent: int) -> pa.Array:
-    """Return times in integer [ns] as exact decimals of a unit, so many powers of ten above it."""
+    """Return times in integer [ns], shape (n,), as exact decimals of a unit, powers of ten above it."""
     words: Bytes = np.column_stack([ns, ns >> 63]).astype("<i8").view(np.uint8)  # 128 bits each
     kind = pa.decimal128(19, exponent)
     return pa.Array.from_buffers(kind, len(ns), [None, pa.py_buffer(np.ascontiguousarray(words))])

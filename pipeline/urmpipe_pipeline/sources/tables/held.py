@@ -167,7 +167,7 @@ def read_held(layout: Layout, columns: Sequence[int], clock: Sequence[ClockColum
 
 
 def numbers_of(column: pa.ChunkedArray) -> tuple[FloatArray, dict[int, str]]:
-    """Return a column as numbers, NaN where there is none, shape (n,), and the texts by row that are none."""
+    """Return a column in its own unit, shape (n,), NaN where a text is no number, and these texts by row."""
     if is_number(column.type):
         double = pa.types.is_float64(column.type)
         numbers, missing = _values(column if double else column.cast(pa.float64(), safe=False), np.float64)

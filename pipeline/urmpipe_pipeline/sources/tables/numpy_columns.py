@@ -18,7 +18,7 @@ _PLAIN: Mapping[str, np.dtype[Any]] = {
 
 
 def column(values: npt.NDArray[Any]) -> pa.Array:
-    """Return values, shape (n,), as a column of their type."""
+    """Return values in any unit, shape (n,), as a column of their type."""
     kind = values.dtype
     if kind.kind in "mM":
         return pa.array(values)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -18,6 +19,7 @@ from urmpipe_pipeline.sources.tables.held import Held
 from urmpipe_pipeline.sources.tables.numpy_columns import column
 
 _NPY = b"\x93NUMPY"
+_IN_ORDER = re.compile(r"(arr_\d+)?")
 _SHOWN = 6
 """Arrays that are named where their lengths differ."""
 
@@ -39,7 +41,8 @@ def read_numpy(path: Path) -> Held:
     if not tables:
         raise LogError(_no_table(path, arrays))
     _refuse_lengths(path, tables)
-    named = "" not in tables or bool(tables[""].dtype.names)
+    in_order = all(_IN_ORDER.fullmatch(name) for name in tables)  # of numpy.savez(file, t, q)
+    named = not in_order or bool(tables.get("", np.empty(0)).dtype.names)
     columns = pa.table({name: column(values) for name, values in _columns(tables)})
     return Held(path.stem, columns, named=named, path=path)
 

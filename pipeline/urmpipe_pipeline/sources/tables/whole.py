@@ -68,7 +68,7 @@ class Whole:
         return replace(times, values=known.values if whole else known.values.take(places, axis=1))
 
     def values(self, columns: Sequence[int]) -> FloatArray:
-        """Return some of them, shape (n, columns); NaN where a cell or a row is missing or wrong."""
+        """Return some, shape (n, columns), in the file's units; NaN where one is missing or wrong."""
         numbers = self.numbers.values
         values = np.full((len(numbers), len(columns)), np.nan)
         for place, column in enumerate(columns):
