@@ -209,6 +209,9 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[Finding]:
     valid = np.flatnonzero(times > UNREADABLE)
     steps = np.diff(times[valid])
     begins = _second_logs(times[valid], steps)
+    if len(begins) > 1 and begins == set(np.flatnonzero(steps < 0).tolist()):
+        yield _several_logs(sorted(int(valid[k + 1]) for k in begins), name)
+        steps = np.where(steps < 0, 1, steps)
     single = []
     for is_wrong, what in ((steps == 0, _TOO_COARSE), (steps < 0, _NO_CLOCK)):
         wrong = np.flatnonzero(is_wrong)
@@ -265,6 +268,15 @@ def _folds(times: IntArray, clock: Clock) -> Iterable[Finding]:
         *OTHER_TIME,
     )
     yield Finding(said, row=row + 2, column=clock.columns[0].header, hints=hints)
+
+
+def _several_logs(rows: Sequence[int], name: str) -> Finding:
+    """Return the finding that a clock begins again at some rows, from 0: episodes or repetitions."""
+    begin = ", ".join(str(row + 1) for row in rows[:SHOWN_GAPS])
+    more = ", ..." if len(rows) > SHOWN_GAPS else ""
+    said = f"found {len(rows) + 1} logs in one file: the clock begins again in rows {begin}{more}"
+    hints = (Hint("", does=f"keep the rows of one, such as the first {rows[0]}"), *OTHER_TIME)
+    return Finding(f"{said}, allowed: one log", row=rows[0] + 1, column=name, hints=hints)
 
 
 def _second_logs(times: IntArray, steps: IntArray) -> set[int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from urmpipe_models.chains.chain import Chain
@@ -18,6 +18,7 @@ from urmpipe_pipeline.sources.columns.columns import (
     given_units,
     refuse_twins,
 )
+from urmpipe_pipeline.sources.columns.long_form import refuse_long_form
 from urmpipe_pipeline.sources.columns.own_log import own_joints, written_roles
 from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_header
 from urmpipe_pipeline.sources.columns.roles import Roles, assign, joint_inference
@@ -106,10 +107,24 @@ def make_plan(
     only = None if apart is None else 1 - apart
     roles = _renamed(_roles(rest, tables, options, robot, only), options.names)
     roles = replace(roles, further=beside)
+    for table in {column.table for column in roles.joints}:
+        own = [column for column in rest if column.table == table]
+        refuse_long_form(roles.joints, own, clocks[table].columns, tables.layouts[table])
+    if apart is None:
+        roles = replace(roles, warnings=(*roles.warnings, *_unused_files(tables, roles)))
     if options.poses:
         return Plan(tables, clocks, roles, units, poses=True)
     told = options.period is not None or options.time not in (None, "none") or apart is not None
     return Plan(tables, clocks, roles, units, apart, False if told else None)
+
+
+def _unused_files(tables: Tables, roles: Roles) -> Iterator[LogWarning]:
+    """Yield a warning for each of several files of which nothing is used."""
+    used = {tables.paths[column.table] for column in roles.columns}
+    for path in dict.fromkeys(tables.paths):
+        if path not in used:
+            hints = (Hint("time", f"{path}:COLUMN", "takes the times from one of its columns"),)
+            yield LogWarning("file-not-used", f"none of the columns of {path.name} is used", hints=hints)
 
 
 def _renamed(roles: Roles, names: Sequence[str]) -> Roles:

@@ -111,6 +111,7 @@ class Vocabulary:
     tcp_position: Patterns
     measured: Patterns
     outside: frozenset[str]
+    tcp_counted: Patterns
     tcp_pose_vector: Patterns
     tcp_matrix: Patterns
     tcp_rotations: tuple[RotationWords, ...]
@@ -164,6 +165,7 @@ def vocabulary() -> Vocabulary:
         tcp_position=_compiled(tcp["position"]),
         measured=_compiled(tcp["measured"]),
         outside=frozenset(tcp["outside"]),
+        tcp_counted=_compiled(tcp["counted"]),
         tcp_pose_vector=_compiled(tcp["pose_vector"]),
         tcp_matrix=_compiled(tcp["matrix"]),
         tcp_rotations=tuple(

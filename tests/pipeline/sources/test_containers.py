@@ -195,7 +195,7 @@ def test_the_command_for_a_format_writes_a_table_that_is_read(name: str, tmp_pat
 
 def test_every_container_has_a_command_that_runs_here() -> None:
     """But for what MATLAB or Excel alone read, and what is no log."""
-    others = ("MATLAB file", "password", "Simulink", "robot", "TOML", "picture", "PDF", "Parquet")
+    others = ("MATLAB file", "password", "Simulink", "robot", "TOML", "picture", "PDF", "web page")
     names = [*WRITERS, "a.mcap"]
     for one in vocabulary().containers:
         suffixed = any(name.lower().endswith(one.suffixes) for name in names) or "JSON" in one.what

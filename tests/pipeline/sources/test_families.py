@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import shlex
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.sources import ReadOptions, read_log
 
 Read = Callable[..., JointLog]
 
@@ -94,3 +99,59 @@ def test_what_is_asked(names: str, answers: list[str], read: Read) -> None:
 def test_units_inside_of_names(read: Read) -> None:
     log = read(table("t joint_deg_1 joint_deg_2 vel_deg_s_1 vel_deg_s_2"))
     assert set(log.units.values()) == {"s", "deg", "deg/s"}
+
+
+def test_a_position_by_numbers_beside_a_quaternion_is_no_arm_of_four_joints(read: Read) -> None:
+    angle = np.linspace(0.1, 1.4, 50)
+    quaternion = np.stack([np.cos(angle), np.sin(angle), 0 * angle, 0 * angle], axis=1)
+    values = np.column_stack([T[:50], quaternion[:, :3] * 0.3, quaternion])
+    lines = [",".join(map(repr, row)) for row in values.tolist()]
+    log = read("\n".join(["time,p1,p2,p3,q1,q2,q3,q4", *lines]), rotation="quat_wxyz")
+    assert not log.joints
+    assert log.tcp_position is not None
+    assert log.tcp_position.tolist() == values[:, 1:4].tolist()
+    assert log.tcp_rotation is not None
+    assert log.tcp_rotation.tolist() == quaternion.tolist()
+
+
+@pytest.mark.parametrize("sign", [",", ";"])
+def test_a_row_a_joint_is_told_with_the_command_that_makes_a_row_a_sample(
+    sign: str, write: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = ("shoulder", "elbow", "wrist")
+    rows = [f"{t!r}{sign}{name}{sign}{t + k!r}" for t in T.tolist() for k, name in enumerate(names)]
+    path = write("\n".join([f"time{sign}joint{sign}position", *rows]))
+    with pytest.raises(LogError, match="found a row a joint: joint goes round 3 names") as refused:
+        read_log([path])
+    command = refused.value.findings[0].hints[0].does
+    monkeypatch.chdir(tmp_path)
+    subprocess.run([sys.executable, *shlex.split(command)[1:]], check=True)
+    log = read_log([tmp_path / "table.csv"], ReadOptions(joints=names))
+    assert log.q.tolist() == [[t, t + 1, t + 2] for t in T.tolist()]
+    assert log.t.tolist() == T.tolist()
+
+
+def test_a_file_of_which_nothing_is_used_is_told(write: Callable[..., Path]) -> None:
+    q = write(table("q1 q2 q3"), "q.csv")
+    others = write(table("seq stamp_s load"), "times.csv")
+    (warning,) = [one for one in read_log([q, others]).warnings if one.kind == "file-not-used"]
+    takes = f'time="{others}:COLUMN" takes the times from one of its columns'
+    assert str(warning) == f"none of the columns of times.csv is used; {takes}"
+
+
+def test_numbers_that_are_neither_rad_nor_deg_are_asked_about(read: Read) -> None:
+    """Ticks of servos: as deg they would be seven turns."""
+    ticks = "\n".join(f"{t!r},{2048 + 600 * k % 97},{1500 + k}" for k, t in enumerate(T.tolist()))
+    with pytest.raises(
+        LogError, match=r"found values up to .* in dxl_1_position, dxl_2_position and no unit"
+    ):
+        read(f"time,dxl_1_position,dxl_2_position\n{ticks}\n")
+
+
+def test_columns_by_a_range_of_numbers(read: Read) -> None:
+    text = table("a b c d e")
+    assert read(text, joints=["2-4"], time="none").joints == ("b", "c", "d")
+    assert read(text, joints=["5", "1-2"], time="none").joints == ("e", "a", "b")
+    with pytest.raises(LogError, match="joints: found no column '6', allowed: a, b, c, d, e"):
+        read(text, joints=["4-9"])
+    assert read(table("2-3 q1 q2"), joints=["2-3"]).joints == ("2-3",)

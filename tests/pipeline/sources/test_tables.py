@@ -293,6 +293,7 @@ def test_source_names() -> None:
             "ros",
             "ros2",
             "fri",
+            "kuka-rsi",
             "abb",
             "plotjuggler",
             "solidworks",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import permutations
@@ -17,6 +18,8 @@ from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, OTHER_ROBOT,
 from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.vocabulary import key, vocabulary
 
+_LAST_NUMBER = re.compile(r"\d+(?=\D*$)")
+
 
 @dataclass(frozen=True, slots=True)
 class NamedJoints:
@@ -30,10 +33,10 @@ class NamedJoints:
 
 
 def numbered_alike(columns: Sequence[Column]) -> list[tuple[Column, ...]]:
-    """Return families of two columns or more of one table whose names differ by a number at the end."""
+    """Return families of two columns or more of one table whose names differ by their last number."""
     alike: dict[tuple[str, int], list[Column]] = {}
     for column in columns:
-        stem = column.key.rstrip("0123456789")
+        stem = _LAST_NUMBER.sub("#", column.key)
         if stem != column.key:
             alike.setdefault((stem, column.table), []).append(column)
     return [tuple(family) for family in alike.values() if len(family) > 1]

@@ -86,6 +86,8 @@ def find_pose(
     position = _position([column for column in numeric if not column.words & vocabulary().outside], file)
     measured = not position
     position = position or _xyz(families(numeric, vocabulary().measured, 0))
+    if not position and (counted := _counted_pose(numeric, layouts, form)):
+        return counted
     rest = [column for column in numeric if column not in position]
     if measured and position:
         stem = os.path.commonprefix([column.key for column in position])  # noqa: RUF071 (names, not paths)
@@ -93,6 +95,21 @@ def find_pose(
         rest = [column for column in rest if stem and column.key.startswith(stem)]
     rotation, forms = _rotation(rest, layouts, form, some=some) if position else ((), ())
     return Pose(position, rotation, forms, measured=measured and bool(position))
+
+
+def _counted_pose(
+    numeric: Sequence[Column], layouts: Sequence[Layout], form: RotationForm | None
+) -> Pose | None:
+    """Return p1, p2, p3 and the only quaternion beside them, which has length 1 in each row."""
+    found = [f for f in families(numeric, vocabulary().tcp_counted, 0) if _numbers(f) == range(3)]
+    if len(found) != 1:
+        return None
+    position = found[0].ordered()
+    rest = [column for column in numeric if column not in position]
+    rotation, forms = _rotation(rest, layouts, form, some=False)
+    if len(rotation) != 4 or not _is_unit(rotation, layouts, some=False):
+        return None
+    return Pose(position, rotation, forms, "the four columns beside them have length 1")
 
 
 def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:

@@ -239,7 +239,7 @@ def _may_be(numeric: Sequence[Column], robot: Chain | None) -> list[Sequence[Col
     about_else = vocabulary().other | vocabulary().outside
     others = [column for column in numeric if not column.words & about_else]
     fits = {len(robot.coordinates)} if robot else range(1, MOST_JOINTS + 1)
-    groups = [*by_arm(others), *numbered_alike(others)]
+    groups = sorted([*by_arm(others), *numbered_alike(others)], key=len, reverse=True)
     return [group for group in groups if len(group) in fits]
 
 

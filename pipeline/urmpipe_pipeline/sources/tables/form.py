@@ -28,13 +28,15 @@ Value = str | list[str]
 CLOSING = {"[": "]", "(": ")"}
 _WORDS = re.compile(r"\b(?:\w+\.)?(?:float|int)\d+(?=\()")
 _INNER = re.compile(r"[^\s,;\[\]()]+")
-_BROKEN = re.compile(rb"\n\r?\n[ \t]")
 _SHOWN = 40
 _MARK = "\x01"
 _MARKERS = bytes((*range(1, 9), *range(14, 32)))
 """Signs that no text has: each stands for a label."""
 
 _UNMARKED = bytes(set(range(256)) - set(_MARKERS + b"\n"))
+
+_GLUED = np.isin(np.arange(256), [*b"0123456789.+-abcdefghijklmnopqrstuvwxyz"])
+"""What is no part of a cell beside an array: signs of numbers and words."""
 
 _SEPARATES = np.isin(np.arange(256), list(b" \t\r\n,;[]()"))
 
@@ -180,8 +182,6 @@ class Form:
             block = block.replace(word.encode(encoding), b"")
         left_out = 0
         if self.continued:
-            if _BROKEN.search(block):  # read row by row, an array does not go on behind a blank line
-                raise UnfitError
             for end in (b"\r\n", b"\n"):
                 block = block.replace(end + b" ", b"  ").replace(end + b"\t", b"  ")
         if self.labels:
@@ -248,6 +248,11 @@ class Form:
         closes = signs == closing[0]
         depth = np.cumsum((signs == opening[0]).view(np.int8) - closes.view(np.int8), dtype=np.int8)
         inside = (depth != 0) | closes
+        if (inside & (signs == ord("\n"))).any():  # an array goes on only where a line begins with a blank
+            raise UnfitError
+        outside = np.flatnonzero(_GLUED[signs] & ~inside)
+        if (inside[np.minimum(outside + 1, len(signs) - 1)] | inside[np.maximum(outside - 1, 0)]).any():
+            raise UnfitError  # something stands at a bracket, as in [1 2]3
         separates = _SEPARATES[signs] & inside
         edges = np.flatnonzero(np.diff(separates.view(np.int8), prepend=np.int8(0), append=np.int8(0)))
         first, last = edges[0::2], edges[1::2] - 1

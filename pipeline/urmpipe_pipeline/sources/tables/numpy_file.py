@@ -40,11 +40,22 @@ def read_numpy(path: Path) -> Held:
     tables = {name: array for name, array in arrays.items() if array is not None and _is_table(array)}
     if not tables:
         raise LogError(_no_table(path, arrays))
+    tables = _upright(tables)
     _refuse_lengths(path, tables)
     in_order = all(_IN_ORDER.fullmatch(name) for name in tables)  # of numpy.savez(file, t, q)
     named = not in_order or bool(tables.get("", np.empty(0)).dtype.names)
     columns = pa.table({name: column(values) for name, values in _columns(tables)})
     return Held(path.stem, columns, named=named, path=path)
+
+
+def _upright(tables: Mapping[str, Array]) -> dict[str, Array]:
+    """Return arrays with a row a sample: joints as rows are turned where an array of one dimension tells."""
+    alone = {len(array) for array in tables.values() if array.ndim == 1}
+    rows = alone.pop() if len(alone) == 1 else None
+    return {
+        name: array.T if array.ndim == 2 and len(array) != rows == array.shape[1] else array
+        for name, array in tables.items()
+    }
 
 
 def _arrays(path: Path) -> Iterator[tuple[str, Array | None]]:

@@ -33,6 +33,9 @@ from urmpipe_pipeline.sources.units.unit_evidence import (
 from urmpipe_pipeline.sources.units.unit_hints import OTHER_UNIT, unit_hints, unit_inference, which_unit
 from urmpipe_pipeline.sources.vocabulary import Quantity, Unit, vocabulary
 
+MOST_DEGREES = 720.0
+"""Values beyond two turns in [deg] are hardly those of an arm's joints: they are asked about."""
+
 MOST_TURNS = 4
 """A joint value of more turns than this is not taken as rad without being told."""
 
@@ -301,6 +304,7 @@ class UnitFinder:
                 return unit
         names = ", ".join(column.name for column in columns)
         largest, fast = peak(values), too_fast(values, t_ns, bounds)
+        fast = fast if largest <= MOST_DEGREES else None  # neither rad nor deg: ticks, percents
         if not fast and largest > MOST_TURNS * math.tau:
             message = f"found values up to {largest:.6g} in {names} and no unit, allowed: rad or deg"
             unnamed = all(column.header.isdigit() for column in columns)

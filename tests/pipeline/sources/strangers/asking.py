@@ -23,7 +23,7 @@ from urmpipe_pipeline.sources.options import read_options
 LONGEST = 3
 """So many questions in a row are answered."""
 
-READINGS = 60
+READINGS = 150
 """So many readings a question may lead to: who has more answers than that has been given none."""
 
 COLUMNS = {"joints", "layout", "time", "side"}

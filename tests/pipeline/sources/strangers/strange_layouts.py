@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 
 from asking import Truth
 from motion import Motion, moves, of_robot, sines, times
-from stranger import DEG, Stranger, strangers
+from stranger import DEG, Stranger, strangers, told_by_rates
 from urmpipe_models.arrays import FloatArray
 
 
@@ -53,7 +53,8 @@ def joints_as_rows() -> Iterator[Stranger]:
     yield stranger(m, "\n".join([*rows, ""]), decimals=6)
     rows = [";".join([f"J{k + 1}", *(f"{v:.5f}" for v in row)]) for k, row in enumerate(np.degrees(m.q).T)]
     yield stranger(m, "\n".join([*rows, ""]), decimals=5, unit=DEG, timed=False)
-    yield stranger(m, savetxt(np.vstack((m.q.T, m.qd.T)), delimiter=","), timed=False)
+    both = savetxt(np.vstack((m.q.T, m.qd.T)), delimiter=",")
+    yield stranger(m, both, timed=False, truth={"period": told_by_rates(m.t)})
     moved = moves(times(200, 0.03), 6, 403)
     yield stranger(moved, savetxt(np.degrees(moved.q).T, delimiter="\t"), timed=False)
 
