@@ -98,7 +98,9 @@ def _of_table(time: str) -> tuple[Callable[[Command], Command], ...]:
 TABLE = _of_table("COLUMN")
 ROWS = (
     click.option("--source", metavar="NAME", help="Who wrote the log: coppeliasim, solidworks, ..."),
-    click.option("--joints", type=NamesType(), help="The joint columns, in the robot's order; of numbers also 2-7."),
+    click.option(
+        "--joints", type=NamesType(), help="The joint columns, in the robot's order; of numbers also 2-7."
+    ),
     *_of_table("[FILE:]COLUMN"),
     click.option(
         "--layout",

@@ -96,7 +96,7 @@ def test_pandas_columns_without_names(tmp_path: Path, arm: Arm) -> None:
     pd.DataFrame(np.c_[Q, Q]).to_csv(path, index=False)
     log = read_log([path], robot=arm(4))
     np.testing.assert_array_equal(log.q, np.c_[Q, Q])
-    assert log.joints == ("0", "1", "2", "3")
+    assert log.joints == ("phi1", "phi2", "phi3", "phi4")
 
 
 def test_numpy_savetxt(tmp_path: Path) -> None:

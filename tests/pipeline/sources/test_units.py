@@ -58,7 +58,7 @@ def test_a_unit_that_is_not_known_is_refused(wrong: Wrong) -> None:
     ]
     assert wrong("t,q1 [gon]\n0,30\n0.1,31\n") == [
         "log.csv, column q1 [gon]: found the unit 'gon', allowed: rad, deg, m, mm, cm;"
-        ' unit={"q1": "deg"} says which'
+        ' convert the values; unit={"q1": "deg"} takes the values so'
     ]
 
 
@@ -122,14 +122,15 @@ def test_a_unit_that_is_not_known(wrong: Wrong, read: Read) -> None:
     text = "t,J1 [counts]\n0,30\n0.1,31\n"
     assert wrong(text) == [
         "log.csv, column J1 [counts]: found the unit 'counts', allowed: rad, deg, m, mm, cm;"
-        ' unit={"J1": "deg"} says which'
+        ' convert the values; unit={"J1": "deg"} takes the values so'
     ]
     assert read(text, unit={"J1": "deg"}).q[0, 0] == 30 * DEG
 
 
 def test_a_line_of_units_that_are_not_known(read: Read, wrong: Wrong) -> None:
     text = "t,J1,J2\n[s],[counts],[counts]\n0,30,1\n0.1,31,1\n"
-    said = 'found the unit \'counts\', allowed: rad, deg, m, mm, cm; unit={"J1": "deg"} says which'
+    said = "found the unit 'counts', allowed: rad, deg, m, mm, cm; convert the values;"
+    said += ' unit={"J1": "deg"} takes the values so'
     assert wrong(text) == [f"log.csv, column J1: {said}"]
     assert read(text, unit={"": "deg"}).units == {"t": "s", "J1": "deg", "J2": "deg"}
     powers = read("t,J1,tau1,M,n\n[s],[rad],[Nm],[kg m2/s2],(1/min)\n0,30,1,1,1\n0.1,31,1,1,1\n")
@@ -266,7 +267,8 @@ def test_a_position_without_unit_is_like_the_others(read: Read) -> None:
 
 
 def test_a_rate_in_an_unknown_unit_is_refused_as_a_joint_is(wrong: Wrong) -> None:
-    said = 'found the unit \'rpm\', allowed: rad, deg, m, mm, cm; unit={"qd1": "deg"} says which'
+    said = "found the unit 'rpm', allowed: rad, deg, m, mm, cm; convert the values;"
+    said += ' unit={"qd1": "deg"} takes the values so'
     assert wrong("t,q1 [rad],qd1 [rpm]\n0,1,2\n1,2,3\n") == [f"log.csv, column qd1 [rpm]: {said}"]
 
 
@@ -288,8 +290,8 @@ def test_huge_numbers_are_read_without_a_warning_of_numpy(read: Read, wrong: Wro
     rows = "0,1e308\n1,-1e308\n2,0\n"
     assert read(f"t,q1 [rad]\n{rows}").q[0, 0] == 1e308
     assert wrong(f"t,q1\n{rows}") == [
-        'log.csv: found values up to 1e+308 in q1 and no unit, allowed: rad or deg; unit="rad" or'
-        ' unit="deg" says which'
+        "log.csv: found values up to 1e+308 in q1 and no unit, allowed: rad or deg; convert ticks and counts;"
+        ' unit="rad" or unit="deg" says which'
     ]
 
 

@@ -72,8 +72,9 @@ def unit_of(
     named = time.unit or vocabulary().unit(time.key)  # "seconds" has no other name
     if named is not None and named.name in EXPONENTS:
         return named.name, "its name", ()
-    if time.unit_text is not None and time.unit_text.lower() in vocabulary().long_times:
-        message = f"found the unit {shown(time.unit_text)}, allowed: {_UNITS}; convert the times"
+    long = time.unit_text or time.key.rpartition("_")[2]
+    if long.lower() in vocabulary().long_times:
+        message = f"found the unit {shown(long)}, allowed: {_UNITS}; convert the times"
         raise layout.error(message, time.header, *EVEN)
     if source is not None and "time" in source.units:
         return source.units["time"].name, f"{source.name} writes {source.units['time'].name}", ()

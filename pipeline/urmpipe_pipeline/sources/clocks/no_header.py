@@ -67,6 +67,9 @@ def without_header(
         LogError: If a column that increases may be the time, a counter or a joint.
     """
     path = options.source == PATH
+    columns = [
+        column for column in columns if column.header
+    ]  # others are an index, or behind a trailing sign
     if path and (first := _before_pose(columns, layout, options)) is not None:
         return first
     if not options.joints and (poses := clock_before_pose(columns, whole)) is not None:
@@ -196,7 +199,10 @@ def _increasing(
     if (found := _alone(clocks, rising, whole)) is not None:
         return found
     if not sure:
-        raise _question([one.column for one in clocks], layout, path=path)
+        steps = np.diff(whole.values([column.index for column in columns]), axis=0)
+        stairs = [column for column, own in zip(columns, steps.T, strict=True) if _is_stair(own)]
+        asked = sorted([*(one.column for one in clocks), *stairs], key=lambda column: column.number)
+        raise _question(asked, layout, path=path)
     return None
 
 

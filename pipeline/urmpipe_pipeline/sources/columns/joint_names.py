@@ -47,7 +47,7 @@ def proved_by_rates(families: Sequence[tuple[Column, ...]], whole: Sequence[Whol
     pairs = []
     for joints, rates in permutations(families, 2):
         values = [whole[some[0].table].values([column.index for column in some]) for some in (joints, rates)]
-        if len(joints) == len(rates) and len(values[0]) == len(values[1]) and period_of(*values):
+        if 2 < len(joints) == len(rates) and len(values[0]) == len(values[1]) and period_of(*values):
             pairs.append((joints, rates))
     first = [pair for pair in pairs if pair[0] not in [rates for _, rates in pairs]]
     if len(first) != 1:
@@ -96,10 +96,10 @@ def _without_number(free: Sequence[Column], file: str, count: int | None, *, hal
     """Return joints without numbers: by a word that they share, by their units, or as all that is left."""
     words = vocabulary()
     about_else = words.other | words.joint_words["rate"] | words.joint_words["acceleration"]
-    still = measured([c for c in free if not c.words & about_else and not (c.unit and c.unit.order)])
-    family = _sharing_a_mark(still)
+    still = [c for c in free if not c.words & about_else and not (c.unit and c.unit.order)]
+    family = _sharing_a_mark(measured(still))
     if family and count in (None, len(family)):
-        _refuse_half(family, free, still, file, count)
+        _refuse_half(family, free, measured(still), file, count)
         names = tuple("_".join(w for w in c.key.split("_") if w not in words.marks) for c in family)
         evidence = "the word position or angle in their names; the order is the file's"
         return NamedJoints(family, evidence, names=names)

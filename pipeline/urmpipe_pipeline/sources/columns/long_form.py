@@ -16,7 +16,7 @@ MOST_NAMES = 40
 def refuse_long_form(
     joints: Sequence[Column], columns: Sequence[Column], clock: Sequence[Column], layout: Layout
 ) -> None:
-    """Raise if a table has a row a joint: a text beside its only joint goes round the same names.
+    """Raise if a table has a row a joint: a column beside its only joint goes round the same names.
 
     Args:
         joints: The joints that were found.
@@ -27,7 +27,8 @@ def refuse_long_form(
     Raises:
         LogError: With the command that makes a row a sample of it.
     """
-    names = [column for column in columns if column.text and _goes_round(layout.cells(column.index))]
+    others = [column for column in columns if column not in joints]
+    names = [column for column in others if _goes_round(layout.cells(column.index))]
     if len(joints) != 1 or not names or layout.header is None:
         return
     found = f"a row a joint: {names[0].header} goes round {len(set(layout.cells(names[0].index)))} names"
@@ -40,7 +41,8 @@ def _goes_round(cells: Sequence[str]) -> bool:
     count = len(set(cells))
     if not 2 <= count <= MOST_NAMES or len(cells) < 3 * count:
         return False
-    return all(cell == cells[k % count] for k, cell in enumerate(cells))
+    whole = all(not cell or not cell[0].isdigit() or cell.isdigit() for cell in cells[:count])
+    return whole and all(cell == cells[k % count] for k, cell in enumerate(cells))
 
 
 def _command(joint: Column, name: Column, time: Column, layout: Layout) -> str:

@@ -219,6 +219,13 @@ def _is_unit(columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool
     return (some or len(values) > 2) and _enough(have_length_1(values), some=some)
 
 
+def turns_as_quaternion(columns: Sequence[Column], layouts: Sequence[Layout]) -> bool:
+    """Return whether four columns have length 1 in every sampled row, and change."""
+    values, _ = _sampled(columns, layouts)
+    changes = len(values) > 2 and bool((values != values[0]).any())
+    return changes and _is_unit(columns, layouts, some=False)
+
+
 def odd_rows(columns: Sequence[Column], layouts: Sequence[Layout]) -> list[int]:
     """Return the few sampled rows, from 1, that hold no orientation although most do: they hide it.
 

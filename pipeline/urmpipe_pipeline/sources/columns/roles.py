@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
@@ -25,7 +27,7 @@ from urmpipe_pipeline.sources.columns.joint_names import (
     proved_by_rates,
     some_named,
 )
-from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, with_form
+from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, turns_as_quaternion, with_form
 from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, OTHER_ROBOT, by_arm, take, which_joints
 from urmpipe_pipeline.sources.columns.tcp_like import about_odd_rows, about_tcp
 from urmpipe_pipeline.sources.options import ReadOptions
@@ -117,8 +119,11 @@ def assign(
         free = [column for column in numeric if column not in (*pose.position, *pose.rotation)]
         half = bool(pose.position and not pose.rotation)
         found = NamedJoints(()) if path else find_joints(free, file, robot, half_pose=half)
-        if whole and not (path or found.columns or pose.position):
+        if whole and not (path or found.columns or pose.position or some_named(free, robot)[0]):
             found = proved_by_rates(numbered_alike(free), whole)
+        if len(found.columns) == 4 and turns_as_quaternion(found.columns, layouts):
+            unit = f"{listed(found.columns)} with length 1 in each row, as a quaternion has"
+            raise which_joints(file, unit, [found.columns])
     pose = with_form(pose, options.rotation)
     if not found.columns:
         return _path(columns, numeric, pose, layouts, robot, path=path)
@@ -231,13 +236,22 @@ def _path(
         lacking = f"found joint columns {listed(found)} and none for {', '.join(missing)}, allowed: {need}"
         answers = () if robot else (take(found),)
         raise LogError(Finding(lacking, file=file, hints=(record, *answers, other)))
-    raise which_joints(file, f"no joint columns in {listed(columns)}", _may_be(numeric, robot), need)
+    none = f"no joint columns in {listed(columns)}" if columns else "no column of numbers"
+    raise which_joints(file, none, _may_be(numeric, layouts, robot), need)
 
 
-def _may_be(numeric: Sequence[Column], robot: Chain | None) -> list[Sequence[Column]]:
-    """Return the columns that may be joints whatever their names, if they are as many as an arm has."""
+def _may_be(
+    numeric: Sequence[Column], layouts: Sequence[Layout], robot: Chain | None
+) -> list[Sequence[Column]]:
+    """Return the columns that may be joints whatever their names, if they are as many as an arm has.
+
+    The only one that increases from row to row may be a time.
+    """
     about_else = vocabulary().other | vocabulary().outside
     others = [column for column in numeric if not column.words & about_else]
+    steps = [np.diff(layouts[column.table].numbers(column.index)) for column in others]
+    rising = [column for column, own in zip(others, steps, strict=True) if len(own) > 1 and (own > 0).all()]
+    others = [column for column in others if len(rising) != 1 or column is not rising[0]]
     fits = {len(robot.coordinates)} if robot else range(1, MOST_JOINTS + 1)
     groups = sorted([*by_arm(others), *numbered_alike(others)], key=len, reverse=True)
     return [group for group in groups if len(group) in fits]

@@ -14,6 +14,11 @@ _UNIT = r"(?:[^\])\d]|(?<=[sm^])[23]|1(?=/))*"
 _BRACKETED = re.compile(rf"\[{_UNIT}\]|\({_UNIT}\)")
 """A unit in brackets, such as [rad/s^2] or (1/min); with another number it is an index."""
 
+_COUNTED = re.compile(
+    r"(?P<stem>(Var|V|f|X|[Cc]ol(umn)?|[Ff]ield|[Cc]h(annel)?|data|ans|arr|Unnamed:)?[ _.]*)(?P<n>\d+)"
+)
+"""What programs call columns that nobody named: pandas, MATLAB, R, NumPy."""
+
 Row = list[str]
 
 
@@ -37,8 +42,19 @@ def header_of(before: Sequence[HeadLine], delimiter: str, width: int) -> tuple[t
             continue
         above = split[at - 1] if at else []
         names = _grouped(cells, above) if abs(len(above) - len(cells)) <= 1 else cells
+        same = names == cells and len(above) == len(cells)
+        units = above if not units and same and _all_units(above, [cells]) else units
         return (line.number, [printable(cell) for cell in names]), units
     return None, units
+
+
+def only_count(names: Sequence[str]) -> bool:
+    """Return whether names say nothing but the numbers of their columns: 0, 1, 2 of pandas, Var1, Var2."""
+    found = [_COUNTED.fullmatch(name) for name in names if name]
+    if len(found) < 3 or not all(found):
+        return False
+    parts = [(match["stem"], int(match["n"])) for match in found if match]
+    return len({stem for stem, _ in parts}) == 1 and all(b == a + 1 for (_, a), (_, b) in pairwise(parts))
 
 
 def numbered(above: HeadLine, row: Sequence[str], delimiter: str) -> bool:
@@ -50,8 +66,10 @@ def numbered(above: HeadLine, row: Sequence[str], delimiter: str) -> bool:
     if len(groups) != len(row):
         return False
     both = [(group, name) for group, name in zip(groups, row, strict=True) if name]
-    counts = [[name for _, name in cells] for _, cells in groupby(both, key=lambda pair: pair[0])]
-    return any(len(count) > 1 for count in counts) and all(map(count_up, counts))
+    counts = {group: [name for _, name in cells] for group, cells in groupby(both, key=lambda pair: pair[0])}
+    return bool(counts) and all(
+        len(count) > 1 and count_up(count) and not group[-1:].isdigit() for group, count in counts.items()
+    )
 
 
 def _grouped(names: Row, above: Row) -> Row:

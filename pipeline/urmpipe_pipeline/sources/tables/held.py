@@ -19,6 +19,7 @@ from urmpipe_pipeline.sources.cells.cell import LONGEST_NS, is_text, to_float, t
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.tables import numpy_columns
 from urmpipe_pipeline.sources.tables.column_facts import UNIT, is_number
+from urmpipe_pipeline.sources.tables.header_lines import only_count
 from urmpipe_pipeline.sources.tables.numbers import (
     NO_TIME,
     SHOWN_FINDINGS,
@@ -84,7 +85,8 @@ def layout_of(held: Held) -> Layout:
     _refuse_empty(held, table)
     columns = [_texts(column.slice(0, SAMPLED_LINES)).to_pylist() for column in table.columns]
     sample = tuple(tuple(cell or "" for cell in row) for row in zip(*columns, strict=True))
-    names = tuple(table.column_names) if held.named else tuple(str(k + 1) for k in range(table.num_columns))
+    named = held.named and not only_count(table.column_names)
+    names = tuple(table.column_names) if named else tuple(str(k + 1) for k in range(table.num_columns))
     units = tuple((field.metadata or {}).get(UNIT, b"").decode() for field in table.schema)
     known = tuple(unit if vocabulary().unit(unit) else "" for unit in units)
     return Layout(
@@ -93,8 +95,8 @@ def layout_of(held: Held) -> Layout:
         decimal=".",
         names=names,
         units=known if any(known) else (),
-        header=1 if held.named else None,
-        first_line=2 if held.named else 1,
+        header=1 if named else None,
+        first_line=2 if named else 1,
         offset=0,
         sample=sample,
         inferences=held.inferences,

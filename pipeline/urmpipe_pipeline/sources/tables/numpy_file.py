@@ -15,11 +15,19 @@ import pyarrow as pa
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
+from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.tables.held import Held
 from urmpipe_pipeline.sources.tables.numpy_columns import column
+from urmpipe_pipeline.sources.vocabulary import key, split_unit, vocabulary
 
 _NPY = b"\x93NUMPY"
 _IN_ORDER = re.compile(r"(arr_\d+)?")
+SURELY_SECONDS = 0.05
+"""A time between samples of so much or less is in s: in ms it would be one of 20 kHz or more."""
+
+ROWS = 16
+"""An array alone with so few rows, and more columns, may have joints as rows."""
+
 _SHOWN = 6
 """Arrays that are named where their lengths differ."""
 
@@ -43,9 +51,42 @@ def read_numpy(path: Path) -> Held:
     tables = _upright(tables)
     _refuse_lengths(path, tables)
     in_order = all(_IN_ORDER.fullmatch(name) for name in tables)  # of numpy.savez(file, t, q)
+    wide = [array for array in tables.values() if array.ndim == 2 and len(array) <= ROWS < array.shape[1]]
+    in_order = in_order or len(tables) == len(wide) == 1  # joints as rows, which are asked about
     named = not in_order or bool(tables.get("", np.empty(0)).dtype.names)
-    columns = pa.table({name: column(values) for name, values in _columns(tables)})
-    return Held(path.stem, columns, named=named, path=path)
+    values = dict(_columns(tables))
+    times, said = _even_times(arrays, values) if named else ({}, ())
+    columns = pa.table({name: column(one) for name, one in (times | values).items()})
+    return Held(path.stem, columns, named=named, path=path, inferences=said)
+
+
+def _even_times(
+    arrays: Mapping[str, Array | None], columns: Mapping[str, Array]
+) -> tuple[dict[str, Array], tuple[Inference, ...]]:
+    """Return the times that a single number between samples gives, if no column is named like a time.
+
+    One of more than 0.05 may be in ms: it says nothing.
+    """
+    words = vocabulary()
+    if any(pattern.search(key(split_unit(name)[0])) for name in columns for pattern in words.time):
+        return {}, ()
+    single = {name: float(one.item()) for name, one in arrays.items() if one is not None and _is_number(one)}
+    periods = {
+        name: value
+        for name, value in single.items()
+        if 0.0 < value <= SURELY_SECONDS and any(pattern.search(key(name)) for pattern in words.period)
+    }
+    if len(periods) != 1:
+        return {}, ()
+    ((name, period),) = periods.items()
+    rows = len(next(iter(columns.values())))
+    times = np.rint(np.arange(rows) * (period * 1e9)).astype(np.int64)
+    said = Inference("period", f"{period:g} s", f"{name} = {period:g} in the file", hints=(Hint("period"),))
+    return {"t [ns]": times}, (said,)
+
+
+def _is_number(array: Array) -> bool:
+    return array.size == 1 and array.dtype.kind in "uif"
 
 
 def _upright(tables: Mapping[str, Array]) -> dict[str, Array]:

@@ -27,7 +27,7 @@ from urmpipe_pipeline.sources.cells.cell import (
 )
 from urmpipe_pipeline.sources.cells.text_clock import looks_like_a_clock
 from urmpipe_pipeline.sources.tables.form import Form
-from urmpipe_pipeline.sources.tables.header_lines import header_of, numbered
+from urmpipe_pipeline.sources.tables.header_lines import header_of, numbered, only_count
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.text import HEAD_BYTES, HeadLine, Segment, head_lines
 from urmpipe_pipeline.text import counted
@@ -166,6 +166,9 @@ def sniff(
     before = [line for line in lines if line.number < body[first].number]
     header, units = header_of(before, style.delimiter, width)
     names, said = _names(segment, header, body[first:], rows[first:], width)
+    if header and only_count(names):
+        said = Inference("header", f"line {header[0]}", "its names only count: columns by number")
+        header, names = None, _by_number(names)
     return Layout(
         segment=segment,
         delimiter=style.delimiter,
@@ -178,6 +181,12 @@ def sniff(
         sample=tuple(tuple(row) for row in rows[first:]),
         inferences=(*_style_inferences(style, delimiter, decimal, told), said),
     )
+
+
+def _by_number(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return names that only count, or in their place numbers from 1, as users have them."""
+    bare = all(name.isdigit() for name in names if name)
+    return tuple(str(k + 1) if name else "" for k, name in enumerate(names)) if bare else names
 
 
 def _told_delimiter(lines: Sequence[HeadLine]) -> tuple[str | None, Sequence[HeadLine]]:

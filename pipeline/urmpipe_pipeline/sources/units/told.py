@@ -95,8 +95,9 @@ class Tellers:
             return self.given[column.number]
         if column.unit_text and column.unit is None:
             message = f"found the unit {shown(column.unit_text)}, allowed: rad, deg, m, mm, cm"
-            hints = unit_hints([column], "mm" if likely == "length" else "deg", "says which")
-            raise LogError(Finding(message, self.file, column=column.header, hints=hints))
+            hints = unit_hints([column], "mm" if likely == "length" else "deg", "takes the values so")
+            said = f"{message}; convert the values"
+            raise LogError(Finding(said, self.file, column=column.header, hints=hints))
         return column.unit
 
     def _first(self, column: Column, allowed: Sequence[Quantity]) -> Told | None:

@@ -307,6 +307,7 @@ class UnitFinder:
         fast = fast if largest <= MOST_DEGREES else None  # neither rad nor deg: ticks, percents
         if not fast and largest > MOST_TURNS * math.tau:
             message = f"found values up to {largest:.6g} in {names} and no unit, allowed: rad or deg"
+            message += "; convert ticks and counts" if largest > MOST_DEGREES else ""
             unnamed = all(column.header.isdigit() for column in columns)
             hints = [Hint("unit", {"": name}, "says which") for name in ("rad", "deg")]
             hints += (

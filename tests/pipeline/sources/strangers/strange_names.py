@@ -86,6 +86,7 @@ def family_of_names() -> Iterator[Stranger]:
     half = ["joint1_pos", "joint2_pos", "joint3_pos", "wrist_a_pos", "wrist_b_pos", "wrist_c_pos"]
     yield table(made(304), "t q", {"t": "time", "q": half}, writer=TABS)
     yield table(made(305), "t q tau", {"t": "time", "q": suffixed(WX, "_pos"), "tau": suffixed(WX, "_load")})
+    yield table(made(309, 5), "t q", {"t": "time", "q": URS[:5]})
     for k, (pattern, unit) in enumerate(MAKERS):
         yield table(
             made(601 + k), "t q", {"t": "time", "q": pattern}, unit=unit, writer=(CSV, TABS, PANDAS)[k % 3]
@@ -107,6 +108,8 @@ def positions_and_velocities_side_by_side() -> Iterator[Stranger]:
     yield mixed(
         made(316), suffixed(numbered("A{}"), ".pos", ".vel", ".trq"), ("q", "qd", "tau"), writer=PANDAS
     )
+    yield mixed(made(318, 5), suffixed(URS[:5], "", "_velocity"), both, writer=SEMICOLON)
+    yield mixed(made(319, 4), suffixed(WX[:4], "", "_vel"), both)
     yield mixed(made(317), suffixed(numbered("joint_{}"), "", "_speed", "_current"), ("q", "qd", "current"))
 
 

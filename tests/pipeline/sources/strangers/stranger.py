@@ -12,9 +12,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from asking import Truth
+from asking import Truth, Verdict, judge
 from motion import Motion
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.sources import ReadOptions
 
 DEG = np.pi / 180
 
@@ -97,7 +100,7 @@ COARSE = Writer("f-string-3", _fstrings(".3f", ","), 3)
 WRITERS = (CSV, TABS, QUOTED, PANDAS, GERMAN, SEMICOLON, SAVETXT, SIX, COMMA, FIXED, COARSE)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Stranger:
     """A file of a stranger.
 
@@ -118,6 +121,13 @@ class Stranger:
     options: Mapping[str, Any] = field(default_factory=dict)
     beside: tuple[str, ...] = ()
     kind: str = ""
+
+    def __repr__(self) -> str:
+        begin = {name: content[:200] for name, content in self.files.items()}
+        return f"Stranger({begin}, robot={self.robot!r}, arm={self.arm})"
+
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
+        printer.text(repr(self))  # else Hypothesis prints whole files
 
     def write(self, folder: Path) -> list[Path]:
         """Write its files, and return those to read."""
@@ -210,6 +220,18 @@ def _names(pattern: str | Sequence[str], count: int) -> list[str]:
     if not isinstance(pattern, str):
         return list(pattern)
     return [pattern.format(k + 1) for k in range(count)]
+
+
+def judged(one: Stranger, folder: Path) -> Verdict:
+    """Read the files of a stranger with what is given with them."""
+    told: dict[str, Any] = {
+        name: value.format(folder=folder) if isinstance(value, str) else value
+        for name, value in one.options.items()
+    }
+    robot = load_robot(one.robot) if one.robot else None
+    if one.arm:
+        robot = Chain("arm", tuple(Joint(f"phi{k + 1}", kind="revolute") for k in range(one.arm)))
+    return judge(one.write(folder), one.truth, ReadOptions(**told), robot)
 
 
 STRANGERS: dict[str, Stranger] = {}

@@ -8,7 +8,6 @@ import re
 import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -16,29 +15,15 @@ import strange_clocks  # noqa: F401 - each puts its files on the list of strange
 import strange_columns  # noqa: F401
 import strange_layouts  # noqa: F401
 import strange_names  # noqa: F401
-from asking import Verdict, judge, outcome
+from asking import outcome
 from motion import sines, times
 from ordinary import well_written
-from stranger import STRANGERS, Stranger
+from stranger import STRANGERS, Stranger, judged
 from urmpipe.main import run
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import ReadOptions
 
 ORDINARY: Mapping[str, Stranger] = {f"ordinary-{k + 1}": one for k, one in enumerate(well_written())}
-
-
-def judged(one: Stranger, folder: Path) -> Verdict:
-    """Read the files of a stranger with what is given with them."""
-    told: dict[str, Any] = {
-        name: value.format(folder=folder) if isinstance(value, str) else value
-        for name, value in one.options.items()
-    }
-    robot = load_robot(one.robot) if one.robot else None
-    if one.arm:
-        robot = Chain("arm", tuple(Joint(f"phi{k + 1}", kind="revolute") for k in range(one.arm)))
-    return judge(one.write(folder), one.truth, ReadOptions(**told), robot)
 
 
 @pytest.mark.parametrize("name", STRANGERS)

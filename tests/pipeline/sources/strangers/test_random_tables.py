@@ -12,15 +12,25 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from asking import Verdict, judge
 from motion import Motion, moves, sines, times
 from strange_clocks import EPOCH, chunked, two_columns
 from strange_columns import grouped
 from strange_layouts import savetxt, stranger
 from strange_names import URS, WX, followed, mixed, numbered, other, suffixed
-from stranger import CSV, FIXED, PANDAS, SAVETXT, SEMICOLON, TABS, WRITERS, Clock, Stranger, table, unit_clock
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_pipeline.sources import ReadOptions
+from stranger import (
+    CSV,
+    FIXED,
+    PANDAS,
+    SAVETXT,
+    SEMICOLON,
+    TABS,
+    WRITERS,
+    Clock,
+    Stranger,
+    judged,
+    table,
+    unit_clock,
+)
 
 TABLES = 500
 
@@ -190,16 +200,6 @@ def padded(draw: st.DrawFn) -> Stranger:
 drawn = st.one_of(tables(), tables(), tables(), mixed_columns(), two_lines(), laid_out(), padded())
 
 
-def judged(one: Stranger) -> Verdict:
-    robot = (
-        Chain("arm", tuple(Joint(f"phi{k + 1}", kind="revolute") for k in range(one.arm)))
-        if one.arm
-        else None
-    )
-    with tempfile.TemporaryDirectory() as folder:
-        return judge(one.write(Path(folder)), one.truth, ReadOptions(), robot)
-
-
 @pytest.mark.slow  # five hundred tables, each with its answers: half a minute
 @settings(
     max_examples=TABLES, derandomize=True, database=None, deadline=None, phases=[Phase.generate],
@@ -207,5 +207,6 @@ def judged(one: Stranger) -> Verdict:
 )  # fmt: skip
 @given(drawn)
 def test_a_random_table_is_right_or_asked_about(one: Stranger) -> None:
-    verdict = judged(one)
+    with tempfile.TemporaryDirectory() as folder:
+        verdict = judged(one, Path(folder))
     assert verdict.good and not verdict.unit_first, verdict
