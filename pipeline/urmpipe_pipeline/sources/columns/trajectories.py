@@ -64,7 +64,8 @@ def path_of_poses(
     if pose is None or table is None:
         return None
     warnings = []
-    if rotation is None and len(pose.forms) > 1 and table.layout.delimiter == SPACES:
+    timed = len(table.layout.names) == 1 + QUATERNION  # poses alone are no TUM
+    if rotation is None and len(pose.forms) > 1 and timed and table.layout.delimiter == SPACES:
         pose = replace(pose, forms=("quat_xyzw",))
         warnings = [_about_order(pose.rotation)]
     pose = with_form(pose, rotation)
