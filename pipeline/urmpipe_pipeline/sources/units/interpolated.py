@@ -90,10 +90,14 @@ def interpolated_rows(values: FloatArray) -> BoolArray:
         steps = np.linalg.norm(np.diff(values, axis=0), axis=1)
         known = steps[np.isfinite(steps)]
         usual = float(np.median(known)) if len(known) else 0.0
+        large = steps > USUAL * usual
+        starts = np.flatnonzero(large[:-1] & large[1:])  # a jump has two such steps or more
         for width in range(2, min(MOST_BETWEEN + 1, len(steps)) + 1):
-            ends = np.linalg.norm(values[width:] - values[:-width], axis=1)
-            for first in np.flatnonzero(np.abs(ends - jump) <= NEAR * jump).tolist():
-                if _is_straight(steps, first, width, float(ends[first]), usual):
+            starts = starts[starts + width <= len(steps)]
+            ends = np.linalg.norm(values[starts + width] - values[starts], axis=1)
+            for k in np.flatnonzero(np.abs(ends - jump) <= NEAR * jump).tolist():
+                first = int(starts[k])
+                if _is_straight(steps, first, width, float(ends[k]), usual):
                     found[first + 1 : first + width] = True
     return found
 
