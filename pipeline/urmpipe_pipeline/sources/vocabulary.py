@@ -15,6 +15,9 @@ from urmpipe_models.orientation import RotationForm
 Quantity = Literal["angle", "length", "time", "date", "ratio"]
 Patterns = tuple[re.Pattern[str], ...]
 
+SURELY_SECONDS = 0.05
+"""A time between samples of so much or less is in s: in ms it would be one of 20 kHz or more."""
+
 _BRACKETS = re.compile(r"^(?P<label>.*?\S)\s*[\[(](?P<inside>[^\[\]()]*)[\])]\s*$")
 _INSIDE = re.compile(
     r"(?<=[\s_./])(?P<unit>rad|deg)(?P<rate>_?(?:per_)?s(?:ec)?_?(?P<power>2?))?(?=[\s_./][\w])",

@@ -155,3 +155,46 @@ def test_columns_by_a_range_of_numbers(read: Read) -> None:
     with pytest.raises(LogError, match="joints: found no column '6', allowed: a, b, c, d, e"):
         read(text, joints=["4-9"])
     assert read(table("2-3 q1 q2"), joints=["2-3"]).joints == ("2-3",)
+
+
+def test_a_quaternion_named_as_joints_is_asked_about(read: Read) -> None:
+    rows = [f"{t!r},{np.cos(t):.9f},{np.sin(t):.9f},0.0,0.0" for t in T.tolist()]
+    with pytest.raises(LogError, match="found q0, q1, q2, q3 with length 1 in each row"):
+        read("\n".join(["t,q0,q1,q2,q3", *rows]))
+
+
+def test_several_logs_in_a_file_are_one_line(read: Read) -> None:
+    rows = [f"{t!r},{np.sin(t + k):.9f}" for k in range(3) for t in T.tolist()]
+    with pytest.raises(LogError, match=r"found 3 logs in one file: .* rows 61, 121, ") as asked:
+        read("\n".join(["t,q1", *rows]))
+    assert len(asked.value.findings) == 1
+
+
+@pytest.mark.parametrize(("file_dt", "period"), [(0.01, 0.01), (2.0, 0.005)])
+def test_the_time_between_samples_in_a_numpy_file(file_dt: float, period: float, tmp_path: Path) -> None:
+    """2.0 may be ms, and says nothing: the period is assumed, and said."""
+    q = np.column_stack([np.sin(T), np.cos(3 * T)])
+    np.savez(tmp_path / "log.npz", q=q, dt=file_dt)
+    log = read_log([tmp_path / "log.npz"])
+    assert (log.q.tolist(), log.period) == (q.tolist(), period)
+    assert log.period_assumed == (file_dt > 1)
+
+
+def test_joints_as_rows_beside_a_time_in_a_numpy_file(tmp_path: Path) -> None:
+    q = np.column_stack([np.sin(T), np.cos(3 * T)])
+    np.savez(tmp_path / "log.npz", t=T, q=q.T)
+    log = read_log([tmp_path / "log.npz"])
+    assert (log.q.tolist(), log.t.tolist()) == (q.tolist(), T.tolist())
+
+
+def test_units_above_the_names(read: Read) -> None:
+    rows = "\n".join(f"{t!r},{90 * np.sin(t):.9f},{300 * np.cos(t):.9f}" for t in T.tolist())
+    log = read(f"[s],[deg],[deg]\nt,q1,q2\n{rows}\n")
+    assert log.units == {"t": "s", "q1": "deg", "q2": "deg"}
+
+
+@pytest.mark.parametrize("names", ["0,1,2", "Var1,Var2,Var3", "f0,f1,f2"])
+def test_names_that_only_count_are_none(names: str, read: Read) -> None:
+    rows = "\n".join(f"{t!r},{np.sin(t):.9f},{np.cos(3 * t):.9f}" for t in T.tolist())
+    log = read(f"{names}\n{rows}\n", time="1")
+    assert (log.t.tolist(), log.joints) == (T.tolist(), ("q1", "q2"))

@@ -18,13 +18,10 @@ from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.tables.held import Held
 from urmpipe_pipeline.sources.tables.numpy_columns import column
-from urmpipe_pipeline.sources.vocabulary import key, split_unit, vocabulary
+from urmpipe_pipeline.sources.vocabulary import SURELY_SECONDS, key, split_unit, vocabulary
 
 _NPY = b"\x93NUMPY"
 _IN_ORDER = re.compile(r"(arr_\d+)?")
-SURELY_SECONDS = 0.05
-"""A time between samples of so much or less is in s: in ms it would be one of 20 kHz or more."""
-
 ROWS = 16
 """An array alone with so few rows, and more columns, may have joints as rows."""
 

@@ -23,7 +23,7 @@ from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.tables.held import Held
 from urmpipe_pipeline.sources.tables.numpy_columns import column
 from urmpipe_pipeline.sources.tables.programs.program import Program, shortened
-from urmpipe_pipeline.sources.vocabulary import key, split_unit, vocabulary
+from urmpipe_pipeline.sources.vocabulary import SURELY_SECONDS, key, split_unit, vocabulary
 from urmpipe_pipeline.text import counted
 
 _DECLARED = re.compile(
@@ -36,9 +36,6 @@ _LENGTH = re.compile(r"L?T(?:IME)?#(?=\d)((?:\d+(?:\.\d+)?(?:d|h|ms|us|ns|m|s))+
 _PARTS = re.compile(r"([\d.]+)(d|h|ms|us|ns|m|s)", re.IGNORECASE)
 _SECONDS = {"d": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _NUMBER = re.compile(r"(?:\w+#)?([+-]?\d[\d_]*(?:\.[\d_]+)?(?:e[+-]?\d+)?)", re.IGNORECASE)
-
-_SURELY_SECONDS = 0.05
-"""A time between samples up to this, without a unit, is in s: as ms it would be shorter than 50 us."""
 
 _MOST = 10**8
 """Values of an array whose bounds are not known."""
@@ -272,7 +269,7 @@ def _seconds(program: Program, scalar: _Scalar) -> float:
         return scalar.value
     if unit is not None and unit.quantity == "time":
         return scalar.value * unit.factor
-    if scalar.value <= _SURELY_SECONDS:
+    if scalar.value <= SURELY_SECONDS:
         return scalar.value
     units = {"s": scalar.value, "ms": float(f"{scalar.value * 1e-3:.12g}")}
     if scalar.value >= 50.0:  # a controller's cycle in us
