@@ -7,6 +7,7 @@ checks), 2 bad input or usage.
 from __future__ import annotations
 
 import gc
+import signal
 import sys
 import warnings
 from collections.abc import Sequence
@@ -122,7 +123,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = list(sys.argv[1:] if arguments is None else arguments)
     gc.set_threshold(COLLECT_AT)
     open_streams()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # what ends us asks for order, as Ctrl-C does
     code = run(given)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done: there is nothing left to stop
     close_streams()
     gc.freeze()  # else Python looks for cycles among all modules before it exits
     sys.exit(code)
@@ -149,5 +152,6 @@ def run(arguments: Sequence[str]) -> int:
             traceback.print_exception(error)
         findings = findings_of(error)
         print_findings(findings, as_json)
-        tell_junit_of(arguments, findings)
+        if not isinstance(error, (KeyboardInterrupt, click.Abort)):  # Ctrl-C: all files stay as they were
+            tell_junit_of(arguments, findings)
     return 2

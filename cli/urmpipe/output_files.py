@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
+from urmpipe import __version__
 from urmpipe.keyword_checks import PathLike
-from urmpipe_models.errors import Finding, OptionError, shown
-from urmpipe_pipeline.outputs import NOUNS, OutputKind, guarded_output, refuse_output
+from urmpipe_models.errors import Finding, OptionError, for_each, shown
+from urmpipe_pipeline.outputs import DRAWING_HEADER, NOUNS, OutputKind, guarded_output, refuse_output
+from urmpipe_pipeline.placing import all_or_none
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.recording import import_ahead
 from urmpipe_pipeline.results import write_recording
@@ -18,11 +20,48 @@ from urmpipe_pipeline.results import write_recording
 Made = TypeVar("Made", bound=Result)
 
 
+class Outputs:
+    """The files that a public function writes beside its result, none of which has its name yet."""
+
+    def __init__(self, named: Mapping[OutputKind, Path], inputs: Sequence[Path]) -> None:
+        self._named = named
+        self._inputs = inputs
+
+    def write(self, kind: OutputKind, write: Callable[[Path, Path], object]) -> None:
+        """Write the file of a kind, if it was asked for.
+
+        Args:
+            kind: Which.
+            write: Writes to its first argument what is to stand in the second.
+
+        Raises:
+            OutputError: If it could not be written.
+        """
+        path = self._named.get(kind)
+        if path is not None:
+            with guarded_output(path, self._inputs, kind) as part:
+                write(part, path)
+
+    def recorded(self, result: Made, progress: Callable[[float], None] | None) -> Made:
+        """Return a result with the recording that was written of it; as it is if none was asked for.
+
+        Args:
+            result: What to record.
+            progress: Told the share of the recording that is written, 0..1.
+
+        Raises:
+            OutputError: If it could not be written, or did not read back as it was written.
+        """
+        path = self._named.get("recording")
+        if path is None:
+            return result
+        written = write_recording(result, path, self._inputs, progress)
+        return replace(result, recording=written)  # type: ignore[type-var]
+
+
 @contextmanager
-def guarded_outputs(
-    named: Mapping[OutputKind, PathLike | None], inputs: Sequence[Path]
-) -> Iterator[dict[OutputKind, Path]]:
-    """Give the parts to write of all outputs but the recording, which `recorded` writes: all or none of them.
+def guarded_outputs(named: Mapping[OutputKind, PathLike | None], inputs: Sequence[Path]) -> Iterator[Outputs]:
+    """Let the body write its outputs, and give them their names once all are written: all or none.
 
     Args:
         named: The files that are asked for, by kind; None for one that is not.
@@ -30,42 +69,21 @@ def guarded_outputs(
 
     Raises:
         OptionError: If two outputs have one name.
-        OutputError: If one may not be written there.
+        OutputError: With all that may not be written where it is asked for; if one cannot be written.
     """
     targets = {kind: Path(path) for kind, path in named.items() if path is not None}
     _refuse_shared(targets)
+    for_each(lambda one: refuse_output(one[1], inputs, one[0]), targets.items())
     if "recording" in targets:
-        refuse_output(targets["recording"], inputs, "recording")
         import_ahead()
-    with ExitStack() as stack:
-        yield {
-            kind: stack.enter_context(guarded_output(path, inputs, kind))
-            for kind, path in targets.items()
-            if kind != "recording"
-        }
+    with all_or_none():
+        yield Outputs(targets, inputs)
 
 
-def recorded(
-    result: Made,
-    output: PathLike | None,
-    inputs: Sequence[Path],
-    progress: Callable[[float], None] | None,
-) -> Made:
-    """Return a result with the recording that was written of it; as it is without an output.
-
-    Args:
-        result: What to record.
-        output: The recording (.rrd) to write; None for none.
-        inputs: Files that are never replaced.
-        progress: Told the share of the recording that is written, 0..1.
-
-    Raises:
-        OutputError: If it may not be written there, or did not read back as it was written.
-    """
-    if output is None:
-        return result
-    written = write_recording(result, Path(output), inputs, progress)
-    return replace(result, recording=written)  # type: ignore[type-var]
+def write_drawing(part: Path, svg: str) -> None:
+    """Write a drawing with the mark by which one of ours is known."""
+    header = "" if svg.startswith(DRAWING_HEADER) else f"{DRAWING_HEADER}{__version__} -->\n"
+    part.write_text(header + svg, encoding="utf-8", newline="\n")
 
 
 def output_kind(output: Path | None, log: OutputKind) -> OutputKind | None:

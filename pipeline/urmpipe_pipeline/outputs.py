@@ -1,13 +1,9 @@
-"""Writing a file so that it is whole or not there: beside its place first, then renamed.
-
-An output replaces only one of its own kind that urmpipe wrote, and never an input.
-"""
+"""Where an output may be written: it replaces only one of its own kind that urmpipe wrote, never an input."""
 
 from __future__ import annotations
 
 import os
 import re
-import uuid
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,6 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 from urmpipe_models.errors import Finding, OutputError
+from urmpipe_pipeline.placing import placed
 from urmpipe_pipeline.text import encodable
 
 OutputKind = Literal[
@@ -100,24 +97,16 @@ HEAD = 4096
 
 @contextmanager
 def guarded_output(path: Path, inputs: Sequence[Path], kind: OutputKind) -> Iterator[Path]:
-    """Give a place to write an output to, and put it in its own place once it is written.
+    """Give a place to write an output to, and put it in its own place once it is written, see `placed`.
 
-    The place is a new name with the suffix .part in the same folder, and nothing is there yet. It is renamed
-    to `path` if the body succeeds, and removed if it fails; an existing output is untouched until the rename.
     Only another one of the same kind is replaced, never an input; inputs that are no files are passed over.
 
     Raises:
         OutputError: If it may not be written there, or could not be.
     """
     refuse_output(path, inputs, kind)
-    part = path.with_name(f"{path.stem[:40]}.{uuid.uuid4().hex[:12]}.part")
-    try:
+    with placed(path) as part:
         yield part
-        part.replace(path)
-    except OSError as error:
-        raise OutputError(Finding(f"cannot be written: {error.strerror or error}", str(path))) from error
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def is_report(path: Path) -> bool:

@@ -6,6 +6,7 @@ import os
 import sys
 import zipfile
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -232,9 +233,10 @@ def test_a_folder_that_may_not_be_written_is_one_line(tmp_path: Path) -> None:
 
 def test_two_writers_of_one_output_do_not_meet(tmp_path: Path) -> None:
     path = tmp_path / "report.html"
-    with guarded_output(path, (), "report") as one, guarded_output(path, (), "report") as other:
+    with ThreadPoolExecutor() as pool, guarded_output(path, (), "report") as one:
         one.write_text("one")
-        other.write_text("other")
+        pool.submit(write, path).result()
+        assert path.read_text() == "new"
     assert [(file, file.read_text()) for file in tmp_path.iterdir()] == [(path, "one")]
 
 

@@ -16,7 +16,7 @@ from urmpipe.driven_runs.arm_runs import ArmRuns
 from urmpipe.driven_runs.arm_unit import ArmUnit
 from urmpipe.driven_runs.running_speed import running_speed
 from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_recording, refuse_warnings
-from urmpipe.output_files import guarded_outputs, recorded
+from urmpipe.output_files import guarded_outputs
 from urmpipe.reading import UntimedReading, map_files, options_of, resolved
 from urmpipe.systems.blocks import ON_PYTHON
 from urmpipe.systems.units import Backend
@@ -134,7 +134,7 @@ def accuracy(
     )
     request, given, _, pushed = for_each(lambda make: make(), parts)
     kept = [*([] if given.file is None else paths(str(path))), *map_files(reading), *paths(inputs)]
-    with guarded_outputs({"recording": output}, kept):
+    with guarded_outputs({"recording": output}, kept) as written:
         asked = list(dict.fromkeys(map(float, velocities)))
         runs, notes = _runs(
             given, request, pushed, backend, tell, lambda share: done(RUNNING * share), asked[0]
@@ -143,7 +143,7 @@ def accuracy(
         speed = None if limit is None else running_speed(_judge(runs, limit, error), asked)
         result = _accuracy(given, request, runs, motions, speed, limit, error, notes)
         refuse_warnings(strict, [one for one in result.warnings if one.kind != ON_PYTHON])
-        return recorded(result, output, kept, lambda share: done(RUNNING + (1.0 - RUNNING) * share))
+        return written.recorded(result, lambda share: done(RUNNING + (1.0 - RUNNING) * share))
 
 
 def _request(arm: Chain | None, start: Sequence[float] | FloatArray | None, timing: Timing) -> Request:

@@ -19,7 +19,7 @@ from urmpipe.keyword_checks import (
     refuse_others,
     refuse_warnings,
 )
-from urmpipe.output_files import guarded_outputs, recorded
+from urmpipe.output_files import guarded_outputs
 from urmpipe.reading import Reading, map_files, resolved
 from urmpipe_models.errors import Finding, OptionError, RecordingError, for_each
 from urmpipe_models.messages import Hint
@@ -156,7 +156,7 @@ def compare(
         "recording": output, "junit": junit, "statistics": csv,
     }  # fmt: skip
     told = None if junit is None else Path(junit)
-    with errors_in_junit(told, kept, voice), guarded_outputs(outputs, kept) as parts:
+    with errors_in_junit(told, kept, voice), guarded_outputs(outputs, kept) as written:
         level = _noise_level(noise, baseline)
         given = resolved(reading, robot, base, tool, base_link, tip_link)
         test = iso_options(
@@ -179,11 +179,10 @@ def compare(
         _refuse_doubts(strict, made)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         shown = present(result)
-        if told is not None:
-            write_junit(shown, parts["junit"], told, voice)
-        if csv is not None and shown.rows is not None:
-            write_table(shown.rows(), parts["statistics"], Path(csv))
-        return recorded(result, output, kept, progress)
+        written.write("junit", lambda part, path: write_junit(shown, part, path, voice))
+        if (rows := shown.rows) is not None:
+            written.write("statistics", lambda part, path: write_table(rows(), part, path))
+        return written.recorded(result, progress)
 
 
 def operands_of(given: Mapping[str, Sequence[Any]], *further: type) -> list[Any]:

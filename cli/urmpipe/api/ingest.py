@@ -19,7 +19,7 @@ from urmpipe.keyword_checks import (
     refuse_others,
     refuse_warnings,
 )
-from urmpipe.output_files import guarded_outputs, recorded
+from urmpipe.output_files import guarded_outputs
 from urmpipe.reading import Reading, map_files, resolved
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, for_each
@@ -109,12 +109,10 @@ def ingest(
             files, robot=given.arm, read=options, tsp=tsp, derivative=derivative, name=name or folder
         )
         refuse_warnings(strict, run.warnings)
-        if audit is not None:
-            write_table(audit_rows(run), written["audit"], Path(audit))
-        if write_map is not None:
-            named = None if given.robot is None or isinstance(given.robot, Chain) else str(given.robot)
-            write_map_part(run, written["map"], Path(write_map), named)
-        return recorded(run, output, kept, progress)
+        written.write("audit", lambda part, path: write_table(audit_rows(run), part, path))
+        named = None if given.robot is None or isinstance(given.robot, Chain) else str(given.robot)
+        written.write("map", lambda part, path: write_map_part(run, part, path, named))
+        return written.recorded(run, progress)
 
 
 def _files_and_name(log: Any, given: Mapping[str, Any]) -> tuple[list[Path | Held], str | None]:

@@ -6,16 +6,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from urmpipe import __version__
 from urmpipe.keyword_checks import PathLike, public, refuse_warnings
-from urmpipe.output_files import guarded_outputs, recorded
+from urmpipe.output_files import guarded_outputs, write_drawing
 from urmpipe_models.networks import network_file
 from urmpipe_models.networks.assembly import RESTARTS
 from urmpipe_models.networks.network import Network
 from urmpipe_pipeline.networks.drawing import network_svg
 from urmpipe_pipeline.networks.finding import Search, find_network
 from urmpipe_pipeline.networks.result import Command, NetworkResult
-from urmpipe_pipeline.outputs import DRAWING_HEADER
 from urmpipe_pipeline.sources.tables.text import fingerprint
 
 NetworkLike: TypeAlias = PathLike | Mapping[str, Any] | Network
@@ -128,11 +126,9 @@ def _found(
     named = [Path(network)] if isinstance(network, (str, Path)) else []
     files = [path for path in named if path.suffix.lower() == ".toml"]
     tell = progress or (lambda share: None)
-    with guarded_outputs({"recording": output, "drawing": draw}, files) as parts:
+    with guarded_outputs({"recording": output, "drawing": draw}, files) as written:
         inputs = [fingerprint(path) for path in files]
         found = find_network(loaded, command, search, inputs, lambda share: tell(SEARCHING * share))
         refuse_warnings(strict, found.warnings)
-        if draw is not None:
-            header = f"{DRAWING_HEADER}{__version__} -->\n"
-            parts["drawing"].write_text(header + network_svg(found), encoding="utf-8", newline="\n")
-        return recorded(found, output, files, lambda share: tell(SEARCHING + (1.0 - SEARCHING) * share))
+        written.write("drawing", lambda part, path: write_drawing(part, network_svg(found)))
+        return written.recorded(found, lambda share: tell(SEARCHING + (1.0 - SEARCHING) * share))

@@ -8,9 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
-from urmpipe import __version__
 from urmpipe.keyword_checks import PathLike, public_reading, refuse_warnings
-from urmpipe.output_files import guarded_outputs, recorded
+from urmpipe.output_files import guarded_outputs, write_drawing
 from urmpipe.reading import LogReading, map_files
 from urmpipe.systems.blocks import ON_PYTHON, Blocks
 from urmpipe.systems.result import check_meters, simulation_of
@@ -20,7 +19,7 @@ from urmpipe_fmus.cosim import load_system, prepare, read_system, system_name, s
 from urmpipe_fmus.cosim import simulate as run_plan
 from urmpipe_fmus.cosim.process import Worker
 from urmpipe_models.errors import Finding, OptionError
-from urmpipe_pipeline.outputs import DRAWING_HEADER, OutputKind
+from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.simulations.simulation import Simulation
 
 if TYPE_CHECKING:
@@ -71,17 +70,16 @@ def simulate(
     kept = [loaded.path, *_files(loaded), *map_files(reading)]
     named: dict[OutputKind, PathLike | None] = {"recording": output, "drawing": draw}
     running, writing = _halves(progress)
-    with guarded_outputs(named, kept) as parts, Worker() as worker:  # it loads what it needs meanwhile
+    with guarded_outputs(named, kept) as written, Worker() as worker:  # it loads what it needs meanwhile
         blocks = Blocks(loaded, bundled=bundled, backend=backend, reading=reading, told=told)
         plan = prepare(loaded, blocks.make, column=blocks.column, duration=blocks.end, period=blocks.period)
         check_meters(plan, blocks)
         svg = system_svg(plan)
-        if draw is not None:
-            _write_drawing(parts["drawing"], svg)
+        written.write("drawing", lambda part, path: write_drawing(part, svg))
         made = simulation_of(plan, run_plan(plan, progress=running, worker=worker), blocks, svg)
         if made.failed is None:  # else that is told, and what was recorded stays
             refuse_warnings(strict, [one for one in made.warnings if one.kind != ON_PYTHON])
-        return recorded(made, output, kept, writing)
+        return written.recorded(made, writing)
 
 
 def _bundled(system: PathLike, arguments: Mapping[str, str]) -> set[str]:
@@ -147,9 +145,3 @@ def _halves(progress: Callable[[float], None] | None) -> tuple[Callable[[float],
     """Return what to tell the progress of the run, and of its recording."""
     tell = progress or (lambda share: None)
     return lambda share: tell(0.8 * share), lambda share: tell(0.8 + 0.2 * share)
-
-
-def _write_drawing(path: Path, svg: str) -> None:
-    """Write a drawing with the mark by which one of ours is known."""
-    header = f"{DRAWING_HEADER}{__version__} -->\n"
-    path.write_text(svg if svg.startswith(DRAWING_HEADER) else header + svg, encoding="utf-8", newline="\n")

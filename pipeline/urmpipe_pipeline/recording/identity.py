@@ -10,6 +10,7 @@ from threading import Thread
 from typing import TYPE_CHECKING
 
 from urmpipe_pipeline.outputs import know_own
+from urmpipe_pipeline.recording.isolated import abort_of
 
 if TYPE_CHECKING:
     from rerun.chunk import RrdReader, StoreEntry
@@ -33,9 +34,11 @@ WHOLE = b"RRF2FOOT\x01\0\0\0"
 def import_ahead() -> None:
     """Import what writes recordings in a thread of its own: most of a second, while a log is read.
 
-    pandas is imported by pyarrow with the first array that it is given.
+    pandas is imported by pyarrow with the first array that it is given. Nobody waits for the thread: Ctrl-C
+    may leave a lock of an import behind, for which it would wait forever.
     """
-    Thread(target=lambda: [import_module(name) for name in ("rerun.blueprint", "pandas")]).start()
+    names = ("rerun.blueprint", "pandas")
+    Thread(target=lambda: [import_module(name) for name in names], daemon=True).start()
 
 
 def is_recording(path: Path) -> bool:
@@ -51,7 +54,7 @@ def is_ours(path: Path) -> bool:
     if _begins_as_ours(path):
         return True
     try:
-        return bool(our_entries(open_reader(path)))
+        return not abort_of(path) and bool(our_entries(open_reader(path)))
     except (RuntimeError, ValueError):
         return False
 

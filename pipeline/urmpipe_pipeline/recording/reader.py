@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.errors import shown
-from urmpipe_pipeline.recording.array_form import ArrayOf, CodecError
+from urmpipe_pipeline.recording.array_form import ArrayOf, CodecError, In
 from urmpipe_pipeline.recording.codec import decode
+from urmpipe_pipeline.recording.forms import form_of
 from urmpipe_pipeline.recording.rows import Rows
-from urmpipe_pipeline.recording.store import LAYOUT_VERSION, Store
+from urmpipe_pipeline.recording.store import LAYOUT_VERSION, Store, checksum
 
 
 def read_result(path: Path, kinds: Mapping[str, type], *, lazy: bool = False) -> Any:
@@ -29,21 +30,23 @@ def read_result(path: Path, kinds: Mapping[str, type], *, lazy: bool = False) ->
     """
     store = Store(path)
     document = _document(store)
-    cls = kinds.get(document.get("kind", ""))
+    cls = kinds.get(str(document.get("kind", "")))
     if cls is None:
         raise store.error(f"found a result of kind {document.get('kind')!r}, allowed: {', '.join(kinds)}")
     try:
-        result = decode(cls, document.get("result"), _reads(store, lazy, document.get("clocks")))
+        result = decode(cls, document.get("result"), _reads(store, lazy, document))
     except CodecError as error:
         raise store.error(f"found damaged metadata, {error}") from error
     located = any(one.name == "recording" for one in fields(result))
     return replace(result, recording=path) if located else result
 
 
-def _reads(store: Store, lazy: bool, clocks: Any) -> ArrayOf:
+def _reads(store: Store, lazy: bool, document: Mapping[str, Any]) -> ArrayOf:
     """Return what reads the array of a path, once."""
-    if not isinstance(clocks, dict) or not clocks.keys().isdisjoint(clocks.values()):
-        raise CodecError(f"found {shown(clocks)}, allowed: the paths of times by those of arrays")
+    clocks = form_of(dict[str, str]).read(document.get("clocks"), In("/clocks", _no_array))
+    checksums = form_of(dict[str, int]).read(document.get("checksums"), In("/checksums", _no_array))
+    if not clocks.keys().isdisjoint(clocks.values()):
+        raise CodecError(f"/clocks: found {shown(clocks)}, allowed: the paths of times by those of arrays")
     known: dict[tuple[str, tuple[int, ...], str], Any] = {}
 
     def array(at: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
@@ -55,7 +58,10 @@ def _reads(store: Store, lazy: bool, clocks: Any) -> ArrayOf:
                 """Return some of the rows."""
                 clock = array(clocks[at], rows[:1], np.dtype(np.int64)) if at in clocks else None
                 t_ns = None if clock is None else np.asarray(clock)
-                return store.read(at, first, end, rows[1:], dtype, t_ns)
+                found = store.read(at, first, end, rows[1:], dtype, t_ns)
+                if end - first == rows[0] and checksum(found) != checksums.get(at):
+                    raise store.error(f"found other values in {at} than were written (by their checksum)")
+                return found
 
             found = Rows(read, rows, dtype)
             known[key] = found if lazy and shape else found.whole.reshape(shape)
@@ -64,18 +70,24 @@ def _reads(store: Store, lazy: bool, clocks: Any) -> ArrayOf:
     return array
 
 
+def _no_array(at: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
+    raise CodecError(f"{at}: found an array, allowed: none")
+
+
 def _document(store: Store) -> dict[str, Any]:
     """Return the metadata, of the layout that is known."""
     try:
         document: dict[str, Any] = json.loads(store.metadata)
         version = document["layout_version"]
         newer = version > LAYOUT_VERSION
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise store.error(f"found damaged metadata ({error!r}), allowed: what urmpipe wrote") from error
     if version != LAYOUT_VERSION:
         who = "a newer" if newer else "an older"
         said = f"found layout version {version}, allowed: {LAYOUT_VERSION}; {who} urmpipe wrote it"
         raise store.error(f"{said}: make it again{_again(document)}")
+    if store.checksum != checksum(store.metadata):
+        raise store.error("found damaged metadata (by their checksum), allowed: what urmpipe wrote")
     return document
 
 

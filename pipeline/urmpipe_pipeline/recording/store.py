@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -15,6 +16,7 @@ from urmpipe_models.arrays import IntArray
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_models.files.missing import meant_by
 from urmpipe_pipeline.recording.identity import APPLICATION_ID, is_recording, open_reader, our_entries
+from urmpipe_pipeline.recording.isolated import abort_of
 
 if TYPE_CHECKING:
     from pyarrow import Array, RecordBatch
@@ -32,11 +34,14 @@ TIME, ROW = "t", "row"
 SLICE = 32_768
 """Rows sent at a time: few enough to keep memory low, many enough to keep the overhead low."""
 
-LAYOUT_VERSION = 6
+LAYOUT_VERSION = 7
 """The version that a recording says; raised when what is stored changes otherwise than by a default."""
 
 PROPERTY = "urmpipe"
 """Name of the recording's property that holds the metadata."""
+
+
+NONE: Mapping[str, Any] = MappingProxyType({})
 
 
 class Opening(NamedTuple):
@@ -53,6 +58,7 @@ class Store:
         path: The file.
         rows: How many rows each entity has.
         metadata: The JSON text in its property.
+        checksum: That of the text as it was written; None in a recording of an older layout.
         opening: Where the viewer should stand; at 0 s if nothing is said.
     """
 
@@ -66,7 +72,9 @@ class Store:
         self._store = self._open()
         self.rows = _row_counts(self._store.summary())
         self.metadata = self._metadata()
-        self.opening = Opening(str(self._property("timeline") or TIME), int(self._property("at") or 0))
+        self.checksum = self._property("checksum")
+        timeline, at = self._property("timeline"), self._property("at")
+        self.opening = Opening(str(timeline or TIME), at if isinstance(at, int) else 0)
 
     def error(self, message: str) -> RecordingError:
         """Return an error that names this file."""
@@ -97,7 +105,10 @@ class Store:
         Raises:
             RecordingError: If some of them are missing, or are none of that type and shape.
         """
-        found, filled = np.empty((end - first, *width), dtype), 0
+        try:
+            found, filled = np.empty((end - first, *width), dtype), 0
+        except (ValueError, OverflowError, MemoryError) as error:
+            raise self.error(f"found no room for {entity}: {_one_line(error)}") from error
         for numbers, rows in self.parts(entity, width, dtype, t_ns):
             filled += _copy(rows, numbers - first, found)
             if filled == len(found):
@@ -127,6 +138,8 @@ class Store:
             raise self.error(f"found no such file{meant}, allowed: a recording (.rrd) that urmpipe wrote")
         if not is_recording(self.path):
             raise self.error("found no Rerun recording, allowed: a recording (.rrd) that urmpipe wrote")
+        if how := abort_of(self.path):
+            raise self.error(f"found a damaged recording (reading it {how}), allowed: one as it was written")
         try:
             reader = open_reader(self.path)
             ours = our_entries(reader)
@@ -151,18 +164,35 @@ class Store:
 
     def _property(self, name: str) -> str | int | None:
         """Return a value of the recording's property; None if it is not there."""
-        for chunk in self._store.stream().filter(content=f"/__properties/{PROPERTY}", components=name):
-            values = chunk.to_record_batch().column(name).to_pylist()
-            if values and values[0]:
-                value: str | int = values[0][0]
-                return value
+        try:
+            for chunk in self._store.stream().filter(content=f"/__properties/{PROPERTY}", components=name):
+                values = chunk.to_record_batch().column(name).to_pylist()
+                if values and values[0]:
+                    value: str | int = values[0][0]
+                    return value
+        except (RuntimeError, ValueError, KeyError) as error:
+            raise self.error(f"found damaged metadata: {_one_line(error)}") from error
         return None
 
 
-def document(kind: str, tree: Any, clocks: Mapping[str, str] = MappingProxyType({})) -> str:
-    """Return the metadata of a result of a kind as JSON: with its tree, and the clocks of its arrays."""
-    told = {"layout_version": LAYOUT_VERSION, "kind": kind, "clocks": dict(clocks), "result": tree}
-    return json.dumps(told)
+def document(
+    kind: str, tree: Any, clocks: Mapping[str, str] = NONE, checksums: Mapping[str, int] = NONE
+) -> str:
+    """Return the metadata of a result of a kind as JSON.
+
+    Args:
+        kind: What a recording calls it.
+        tree: All of the result but its arrays.
+        clocks: The paths of times by those of the arrays that they tell the rows of.
+        checksums: Those of the arrays by their paths, see `checksum`.
+    """
+    told = {"layout_version": LAYOUT_VERSION, "kind": kind, "clocks": dict(clocks)}
+    return json.dumps({**told, "checksums": dict(checksums), "result": tree})
+
+
+def checksum(values: NDArray[Any] | str) -> int:
+    """Return the checksum (CRC-32) of an array or a text: a changed byte changes it."""
+    return zlib.crc32(values.encode() if isinstance(values, str) else np.ascontiguousarray(values))
 
 
 def _decoded(

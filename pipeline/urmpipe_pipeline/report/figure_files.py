@@ -7,15 +7,16 @@ import struct
 import unicodedata
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from html import escape
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, get_args
 
-from urmpipe_models.errors import Finding, OptionError, OutputError
-from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_models.errors import Finding, OptionError, OutputError, for_each
+from urmpipe_pipeline.outputs import guarded_output, refuse_output
+from urmpipe_pipeline.placing import all_or_none
 from urmpipe_pipeline.report.headless import FigureFormat, draw
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.text import unique
@@ -94,15 +95,15 @@ def write_figures(
         for stem, (part, figure) in zip(stems, figures, strict=True)
         for suffix in options.formats
     ]
-    with ExitStack() as stack:
-        stack.enter_context(_made_folder(options.folder))
-        places = [stack.enter_context(guarded_output(file.path, inputs, "figure")) for _, _, file in wanted]
+    with _made_folder(options.folder), all_or_none():
+        for_each(lambda one: refuse_output(one[2].path, inputs, "figure"), wanted)
 
         def write(number: int, drawn: bytes) -> None:
             """Put our mark into a drawn figure and write it to its place."""
-            figure, suffix, _ = wanted[number]
+            figure, suffix, file = wanted[number]
             marked = _marked_svg(drawn, figure) if suffix == "svg" else _marked_png(drawn, figure)
-            places[number].write_bytes(marked)
+            with guarded_output(file.path, inputs, "figure") as part:
+                part.write_bytes(marked)
             if progress:
                 progress((number + 1) / len(wanted))
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.display import Shown, line_of, number_of
-from urmpipe_models.errors import Finding, OutputError
+from urmpipe_models.errors import Finding, OutputError, for_each
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.json_values import json_ready
-from urmpipe_pipeline.outputs import EXPORT_HEADER, guarded_output, know_own
+from urmpipe_pipeline.outputs import EXPORT_HEADER, guarded_output, know_own, refuse_output
+from urmpipe_pipeline.placing import all_or_none
 from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
 from urmpipe_pipeline.tables.lines import write_csv, write_tum
 from urmpipe_pipeline.tables.mat_file import write_mat
@@ -201,10 +201,12 @@ def write_all(
     if to == "csv" and targets[0].is_file():
         found = "found a file, allowed: a new name; nothing in a CSV tells whose it is, so none is replaced"
         raise OutputError(Finding(found, str(targets[0])))
-    with ExitStack() as stack:
-        parts = [stack.enter_context(guarded_output(path, inputs, "export")) for path in targets]
-        for path, part, write in zip(targets, parts, writers, strict=True):
-            if wrong := write(part):
+    for_each(lambda path: refuse_output(path, inputs, "export"), targets)
+    with all_or_none():
+        for path, write in zip(targets, writers, strict=True):
+            with guarded_output(path, inputs, "export") as part:
+                wrong = write(part)
+            if wrong:
                 said = f"reads back otherwise than written: {', '.join(wrong)}"
                 raise OutputError(Finding(said, str(path)))
 

@@ -1,0 +1,78 @@
+"""Recordings in which a byte changed: one line, or the result as it was; never other values, and no abort."""
+
+from __future__ import annotations
+
+import re
+import signal
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from same_results import assert_same
+from urmpipe_models.errors import RecordingError
+from urmpipe_models.processes import command, environment
+from urmpipe_pipeline.results import read_recording, write_recording
+from urmpipe_pipeline.runs.results import Run
+
+MakeRun = Callable[..., Run]
+
+HOW = "reading it ended the process: Aborted (SIGABRT)"
+ABORTED = f"found a damaged recording ({HOW}), allowed: one as it was written"
+
+
+def changed(path: Path, at: int, copy: Path) -> Path:
+    """Return a copy of a file in which the last bit of a byte is another."""
+    content = bytearray(path.read_bytes())
+    content[at] ^= 0x01
+    copy.write_bytes(content)
+    return copy
+
+
+def test_a_byte_that_aborts_the_reader_is_one_line(make_run: MakeRun, tmp_path: Path) -> None:
+    """About one byte in twenty, changed, aborts the process that reads it: many are tried until one does."""
+    path = write_recording(make_run(rows=5), tmp_path / "whole.rrd")
+    whole, size, places = read_recording(path), path.stat().st_size, np.random.default_rng(7)
+    said = ""
+    for number in range(300):
+        one = changed(path, int(places.integers(size)), tmp_path / f"{number}.rrd")
+        try:
+            assert_same(read_recording(one), whole)
+        except RecordingError as error:
+            said = str(error).removeprefix(f"{one}: ")
+        if said.startswith("found a damaged recording (reading"):
+            break
+    assert said == ABORTED
+    line = command("urmpipe_pipeline.recording.isolated", str(one))
+    ended = subprocess.run(line, env=environment(), capture_output=True, timeout=100, check=False)
+    assert ended.returncode == -signal.SIGABRT  # else nothing would need a process of its own
+
+
+def test_a_changed_value_is_told(make_run: MakeRun, tmp_path: Path) -> None:
+    run = make_run(rows=50)
+    path = write_recording(run, tmp_path / "whole.rrd")
+    content = path.read_bytes()
+    value = next(one.tobytes() for one in np.ravel(run.log.q) if content.count(one.tobytes()) == 1)
+    one = changed(path, content.index(value), tmp_path / "changed.rrd")
+    with pytest.raises(RecordingError) as caught:
+        read_recording(one)
+    assert str(caught.value) == f"{one}: found other values in /log/q than were written (by their checksum)"
+    lazily = read_recording(one, lazy=True)
+    assert isinstance(lazily, Run)
+    with pytest.raises(RecordingError):
+        np.asarray(lazily.log.q)
+
+
+def test_a_changed_letter_of_the_metadata_is_told(make_run: MakeRun, tmp_path: Path) -> None:
+    path = write_recording(make_run(rows=5), tmp_path / "whole.rrd")
+    run = read_recording(path)
+    assert isinstance(run, Run)
+    created, content, said = run.provenance.created.encode()[:19], path.read_bytes(), set()
+    for number, found in enumerate(re.finditer(re.escape(created), content)):
+        one = changed(path, found.start(), tmp_path / f"{number}.rrd")
+        with pytest.raises(RecordingError) as caught:
+            read_recording(one)
+        said.add(str(caught.value).removeprefix(f"{one}: "))
+    assert said == {"found damaged metadata (by their checksum), allowed: what urmpipe wrote"}
