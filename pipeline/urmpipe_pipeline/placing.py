@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import atexit
+import os
 import signal
 import threading
 import uuid
@@ -117,7 +118,8 @@ def _named(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise OutputError(Finding(f"cannot be written: {error.strerror or error}", str(path))) from error
+        why = os.strerror(error.errno) if error.errno else str(error)  # libraries add words of their own
+        raise OutputError(Finding(f"cannot be written: {why}", str(path))) from error
 
 
 def _remove(parts: Iterable[Path]) -> None:

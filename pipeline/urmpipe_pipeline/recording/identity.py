@@ -10,7 +10,7 @@ from threading import Thread
 from typing import TYPE_CHECKING
 
 from urmpipe_pipeline.outputs import know_own
-from urmpipe_pipeline.recording.isolated import abort_of
+from urmpipe_pipeline.recording.trial import recording_abort
 
 if TYPE_CHECKING:
     from rerun.chunk import RrdReader, StoreEntry
@@ -54,7 +54,7 @@ def is_ours(path: Path) -> bool:
     if _begins_as_ours(path):
         return True
     try:
-        return not abort_of(path) and bool(our_entries(open_reader(path)))
+        return not recording_abort(path) and bool(our_entries(open_reader(path)))
     except (RuntimeError, ValueError):
         return False
 

@@ -16,7 +16,7 @@ from urmpipe_models.arrays import IntArray
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_models.files.missing import meant_by
 from urmpipe_pipeline.recording.identity import APPLICATION_ID, is_recording, open_reader, our_entries
-from urmpipe_pipeline.recording.isolated import abort_of
+from urmpipe_pipeline.recording.trial import recording_abort
 
 if TYPE_CHECKING:
     from pyarrow import Array, RecordBatch
@@ -138,7 +138,7 @@ class Store:
             raise self.error(f"found no such file{meant}, allowed: a recording (.rrd) that urmpipe wrote")
         if not is_recording(self.path):
             raise self.error("found no Rerun recording, allowed: a recording (.rrd) that urmpipe wrote")
-        if how := abort_of(self.path):
+        if how := recording_abort(self.path):
             raise self.error(f"found a damaged recording (reading it {how}), allowed: one as it was written")
         try:
             reader = open_reader(self.path)

@@ -45,7 +45,7 @@ def test_a_byte_that_aborts_the_reader_is_one_line(make_run: MakeRun, tmp_path: 
         if said.startswith("found a damaged recording (reading"):
             break
     assert said == ABORTED
-    line = command("urmpipe_pipeline.recording.isolated", str(one))
+    line = command("urmpipe_pipeline.isolated", "urmpipe_pipeline.recording.trial", str(one))
     ended = subprocess.run(line, env=environment(), capture_output=True, timeout=100, check=False)
     assert ended.returncode == -signal.SIGABRT  # else nothing would need a process of its own
 

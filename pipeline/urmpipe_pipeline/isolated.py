@@ -1,13 +1,15 @@
-"""A recording is read in a process of its own before it is read here: a damaged one can abort Rerun's reader.
+"""What a damaged file can abort is tried in its own process first: `python -m urmpipe_pipeline.isolated`.
 
-Rerun is written in Rust and aborts the whole process where it meets bytes that it did not expect, which no
-`except` catches. What ended that process is not read in this one.
+Libraries in C and Rust end the whole process, by SIGSEGV or SIGABRT, where they meet bytes that they did not
+expect, and no `except` catches that. A file that ended such a process is not read in this one.
 """
 
 from __future__ import annotations
 
 import sys
 from collections import deque
+from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from subprocess import DEVNULL, Popen, TimeoutExpired
 from typing import TypeAlias
@@ -23,22 +25,27 @@ _whole: deque[Mark] = deque(maxlen=256)
 """Files that this process has written and read back, or that have been read before: the last of them."""
 
 
-def abort_of(path: Path) -> str:
-    """Return how reading a recording ends the process that does it; empty if it does not.
+def abort_of(path: Path, reader: str, meanwhile: Sequence[str] = ()) -> str:
+    """Return how reading a file ends the process that does it; empty if it does not.
+
+    Args:
+        path: The file.
+        reader: The module whose `read_through` reads all of a file.
+        meanwhile: Modules that are needed afterwards, imported while the other process runs.
 
     Raises:
-        OSError: If the file cannot be read.
+        OSError: If there is no such file.
     """
     mark = _mark(path)
     if mark in _whole:
         return ""
     process = Popen(
-        command(__name__, str(path)), stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL, env=environment()
+        command(__name__, reader, str(path)), stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL, env=environment()
     )
     limit = PATIENCE + mark[2] / RATE
     try:
-        import rerun.chunk  # noqa: F401 - takes half a second, meanwhile
-
+        for name in meanwhile:
+            import_module(name)
         code = process.wait(limit)
     except TimeoutExpired:
         return f"took more than {limit:.0f} s"
@@ -62,24 +69,6 @@ def _mark(path: Path) -> Mark:
     return state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns
 
 
-def read_all(path: str) -> None:
-    """Read all that stands in a recording; what its reader refuses in an orderly way is told elsewhere.
-
-    Rerun's own classes round these take half a second to import.
-    """
-    from rerun_bindings import RrdReaderInternal
-
-    try:
-        reader = RrdReaderInternal(path)
-        for entry in reader.store_entries():
-            store = reader.store(store=entry)
-            store.summary()
-            for chunk in store.stream().to_chunks():
-                chunk.to_record_batch()
-    except (RuntimeError, ValueError):
-        pass
-
-
 if __name__ == "__main__":
     limit_memory()
-    read_all(sys.argv[1])
+    import_module(sys.argv[1]).read_through(sys.argv[2])

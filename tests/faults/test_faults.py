@@ -1,0 +1,65 @@
+"""Ctrl-C, kill -9, files that may not grow, full disks: outputs are whole or absent, all of a command or none.
+
+`docs/reliability_figures.py` does the same at more moments and sizes.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from forks import Forks, forks
+from jobs import JOBS, Job, write_inputs
+from trials import full, interrupted, limited, small_disk
+
+COMPARE = next(job for job in JOBS if job.name == "compare")
+
+
+@pytest.fixture(scope="module")
+def forked() -> Iterator[Forks]:
+    """A process that is forked for each command line."""
+    with forks() as started:
+        yield started
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder with the inputs of all jobs."""
+    write_inputs(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL, signal.SIGTERM])
+def test_a_stopped_comparison_leaves_all_outputs_or_none(forked: Forks, number: int, folder: Path) -> None:
+    found = interrupted(forked, COMPARE, folder, number, moments=10)
+    assert found["old"] >= 3  # most of its time goes before its outputs are in place
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize("job", [job for job in JOBS if job is not COMPARE], ids=lambda job: job.name)
+def test_a_stopped_command_leaves_all_outputs_or_none(
+    forked: Forks, job: Job, number: int, folder: Path
+) -> None:
+    interrupted(forked, job, folder, number, moments=2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("job", JOBS, ids=lambda job: job.name)
+def test_a_file_that_may_not_grow_is_one_line(forked: Forks, job: Job, folder: Path) -> None:
+    found = limited(forked, job, folder, sizes=10 if job is COMPARE else 3)
+    assert found["old"] > found["new"]
+
+
+@pytest.mark.slow
+def test_a_full_disk_is_one_line(forked: Forks, tmp_path: Path) -> None:
+    with small_disk(tmp_path, "6m") as mounted:
+        if not mounted:
+            pytest.skip("mounting a small disk needs Linux and root")
+        write_inputs(tmp_path)
+        found = full(forked, COMPARE, tmp_path, sizes=10)
+    assert found["old"] > found["new"]
