@@ -1,7 +1,7 @@
 """Calls from Python, many in one process: `python tests/faults/calls.py ROUNDS`, in a folder of its own.
 
-A round ingests a log, compares it and reports the comparison, each with a file. Printed is a JSON line for each
-round: the threads of the process, its open files and its memory in [MB].
+A round ingests a log, compares it and reports the comparison, each with a file. Printed is a JSON line for
+each round: the threads of the process, its open files and its memory in [MB].
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ import sys
 import warnings
 from pathlib import Path
 
-from jobs import write_inputs
-
 import urmpipe
+from jobs import write_inputs
 
 
 def main(rounds: int) -> None:
@@ -32,7 +31,7 @@ def main(rounds: int) -> None:
 
 def _count(kind: str) -> int:
     """Return how many threads or files this process has."""
-    return len(os.listdir(f"/proc/self/{kind}"))
+    return len(list(Path(f"/proc/self/{kind}").iterdir()))
 
 
 def _memory() -> float:

@@ -16,8 +16,11 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
+
+from urmpipe.main import COMMANDS
 
 HANGS = 100.0
 """Time in [s] after which a command hangs: each takes a second or two."""
@@ -96,18 +99,9 @@ def forks() -> Iterator[Forks]:
 
 def _answer_orders() -> None:
     """Read orders, a line each, and tell how each ended."""
-    import fmpy  # noqa: F401
-    import pandas  # noqa: F401
-    import plotly.graph_objects
-    import pyarrow.parquet
-    import rerun.blueprint
-    import scipy.io  # noqa: F401
-
-    import urmpipe.main
-    from urmpipe.main import COMMANDS
-
-    for name in COMMANDS:
-        __import__(f"urmpipe.commands.{name}")
+    libraries = ("fmpy", "pandas", "plotly.graph_objects", "pyarrow.parquet", "rerun.blueprint", "scipy.io")
+    for name in (*libraries, *(f"urmpipe.commands.{name}" for name in COMMANDS)):
+        import_module(name)
     while line := sys.stdin.readline():
         print(json.dumps(asdict(_ended(json.loads(line)))), flush=True)
 
@@ -132,7 +126,8 @@ def _ended(order: dict[str, Any]) -> Ended:
             os.killpg(child, signal.SIGKILL)
             code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         left = _left(child)
-        return Ended(code or 0, *(one.result() for one in said), seconds, hung, left)
+        out_text, err_text = (one.result() for one in said)
+        return Ended(code or 0, out_text, err_text, seconds, hung, left)
 
 
 def _read(source: int) -> str:

@@ -110,7 +110,7 @@ def _state(job: Job, folder: Path) -> dict[str, tuple[int, bytes] | None]:
 
 
 def _outputs(job: Job, folder: Path, before: dict[str, tuple[int, bytes] | None]) -> str:
-    """Return whether all outputs are old or new: none is half written, and no new one stands beside an old."""
+    """Return whether all outputs are old or new: each is whole, and no new one stands beside an old one."""
     after = _state(job, folder)
     for name, state in after.items():
         if name.endswith(".xml") and state is not None and b"<error " in state[1]:

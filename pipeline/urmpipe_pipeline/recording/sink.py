@@ -40,12 +40,14 @@ class Sink:
     """
 
     def __init__(self, stream: RecordingStream, file: IO[bytes], *, piped: bool) -> None:
+        from rerun import binary_stream
+
         self.stream = stream
         self._file = file
         self._error: OSError | None = None
         self._thread: Thread | None = None
         if not piped:
-            self._held = stream.binary_stream()
+            self._held = binary_stream(stream)
             return
         source, into = os.pipe()
         try:

@@ -1,4 +1,4 @@
-"""Ctrl-C, kill -9, files that may not grow, full disks: outputs are whole or absent, all of a command or none.
+"""Ctrl-C, kill -9, files that may not grow, full disks: outputs are whole or absent, all or none of them.
 
 `docs/reliability_figures.py` does the same at more moments and sizes.
 """
