@@ -68,6 +68,8 @@ def findings_of(error: BaseException) -> Sequence[Finding]:
             said = "stopped before it was done; no file is left half written"
         case MemoryError():
             said = "out of memory"
+        case ValueError() if str(error).startswith("embedded null "):  # what a path cannot hold
+            said = "found a null character, allowed: none in the name of a file"
         case _:
             said = f"{type(error).__name__}: {error} (a fault of urmpipe itself; --debug shows where)"
     return [Finding(said)]

@@ -9,8 +9,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from urmpipe_models.errors import Finding, FmuError
-
 EARLIEST = (1980, 1, 1, 0, 0, 0)
 """The time of every entry: zip knows none before."""
 
@@ -35,7 +33,7 @@ def write_fmu(path: Path, files: Mapping[str, bytes]) -> None:
         files: Contents by their path in the FMU.
 
     Raises:
-        FmuError: If it cannot be written.
+        OSError: If it cannot be written.
     """
     part = path.with_name(f"{path.stem[:40]}.{uuid.uuid4().hex[:12]}.part")
     try:
@@ -43,10 +41,8 @@ def write_fmu(path: Path, files: Mapping[str, bytes]) -> None:
             for name in sorted(files):
                 archive.writestr(_entry(name), files[name], compresslevel=9)
         part.replace(path)
-    except OSError as error:
-        raise FmuError(Finding(f"cannot be written: {error.strerror or error}", str(path))) from error
     finally:
-        with suppress(OSError):  # why it cannot be written has been told
+        with suppress(OSError):  # why it cannot be written is told
             part.unlink()
 
 

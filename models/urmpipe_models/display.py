@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from html import escape
 from typing import Any, ClassVar
 
-from urmpipe_models.messages import one_line
+from urmpipe_models.messages import in_html, one_line
 
 LONGEST = 120
 """Characters of the line: it fits into a terminal, and into a list of results."""
@@ -49,8 +48,8 @@ class Shown(ABC):
         """Return for a notebook what presents it, else its headline, warnings and the head of its table."""
         if (page := Shown.page(self)) is not None:
             return page
-        notes = "".join(f"<li>{escape(one_line(note))}</li>" for note in self._notes())
-        headline = f"<p><b>{type(self).__name__}</b> {escape(one_line(self._headline()))}</p>"
+        notes = "".join(f"<li>{in_html(note)}</li>" for note in self._notes())
+        headline = f"<p><b>{type(self).__name__}</b> {in_html(self._headline())}</p>"
         return f"{headline}{notes and f'<ul>{notes}</ul>'}{self._table()}"
 
 

@@ -22,13 +22,17 @@ Made = TypeVar("Made")
 
 def shown(value: object) -> str:
     """Return a value as a message shows it: cut where it is long, its type alone where it is an object."""
-    text = repr(value)
+    name = type(value).__name__
+    kind = f"{'an' if name[0] in 'AEIOUaeiou' else 'a'} {name}"
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # an integer of more digits than Python writes, or nested too deep
+        return f"{kind} too large to be shown"
     if len(text) <= SHOWN and text.isprintable() and not text.startswith("<"):
         return text
     if isinstance(value, (str, bytes, int, float, list, tuple, dict)):
         return one_line(f"{text[: SHOWN - 3]}...")
-    name = type(value).__name__
-    return f"{'an' if name[0] in 'AEIOUaeiou' else 'a'} {name}"
+    return kind
 
 
 class UrmpipeError(Exception):

@@ -11,12 +11,20 @@ would change it, are fields. Who prints chooses the voice, so that a stored mess
 
 from __future__ import annotations
 
+import html
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import groupby
 from typing import Any
 
 from urmpipe_models.spelling import IN_MAP, IN_NO_FILE, Voice, spelled, subject
+
+HIDDEN = "\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
+"""DEL, C1, and what else ends a line or reorders letters without being seen, as a range of a pattern."""
+
+_ACTING, _HIDDEN = re.compile(f"[\x00-\x1f{HIDDEN}]"), re.compile(f"[{HIDDEN}]")
+_UNHOLDABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 
 Value = str | bool | float | list[str] | list[float] | Mapping[str, str | tuple[float, float] | None] | None
 """What to give a parameter: by column or joint, "" for all; True for a flag; None for the reader's own."""
@@ -168,4 +176,39 @@ def one_line(text: str) -> str:
     """
     if text.isprintable():
         return text
-    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
+    return "".join(one if one.isprintable() else _escape(one) for one in text)
+
+
+def inert(text: str, kept: str = "") -> str:
+    """Return a text with escapes of Python's strings for what ends a line, acts on a terminal or reorders.
+
+    Unlike `one_line` it leaves letters that are merely unusual, such as a space that does not break.
+
+    Args:
+        text: The text.
+        kept: Letters to leave: those that end a line where lines are meant.
+    """
+    return _ACTING.sub(lambda found: found[0] if found[0] in kept else _escape(found[0]), text)
+
+
+def shown_json(written: str) -> str:
+    """Return JSON, or a string of TOML, with escapes for what is not seen: it reads back the same."""
+    return _HIDDEN.sub(lambda found: f"\\u{ord(found[0]):04x}", written)
+
+
+def in_html(words: str) -> str:
+    """Return words as text of HTML or SVG, on one line and without what is not printable."""
+    return html.escape(one_line(words))
+
+
+def in_xml(written: str) -> str:
+    """Return escaped text of XML with references for what is not seen.
+
+    For what XML cannot hold, most control characters and lone surrogates, stand escapes of Python's strings.
+    """
+    held = _HIDDEN.sub(lambda found: f"&#x{ord(found[0]):x};", written)
+    return _UNHOLDABLE.sub(lambda found: ascii(found[0])[1:-1], held)
+
+
+def _escape(letter: str) -> str:
+    return letter.encode("unicode_escape").decode()

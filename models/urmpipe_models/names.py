@@ -13,6 +13,9 @@ MOST_LISTED = 16
 LEAST_LIKE = 0.6
 """Share of letters that two names have in common, from where on one may have been meant by the other."""
 
+LONGEST = 200
+"""Letters of a name that may have been meant otherwise."""
+
 
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:
     """Return ` (did you mean NAME?)` with the allowed name most like another, or nothing if none is.
@@ -36,16 +39,18 @@ def not_among(name: str, allowed: Iterable[str]) -> str:
 
 
 def listed(name: str, allowed: Iterable[str]) -> str:
-    """Return the allowed names in their order; of more than `MOST_LISTED`, those most like a given one."""
+    """Return the allowed names in their order; of more than `MOST_LISTED`, those like a given one."""
     names = list(dict.fromkeys(allowed))
     if len(names) <= MOST_LISTED:
         return ", ".join(names) or "none"
-    first = _nearest_first(name, names, 0.0)[:MOST_LISTED]
+    first = ((name and _nearest_first(name, names, 0.0)) or names)[:MOST_LISTED]
     return f"{', '.join(first)} and {len(names) - len(first)} others"
 
 
 def _nearest_first(name: str, allowed: Iterable[str], least: float) -> list[str]:
     """Return the names that are at least so much like another, the nearest first; of equal ones the last."""
+    if len(name) > LONGEST:
+        return []
     wanted = _letters(name)
     like = {one: SequenceMatcher(None, _letters(one), wanted).ratio() for one in allowed}
     return sorted((one for one in like if like[one] >= least), key=lambda one: (like[one], one), reverse=True)

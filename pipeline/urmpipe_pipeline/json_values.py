@@ -26,6 +26,18 @@ def json_ready(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
+def parsed_json(written: str | bytes) -> Any:
+    """Return the value that JSON holds.
+
+    Raises:
+        ValueError: If it is no JSON, or nested too deep to be read.
+    """
+    try:
+        return json.loads(written)
+    except RecursionError:
+        raise ValueError("nested too deep") from None
+
+
 def plain(value: Any) -> str:
     """Return an option's value as one line: text as it is, the rest as JSON."""
     return value if isinstance(value, str) else json.dumps(json_ready(value), ensure_ascii=False)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
+from urllib.parse import unquote
 
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.visual import Mesh, Visual
+from urmpipe_models.chains.visual import FILE, PACKAGE_PATH, Mesh, Visual
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.json_values import parsed_json
 
 MEDIA_TYPES = {
     ".stl": "model/stl",
@@ -22,10 +23,16 @@ VISUAL_MISSING = "visual-missing"
 """The kind of the warning about meshes that cannot be drawn."""
 
 
+WITHIN = "files in the folder of its description, in ROS packages around it, and in folders of"
+"""Which meshes a description may take, but for the name of the variable that lists folders."""
+
+
 def drawable(visual: Visual) -> bool:
     """Tell whether a shape can be drawn: a mesh if its file is there, of a known form, and needs no other."""
     if not isinstance(visual.shape, Mesh):
         return True
+    if visual.shape.file.startswith(FILE):  # the description may not take it
+        return False
     path = Path(visual.shape.file)
     suffix = path.suffix.lower()
     try:
@@ -36,20 +43,29 @@ def drawable(visual: Visual) -> bool:
 
 
 def missing_visuals(robot: Chain) -> list[LogWarning]:
-    """Return one warning if meshes of an arm cannot be drawn, with their number and the first of them."""
+    """Return a warning about meshes of an arm that cannot be drawn, and one about those it may not take."""
     meshes = {visual.shape.file: visual for visual in robot.visuals if isinstance(visual.shape, Mesh)}
-    missing = [file for file, visual in meshes.items() if not drawable(visual)]
-    if not missing:
-        return []
-    count = f"{len(missing)} of {len(meshes)} mesh files of robot {robot.name}"
-    said = f"{count} cannot be drawn, the first {missing[0]}: lines stand for the links"
-    return [LogWarning(VISUAL_MISSING, f"{said}; allowed: {', '.join(MEDIA_TYPES)} files that are there")]
+    outside = [file for file in meshes if file.startswith(FILE)]
+    missing = [file for file, visual in meshes.items() if file not in outside and not drawable(visual)]
+    found = (
+        (missing, "cannot be drawn", f"{', '.join(MEDIA_TYPES)} files that are there"),
+        (outside, "are outside its folder and not drawn", f"{WITHIN} {PACKAGE_PATH}"),
+    )
+    return [
+        LogWarning(
+            VISUAL_MISSING,
+            f"{len(files)} of {len(meshes)} mesh files of robot {robot.name} {said}, the first"
+            f" {unquote(files[0].removeprefix(FILE))}: lines stand for the links; allowed: {allowed}",
+        )
+        for files, said, allowed in found
+        if files
+    ]
 
 
 def _self_contained(path: Path) -> bool:
     """Tell whether a glTF file names no other file, which would not be in the recording."""
     try:
-        document = json.loads(path.read_bytes())
+        document = parsed_json(path.read_bytes())
         parts = [*document.get("buffers", []), *document.get("images", [])]
         return all(part.get("uri", "data:").startswith("data:") for part in parts)
     except (OSError, ValueError, TypeError, AttributeError):  # cannot be read, or is no glTF

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from html import escape
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.dynamics.over_log import mass_centres_over_log
+from urmpipe_models.messages import in_html
 from urmpipe_pipeline.lettering import Box, box_about, freest, width_of
 from urmpipe_pipeline.outlines import Piece, drawn_pieces, polyline
 from urmpipe_pipeline.palette import INK_COLOUR, MASS_COLOUR, REFERENCE_COLOUR
@@ -190,9 +190,9 @@ def projected(sketch: Sketch, views: Sequence[View], title: str, mark: str = "")
         (
             *([f"<!-- {mark} -->"] if mark else []),
             f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="sans-serif" font-size="13">',
-            f"<title>{escape(title)}</title>",
+            f"<title>{in_html(title)}</title>",
             '<rect width="100%" height="100%" fill="white"/>',
-            f'<text x="{SCALE_PX}" y="24" font-size="17">{escape(title)}</text>',
+            f'<text x="{SCALE_PX}" y="24" font-size="17">{in_html(title)}</text>',
             *(line for one in frames for line in (*_scales(one), *_drawn(sketch, one))),
             *_legend(sketch, bottom),
             "</svg>\n",
@@ -229,7 +229,7 @@ def _scales(frame: _Frame) -> Iterator[str]:
     (left, top), (width, height) = frame.corner, frame.size
     bottom, right = top + height, left + width
     names = ["xyz"[axis] for axis in frame.axes]
-    yield f'<text x="{left:.1f}" y="{top - 8:.1f}" fill="#555">{escape(frame.view.title)}</text>'
+    yield f'<text x="{left:.1f}" y="{top - 8:.1f}" fill="#555">{in_html(frame.view.title)}</text>'
     box = f'x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}"'
     yield f'<rect {box} fill="none" stroke="#c3cad0"/>'
     grid, number = 'stroke="#e4e8eb"', 'fill="#5b6770" font-size="11"'
@@ -265,7 +265,7 @@ def _drawn(sketch: Sketch, frame: _Frame) -> Iterator[str]:
     for spot, (x, y) in zip(sketch.spots, placed.tolist(), strict=True):
         yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{5 if alone else 3}" fill="{spot.colour}"/>'
     for (x, y), words in _names(placed, [spot.words for spot in sketch.spots]):
-        yield f'<text x="{x + 8:.1f}" y="{y - 6:.1f}" {HALO}>{escape(words)}</text>'
+        yield f'<text x="{x + 8:.1f}" y="{y - 6:.1f}" {HALO}>{in_html(words)}</text>'
     yield from _beside(sketch.names, frame)
 
 
@@ -287,7 +287,7 @@ def _beside(names: Sequence[Spot], frame: _Frame) -> Iterator[str]:
         taken.append(box)
         at = f'x="{box.middle[0]:.1f}" y="{box.middle[1] + 4.5:.1f}" text-anchor="middle"'
         fill = colours.get(words, INK_COLOUR)
-        yield f'<text class="name" {at} font-size="{NAME_PX:g}" fill="{fill}" {HALO}>{escape(words)}</text>'
+        yield f'<text class="name" {at} font-size="{NAME_PX:g}" fill="{fill}" {HALO}>{in_html(words)}</text>'
 
 
 def _mass(place: FloatArray, radius: float) -> str:

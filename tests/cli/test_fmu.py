@@ -7,6 +7,7 @@ import re
 import shutil
 import zipfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 import urmpipe
+from foreign_fmus import HANGS, Foreign, Scalar, fmu, trouble_in
 from urmpipe.api.build_fmu import build_fmu
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.check import check_fmu
@@ -287,3 +289,38 @@ def test_no_file_of_the_working_folder_is_taken_for_a_module(
     (meter.parent / "json.py").write_text("raise RuntimeError('run by mistake')\n", encoding="utf-8")
     monkeypatch.chdir(meter.parent)
     assert check_fmu(meter).problems == ()
+
+
+def test_check_tells_warnings_of_an_fmu_and_is_0_all_the_same(urmpipe: RunCommand) -> None:
+    held = Scalar("y", 0, start="0", initial="exact")
+    warm = Foreign(name="warm", scalars=(held,), terminate="return fmi2Warning;")
+    path = fmu(replace(warm, variable_step=False))
+    ran = urmpipe("fmu", "check", path)
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.out.splitlines()[1:3] == ["warning: fmi2Terminate returned fmi2Warning", "No problem found."]
+    assert json.loads(urmpipe("fmu", "check", path, "--json").out)["warnings"] == [
+        "fmi2Terminate returned fmi2Warning"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [("exit(0);", "ended the process with the exit code 0"), (HANGS, "did not return within 1 s")],
+)
+def test_check_of_an_fmu_that_does_not_come_to_its_end_is_1(
+    urmpipe: RunCommand, code: str, said: str
+) -> None:
+    ran = urmpipe(
+        "fmu", "check", fmu(replace(trouble_in("free", code), variable_step=False)), "--timeout", "1000ms"
+    )
+    assert (ran.code, ran.err) == (1, "")
+    assert f"problem: fmi2FreeInstance {said}" in ran.out.splitlines()
+
+
+def test_check_unpacks_nothing_outside_of_its_folder(urmpipe: RunCommand, tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "out.fmu", "w") as archive:
+        archive.writestr("../out.txt", "")
+    ran = urmpipe("fmu", "check", "out.fmu")
+    allowed = "paths below the FMU's folder, with / between their parts"
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err == f"error: out.fmu: found the path ../out.txt, allowed: {allowed}\n"

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import json
+import re
 import shlex
 import sys
+import tomllib
+import xml.etree.ElementTree as ET
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +15,7 @@ from typing import Any
 import pytest
 
 from urmpipe.printing.terminal import print_recording, progress_bar
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.spelling import pasted
 
 
@@ -94,3 +99,93 @@ def test_a_report_says_that_it_replaced_an_earlier_one(urmpipe: Callable[..., An
     assert urmpipe("report", "verdict.rrd").out == "Report: verdict.html  (open it in any browser)\n"
     said = "Report: verdict.html  (open it in any browser; it replaced an earlier one)\n"
     assert urmpipe("report", "verdict.rrd").out == said
+
+
+CLAIM = "PASS  all logs within tolerance"
+LETTERS = "\x85\x9b\x7f\u061c\u200e\u200f\u2028\u2029\u202a\u202e\u2066\u2069"
+HELD = f"x\n{CLAIM}{LETTERS}<b>&"
+"""A name that XML can hold: a line of its own that looks like a verdict, C1 and marks of direction."""
+
+NAME = f"{HELD}\x1b[31m\r\x07"
+ARM = f"""name = {json.dumps(NAME)}
+kind = "joints"
+description = {json.dumps(NAME)}
+source = {json.dumps(NAME)}
+[[joints]]
+name = {json.dumps(f"j{NAME}")}
+origin = {{ translation = [0, 0, 0.1] }}
+[[joints]]
+name = "second"
+origin = {{ translation = [0.2, 0, 0] }}
+axis = [0, 1, 0]
+[tip]
+translation = [0.3, 0, 0]
+[[inertials]]
+joint = "second"
+mass = 2
+centre = [0.1, 0, 0]
+inertia = [0.1, 0.1, 0.1, 0, 0, 0]
+source = {json.dumps(NAME)}
+"""
+
+
+def clean(text: str, kept: str = "\n\t") -> bool:
+    """Tell whether no letter acts on a terminal or others, and no line claims what a name says."""
+    acting = re.findall(f"[\x00-\x1f{LETTERS}\x80-\x9f]", text)
+    return set(acting) <= set(kept) and not re.search(rf"^\s*{CLAIM}", text, re.MULTILINE)
+
+
+def test_no_name_breaks_a_line_of_what_robot_prints_and_writes(
+    urmpipe: Callable[..., Any], tmp_path: Path
+) -> None:
+    """JSON, TOML and XML read back as the name, but for what XML cannot hold."""
+    (tmp_path / "arm.toml").write_text(ARM, encoding="utf-8")
+    for words in (
+        ["show", "arm.toml", "--picture", "arm.svg"],
+        ["export", "arm.toml", "-o", "same.toml"],
+        ["export", "arm.toml", "-o", "same.urdf"],
+        ["equations", "arm.toml", "-o", "arm.c"],
+        ["equations", "arm.toml"],
+    ):
+        ran = urmpipe("robot", *words)
+        assert (ran.code, clean(ran.out + ran.err)) == (0, True)
+    shown = urmpipe("robot", "show", "arm.toml", "--json").out
+    assert clean(shown)
+    assert json.loads(shown)["name"] == NAME
+    for name in ("arm.svg", "arm.c", "same.toml", "same.urdf"):
+        assert clean((tmp_path / name).read_text(encoding="utf-8"))
+    ET.parse(tmp_path / "arm.svg")
+    assert tomllib.loads((tmp_path / "same.toml").read_text(encoding="utf-8"))["name"] == NAME
+    read_back = load_robot(tmp_path / "same.urdf")
+    assert read_back.name == f"{HELD}\\x1b[31m\r\\x07"
+    assert read_back.coordinates == (f"j{read_back.name}", "second")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows allows no such names")
+def test_no_name_breaks_a_line_of_a_verdict(urmpipe: Callable[..., Any], tmp_path: Path) -> None:
+    """Of a robot, a file or a column: in the terminal, JSON, JUnit, CSV, the report, exports and maps."""
+    (tmp_path / "arm.toml").write_text(ARM, encoding="utf-8")
+    wanted, done, column = f"wanted{NAME}.csv", f"done{NAME}.csv", "q1\u202e\x9b\x7f\u2066"
+    for name, more in ((wanted, 0.0), (done, 0.5)):
+        rows = "".join(f"{0.01 * k:.2f},{0.01 * k + more:.4f},{-0.01 * k:.4f}\n" for k in range(60))
+        (tmp_path / name).write_text(f"t [s],{column} [rad],q2 [rad]\n{rows}", encoding="utf-8")
+    read, files = ["--robot", "arm.toml"], ["--junit", "v.xml", "--csv", "v.csv"]
+    for words, code in (
+        (["compare", wanted, done, *read, *files, "-o", "v.rrd"], 1),
+        (["compare", wanted, done, *read, "-o", "v.rrd", "-q"], 1),
+        (["report", "v.rrd", "-o", "v.html"], 0),
+        (["export", "v.rrd", "--to", "csv", "-o", "rows.csv"], 0),
+        (["ingest", done, *read, "--write-map", "map.toml", "--audit", "audit.csv", "-o", "done.rrd"], 0),
+        (["ingest", done, *read, "--explain"], 0),
+        (["diagnose", wanted, done, *read], 1),
+        (["compare", wanted, f"{NAME}.csv", *read], 2),
+    ):
+        ran = urmpipe(*words)
+        assert (ran.code, clean(ran.out + ran.err)) == (code, True), words[0]
+    told = urmpipe("compare", wanted, done, *read, "-o", "v.rrd", "--json").out
+    assert clean(told)
+    assert json.loads(told)["runs"][0]["name"] == f"done{NAME}"
+    for name in ("v.xml", "v.csv", "v.html", "rows.csv", "map.toml", "audit.csv"):
+        written = (tmp_path / name).read_bytes().decode()
+        assert clean(re.sub("<script>.*?</script>", "", written, flags=re.DOTALL)), name  # not of names
+    ET.parse(tmp_path / "v.xml")

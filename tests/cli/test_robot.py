@@ -285,3 +285,28 @@ def test_a_pose_in_degrees_is_told_of(urmpipe: Any) -> None:
         "warning: --q: these values look like degrees: found phi2 = 90 rad (5156.62 deg), allowed: rad\n",
     )
     assert urmpipe("robot", "show", "urm6", "--q", "0,3.14,0,3,0,0").err == ""
+
+
+def test_an_arm_whose_last_axes_are_parallel_has_no_closed_form(urmpipe: Any, tmp_path: Path) -> None:
+    """Where such axes all but meet, no point is nearest to them."""
+    rows = ["d = 47", "alpha = 90", "a = 120, theta = 90", "alpha = -90, a = 20", "d = 130", "d = 29"]
+    head = 'kind = "modified_dh"\nlength_unit = "mm"\nangle_unit = "deg"'
+    text = f"{head}\njoints = [{{ {' }, { '.join(rows)} }}]"
+    (tmp_path / "arm.toml").write_text(text, encoding="utf-8")
+    ran = urmpipe("robot", "show", "arm.toml")
+    assert (ran.code, ran.err) == (0, "")
+    assert "Inverse: iterative" in ran.out
+
+
+def test_a_null_character_in_a_name_is_one_line(urmpipe: Any, tmp_path: Path) -> None:
+    (tmp_path / "arm.toml").write_text('kind = "urdf"\nfile = "a\\u0000.urdf"', encoding="utf-8")
+    for words, said in (
+        (("robot", "show", "a\0.toml"), "found 'a\\x00.toml', allowed: the name of a file"),
+        (("robot", "show", "arm.toml"), "arm.toml: found 'a\\x00.urdf', allowed: the name of a file"),
+        (
+            ("robot", "export", "urm6", "-o", "a\0.urdf"),
+            "found a null character, allowed: none in the name of a file",
+        ),
+    ):
+        ran = urmpipe(*words)
+        assert (ran.code, ran.out, ran.err) == (2, "", f"error: {said}\n")

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 import urmpipe as package
-from foreign_fmus import Foreign, Scalar, fmu, gain
-from urmpipe_models.errors import LogError
+from foreign_fmus import HANGS, Foreign, Scalar, fmu, gain
+from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.simulations.simulation import Simulation
 
 RunCommand = Callable[..., Any]
@@ -93,8 +93,37 @@ def test_a_meter_of_a_run_that_ended_early_does_not_pass(
     ran = urmpipe(*write(tmp_path, {"bad": ends}, {ACTUAL: "bad.y"}), "--json")
     (verdict,) = json.loads(ran.out)["verdicts"]
     assert (verdict["verdict"], verdict["out_of_tolerance"]) == ("fail", 0)
-    assert verdict["doubts"] == ["the run ended after 4 of 11 samples"]
+    assert verdict["doubts"] == ["the run ended at t = 0.3 s of 1 s"]
     assert ran.code == (1 if stops is STOPS else 2)
+
+
+def test_a_call_that_does_not_return_fails_the_run(urmpipe: RunCommand, tmp_path: Path) -> None:
+    hangs = replace(ENDS, name="hangs", step=f"if (t > 0.25) {HANGS}")
+    ran = urmpipe(*write(tmp_path, {"bad": hangs}, {ACTUAL: "bad.y"}), "--timeout", "2s", "--json")
+    failed = "block bad: fmi2DoStep at t = 0.3 s: did not return within 2 s; it logged nothing"
+    assert ran.code == 2
+    assert errors(ran.err) == [f"error: {failed}; what was recorded until then is in system.rrd"]
+    assert json.loads(ran.out)["samples"] == 4
+    assert recorded(tmp_path).failed == failed
+
+
+def test_the_time_that_a_call_may_take_is_above_0(urmpipe: RunCommand, tmp_path: Path) -> None:
+    line = write(tmp_path, {"a": ENDS}, {ACTUAL: "a.y"})
+    assert errors(urmpipe(*line, "--timeout", "0").err) == [
+        "error: --timeout: found '0', allowed: a positive time in s, such as 0.005 or 5ms"
+    ]
+    with pytest.raises(OptionError, match="timeout: found -1 s, allowed: above 0"):
+        package.simulate(tmp_path / "system.toml", timeout=-1.0)
+
+
+def test_an_fmu_that_ends_the_run_with_its_last_step_is_judged_as_a_whole(
+    urmpipe: RunCommand, tmp_path: Path
+) -> None:
+    step = "if (t > 0.85) { m->last = t + h; m->terminated = 1; return fmi2Discard; }"
+    whole = replace(ENDS, name="whole", step=step)
+    ran = urmpipe(*write(tmp_path, {"bad": whole}, {ACTUAL: "bad.y"}), "--json")
+    (verdict,) = json.loads(ran.out)["verdicts"]
+    assert (verdict["verdict"], verdict["samples"], verdict["doubts"]) == ("pass", 11, [])
 
 
 TOLD = "a: y: found nan at t = 0.2 s; values that are not finite: 4"  # y[1] and y[2] at two points
@@ -171,3 +200,19 @@ def test_the_meter_that_is_in_doubt_decides_before_one_that_passes(tmp_path: Pat
     assert {one.block: one.verdict for one in result.verdicts} == {"m": "fail", "near": "pass"}
     assert result.judged_worst is not None
     assert (result.judged_worst.block, result.verdict) == ("m", "fail")
+
+
+def test_compare_passes_no_motion_to_which_leads_what_is_not_finite(
+    urmpipe: RunCommand, tmp_path: Path
+) -> None:
+    point = tuple(Scalar(f"p[{i}]", i, unit="m") for i in (1, 2, 3))
+    tip = Foreign("tip", (*point, Scalar("u", 4, "input", unit="m")), compute="v->r[1] = fmin(v->r[4], 0.0);")
+    write(tmp_path, {"a": GLITCH, "tip": tip}, {ACTUAL: "tip.p[1]", '"tip.u"': "a.y[1]"})
+    assert urmpipe("simulate", "system.toml").code == 1
+    (tmp_path / "path.csv").write_text("t,x [m],y [m],z [m]\n0,0,0,0\n1,0,0,0\n", encoding="utf-8")
+    ran = urmpipe("compare", "path.csv", "system.rrd", "--block", "tip")
+    assert (ran.code, ran.out) == (2, "")
+    assert errors(ran.err) == [
+        "error: system.rrd: a.y: found nan at t = 0.2 s; values that are not finite: 4; allowed: none where"
+        " block tip is judged"
+    ]

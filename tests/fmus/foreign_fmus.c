@@ -19,13 +19,27 @@ typedef struct {
     fmi2ComponentEnvironment environment;
     char name[64];
     fmi2Boolean terminated;
+    double last;                                          /* last successful time of a discarded step */
 } Model;
 
 #define LOG(m, status, ...) (m)->logger((m)->environment, (m)->name, status, "log", __VA_ARGS__)
 
+static int overflow(volatile int n) {                    /* overflows the stack */
+    volatile char held[4096];
+    held[0] = n;
+    return n < 0 ? 0 : overflow(n + 1) + held[0];
+}
+
+static void take(size_t bytes) {                         /* takes memory; where it gets none, writes to NULL */
+    volatile char *held = malloc(bytes);
+    for (size_t i = 0; i < bytes; i += 4096) held[i] = 1;
+}
+
 static void compute(Model *m);                           /* outputs of inputs, parameters, states */
 static fmi2Status step(Model *m, double t, double h);    /* states after a step */
 #include "model.h"
+
+__attribute__((constructor)) static void loaded(void) { LOAD }
 
 fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, fmi2String resources,
                               const fmi2CallbackFunctions *f, fmi2Boolean visible, fmi2Boolean logging) {
@@ -33,6 +47,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
     Model *m = calloc(1, sizeof(Model));
     m->logger = f->logger;
     m->environment = f->componentEnvironment;
+    m->last = NAN;
     strncpy(m->name, name, sizeof m->name - 1);
     START
     return m;
@@ -42,21 +57,26 @@ const char *fmi2GetTypesPlatform(void) { return "default"; }
 const char *fmi2GetVersion(void) { return "2.0"; }
 void fmi2FreeInstance(fmi2Component c) { FREE free(c); }
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean on, size_t n, const fmi2String k[]) { return fmi2OK; }
-fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean d, fmi2Real tol, fmi2Real t, fmi2Boolean e, fmi2Real s) { return fmi2OK; }
-fmi2Status fmi2EnterInitializationMode(fmi2Component c) { return fmi2OK; }
-fmi2Status fmi2ExitInitializationMode(fmi2Component c) { compute(c); return fmi2OK; }
+fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean d, fmi2Real tol, fmi2Real t, fmi2Boolean e, fmi2Real s) {
+    SETUP
+    return fmi2OK;
+}
+fmi2Status fmi2EnterInitializationMode(fmi2Component c) { ENTER return fmi2OK; }
+fmi2Status fmi2ExitInitializationMode(fmi2Component c) { EXIT compute(c); return fmi2OK; }
 fmi2Status fmi2Terminate(fmi2Component c) { TERMINATE return fmi2OK; }
 fmi2Status fmi2Reset(fmi2Component c) { return fmi2OK; }
 
 #define GET(kind, type, field) \
     fmi2Status fmi2Get##kind(fmi2Component c, const fmi2ValueReference r[], size_t n, type o[]) { \
         Model *m = c; \
+        ON_GET \
         if (FRESH) compute(m); \
         for (size_t k = 0; k < n; k++) o[k] = m->v.field[r[k]]; \
         return fmi2OK; \
     } \
     fmi2Status fmi2Set##kind(fmi2Component c, const fmi2ValueReference r[], size_t n, const type o[]) { \
         Model *m = c; \
+        ON_SET \
         for (size_t k = 0; k < n; k++) m->v.field[r[k]] = o[k]; \
         return fmi2OK; \
     }
@@ -105,7 +125,10 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no) {
 }
 fmi2Status fmi2CancelStep(fmi2Component c) { return fmi2Error; }
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind k, fmi2Status *s) { return fmi2Discard; }
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind k, fmi2Real *s) { return fmi2Discard; }
+fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind k, fmi2Real *s) {
+    *s = ((Model *)c)->last;
+    return k == fmi2LastSuccessfulTime && !isnan(*s) ? fmi2OK : fmi2Discard;
+}
 fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind k, fmi2Integer *s) { return fmi2Discard; }
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind k, fmi2Boolean *s) {
     *s = ((Model *)c)->terminated;

@@ -48,13 +48,23 @@ class Scalar:
 
 @dataclass(frozen=True)
 class Foreign:
-    """A foreign FMU: variables and C."""
+    """A foreign FMU: variables and C.
+
+    `load` to `terminate` hold C that a call begins with, `load` what runs when the library is loaded. In
+    `start`, `get`, `set` and `step`, `m` is the instance.
+    """
 
     name: str
     scalars: tuple[Scalar, ...]
     compute: str = ""
     step: str = ""
     start: str = ""
+    load: str = ""
+    setup: str = ""
+    enter: str = ""
+    exit: str = ""
+    get: str = ""
+    set: str = ""
     free: str = ""
     terminate: str = ""
     fresh: bool = True
@@ -77,8 +87,8 @@ class Foreign:
         (work / "model.h").write_text(
             f'#define GUID "{self.guid}"\n#define FRESH {int(self.fresh)}\n'
             f"#define VARIABLE_STEP {int(self.variable_step)}\n"
-            f"#define START {self.start}\n#define FREE {self.free}\n#define TERMINATE {self.terminate}\n"
-            f"static void compute(Model *m) {{ Values *v = &m->v; (void)v; {self.compute} }}\n"
+            + "".join(f"#define {macro} {code}\n" for macro, code in self._calls().items())
+            + f"static void compute(Model *m) {{ Values *v = &m->v; (void)v; {self.compute} }}\n"
             "static fmi2Status step(Model *m, double t, double h) {\n"
             f"    Values *v = &m->v; (void)v; {self.step}\n    return fmi2OK;\n}}\n"
         )
@@ -103,6 +113,20 @@ class Foreign:
             archive.writestr("modelDescription.xml", self.description())
             archive.write(library, f"binaries/{fmpy.platform}/{library.name}")
         return made
+
+    def _calls(self) -> dict[str, str]:
+        """Return the C of each call by its macro."""
+        return {
+            "LOAD": self.load,
+            "START": self.start,
+            "SETUP": self.setup,
+            "ENTER": self.enter,
+            "EXIT": self.exit,
+            "ON_GET": self.get,
+            "ON_SET": self.set,
+            "FREE": self.free,
+            "TERMINATE": self.terminate,
+        }
 
     def description(self) -> str:
         places = {one.name: i for i, one in enumerate(self.scalars, 1)}
@@ -157,6 +181,48 @@ def gain(name: str = "gain", *, fresh: bool = True, formula: str = "k * u + c", 
         start="m->v.r[0] = 1;",
         fresh=fresh,
         **options,  # type: ignore[arg-type]
+    )
+
+
+HANGS = "for (;;) pause();"
+"""C that does not return."""
+
+OVERFLOWS = "overflow(0);"
+"""C that overflows the stack."""
+
+TAKES_MEMORY = "take(20000000000u);"
+"""C that takes 20 GB in one piece; where it gets none, it writes to NULL."""
+
+NAN_OUTPUT = Foreign(
+    name="nan_output",
+    scalars=(Scalar("y", 0), Scalar("well", 1)),
+    compute="v->r[0] = v->time > 0.15 ? NAN : v->time; v->r[1] = v->time;",
+)
+"""y is nan from 0.15 s on."""
+
+STAIR = Foreign(
+    name="stair",
+    scalars=(Scalar("at", 0, "parameter", start="0.9"), Scalar("y", 1)),
+    compute="v->r[1] = v->time;",
+    step="""
+    if (t + h > v->r[0] - 1e-9) { m->last = v->time = v->r[0]; m->terminated = 1; return fmi2Discard; }
+    """,
+    start="m->v.r[0] = 0.9;",
+)
+"""Ends the run at the time `at` within a step, as Reference-FMUs' Stair does; y is the time there."""
+
+
+def trouble_in(call: str, code: str) -> Foreign:
+    """Return an FMU of which a call runs some C.
+
+    Args:
+        call: load, start (fmi2Instantiate), setup, enter, exit, get, set, step, terminate or free.
+        code: The C.
+    """
+    return Foreign(
+        name=f"in_{call}",
+        scalars=(Scalar("u", 0, "input"), Scalar("y", 1)),
+        **{call: code.replace("\n", " ")},  # type: ignore[arg-type]
     )
 
 

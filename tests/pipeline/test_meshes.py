@@ -11,6 +11,8 @@ import pytest
 
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.chains.visual import Box, Mesh, Visual
+from urmpipe_models.robots.robot_file import chain_from_dict, chain_to_dict
+from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.meshes import drawable, missing_visuals
@@ -37,6 +39,27 @@ def test_one_warning_tells_of_all_meshes_that_are_missing(tmp_path: Path) -> Non
     assert kinematics(robot, *(np.zeros((1, 1)),) * 3)[1] == missing_visuals(robot)
 
 
+def test_a_mesh_that_the_description_may_not_take_is_told_and_not_drawn(tmp_path: Path) -> None:
+    (tmp_path / "my arm").mkdir()
+    (tmp_path / "secret.stl").write_bytes(b"solid")
+    (tmp_path / "my arm" / "arm.urdf").write_text(
+        "<robot name='arm'><link name='b'><visual><geometry><mesh filename='../secret.stl'/></geometry>"
+        "</visual></link><link name='e'/><joint name='j' type='continuous'><parent link='b'/>"
+        "<child link='e'/></joint></robot>"
+    )
+    robot = read_urdf(tmp_path / "my arm" / "arm.urdf")
+    for one in (robot, chain_from_dict(chain_to_dict(robot))):  # as a recording keeps it
+        assert not any(map(drawable, one.visuals))
+        assert missing_visuals(one) == [
+            LogWarning(
+                "visual-missing",
+                "1 of 1 mesh files of robot arm are outside its folder and not drawn, the first"
+                f" {tmp_path}/my arm/../secret.stl: lines stand for the links; allowed: files in the folder"
+                " of its description, in ROS packages around it, and in folders of ROS_PACKAGE_PATH",
+            )
+        ]
+
+
 @pytest.mark.parametrize(
     ("document", "whole"),
     [
@@ -51,3 +74,10 @@ def test_a_gltf_that_needs_other_files_is_not_drawn(document: object, whole: boo
     path = tmp_path / "arm.gltf"
     path.write_text(json.dumps(document), encoding="utf-8")
     assert drawable(Visual(None, Mesh(str(path)), translation(0.0, 0.0, 0.0))) is whole
+
+
+def test_a_gltf_of_many_brackets_or_of_no_text_is_not_drawn(tmp_path: Path) -> None:
+    path = tmp_path / "arm.gltf"
+    for content in (b"[" * 100_000, b'{"buffers":' * 100_000, b"\xff\xfe", b"9" * 5000):
+        path.write_bytes(content)
+        assert not drawable(Visual(None, Mesh(str(path))))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import datetime, timedelta
 
 import numpy as np
 
@@ -359,3 +360,20 @@ def seven_joints_for_six() -> Made:
     truth: Truth = motion(30, joints=7)
     rows = np.column_stack((truth.t, truth.q)).tolist()
     return made("seven_joints_for_six.csv", writer([["t", *(f"joint_{k}" for k in range(1, 8))], *rows]))
+
+
+@specimen
+def rows_of_one_cell() -> Made:
+    """A header of a time and a joint over rows of one number: which of both is missing, nothing tells."""
+    return made("rows_of_one_cell.csv", "t,q1\n1\n2\n")
+
+
+@specimen
+def midnight_among_rows() -> Made:
+    """Times of day of 24 rows, 10 ms apart over midnight, of which two are exchanged there."""
+    truth = motion(24)
+    start = datetime(2021, 4, 11, 23, 59, 59, 875000)
+    times = [f"{start + timedelta(milliseconds=10 * k):%H:%M:%S.%f}" for k in range(24)]
+    times[12], times[13] = times[13], times[12]
+    rows = [[time, *q] for time, q in zip(times, np.round(truth.q, 6).tolist(), strict=True)]
+    return made("midnight_among_rows.csv", writer([["t", *Q6], *rows]))

@@ -256,6 +256,14 @@ def clock_time_of_day_midnight() -> Made:
 
 
 @specimen
+def clock_seconds_of_day() -> Made:
+    """Seconds of the day past midnight: 86399.98 is followed by 0.00."""
+    return clocked(
+        "clock_seconds_of_day", "time [s]", lambda t: f"{(86399.8 + t) % 86400:.2f}", motion(ROWS), start=86399.8
+    )
+
+
+@specimen
 def clock_micros_not_padded() -> Made:
     """hh:mm:ss:micro with the microseconds as a whole number: 22:27:22:5247 is 5247 us, not 0.5247 s."""
 

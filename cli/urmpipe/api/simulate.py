@@ -17,7 +17,7 @@ from urmpipe.systems.units import Backend
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.cosim import load_system, prepare, read_system, system_name, system_names, system_svg
 from urmpipe_fmus.cosim import simulate as run_plan
-from urmpipe_fmus.cosim.process import Worker
+from urmpipe_fmus.cosim.process import TIMEOUT, Worker
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.simulations.simulation import Simulation
@@ -34,6 +34,7 @@ def simulate(
     step: float | None = None,
     duration: float | None = None,
     backend: Backend | None = None,
+    timeout: float = TIMEOUT,
     strict: bool = False,
     output: PathLike | None = None,
     draw: PathLike | None = None,
@@ -49,6 +50,7 @@ def simulate(
         step: Communication step in [s]; default: that of the system, else of the joint log that it plays.
         duration: In [s]; default: that of the system, else of the longest log that it reads.
         backend: native or python, for the FMUs of units; default: native if it can be built here.
+        timeout: How long a call of an FMU may take, in [s]: one that does not return ends the run.
         strict: Whether a warning is an error, but for the one that the blocks run on Python.
         output: The recording (.rrd) to write.
         draw: An SVG file to draw the system to.
@@ -65,7 +67,9 @@ def simulate(
         UrmpipeError: With everything that is wrong with the system, before the first step, or with an output.
     """
     texts = {name: str(value) for name, value in (arguments or {}).items()}
-    loaded = _changed(read_system(system, texts), step, duration)
+    _check_times(step=step, duration=duration, timeout=timeout)
+    read = read_system(system, texts)
+    loaded = replace(read, step=step or read.step, duration=duration or read.duration)
     bundled = _bundled(system, texts)
     kept = [loaded.path, *_files(loaded), *map_files(reading)]
     named: dict[OutputKind, PathLike | None] = {"recording": output, "drawing": draw}
@@ -76,7 +80,8 @@ def simulate(
         check_meters(plan, blocks)
         svg = system_svg(plan)
         written.write("drawing", lambda part, path: write_drawing(part, svg))
-        made = simulation_of(plan, run_plan(plan, progress=running, worker=worker), blocks, svg)
+        ran = run_plan(plan, timeout=timeout, progress=running, worker=worker)
+        made = simulation_of(plan, ran, blocks, svg)
         if made.failed is None:  # else that is told, and what was recorded stays
             refuse_warnings(strict, [one for one in made.warnings if one.kind != ON_PYTHON])
         return written.recorded(made, writing)
@@ -116,20 +121,18 @@ def own_logs(system: str) -> dict[str, str]:
     }
 
 
-def _changed(system: System, step: float | None, duration: float | None) -> System:
-    """Return a system with another step or duration, if they are given.
+def _check_times(**given: float | None) -> None:
+    """Refuse times in [s] that are given and not positive.
 
     Raises:
-        OptionError: If one is no positive time.
+        OptionError: With each of them.
     """
-    given = {"step": step, "duration": duration}
     wrong = {name: value for name, value in given.items() if value is not None and not 0.0 < value < math.inf}
     if wrong:
         faults = (
             Finding(parameter=name, found=f"{value:g} s", allowed="above 0") for name, value in wrong.items()
         )
         raise OptionError(*faults)
-    return replace(system, step=step or system.step, duration=duration or system.duration)
 
 
 def _files(system: System) -> list[Path]:

@@ -11,7 +11,7 @@ import urmpipe
 from urmpipe.options.named import NamedType, named_values, option_names, option_value
 from urmpipe.options.output import Terminal, output_options
 from urmpipe.options.reading import MAP_OPTION
-from urmpipe.options.types import ROBOT, UNIT, NamesType, OneOf
+from urmpipe.options.types import DURATION, ROBOT, UNIT, NamesType, OneOf
 from urmpipe.usage import Group
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.messages import Hint
@@ -160,20 +160,27 @@ def build(
 
 @fmu.command(short_help="Validate an FMU, run it and list its variables.")
 @click.argument("file", metavar="FILE.fmu", type=click.Path(path_type=Path))
+@click.option(
+    "--timeout",
+    type=DURATION,
+    default=60.0,
+    help="How long a call of the FMU may take [default: 60 s].",
+)
 @output_options
-def check(file: Path, terminal: Terminal) -> int:
+def check(file: Path, timeout: float, terminal: Terminal) -> int:
     """Validate an FMU of any tool, run it, and list its variables.
 
     \b
     Examples:
       urmpipe fmu check kinematic_chain.fmu
       urmpipe fmu check other.fmu --json
+      urmpipe fmu check slow.fmu --timeout 600
 
     Exit codes: 0 nothing found, 1 problems found, 2 no FMU.
     """
     from urmpipe.printing.fmu import checked_dict, print_checked
     from urmpipe_fmus.check import check_fmu
 
-    checked = check_fmu(file)
+    checked = check_fmu(file, timeout=timeout)
     terminal.answer(lambda: checked_dict(checked), lambda: print_checked(checked))
     return 1 if checked.problems else 0

@@ -51,6 +51,11 @@ if TYPE_CHECKING:
     type=OneOf(["native", "python"]),
     help="What the units run as [default: native if it can be built here].",
 )
+@click.option(
+    "--timeout",
+    type=DURATION,
+    help="How long a call of an FMU may take [default: 60 s].",
+)
 @row_options
 @STRICT_OPTION
 @output_options
@@ -88,7 +93,8 @@ def simulate(
         raise click.UsageError(f"found {found}, allowed: one of both")
     if listed or system is None:
         return _list(terminal)
-    asked = {"arguments": arguments, "step": step, "duration": duration, **options}
+    given = {"arguments": arguments, "step": step, "duration": duration, **options}
+    asked = {name: value for name, value in given.items() if value is not None}
     if write_system is not None:
         _refuse_run_options({"output": output, "draw": draw, **asked})
         return _write(system, write_system, terminal)

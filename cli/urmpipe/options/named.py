@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -10,6 +9,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from urmpipe_models.errors import shown
+from urmpipe_models.files.toml_text import TomlError, toml_values
 
 
 class NamedType(click.ParamType[str]):
@@ -68,8 +68,8 @@ def _operand(ctx: click.Context, name: str) -> str | None:
 def option_value(text: str) -> Any:
     """Return the value of NAME=VALUE: as TOML has it, else some words parted by commas, or a word."""
     try:
-        return tomllib.loads(f"value = {text}\n")["value"]
-    except (tomllib.TOMLDecodeError, KeyError):
+        return toml_values(f"value = {text}\n")["value"]
+    except (TomlError, KeyError):
         words = [part.strip() for part in text.split(",")]
         return words if len(words) > 1 else text.strip()
 

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from urmpipe.printing.terminal import lines_of
+from urmpipe_models.messages import one_line
 from urmpipe_pipeline.text import NOTHING
 
 if TYPE_CHECKING:
@@ -25,13 +27,13 @@ class Column:
     """One column of a table.
 
     Attributes:
-        head: Its head, which may have several lines.
+        head: The lines of its head.
         cells: One a row; None where there is nothing.
         key: Whether it names the rows: it stands at the left of every part.
         words: Whether it holds words, which stand to the left and are folded; else numbers.
     """
 
-    head: str
+    head: Sequence[str]
     cells: Sequence[str | Text | None]
     key: bool = False
     words: bool = False
@@ -41,8 +43,8 @@ class Column:
         """Places that the widest line takes."""
         from rich.cells import cell_len
 
-        lines = [*self.head.split("\n"), *(str(cell or NOTHING) for cell in self.cells)]
-        width = max(map(cell_len, lines))
+        lines = [*self.head, *(str(cell or NOTHING) for cell in self.cells)]
+        width = max(cell_len(one_line(line)) for line in lines)
         return min(width, KEY_WIDTH) if self.key or self.words else width
 
 
@@ -54,7 +56,8 @@ def print_columns(console: Console, title: str, columns: Sequence[Column]) -> No
         title: What stands above.
         columns: Those that name the rows, and the others from the left.
     """
-    console.print(f"\n{title}", style="italic", soft_wrap=True)
+    console.print()
+    console.print(title, style="italic", soft_wrap=True)
     for part in _parts(columns, console.width):
         console.print(_table(part))
 
@@ -82,7 +85,7 @@ def _table(columns: Sequence[Column]) -> Table:
     for column in columns:
         # Blanks between columns: one of the box, the others of the padding.
         table.add_column(
-            column.head,
+            lines_of(column.head),
             justify="left" if column.key or column.words else "right",
             width=column.width,
             no_wrap=not (column.key or column.words),

@@ -121,6 +121,8 @@ def print_checked(checked: Checked) -> None:
     say(f"{checked.path}: {checked.name} of {checked.generator or 'an unknown tool'}, {platforms}; {ran}")
     for problem in checked.problems:
         say(f"problem: {problem}")
+    for warning in checked.warnings:
+        say(f"warning: {warning}")
     if not checked.problems:
         say("No problem found.")
     heads = ("Variable", "Causality", "Type", "Unit", "Start", "Min", "Max", "Before", "After", "Description")

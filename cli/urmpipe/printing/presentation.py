@@ -9,7 +9,13 @@ from urmpipe.printing.columns import Column, print_columns
 from urmpipe.printing.terminal import LISTED, judged, judged_line, new_console
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation import section as shown
-from urmpipe_pipeline.presentation.brief import brief_columns, brief_facts, brief_tables, head, rows_within
+from urmpipe_pipeline.presentation.brief import (
+    brief_columns,
+    brief_facts,
+    brief_tables,
+    head_lines,
+    rows_within,
+)
 from urmpipe_pipeline.presentation.digits import units_differ, written
 
 if TYPE_CHECKING:
@@ -76,7 +82,7 @@ def _print_table(console: Console, section: shown.Section, table: shown.Table, *
     rows = rows_within(table, LISTED)
     columns = [
         Column(
-            head(one, "\n"),
+            head_lines(one),
             [_cell(cell, unit=units_differ(one.cells)) for cell in one.cells[rows]],
             key=not number,
             words=all(isinstance(cell, (str, shown.Ref, shown.Advice, type(None))) for cell in one.cells),

@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from urmpipe_models.messages import one_line
+from urmpipe_models.messages import one_line, shown_json
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -36,8 +36,11 @@ def print_json(value: Any) -> None:
 
 
 def echo_json(value: Any, indent: int | None = None) -> None:
-    """Print a JSON value in the letters that it holds, or in ASCII where the output cannot take them all."""
-    written = json.dumps(value, ensure_ascii=False, indent=indent)
+    """Print a JSON value in the letters that it holds, or in ASCII where the output cannot take them all.
+
+    What is no visible letter stands there as an escape of JSON, which reads back as it is.
+    """
+    written = shown_json(json.dumps(value, ensure_ascii=False, indent=indent))
     try:
         written.encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:  # such as the bytes of a file name that are no text
@@ -137,11 +140,18 @@ def new_console() -> Console:
             raise BrokenPipeError
 
         def render_str(self, text: str, **options: Any) -> Text:
-            """Return a string or the text of a cell, line by line without what is not printable."""
-            return super().render_str("\n".join(one_line(line) for line in text.split("\n")), **options)
+            """Return a string or the text of a cell on one line, without what is not printable."""
+            return super().render_str(one_line(text), **options)
 
     width = None if sys.stdout.isatty() else PIPE_WIDTH
     return PlainConsole(width=width, markup=False, emoji=False, highlight=False)
+
+
+def lines_of(lines: Iterable[str]) -> Text:
+    """Return lines that a cell or a head has, each without what is not printable."""
+    from rich.text import Text
+
+    return Text("\n".join(map(one_line, lines)))
 
 
 def new_table(*columns: str, title: str) -> Table:

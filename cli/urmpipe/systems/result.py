@@ -11,7 +11,7 @@ import numpy as np
 
 from urmpipe.systems.blocks import CHAIN, METER, Blocks
 from urmpipe_fmus.cosim.interface import ELEMENT, Interface
-from urmpipe_fmus.cosim.plan import Plan
+from urmpipe_fmus.cosim.plan import NANOSECOND, Plan
 from urmpipe_fmus.cosim.simulation import NotFinite, Recorded
 from urmpipe_fmus.cosim.system import Block, Port, System
 from urmpipe_models.arrays import FloatArray
@@ -215,7 +215,7 @@ def _meters(system: System) -> list[str]:
 
 def _verdicts(plan: Plan, recorded: Recorded, odd: Mapping[Port, NotFinite]) -> Iterator[DeltaVerdict]:
     """Yield the verdict of each delta meter."""
-    for name in _meters(plan.system):
+    for name in _meters(plan.system) if len(recorded.t_ns) else ():
         columns = [recorded.column(name, f"delta[{i}]") for i in (1, 2, 3)]
         tolerance = {"axis": _value(plan, Port(name, TOLERANCE))}
         doubts = tuple(_doubts(plan, recorded, odd, name))
@@ -230,9 +230,10 @@ def _doubts(plan: Plan, recorded: Recorded, odd: Mapping[Port, NotFinite], meter
     What is not finite may have reached it through any block before it, which need not show it: an FMU may
     clip it, or keep it as a state of its own.
     """
-    count, whole = len(recorded.t_ns), plan.count // plan.system.record_every + 1
-    if count < whole:
-        yield f"the run ended after {count} of {whole} samples"
+    every = plan.system.record_every
+    last, end = float(recorded.t_ns[-1]) * 1e-9, plan.count // every * every * plan.step
+    if end - last > NANOSECOND:
+        yield f"the run ended at t = {last:.9g} s of {end:.9g} s"
     before = _before(plan, meter)
     for port, one in odd.items():
         if port.block in before:

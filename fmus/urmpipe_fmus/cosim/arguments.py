@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from urmpipe_models.errors import Finding, shown
+from urmpipe_models.files.contents import is_there
 from urmpipe_models.messages import Hint
 from urmpipe_models.names import not_among
 
@@ -18,7 +19,7 @@ def beside(folder: Path, value: Any) -> Any:
     """Return a value in which each text that names a file of a folder is that file's path."""
     if isinstance(value, str) and value and not value.startswith("$"):
         path = folder / value
-        return str(path) if "\0" not in value and path.is_file() else value
+        return str(path) if is_there(path) else value
     if isinstance(value, Mapping):
         return {key: one if key in NAMES else beside(folder, one) for key, one in value.items()}
     return _mapped(lambda one: beside(folder, one), value)

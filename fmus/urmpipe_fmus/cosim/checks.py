@@ -125,8 +125,13 @@ class Wiring:
         """Tell types and units that differ, and texts; once for an array."""
         for one, output in pairs:
             kinds = (_kind(output), _kind(one))
-            if kinds[0] != kinds[1] or one.type == "String":
-                self._fault(where, f"found {source}, {kinds[0]}, allowed: {kinds[1]} (numbers only)")
+            if "String" in (one.type, output.type):
+                found = f"found {source}, {kinds[0]}, for {one.name}, {kinds[1]}"
+                allowed = "numbers: texts are not exchanged, start gives one for the whole run"
+                self._fault(where, f"{found}; allowed: {allowed}")
+                return
+            if kinds[0] != kinds[1]:
+                self._fault(where, f"found {source}, {kinds[0]}, allowed: {kinds[1]}")
                 return
             fault = unit_fault(output.unit, output.base, one)
             if fault:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from urmpipe_fmus.fmu_file import open_fmu
 from urmpipe_fmus.platforms import binaries_here
 from urmpipe_fmus.si_units import BASE_NAMES, BaseUnit, base_unit, same_unit
 from urmpipe_models.errors import CosimulationError, UnitError
@@ -144,17 +144,15 @@ def read_interface(path: Path) -> Interface:
     It is not held to the standard's schema, as `check_fmu` does: many an FMU that is not quite valid runs.
 
     Raises:
-        CosimulationError: If it cannot be read, is no FMU for co-simulation by FMI 2.0, or has no binaries
-            for this platform.
+        FmuError: If its archive or its description cannot be read.
+        CosimulationError: If its variables cannot be read, it is no FMU for co-simulation by FMI 2.0, or it
+            has no binaries for this platform.
     """
-    import fmpy
-
+    file = open_fmu(path)
+    described = file.described()
     try:
-        with zipfile.ZipFile(path) as archive:
-            names = set(archive.namelist())
-        described = fmpy.read_model_description(str(path), validate=False)
         shown = _interface(path, described)
-    except Exception as error:  # fmpy raises Exception itself, and what a description can be wrong by is much
+    except Exception as error:  # what a description can be wrong by is much
         said = " ".join(str(error).split())
         raise CosimulationError(f"{path}: cannot be read as an FMU: {said}") from error
     if shown is None:
@@ -162,8 +160,8 @@ def read_interface(path: Path) -> Interface:
         found = f"FMI {described.fmiVersion} for {' and '.join(kinds) or 'nothing'}"
         raise CosimulationError(f"{path}: found {found}, allowed: FMI 2.0 for coSimulation")
     binaries = binaries_here(shown.identifier)
-    if not names & set(binaries):
-        platforms = sorted({name.split("/")[1] for name in names if re.match(r"binaries/[^/]+/.", name)})
+    if not set(file.names) & set(binaries):
+        platforms = sorted({name.split("/")[1] for name in file.names if re.match(r"binaries/[^/]+/.", name)})
         raise CosimulationError(
             f"{path}: found binaries for {', '.join(platforms) or 'no platform'},"
             f" allowed: {' or '.join(binaries)}"

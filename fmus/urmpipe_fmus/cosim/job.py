@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +19,11 @@ from numpy.typing import NDArray
 TYPES = ("Real", "Integer", "Boolean")
 """The types of numbers, in the order of the recorded columns."""
 
-JOB, RECORDED, NOT_FINITE, PROGRESS, RESULT, LOG, SAID = (
+JOB, RECORDED, NOT_FINITE, WARNED, PROGRESS, RESULT, LOG, SAID = (
     "job.pickle",
     "recorded.bin",
     "not_finite.bin",
+    "warned.bin",
     "progress.bin",
     "result.json",
     "log.txt",
@@ -30,7 +32,8 @@ JOB, RECORDED, NOT_FINITE, PROGRESS, RESULT, LOG, SAID = (
 """Files in the folder of a run; LOG holds what the FMUs log, SAID what they print.
 
 NOT_FINITE has three rows of doubles with a column for each recorded Real: of its values that are not finite
-the first, the communication point of that, and how many there were.
+the first, the communication point of that, and how many there were. WARNED has two rows with a column for
+each `call_code`: how often it returned fmi2Warning, and the communication point of the first.
 """
 
 FUNCTIONS = (
@@ -47,6 +50,8 @@ FUNCTIONS = (
     "fmi2GetInteger",
     "fmi2GetBoolean",
     "fmi2DoStep",
+    "fmi2GetBooleanStatus",
+    "fmi2GetRealStatus",
     "fmi2GetFMUstate",
     "fmi2SetFMUstate",
     "fmi2FreeFMUstate",
@@ -55,8 +60,14 @@ FUNCTIONS = (
 )
 """What a block can be doing."""
 
-ELSEWHERE = -1
+CALLS = 2**24
+"""More than there are codes of calls: what a call is and its number are kept in one integer."""
+
+ELSEWHERE = CALLS - 1
 """The call while no block is called."""
+
+next_call = count(0, CALLS).__next__
+"""Gives the number of a call, times `CALLS`."""
 
 
 class Progress(ctypes.Structure):
@@ -65,11 +76,24 @@ class Progress(ctypes.Structure):
     Attributes:
         rows: Rows recorded.
         k: The communication point.
-        call: Block and function being called, see `call_code`.
+        call: Block and function being called, see `call_code`, plus `next_call()`: each call has another.
         done: Whether all is done that the process was for: an FMU can end it before, with any exit code.
+        ended: Where the last row stands in [s] if it was read once more as an FMU ended the run; else 0.
     """
 
-    _fields_ = tuple((name, ctypes.c_int64) for name in ("rows", "k", "call", "done"))
+    _fields_ = (
+        *((name, ctypes.c_int64) for name in ("rows", "k", "call", "done")),
+        ("ended", ctypes.c_double),
+    )
+
+    def begin(self, code: int) -> None:
+        """Note what is called next, see `call_code`."""
+        self.call = code + next_call()
+
+    @property
+    def code(self) -> int:
+        """Block and function being called, see `call_code`."""
+        return int(self.call % CALLS)
 
 
 def call_code(block: int, function: str) -> int:
@@ -183,8 +207,13 @@ class Job:
 
     @property
     def rows(self) -> int:
-        """How many rows a whole run records."""
-        return self.count // self.record_every + 1
+        """How many rows a run may record: those of a whole run, and where an FMU ends it one more."""
+        return self.count // self.record_every + 2
+
+    @property
+    def calls(self) -> int:
+        """How many codes of calls there are."""
+        return len(self.blocks) * len(FUNCTIONS)
 
     @property
     def columns(self) -> int:

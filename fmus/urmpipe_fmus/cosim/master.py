@@ -7,14 +7,24 @@ before each call, in memory that outlives the process.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_fmus.cosim.job import ELSEWHERE, TYPES, ExchangeJob, Job, LoopJob, Progress, called
+from urmpipe_fmus.cosim.job import (
+    ELSEWHERE,
+    TYPES,
+    ExchangeJob,
+    Job,
+    LoopJob,
+    Progress,
+    call_code,
+    called,
+    next_call,
+)
 from urmpipe_fmus.cosim.loops import LoopSolver, NoConvergence
 from urmpipe_fmus.cosim.rollback import Exchange, Member, Moved
 from urmpipe_fmus.cosim.slave import (
@@ -31,9 +41,21 @@ from urmpipe_fmus.cosim.slave import (
 Prepared = tuple[int, Call]
 """Block and function, and the call itself."""
 
+NANOSECOND = 1e-9
+"""Times in [s] that differ by no more are one: rows are recorded by whole nanoseconds."""
+
 
 class Ended(Exception):  # noqa: N818 - no error: an FMU may end the simulation
-    """A block ended the simulation."""
+    """A block ended the simulation.
+
+    Attributes:
+        block: Its number.
+        t: How far it came in [s]; nan if it does not tell.
+    """
+
+    def __init__(self, block: int, t: float) -> None:
+        super().__init__(block, t)
+        self.block, self.t = block, t
 
 
 class Master:
@@ -45,10 +67,8 @@ class Master:
         recorded: Where it is recorded, each column in its own unit, shape (rows, columns).
         not_finite: Where values are noted that are not finite, zeros as yet, see `NOT_FINITE`, shape (3,
             recorded Reals).
+        warned: Where each fmi2Warning is noted, zeros as yet, see `WARNED`, shape (2, codes of calls).
         callbacks: What the FMUs are given: logger and memory.
-
-    Attributes:
-        warnings: How often each block's function returned fmi2Warning, by code.
     """
 
     def __init__(
@@ -57,18 +77,19 @@ class Master:
         progress: Progress,
         recorded: NDArray[np.float64],
         not_finite: NDArray[np.float64],
+        warned: NDArray[np.float64],
         callbacks: Any,
     ) -> None:
         self._job, self._progress, self._recorded, self._callbacks = job, progress, recorded, callbacks
+        self._ends: list[str] = []
         self._values = {kind: job.start[kind].copy() for kind in TYPES}
         self._time, self._step, self._exact = (ctypes.c_double(one) for one in (0.0, job.step, job.step))
         self._slaves: list[Slave] = []
         self._members: dict[int, Member] = {}
         self._looped: list[tuple[str, str, Exchange]] = []
-        self.warnings: dict[int, int] = {}
         self._columns = self._shares(job)
         self._reals = self._values["Real"][: job.recorded["Real"]]
-        self._not_finite = not_finite
+        self._not_finite, self._warnings = not_finite, warned
 
     def run(self) -> None:
         """Run the whole job.
@@ -76,11 +97,12 @@ class Master:
         Raises:
             FmuFailed: If an FMU did not do what it was asked.
             NoConvergence: If a loop was not solved.
-            Ended: If a block ended the simulation.
         """
         try:
             self._start()
             self._loop()
+        except Ended as ended:  # while a step of a loop is done again
+            self._note_end(ended, self._time.value, self._time.value)
         except (FmuFailed, NoConvergence):  # what is not finite may be why
             self._look(0)
             raise
@@ -94,12 +116,12 @@ class Master:
         for slave in self._slaves:
             if slave.block.folder not in corrupted:
                 slave.end()
-        self._progress.call = ELSEWHERE
+        self._progress.begin(ELSEWHERE)
 
     @property
     def notes(self) -> list[str]:
-        """What should be seen of a run: outputs in loops that may be a step late."""
-        return [
+        """What should be seen of a run: that a block ended it, outputs in loops that may be a step late."""
+        return self._ends + [
             f"algebraic loop: {ring}: the outputs of block {name} never followed its inputs: they do not"
             " depend on them, or are those of the step before"
             for name, ring, exchange in self._looped
@@ -109,31 +131,25 @@ class Master:
     def _start(self) -> None:
         """Instantiate the blocks, set their start values, and exchange what they start with."""
         for number, block in enumerate(self._job.blocks):
-            self._slaves.append(Slave(number, block, self._progress))
+            self._slaves.append(Slave(number, block, self._progress, self._warned))
         for slave in self._slaves:
             slave.instantiate(self._callbacks)
         for slave in self._slaves:
-            self._once(slave, "fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0)
-            if slave.set_start() == WARNING:
-                self._warned(self._progress.call)
+            slave.once("fmi2SetupExperiment", 0, 0.0, 0.0, 0, 0.0)
+            slave.set_start()
         for slave in self._slaves:
-            self._once(slave, "fmi2EnterInitializationMode")
+            slave.once("fmi2EnterInitializationMode")
         self._prepare()
         self._log(0)
         self._run(self._point)
         self._look(0)
         for slave in self._slaves:
-            self._once(slave, "fmi2ExitInitializationMode")
+            slave.once("fmi2ExitInitializationMode")
             slave.running = True
-
-    def _once(self, slave: Slave, function: str, *arguments: Any) -> None:
-        if slave.once(function, *arguments) == WARNING:
-            self._warned(self._progress.call)
 
     def _prepare(self) -> None:
         """Prepare the calls of a communication point and those of a step."""
-        in_loops = {e.block for one in self._job.order if isinstance(one, LoopJob) for e in one.exchanges}
-        for number in sorted(in_loops):
+        for number in sorted(self._in_loops()):
             if self._slaves[number].block.can_save:
                 slave = self._slaves[number]
                 self._members[number] = Member(slave, self._time, self._length(slave), self._check)
@@ -143,7 +159,7 @@ class Master:
                 self._point.append((ELSEWHERE, self._solver(one).solve))
             else:
                 self._point += self._sets(one) + self._gets(one)
-        self._steps = [
+        self._steps = [(call_code(n, "fmi2DoStep"), one.step) for n, one in self._members.items()] + [
             slave.stepper(self._time, self._length(slave))
             for slave in self._slaves
             if slave.number not in self._members
@@ -196,16 +212,78 @@ class Master:
                     exchange.begin()
             following = (k + 1) * job.step
             exact.value = following - here
-            for member in self._members.values():
-                member.step()
-            self._run(self._steps)
+            ended = self._step_all(following)
+            if ended:
+                self._finish(ended, here, following)
+                break
             time.value = following
+
+    def _step_all(self, following: float) -> list[Ended]:
+        """Do the step of all blocks; return which of them ended the simulation.
+
+        Once one did, the others step only where it came to the next communication point, at a time in [s].
+        """
+        ended: list[Ended] = []
+        left = self._steps
+        while left:
+            try:
+                self._run(left)
+                break
+            except Ended as one:
+                ended.append(one)
+                if not _same(one.t, following):
+                    break
+                left = left[1 + next(i for i, (code, _) in enumerate(left) if called(code)[0] == one.block) :]
+        return ended
+
+    def _finish(self, ended: Sequence[Ended], here: float, following: float) -> None:
+        """Record once more where blocks ended the simulation, in a step from and to times in [s].
+
+        At the next communication point all blocks exchange their values, but nothing is set in those that
+        ended: after a discarded step that is not allowed (FMI 2.0.4, section 4.2.4). At a time before, and
+        for a block in a loop, which would have to be set, the outputs of the block alone are read.
+        """
+        for one in ended:
+            self._note_end(one, here, following)
+        over, last = {one.block for one in ended}, ended[-1].t
+        if not here + NANOSECOND < last <= following + NANOSECOND:
+            return
+        if all(_same(one.t, following) for one in ended) and not over & self._in_loops():
+            last = self._time.value = following
+            self._progress.k += 1
+            self._log(self._progress.k)
+            self._run([one for one in self._point if not _sets(one, over)])
+            self._look(1)
+        else:
+            self._run(self._reads(ended[-1].block))
+            self._look(0)
+            if len(self._slaves) > 1:
+                self._ends.append(
+                    f"at t = {last:.9g} s the other blocks have their values of t = {here:.9g} s"
+                )
+        self._progress.ended = last
+        self._record(self._progress.rows)
+
+    def _note_end(self, ended: Ended, here: float, following: float) -> None:
+        """Note that a block ended the simulation, in a step from and to times in [s]."""
+        t = ended.t if here <= ended.t <= following + NANOSECOND else here
+        name = self._slaves[ended.block].block.name
+        self._ends.append(f"block {name} ended the simulation at t = {t:.9g} s")
+
+    def _in_loops(self) -> set[int]:
+        """Return the blocks in algebraic loops."""
+        return {e.block for one in self._job.order if isinstance(one, LoopJob) for e in one.exchanges}
+
+    def _reads(self, block: int) -> list[Prepared]:
+        """Return the calls that read all outputs of a block."""
+        exchanges = [e for o in self._job.order for e in (o.exchanges if isinstance(o, LoopJob) else (o,))]
+        return [call for one in exchanges if one.block == block for call in self._gets(one)]
 
     def _run(self, calls: Sequence[Prepared]) -> None:
         """Make some calls."""
         progress = self._progress
         for code, call in calls:
-            progress.call = code
+            progress.call = code + next_call()
             status = call()
             if status:
                 self._check(code, status)
@@ -221,7 +299,7 @@ class Master:
         slave = self._slaves[block]
         slave.blame(status)
         if status == DISCARD and function == "fmi2DoStep" and slave.terminated():
-            raise Ended(f"block {slave.block.name} ended the simulation at t = {self._time.value:.9g} s")
+            raise Ended(block, slave.last_successful_time())
         said = f"returned {status_name(status)}"
         if status == DISCARD and function == "fmi2DoStep":
             said += f", it cannot step by {self._job.step:g} s from there: a smaller system.step may help"
@@ -230,7 +308,11 @@ class Master:
         raise FmuFailed(code, said, status)
 
     def _warned(self, code: int) -> None:
-        self.warnings[code] = self.warnings.get(code, 0) + 1
+        """Note that a call returned fmi2Warning."""
+        count, first = self._warnings
+        if not count[code]:
+            first[code] = self._progress.k
+        count[code] += 1
 
     def _log(self, k: int) -> None:
         """Put the values of logs at a communication point into their places."""
@@ -268,3 +350,15 @@ class Master:
         for columns, kind in self._columns:
             self._recorded[row, columns] = self._values[kind][: columns.stop - columns.start]
         self._progress.rows = row + 1
+
+
+def _same(one: float, other: float) -> bool:
+    """Return whether two times in [s] are one."""
+    return abs(one - other) <= NANOSECOND
+
+
+def _sets(prepared: Prepared, blocks: Collection[int]) -> bool:
+    """Return whether a call sets a value of some blocks."""
+    code, _ = prepared
+    block, function = called(code)
+    return block in blocks and function.startswith("fmi2Set")

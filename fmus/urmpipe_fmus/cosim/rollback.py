@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_fmus.cosim.slave import Call, Slave
+from urmpipe_fmus.cosim.slave import OK, Call, Slave
 
 NUDGE = 1e-4
 """Relative: by how much inputs are moved to see whether outputs follow."""
@@ -50,13 +50,14 @@ class Member:
         self._again = slave.stepper(self._then, self._back, keep=True)
         self._save, self._set_aside = slave.saver(self._state), slave.saver(self._aside)
 
-    def step(self) -> None:
-        """Do the step to the next communication point; its start is remembered."""
+    def step(self) -> int:
+        """Do the step to the next communication point; its start is remembered. Returns FMI's status OK."""
         if self.stale is not False:
             self._call(self._save)
         self._then.value, self._back.value = self._now.value, self._length.value
         self._call(self._forward)
         self._stepped = True
+        return OK
 
     @property
     def undecided(self) -> bool:

@@ -8,7 +8,7 @@ import math
 import mmap
 import os
 import pickle
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,17 +26,19 @@ from urmpipe_fmus.cosim.job import (
     RECORDED,
     RESULT,
     SAID,
+    WARNED,
     Job,
     Progress,
     called,
 )
 from urmpipe_fmus.cosim.plan import Plan
-from urmpipe_fmus.cosim.process import Worker
+from urmpipe_fmus.cosim.process import TIMEOUT, CallWatch, Worker
 from urmpipe_fmus.cosim.system import Port
-from urmpipe_fmus.fmu_process import ending
+from urmpipe_fmus.fmu_file import open_fmu
 from urmpipe_fmus.python_fmu.place import why_not_in
 from urmpipe_models.errors import CosimulationError
 from urmpipe_models.messages import one_line
+from urmpipe_models.processes import ending
 
 LAST_LINES = 5
 """So many of a block's last log lines are told with an error."""
@@ -99,12 +101,17 @@ class Recorded:
 
 
 def simulate(
-    plan: Plan, *, progress: Callable[[float], None] | None = None, worker: Worker | None = None
+    plan: Plan,
+    *,
+    timeout: float = TIMEOUT,
+    progress: Callable[[float], None] | None = None,
+    worker: Worker | None = None,
 ) -> Recorded:
     """Run a system in a process of its own: an FMU that crashes does not take this one with it.
 
     Args:
         plan: The system.
+        timeout: How long a call of an FMU may take, in [s]: one that does not return fails.
         progress: Called now and then with the share that is done, 0 to 1.
         worker: The process, started before the plan was made; by default one that is started now. It does
             one job.
@@ -117,7 +124,7 @@ def simulate(
     """
     if worker is None:
         with Worker() as started:
-            return simulate(plan, progress=progress, worker=started)
+            return simulate(plan, timeout=timeout, progress=progress, worker=started)
     folder = worker.folder
     assembly = Assembly(plan)
     job = assembly.job(_unpacked(plan, folder))
@@ -125,33 +132,30 @@ def simulate(
     with (folder / PROGRESS).open("r+b") as file:
         shared = mmap.mmap(file.fileno(), ctypes.sizeof(Progress))
 
-    def tell() -> None:
-        """Tell the share that is done."""
+    calls = CallWatch(timeout)
+
+    def watch() -> str:
+        """Tell the share that is done; return that a call does not return."""
+        state = Progress.from_buffer_copy(shared)
         if progress is not None:
-            progress(Progress.from_buffer_copy(shared).k / job.count)
+            progress(state.k / job.count)
+        return calls.overdue(state)
 
     try:
-        code = worker.work(tell)
+        ended = worker.work(watch)
         state = Progress.from_buffer_copy(shared)
     finally:
         shared.close()
-    return _recorded(plan, assembly, job, folder, state, code)
+    return _recorded(plan, assembly, job, folder, state, ended)
 
 
 def _unpacked(plan: Plan, folder: Path) -> dict[str, Path]:
     """Unpack every FMU once; return where that of each block is."""
-    import fmpy
-
     places: dict[Path, Path] = {}
     for shown in plan.interfaces.values():
         if shown.path not in places:
             places[shown.path] = folder / f"fmu{len(places)}"
-            try:
-                fmpy.extract(
-                    shown.path, places[shown.path], include=lambda one: not one.startswith("sources/")
-                )
-            except Exception as error:  # fmpy raises Exception itself
-                raise CosimulationError(f"{shown.path}: cannot be unpacked: {error}") from error
+            open_fmu(shown.path).unpack(places[shown.path], skip="sources/")
             misplaced = why_not_in(places[shown.path])
             if misplaced:
                 raise CosimulationError(f"{shown.path}: {misplaced}")
@@ -165,8 +169,9 @@ def _lay_out(job: Job, folder: Path) -> None:
     Room is taken at once: a disk that runs full under a memory map would end the process.
     """
     (folder / JOB).write_bytes(pickle.dumps(job))
-    (folder / PROGRESS).write_bytes(bytes(Progress(rows=0, k=0, call=ELSEWHERE)))
+    (folder / PROGRESS).write_bytes(bytes(Progress(call=ELSEWHERE)))
     (folder / NOT_FINITE).write_bytes(bytes(8 * 3 * max(job.recorded["Real"], 1)))
+    (folder / WARNED).write_bytes(bytes(8 * 2 * job.calls))
     size = 8 * job.rows * max(job.columns, 1)
     try:
         with (folder / RECORDED).open("wb") as file:
@@ -182,7 +187,7 @@ def _lay_out(job: Job, folder: Path) -> None:
 
 
 def _recorded(
-    plan: Plan, assembly: Assembly, job: Job, folder: Path, state: Progress, exit_code: int
+    plan: Plan, assembly: Assembly, job: Job, folder: Path, state: Progress, ended: str
 ) -> Recorded:
     """Return what a run left in its folder."""
     ports = assembly.ports
@@ -197,17 +202,19 @@ def _recorded(
     )
     result = _result(folder)
     failed = _failure(job, folder, state, result) if result else None
-    if failed is None and (exit_code or not state.done):
-        failed = _crash(job, folder, state, exit_code)
-    points = np.arange(state.rows) * job.record_every * job.step
+    if failed is None and (ended or not state.done):
+        failed = _crash(job, folder, state, ended or ending(0))
+    times = np.arange(state.rows) * job.record_every * job.step
+    if state.ended:
+        times[-1] = state.ended
     return Recorded(
-        t_ns=np.round(points * 1e9).astype(np.int64),
+        t_ns=np.round(times * 1e9).astype(np.int64),
         names=names,
         units=tuple(plan.variable(port).unit for port in names),
         types=tuple(plan.variable(port).type for port in names),
         values=values[:, [shown[port] for port in names]],
         failed=failed,
-        notes=(*plan.notes, *(_notes(job, folder, result) if result else ())),
+        notes=(*plan.notes, *(result["notes"] if result else ()), *_warnings(job, folder)),
         not_finite=_not_finite(assembly.recorded["Real"], job, folder),
     )
 
@@ -237,12 +244,11 @@ def _failure(job: Job, folder: Path, state: Progress, result: dict[str, Any]) ->
     return _told(job, folder, state, result["code"], result["failed"])
 
 
-def _crash(job: Job, folder: Path, state: Progress, exit_code: int) -> str:
-    """Return how a run failed whose process ended before all was done, with any exit code."""
-    how = ending(exit_code)
-    if state.call == ELSEWHERE:
-        return one_line(f"the process of the co-simulation {how}" + _quoted(_said(folder)[-LAST_LINES:]))
-    return _told(job, folder, state, state.call, how)
+def _crash(job: Job, folder: Path, state: Progress, ended: str) -> str:
+    """Return how a run failed whose process ended in some way before all was done."""
+    if state.code == ELSEWHERE:
+        return one_line(f"the process of the co-simulation {ended}" + _quoted(_said(folder)[-LAST_LINES:]))
+    return _told(job, folder, state, state.code, ended)
 
 
 def _told(job: Job, folder: Path, state: Progress, code: int, what: str) -> str:
@@ -274,13 +280,14 @@ def _said(folder: Path) -> list[str]:
     return [line.strip() for line in text.splitlines() if line.strip()]
 
 
-def _notes(job: Job, folder: Path, result: dict[str, Any]) -> list[str]:
-    """Return what a run that could say how it ended leaves to be seen."""
-    notes = list(result["notes"])
-    for code, count in result["warnings"]:
+def _warnings(job: Job, folder: Path) -> Iterator[str]:
+    """Yield which calls returned fmi2Warning."""
+    counts, first = np.fromfile(folder / WARNED, np.float64).reshape(2, -1)
+    for code in np.flatnonzero(counts).tolist():
         number, function = called(code)
         name = job.blocks[number].name
         lines = [text for block, status, text in _log(folder) if block == name and status == "fmi2Warning"]
         last = f", the last: {lines[-1]}" if lines else ""
-        notes.append(one_line(f"block {name}: {function} returned fmi2Warning {count} times{last}"))
-    return notes
+        times = f"{counts[code]:.0f} times, first" if counts[code] > 1 else "once,"
+        when = f"at t = {first[code] * job.step:.9g} s"
+        yield one_line(f"block {name}: {function} returned fmi2Warning {times} {when}{last}")

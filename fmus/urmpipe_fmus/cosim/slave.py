@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
@@ -25,7 +26,7 @@ OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 
 STATUS_NAMES = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
 
-TERMINATED = 3
+LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3
 """Of fmi2StatusKind (FMI 2.0.4, section 4.2.3)."""
 
 EXCHANGE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
@@ -52,6 +53,12 @@ class FmuFailed(Exception):  # noqa: N818 - it ends the run, and is told as a re
 class Slave:
     """An instance of an FMU.
 
+    Args:
+        number: Number of its block.
+        block: Its block.
+        progress: Where each call is noted before it is made.
+        warned: Told each call by `once` that returned fmi2Warning.
+
     Attributes:
         number: Number of its block.
         block: Its block.
@@ -60,12 +67,16 @@ class Slave:
         running: Whether it is initialized: only then it may be terminated.
     """
 
-    def __init__(self, number: int, block: BlockJob, progress: Progress) -> None:
-        self.number, self.block, self._progress = number, block, progress
+    def __init__(
+        self, number: int, block: BlockJob, progress: Progress, warned: Callable[[int], None]
+    ) -> None:
+        self.number, self.block, self._warned = number, block, warned
+        self.note = progress.begin
         self.failed = self.fatal = self.running = False
         self._kept: list[Any] = []
         self._states: list[ctypes.c_void_p] = []
-        self._code = progress.call = call_code(number, "loading")
+        code = call_code(number, "loading")
+        self.note(code)
         try:
             self._fmu = FMU2Slave(
                 guid=block.guid,
@@ -75,7 +86,7 @@ class Slave:
                 instanceName=block.name,
             )
         except Exception as error:  # FMPy raises Exception itself, ctypes OSError and AttributeError
-            raise FmuFailed(self._code, f"cannot be loaded: {error}") from error
+            raise FmuFailed(code, f"cannot be loaded: {error}") from error
 
     @property
     def _component(self) -> ctypes.c_void_p:
@@ -83,21 +94,20 @@ class Slave:
 
     def instantiate(self, callbacks: Any) -> None:
         """Make the instance."""
-        code = self._progress.call = call_code(self.number, "fmi2Instantiate")
+        code = call_code(self.number, "fmi2Instantiate")
+        self.note(code)
         try:
             self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
         except Exception as error:  # FMPy raises Exception itself
             raise FmuFailed(code, "gave no instance") from error
 
-    def note(self, code: int) -> None:
-        """Note what is called next."""
-        self._progress.call = code
-
-    def once(self, function: str, *arguments: Any) -> int:
-        """Call a function that is not worth preparing; return FMI's status."""
-        code = self._progress.call = call_code(self.number, function)
+    def once(self, function: str, *arguments: Any) -> None:
+        """Call a function that is not worth preparing."""
+        code = call_code(self.number, function)
+        self.note(code)
         try:
-            return int(getattr(self._fmu, function)(self._component, *arguments) or OK)
+            if getattr(self._fmu, function)(self._component, *arguments) == WARNING:
+                self._warned(code)
         except FMICallException as error:
             self.blame(error.status)
             raise FmuFailed(code, f"returned {status_name(error.status)}", error.status) from error
@@ -107,16 +117,14 @@ class Slave:
         self.failed = self.failed or status >= ERROR
         self.fatal = self.fatal or status == FATAL
 
-    def set_start(self) -> int:
-        """Set the start values; return the worst of FMI's status."""
-        worst = OK
+    def set_start(self) -> None:
+        """Set the start values."""
         for kind, reference, value in self.block.starts:
             references = (ctypes.c_uint * 1)(reference)
             held: Any = (ctypes.c_char_p * 1)(str(value).encode()) if kind == "String" else None
             if held is None:
                 held = (ELEMENTS[kind] * 1)(value if kind == "Real" else int(value))
-            worst = max(worst, self.once(f"fmi2Set{kind}", references, 1, held))
-        return worst
+            self.once(f"fmi2Set{kind}", references, 1, held)
 
     def getter(self, transfer: Transfer, values: Mapping[str, NDArray[Any]]) -> tuple[int, Call]:
         """Return the code and the call that reads values into their places, which are neighbours.
@@ -192,11 +200,14 @@ class Slave:
     def terminated(self) -> bool:
         """Return whether a discarded step means that the FMU wants to end the simulation."""
         ended = ctypes.c_int(0)
-        try:
-            self._fmu.fmi2GetBooleanStatus(self._component, TERMINATED, ctypes.byref(ended))
-        except FMICallException:
-            return False
+        self._try("fmi2GetBooleanStatus", TERMINATED, ctypes.byref(ended))
         return bool(ended.value)
+
+    def last_successful_time(self) -> float:
+        """Return in [s] how far a discarded step came; nan if the FMU does not tell."""
+        time = ctypes.c_double()
+        told = self._try("fmi2GetRealStatus", LAST_SUCCESSFUL_TIME, ctypes.byref(time))
+        return time.value if told else math.nan
 
     def end(self) -> None:
         """Terminate and free the instance, as far as its status lets it."""
@@ -209,13 +220,15 @@ class Slave:
                 self._try("fmi2FreeFMUstate", ctypes.byref(state))
         if self.fatal:
             return
-        self._progress.call = call_code(self.number, "fmi2FreeInstance")
+        self.note(call_code(self.number, "fmi2FreeInstance"))
         self._fmu.fmi2FreeInstance(self._component)
 
-    def _try(self, function: str, *arguments: Any) -> None:
-        """Call a function whose failure changes nothing any more."""
+    def _try(self, function: str, *arguments: Any) -> bool:
+        """Call a function whose failure changes nothing; return whether it did what it is for."""
         with suppress(FmuFailed):
             self.once(function, *arguments)
+            return True
+        return False
 
 
 def status_name(status: int) -> str:

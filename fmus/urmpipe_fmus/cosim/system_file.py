@@ -13,6 +13,7 @@ from urmpipe_fmus.cosim.arguments import beside, given, replaced, unknown
 from urmpipe_fmus.cosim.system import SYSTEMS, TOLERANCE, Block, Connection, LogInput, Port, System
 from urmpipe_fmus.units import unit_name
 from urmpipe_models.errors import CosimulationError, Finding, shown
+from urmpipe_models.files.contents import is_there
 from urmpipe_models.files.missing import meant_by
 from urmpipe_models.files.places import placed
 from urmpipe_models.files.toml_text import parse_toml
@@ -272,7 +273,7 @@ class _System:
         text = self._text(table, where, key, "")
         if not text:
             return None
-        if "\0" in text or not Path(text).is_file():
+        if not is_there(Path(text)):
             self._fault(f"{where}.{key}", f"found {shown(text)}, allowed: a file that is there")
         return Path(text)
 

@@ -14,7 +14,6 @@ import pickle
 import shutil
 import signal
 import sys
-import threading
 import traceback
 from pathlib import Path
 from typing import Any
@@ -31,14 +30,21 @@ from urmpipe_fmus.cosim.job import (
     PROGRESS,
     RECORDED,
     RESULT,
+    WARNED,
     Job,
     Progress,
     called,
 )
 from urmpipe_fmus.cosim.loops import NoConvergence
-from urmpipe_fmus.cosim.master import Ended, Master
+from urmpipe_fmus.cosim.master import Master
 from urmpipe_fmus.cosim.slave import FmuFailed, status_name
+from urmpipe_fmus.end_with_parent import end_with_parent
 from urmpipe_fmus.fmu_process import callbacks_with
+from urmpipe_models.processes import limit_memory
+
+MEMORY = 8 * 2**30
+"""Bytes that the FMUs may ask for together, beside the files of the run, with what is only reserved, as
+runtimes of Python and Java do. An FMU that is given no more ends this process, not the computer."""
 
 LOG_BYTES = 1_000_000
 """A log that is longer is begun anew; the one before is kept beside it."""
@@ -59,7 +65,7 @@ class Log:
         self, _: Any, instance: bytes | None, status: int, category: bytes | None, text: bytes | None
     ) -> None:
         """Take a message of the block that is being called."""
-        code = self._progress.call
+        code = self._progress.code
         name = self._job.blocks[called(code)[0]].name if code != ELSEWHERE else _decoded(instance)
         words = " ".join(_decoded(text).split())
         line = f"{name}\t{status_name(status)}\t{words}\n".encode()
@@ -82,20 +88,19 @@ def work(folder: Path) -> None:
         progress = Progress.from_buffer(mmap.mmap(file.fileno(), ctypes.sizeof(Progress)))
     recorded = _shared(folder / RECORDED).reshape(job.rows, -1)
     not_finite = _shared(folder / NOT_FINITE)[: 3 * job.recorded["Real"]].reshape(3, -1)
+    warned = _shared(folder / WARNED).reshape(2, job.calls)
     log = Log(folder / LOG, job, progress)
     callbacks = callbacks_with(log.take)
-    master = Master(job, progress, recorded, not_finite, callbacks)
-    result: dict[str, Any] = {"failed": None, "code": ELSEWHERE, "notes": []}
+    master = Master(job, progress, recorded, not_finite, warned, callbacks)
+    limit_memory(MEMORY + sum(one.stat().st_size for one in folder.iterdir() if one.is_file()))
+    result: dict[str, Any] = {"failed": None, "code": ELSEWHERE}
     try:
         master.run()
     except FmuFailed as error:
         result |= {"failed": error.said, "code": error.code}
     except NoConvergence as error:
         result |= {"failed": str(error)}
-    except Ended as ended:
-        result["notes"] += [str(ended)]
-    result["notes"] += master.notes
-    result["warnings"] = sorted(master.warnings.items())
+    result["notes"] = master.notes
     partial = folder / f"{RESULT}.part"
     partial.write_text(json.dumps(result), encoding="utf-8")
     partial.replace(folder / RESULT)
@@ -107,22 +112,6 @@ def _shared(path: Path) -> NDArray[np.float64]:
     """Return the doubles of a file, where what is written outlives this process, shape (n,)."""
     with path.open("r+b") as file:
         return np.frombuffer(mmap.mmap(file.fileno(), 0), np.float64)
-
-
-def end_with_parent(folder: Path) -> None:
-    """End this process when the one that started it does: its end of the standard input is closed then.
-
-    Args:
-        folder: The folder of the run, of no use to anybody then.
-    """
-
-    def watch() -> None:
-        """Wait until the input is closed, then leave nothing behind."""
-        sys.stdin.buffer.read()
-        shutil.rmtree(folder, ignore_errors=True)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 if __name__ == "__main__":

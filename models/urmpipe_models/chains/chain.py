@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from html import escape
 from numbers import Real
 from typing import Literal
 
@@ -17,6 +16,7 @@ from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.drives.joint_drives import JointDrive
 from urmpipe_models.elementwise import Element, Vector
 from urmpipe_models.errors import RobotError
+from urmpipe_models.messages import in_html
 from urmpipe_models.names import not_among
 from urmpipe_models.transform import Transform
 
@@ -227,7 +227,7 @@ class Chain(Shown):
     def _table(self) -> str:
         """Return a row a joint: its name, kind and limits; a model knows no pandas."""
         rows = "".join(
-            f"<tr><td>{escape(one.name)}</td><td>{one.kind}</td><td>{one.lower:.6g}</td><td>{one.upper:.6g}</td></tr>"
+            f"<tr><td>{in_html(one.name)}</td><td>{one.kind}</td><td>{one.lower:.6g}</td><td>{one.upper:.6g}</td></tr>"
             for one in self.joints
         )
         return f"<table><tr><th>joint</th><th>kind</th><th>lower</th><th>upper</th></tr>{rows}</table>"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -17,6 +18,9 @@ Colour: TypeAlias = tuple[float, float, float, float]
 
 PACKAGE, FILE = "package://", "file://"
 """What a reference to a mesh may begin with."""
+
+PACKAGE_PATH = "ROS_PACKAGE_PATH"
+"""The environment variable that lists folders of which meshes may be taken, as ROS has it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +55,7 @@ class Sphere:
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A file of triangles in [m], times `scale`: `file` is a path, or a package:// that was not found."""
+    """A file of triangles in [m], times `scale`: `file` is a path, or a URL that `mesh_file` did not take."""
 
     file: str
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -93,23 +97,52 @@ class Visual:
 
 
 def mesh_file(reference: str, folder: Path) -> str:
-    """Return where a mesh file stands.
+    """Return where a mesh file stands, if a description in a folder may take it.
+
+    A description takes files from its own folder, from the ROS package that it stands in, from those around,
+    and from folders that the user lists in ROS_PACKAGE_PATH, all links followed: nothing else gets into a
+    recording, whoever wrote the description. A ROS package is a folder with a file package.xml.
 
     Args:
-        reference: A path, relative to the folder or absolute, or file://PATH, or package://PACKAGE/PATH. The
-            folder of a package is looked for beside and above the folder of the description.
+        reference: A path, relative to the folder or absolute, or file://PATH, or package://PACKAGE/PATH.
         folder: Where the description stands.
 
     Returns:
-        An absolute path; a reference to a package that is not there as it was written.
+        An absolute path; a reference to a package that is not there as it was written; of a file that may not
+        be taken its URL, which begins with file://.
     """
+    if "\0" in reference:  # which no path holds
+        return reference
+    folder = folder.absolute()
     if not reference.startswith(PACKAGE):
         path = unquote(reference.removeprefix(FILE)) if reference.startswith(FILE) else reference
-        return str((folder / path).absolute())
-    package, _, path = reference.removeprefix(PACKAGE).partition("/")
-    above = folder.absolute()
-    for place in (above, *above.parents):
-        root = place if place.name == package else place / package
-        if package and root.is_dir():
-            return str(root / path)
-    return reference
+        file, package = folder / path, next((one for one in folder.parents if _is_package(one)), folder)
+    elif (root := _package(reference, folder)) is not None:
+        file, package = root / reference.removeprefix(PACKAGE).partition("/")[2], root
+    else:
+        return reference
+    roots = [folder, *([package] if _is_package(package) else []), *_listed_folders()]
+    try:
+        taken = any(file.resolve().is_relative_to(one.resolve()) for one in roots)
+    except (OSError, RuntimeError):  # links in a circle
+        taken = False
+    return str(file) if taken else file.as_uri()
+
+
+def _package(reference: str, folder: Path) -> Path | None:
+    """Return the folder of the package of a reference: beside or above a folder, or a listed one."""
+    name = reference.removeprefix(PACKAGE).partition("/")[0]
+    if not name.strip("."):  # a step up is no name
+        return None
+    around = (one if one.name == name else one / name for one in (folder, *folder.parents))
+    listed = (one if one.name == name else one / name for one in _listed_folders())
+    return next((one for one in (*around, *listed) if one.is_dir()), None)
+
+
+def _is_package(folder: Path) -> bool:
+    return (folder / "package.xml").is_file()
+
+
+def _listed_folders() -> list[Path]:
+    """Return the folders that the user lists in ROS_PACKAGE_PATH."""
+    return [Path(one).absolute() for one in os.environ.get(PACKAGE_PATH, "").split(os.pathsep) if one]

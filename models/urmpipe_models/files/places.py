@@ -22,7 +22,7 @@ def placed(path: Path, name: str, faults: Iterable[Finding]) -> tuple[Finding, .
         faults: Those without a file are about a table or key of this one, such as `blocks.load`.
     """
     lines: dict[str, int] = {}
-    for full, number in _named_lines(path.read_text(encoding="utf-8-sig").splitlines()):
+    for full, number in _named_lines(path.read_text(encoding="utf-8-sig").split("\n")):
         lines.setdefault(full, number)
     return tuple(
         one if one.file else replace(one, file=name, line=_line_of(lines, one.about or ""))
@@ -51,6 +51,6 @@ def _plain(name: str) -> str:
 
 def _line_of(lines: dict[str, int], name: str) -> int | None:
     """Return the line of a table or key, of an item that of its list; else that of the table around."""
-    while name not in lines and "." in name:
+    while name not in lines and ("." in name or name.endswith("]")):
         name = name.rpartition("[" if name.endswith("]") else ".")[0]
     return lines.get(name)

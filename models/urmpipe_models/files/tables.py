@@ -11,6 +11,9 @@ from urmpipe_models.names import did_you_mean
 
 Rows3: TypeAlias = tuple[tuple[float, ...], ...]
 
+ASKED = 100
+"""So many unknown keys of a table ask whether another may be meant."""
+
 
 class Table:
     """One table, read key by key.
@@ -169,11 +172,10 @@ class Table:
 
     def close(self) -> None:
         """Note every key that was not asked for, with the nearest one that was."""
-        for key in self._data:
-            if key not in self._known:
-                hint = did_you_mean(key, self._known)
-                allowed = ", ".join(dict.fromkeys(self._known))
-                self.fault(key, f"unknown{hint}; allowed: {allowed}")
+        allowed = list(dict.fromkeys(self._known))
+        for number, key in enumerate(key for key in self._data if key not in self._known):
+            hint = did_you_mean(key, allowed) if number < ASKED else ""
+            self.fault(key, f"unknown{hint}; allowed: {', '.join(allowed)}")
 
     def _within(self, data: Mapping[str, Any], place: str) -> Table:
         """Return a table within this one, whose faults are noted in the same way."""

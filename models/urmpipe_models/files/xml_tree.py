@@ -8,7 +8,10 @@ from pathlib import Path
 from xml.parsers import expat
 
 from urmpipe_models.errors import Finding, RobotError
-from urmpipe_models.files.missing import meant_by
+from urmpipe_models.files.contents import read_contents
+
+LONGEST = 10_000
+"""Letters of an attribute at most."""
 
 
 @dataclass(slots=True)
@@ -51,14 +54,10 @@ def read_xml(path: Path) -> Node:
     character: nothing is ever expanded or fetched.
 
     Raises:
-        RobotError: If the file cannot be read, is not well-formed, or has a document type.
+        RobotError: If the file cannot be read, is not well-formed, or has a document type or an attribute of
+            more than `LONGEST` letters.
     """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        meant = meant_by(path, (".urdf",)) if isinstance(error, FileNotFoundError) else ""
-        raise RobotError(Finding(f"cannot be read: {error.strerror}{meant}", str(path))) from error
-    return _parsed(content, path)
+    return _parsed(read_contents(path, RobotError, (".urdf",)), path)
 
 
 def _parsed(content: bytes, path: Path) -> Node:
@@ -69,6 +68,9 @@ def _parsed(content: bytes, path: Path) -> Node:
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         """Hang a new node below the open one."""
+        if (longest := max(map(len, attributes.values()), default=0)) > LONGEST:
+            message = f"found an attribute of {longest} letters, allowed: {LONGEST} at most"
+            raise RobotError(Finding(message, str(path), line=parser.CurrentLineNumber))
         node = Node(tag, attributes, parser.CurrentLineNumber)
         ancestors[-1].children.append(node)
         ancestors.append(node)

@@ -30,8 +30,8 @@ rotations, are one."""
 RESTARTS = 2000
 """So many starts in a row that find nothing new end a search."""
 
-BATCH = 500
-"""Starts that are followed side by side."""
+BATCH, ENTRIES = 500, 2e7
+"""Starts that are followed side by side, fewer where their Jacobians together have more entries."""
 
 MOST = 200_000
 """Starts of a search at most, and assemblies that it may find: more are a continuum."""
@@ -148,7 +148,8 @@ def _search(
     mechanism, rng = found.mechanism, np.random.default_rng(seed)
     tried = in_vain = 0
     while in_vain < restarts and tried < MOST and len(found.kept) < MANY:
-        count = min(BATCH, restarts - in_vain)
+        together = max(1, int(ENTRIES / len(found.start) ** 2))
+        count = min(BATCH, together, restarts - in_vain)
         starts = _random_starts(mechanism, found.start, count, rng)
         ends = descend(mechanism, starts, mechanism.free, patient=False)
         for new in found.add(ends):

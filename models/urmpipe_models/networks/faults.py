@@ -23,6 +23,9 @@ from urmpipe_models.networks.value_faults import (
 if TYPE_CHECKING:
     from urmpipe_models.transform import Transform
 
+MOST = 500
+"""Joints and elements of a network at most: the search for an assembly solves for all of them at once."""
+
 
 def faults_of(parts: Parts) -> Iterator[Finding]:
     """Yield what is wrong with the parts of a network.
@@ -39,6 +42,9 @@ def _structure_faults(parts: Parts) -> Iterator[Finding]:
     if not parts.ties:
         message = "found none, and no elements; allowed: at least one of them"
         yield Finding(message, about="joints", kind="untied")
+    if len(parts.ties) > MOST:
+        message = f"found {len(parts.ties)} with elements and those of chains, allowed: {MOST} at most"
+        yield Finding(message, about="joints")
     yield from _name_faults(parts)
     yield from _body_faults(parts)
     for where, tie in parts.ties:

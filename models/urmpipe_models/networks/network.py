@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from html import escape
 
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import NetworkError
+from urmpipe_models.messages import in_html
 from urmpipe_models.networks.faults import faults_of
 from urmpipe_models.networks.parts import Parts
 
@@ -45,8 +45,8 @@ class Network(Parts, Shown):
     def _table(self) -> str:
         """Return a row a joint or element: its name, kind and bodies."""
         rows = "".join(
-            f"<tr><td>{escape(one.name)}</td><td>{one.kind}</td><td>{escape(one.bodies[0])}</td>"
-            f"<td>{escape(one.bodies[1])}</td></tr>"
+            f"<tr><td>{in_html(one.name)}</td><td>{one.kind}</td><td>{in_html(one.bodies[0])}</td>"
+            f"<td>{in_html(one.bodies[1])}</td></tr>"
             for _, one in self.ties
         )
         return f"<table><tr><th>name</th><th>kind</th><th>body</th><th>body</th></tr>{rows}</table>"

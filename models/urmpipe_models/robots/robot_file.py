@@ -19,6 +19,7 @@ from urmpipe_models.files.toml_text import parse_toml, toml_lines, toml_text
 from urmpipe_models.robots.carried import carried_to_dict, own_faults, read_carried
 from urmpipe_models.robots.robot_frames import Units, frame_to_dict, read_frame
 from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.robots.urdf_tree import MOST
 from urmpipe_models.robots.written import EXPORT_MARK
 
 LONGEST = 100.0
@@ -164,6 +165,8 @@ def _read(
     except RobotError as error:
         further = (Finding(f"robot {name}: {fault}") for fault in own_faults(carried))
         raise RobotError(*_in_file(file, (*error.findings, *further))) from error
+    if len(chain.joints) > MOST:
+        raise RobotError(Finding(f"found {len(chain.joints)} joints, allowed: {MOST} at most", file))
     try:
         return replace(
             chain.placed(base, tool),

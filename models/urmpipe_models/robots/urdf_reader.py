@@ -10,7 +10,7 @@ from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.chains.visual import Visual
 from urmpipe_models.errors import RobotError, shown
 from urmpipe_models.messages import Hint
-from urmpipe_models.names import did_you_mean
+from urmpipe_models.names import did_you_mean, listed
 from urmpipe_models.robots.urdf_inertials import chain_masses
 from urmpipe_models.robots.urdf_tree import (
     BASE_JOINT,
@@ -95,7 +95,8 @@ def _is_link(tree: UrdfTree, role: str, link: str) -> bool:
     if link in tree.links:
         return True
     hint = did_you_mean(link, tree.links)
-    tree.fault(f"{role} link {shown(link)} is not in the file{hint}; allowed: {_listed(tree.links)}")
+    allowed = listed(link, tree.links)
+    tree.fault(f"{role} link {shown(link)} is not in the file{hint}; allowed: {allowed}")
     return False
 
 
@@ -234,4 +235,4 @@ def _visuals(tree: UrdfTree, carrier: Carrier) -> Iterator[Visual]:
 
 def _listed(names: Iterable[str]) -> str:
     """Return names as a list in a sentence."""
-    return ", ".join(names) or "none"
+    return listed("", names)

@@ -35,6 +35,12 @@ MASS_JOINT = "urmpipe_mass_"
 STAND_IN = "urmpipe"
 """Name of the material of the shapes that `write_urdf` gives an arm that has none."""
 
+MOST = 1000
+"""Links of a file, and joints of an arm, at most: a humanoid has a hundred."""
+
+ASKED = 20
+"""So many faults of links ask whether another may be meant: nobody reads more."""
+
 COUNTS = {1: "a number", 3: "three numbers", 4: "four numbers"}
 
 
@@ -118,6 +124,8 @@ def read_tree(path: Path) -> UrdfTree:
         raise RobotError(
             Finding(f"found <{root.tag}>; allowed: a URDF file, <robot>", str(path), line=root.line)
         )
+    if (most := max(len(root.all("link")), len(root.all("joint")))) > MOST:
+        raise RobotError(Finding(f"found {most} links or joints, allowed: {MOST} at most", str(path)))
     tree = UrdfTree(str(path), root.attributes.get("name", path.stem))
     for node in root.all("link"):
         _add_link(tree, node)
@@ -181,7 +189,7 @@ def _link_of(tree: UrdfTree, node: Node, joint: str, end: Literal["parent", "chi
         tree.sound = False
         return ""
     if link not in tree.links:
-        hint = did_you_mean(link, tree.links)
+        hint = did_you_mean(link, tree.links) if len(tree.faults) < ASKED else ""
         tree.fault(f"joint {joint}: {end} {shown(link)}; allowed: a link of the file{hint}", node.line)
         tree.sound = False
     return link

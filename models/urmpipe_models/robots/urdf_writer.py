@@ -12,6 +12,7 @@ from urmpipe_models.chains.inertial import Inertial
 from urmpipe_models.chains.visual import Box, Mesh, Shape, Sphere, Visual
 from urmpipe_models.elementwise import ZERO, Vector
 from urmpipe_models.errors import RobotError
+from urmpipe_models.messages import in_xml
 from urmpipe_models.robots.urdf_inertials import MOMENTS
 from urmpipe_models.robots.urdf_tree import (
     BASE_JOINT,
@@ -76,7 +77,7 @@ def urdf_text(chain: Chain) -> str:
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
         f"<!-- {EXPORT_MARK}: lengths in m, angles in rad -->",
-        f"<robot name={quoteattr(chain.name)}{_version(chain)}>",
+        f"<robot name={_quoted(chain.name)}{_version(chain)}>",
         f'  <material name="{STAND_IN}"><color rgba="0.35 0.55 0.75 1.0"/></material>',
         '  <link name="world"/>',
     ]
@@ -162,7 +163,7 @@ def _visual_lines(visual: Visual) -> list[str]:
 def _shape(shape: Shape) -> str:
     """Return a shape as an element."""
     if isinstance(shape, Mesh):
-        return f'<mesh filename={quoteattr(shape.file)} scale="{_numbers(shape.scale)}"/>'
+        return f'<mesh filename={_quoted(shape.file)} scale="{_numbers(shape.scale)}"/>'
     if isinstance(shape, Box):
         return f'<box size="{_numbers(shape.size)}"/>'
     if isinstance(shape, Sphere):
@@ -175,7 +176,7 @@ def _joint_lines(joint: Joint, parent: str, child: str) -> list[str]:
     """Return a joint as lines of URDF."""
     xyz, rpy = _numbers(joint.origin.translation), _numbers(rpy_of(joint.origin.rotation))
     lines = [
-        f'  <joint name={quoteattr(joint.name)} type="{_type(joint)}">',
+        f'  <joint name={_quoted(joint.name)} type="{_type(joint)}">',
         f'    <parent link="{parent}"/>',
         f'    <child link="{child}"/>',
         f'    <origin xyz="{xyz}" rpy="{rpy}"/>',
@@ -190,7 +191,7 @@ def _joint_lines(joint: Joint, parent: str, child: str) -> list[str]:
     if joint.mimic is not None:
         leader, multiplier, offset = joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset
         values = f'multiplier="{float(multiplier)!r}" offset="{float(offset)!r}"'
-        lines.append(f"    <mimic joint={quoteattr(leader)} {values}/>")
+        lines.append(f"    <mimic joint={_quoted(leader)} {values}/>")
     return [*lines, "  </joint>"]
 
 
@@ -203,6 +204,11 @@ def _type(joint: Joint) -> str:
 def _finite(value: float) -> float:
     """Return a limit that URDF can hold."""
     return max(-UNLIMITED, min(UNLIMITED, float(value)))
+
+
+def _quoted(text: str) -> str:
+    """Return a text as the value of an attribute: what can be held but not be seen stands as a number."""
+    return in_xml(quoteattr(text))
 
 
 def _numbers(values: Sequence[float]) -> str:

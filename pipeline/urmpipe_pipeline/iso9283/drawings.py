@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.messages import in_html
 from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.iso9283.corners import CornerPath
 from urmpipe_pipeline.iso9283.result import AttainedPoses, CutPath, IsoTest
@@ -296,7 +296,7 @@ SMALL_END = 'fill="#5b6770" font-size="10" text-anchor="end"'
 
 
 def _title(words: str, left: float, top: float) -> str:
-    return f'<text x="{left + GAP_PX:.1f}" y="{top + 20:.1f}">{escape(words)}</text>'
+    return f'<text x="{left + GAP_PX:.1f}" y="{top + 20:.1f}">{in_html(words)}</text>'
 
 
 def _cloud(points: FloatArray) -> str:
@@ -328,12 +328,12 @@ def _svg(
     legend, x = [], float(GAP_PX) + 10.0
     for sign, words in entries:
         legend.append(f'<g transform="translate({x:.0f} {height + 10:.0f})">{sign}')
-        legend.append(f'<text x="14" y="4">{escape(words)}</text></g>')
+        legend.append(f'<text x="14" y="4">{in_html(words)}</text></g>')
         x += 40.0 + 6.6 * len(words)
     return "\n".join(
         (
             f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="sans-serif" font-size="12">',
-            f"<title>{escape(title)}</title>",
+            f"<title>{in_html(title)}</title>",
             '<rect width="100%" height="100%" fill="white"/>',
             *parts,
             *legend,

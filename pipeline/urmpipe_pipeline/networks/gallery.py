@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from html import escape
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.messages import in_html
 from urmpipe_models.networks.findings import Assembly
 from urmpipe_models.networks.network import Network
 from urmpipe_pipeline.networks.parts_in_space import body_points, parts, placed
@@ -46,9 +46,9 @@ def gallery_svg(result: NetworkResult) -> str:
     return "\n".join(
         (
             f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="sans-serif" font-size="12">',
-            f"<title>{escape(heading)}</title>",
+            f"<title>{in_html(heading)}</title>",
             '<rect width="100%" height="100%" fill="white"/>',
-            f'<text x="14" y="26" font-size="17">{escape(heading)}</text>',
+            f'<text x="14" y="26" font-size="17">{in_html(heading)}</text>',
             *(
                 line
                 for k, pieces in enumerate(drawn)

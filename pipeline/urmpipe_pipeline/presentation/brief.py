@@ -35,7 +35,12 @@ def rows_within(table: Table, most: int) -> slice:
     return slice(-most, None) if ranks and len(table.columns[0].cells) > most else slice(most)
 
 
-def head(column: Column, parting: str = " ") -> str:
+def head(column: Column) -> str:
     """Return the title of a column with the unit of its values."""
+    return " ".join(head_lines(column))
+
+
+def head_lines(column: Column) -> list[str]:
+    """Return the title of a column and, where they have one, the unit of its values."""
     unit = unit_of(column.cells)
-    return f"{column.title}{parting}[{unit}]" if unit else column.title
+    return [column.title, f"[{unit}]"] if unit else [column.title]

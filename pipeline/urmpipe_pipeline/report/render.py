@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
+from urmpipe_models.messages import inert
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.report.figure_files import FigureFile, FigureOptions, figure_stem, write_figures
@@ -99,14 +100,31 @@ def environment() -> Environment:
     engine = Environment(
         loader=PackageLoader(__package__, "assets"),
         autoescape=True,
+        finalize=_inert,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    engine.filters |= {"raw": Markup, "json": script_json, "data_address": data_address, "stem": figure_stem}
+    engine.filters |= {
+        "raw": Markup,
+        "lines": text_lines,
+        "json": script_json,
+        "data_address": data_address,
+        "stem": figure_stem,
+    }
     engine.filters["kind"] = lambda block: type(block).__name__
     return engine
+
+
+def _inert(value: Any) -> Any:
+    """Return a text of the page on one line, with escapes for what reorders letters or acts on a terminal."""
+    return value if isinstance(value, Markup) or not isinstance(value, str) else inert(value)
+
+
+def text_lines(text: str) -> Markup:
+    """Return a text of several lines that stand as they are, else as any text of the page."""
+    return escape(inert(text, kept="\n\t"))
 
 
 def data_address(svg: str) -> str:

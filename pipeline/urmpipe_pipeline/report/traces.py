@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.messages import inert
 from urmpipe_pipeline import text
 from urmpipe_pipeline.decimate import POINTS, decimate
 from urmpipe_pipeline.report.spec import BAND, FAULT, INK, MUTED, Spec, typed
@@ -42,7 +43,7 @@ THINNEST = 1 / 1000
 
 def label(said: str) -> str:
     """Return a text from a file so that plotly.js, which reads HTML, draws it letter by letter."""
-    return html.escape(said, quote=False)
+    return html.escape(inert(said), quote=False)
 
 
 def line(

@@ -28,9 +28,15 @@ ROUNDING_NS = 1000
 RESAMPLED = "resampled"
 """The kind of the warning that every run has whose grid is not the rows of its log."""
 
-MOST = 20_000_000
-"""Samples of a grid, where a log does not have as many rows: more come of a broken clock or a mistyped period
-and would fill the memory."""
+MOST_BYTES = 256 << 20
+"""Bytes of a run on a grid, where the rows of its log do not hold as many: more come of a broken clock or a
+mistyped period."""
+
+FINER = 8
+"""A grid may have so many samples for each row of its log, however many these are."""
+
+_ALWAYS = 31
+"""Numbers of a sample beside three a joint: its time, the tool centre point with its rates."""
 
 
 class RowClock(NamedTuple):
@@ -184,15 +190,17 @@ def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
 
 
 def _refuse_endless(log: JointLog, wanted: float, count: int) -> None:
-    """Raise a `LogError` if a grid has more samples than fit in memory."""
-    if count > max(MOST, log.rows):
-        steps = np.diff(log.t_ns)
-        row = int(np.argmax(steps)) + 2
-        found = f"found {count} samples every {wanted / 1e6:.6g} ms for {log.rows} rows"
-        gap = f"{float(steps.max()) / 1e9:.6g} s pass before row {row}"
-        message = f"{found}, {gap}, allowed: {MOST} samples; a clock without such a gap"
-        hints = (Hint("tsp", None, "sets a longer period"),)
-        raise LogError(Finding(message, log.files[0].name if log.files else log.name, row=row, hints=hints))
+    """Raise a `LogError` if a grid has more samples than its log or the memory accounts for."""
+    most = max(MOST_BYTES // (8 * (_ALWAYS + 3 * len(log.joints))), FINER * log.rows)
+    if count <= most:
+        return
+    steps = np.diff(log.t_ns)
+    row = int(np.argmax(steps)) + 2
+    found = f"found {count} samples every {wanted / 1e6:.6g} ms for {log.rows} rows"
+    gap = f"{float(steps.max()) / 1e9:.6g} s pass before row {row}"
+    message = f"{found}, {gap}, allowed: {most} samples; a clock without such a gap"
+    hints = (Hint("tsp", None, "sets a longer period"),)
+    raise LogError(Finding(message, log.files[0].name if log.files else log.name, row=row, hints=hints))
 
 
 def _rounded(clock: Regular) -> LogWarning:

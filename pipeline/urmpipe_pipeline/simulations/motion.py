@@ -26,8 +26,8 @@ from urmpipe_pipeline.sources import ReadOptions
 SIMULATED = "simulate"
 """The source of a log that is the motion of a block."""
 
-FAILED = "simulation-failed"
-"""The kind of the warning that a simulation ended early, and so did the motion."""
+NOT_FINITE = "not-finite"
+"""The kind of the warning that an output of a block was not finite."""
 
 _JOINTS = (("q", "rad"), ("phi", "rad"), ("s", "m"))
 """What joints are called, and the unit that tells that they turn, or slide."""
@@ -57,12 +57,15 @@ def run_of_block(simulation: Simulation, block: str | None = None, robot: Chain 
 
     Raises:
         LogError: If no block is named and none or several have a motion, if it has no sample, or the arm has
-            other joints.
+            other joints; if the simulation ended early, or a value that led to the motion was not finite.
         OptionError: If a block is named that has no motion.
     """
     chosen = _chosen(simulation, block)
     if not len(simulation.t_ns):
         raise LogError(Finding("found a simulation without a sample, allowed: a motion", _place(simulation)))
+    doubts = tuple(_doubts(simulation, chosen))
+    if doubts:
+        raise LogError(*doubts)
     arm, because = (robot, None) if robot is not None else _arm_of(simulation, chosen)
     only = Inference("block", chosen, "it alone has a motion", hints=(Hint("block"),))
     told = (*(() if block else (only,)), *((because,) if because else ()))
@@ -210,6 +213,31 @@ def _warnings(simulation: Simulation) -> Iterator[LogWarning]:
     for one in simulation.warnings:
         if one.kind != SLOW:
             yield replace(one, hints=())
+
+
+def _doubts(simulation: Simulation, block: str) -> Iterator[Finding]:
+    """Yield why no verdict may rest on the motion of a block.
+
+    What is not finite may have reached it through any block before it, which need not show it.
+    """
+    place = _place(simulation)
     if simulation.failed is not None:
-        said = f"the simulation ended early, and so does the motion: {simulation.failed}"
-        yield LogWarning(FAILED, said)
+        yield Finding(
+            f"found a simulation that ended early, allowed: a whole one; {simulation.failed}", place
+        )
+    before = _before(simulation, block)
+    for one in simulation.warnings:
+        if one.kind == NOT_FINITE and one.about in before:
+            said = f"{one.about}.{one.column}: {one.message}; allowed: none where block {block} is judged"
+            yield Finding(said, place)
+
+
+def _before(simulation: Simulation, block: str) -> set[str]:
+    """Return the blocks on whose outputs a block depends, directly or through others, and itself."""
+    into = [(to.partition(".")[0], source.partition(".")[0]) for to, source in simulation.connections.items()]
+    found: set[str] = set()
+    new = {block}
+    while new:
+        found |= new
+        new = {source for to, source in into if to in new} - found
+    return found

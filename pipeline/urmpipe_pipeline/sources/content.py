@@ -22,6 +22,7 @@ from urmpipe_pipeline.sources.checks import (
     without_unread,
 )
 from urmpipe_pipeline.sources.clocks.durations import summed
+from urmpipe_pipeline.sources.clocks.nights import over_midnight
 from urmpipe_pipeline.sources.clocks.text_times import timed
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.columns.roles import Roles
@@ -109,7 +110,7 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
         too_many = Finding(unread, file, parameter="skip_bad", allowed=f"{MOST_SKIPPED:.0%} of them")
     elif may_skip(numbers):
         too_many = Finding(unread, file, hints=(Hint("skip_bad", True, "leaves them out"),))
-    numbers = trimmed(timed(layout, clock.parts, numbers))
+    numbers = over_midnight(trimmed(timed(layout, clock.parts, numbers)), clock)
     numbers, padding = without_padding(numbers, lambda: plan.tables.whole[table].read.values)
     if clock.lasts:
         numbers = summed(numbers, clock.columns[0].name)

@@ -28,6 +28,9 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH, Tables
 from urmpipe_pipeline.sources.vocabulary import Patterns, Unit
 
+MOST_JOINTS = 500
+"""Joints of a log: an arm has seven, a humanoid with its hands has sixty."""
+
 SHOWN_LOGS = 6
 """Files that are named where several logs stand for one."""
 
@@ -107,6 +110,7 @@ def make_plan(
     only = None if apart is None else 1 - apart
     roles = _renamed(_roles(rest, tables, options, robot, only), options.names)
     roles = replace(roles, further=beside)
+    _refuse_many(roles, tables)
     for table in {column.table for column in roles.joints}:
         own = [column for column in rest if column.table == table]
         refuse_long_form(roles.joints, own, clocks[table].columns, tables.layouts[table])
@@ -116,6 +120,14 @@ def make_plan(
         return Plan(tables, clocks, roles, units, poses=True)
     told = options.period is not None or options.time not in (None, "none") or apart is not None
     return Plan(tables, clocks, roles, units, apart, False if told else None)
+
+
+def _refuse_many(roles: Roles, tables: Tables) -> None:
+    """Raise if a log has more joints than any arm."""
+    if len(roles.joints) > MOST_JOINTS:
+        found, allowed = f"{len(roles.joints)} joints", f"{MOST_JOINTS} at most"
+        file = tables.layouts[roles.joints[0].table].file
+        raise LogError(Finding(file=file, found=found, allowed=allowed, hints=(Hint("joints"),)))
 
 
 def _unused_files(tables: Tables, roles: Roles) -> Iterator[LogWarning]:

@@ -18,6 +18,7 @@ from urmpipe_pipeline.sources.plan import Plan, make_plan
 from urmpipe_pipeline.sources.tables.held import Held, fingerprint_of
 from urmpipe_pipeline.sources.tables.opening import Tables, open_tables
 from urmpipe_pipeline.sources.tables.own_tables import roles_of
+from urmpipe_pipeline.sources.tables.reachable import unchanged
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.sources.units.kinematic_units import Recorded
 from urmpipe_pipeline.sources.vocabulary import key, split_unit, vocabulary
@@ -56,11 +57,11 @@ def read_numbers(
 ) -> Reading:
     """Return the numbers of a log; arguments and errors are those of `read_log`."""
     options = options or ReadOptions()
-    tables = open_tables(files, options)
-    options = _with_own_clock(tables, options)
-    with ThreadPoolExecutor(max_workers=1) as beside:
-        named = named_file(options.time)
-        used = [*files, named[0]] if named else files
+    named = named_file(options.time)
+    used = [*files, named[0]] if named else files
+    with unchanged(used), ThreadPoolExecutor(max_workers=1) as beside:
+        tables = open_tables(files, options)
+        options = _with_own_clock(tables, options)
         hashed = [beside.submit(_fingerprint, file) for file in used]
         plan = make_plan(tables, options, robot)
         content = read_content(plan, skip_bad=options.skip_bad)

@@ -18,6 +18,7 @@ from urmpipe_pipeline.sources.content import read_content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.opening import open_tables
+from urmpipe_pipeline.sources.tables.reachable import unchanged
 from urmpipe_pipeline.sources.vocabulary import Unit
 from urmpipe_pipeline.text import counted
 
@@ -58,7 +59,12 @@ def read_series(file: Path, names: Sequence[str], options: ReadOptions | None = 
     Raises:
         LogError: If a column is not there, or with everything that is wrong with the rows.
     """
-    options = options or ReadOptions()
+    with unchanged([file]):
+        return _read(file, names, options or ReadOptions())
+
+
+def _read(file: Path, names: Sequence[str], options: ReadOptions) -> Series:
+    """Return some columns of a table as `read_series` does."""
     tables = open_tables([file], options)
     columns = columns_of(tables.layouts, tables.titles)
     chosen = for_each(lambda name: find_column(columns, name, file=str(file)), names)

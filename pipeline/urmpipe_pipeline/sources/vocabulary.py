@@ -219,6 +219,7 @@ def split_unit(name: str) -> tuple[str, str | None]:
     return name.strip(), word if known else None
 
 
+@lru_cache(maxsize=1 << 14)
 def key(label: str) -> str:
     """Return a column's name for comparison: lower case, every run of other signs an underscore."""
     return re.sub(r"[\W_]+", "_", label.lower()).strip("_")

@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Literal
 
 from urmpipe_models.errors import Finding, OutputError, UrmpipeError
+from urmpipe_models.messages import HIDDEN
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
@@ -33,7 +34,7 @@ from urmpipe_pipeline.presentation.section import Presentation, Section
 
 BAD_INPUT = "bad-input"
 
-UNHOLDABLE = re.compile("[^\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+UNHOLDABLE = re.compile(f"[{HIDDEN}]|[^\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What XML may not hold, or a reader may turn into something else: line ends and tabs in attributes."""
 
 

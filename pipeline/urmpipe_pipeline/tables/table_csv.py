@@ -6,6 +6,7 @@ import csv
 from pathlib import Path
 
 from urmpipe_models.errors import Finding, OutputError
+from urmpipe_models.messages import inert
 from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Table, Value
 from urmpipe_pipeline.text import exact
 
@@ -20,7 +21,7 @@ def write_table(table: Table, part: Path, path: Path) -> None:
         OutputError: If it did not read back as it was written.
     """
     cells = zip(*(map(_cell, column.cells) for column in table.columns), strict=True)
-    rows = [[column.key for column in table.columns], *map(list, cells)]
+    rows = [list(map(inert, row)) for row in ([column.key for column in table.columns], *cells)]
     with part.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows(rows)
     with part.open(encoding="utf-8", errors="surrogateescape", newline="") as file:

@@ -51,8 +51,21 @@ def test_an_fmu_may_end_the_simulation() -> None:
 def test_warnings_are_counted() -> None:
     recorded = ran({"bad": TROUBLE}, None, {"bad": {"kind": 7}}, step=0.01)
     assert recorded.failed is None
-    assert recorded.notes == ("block bad: fmi2DoStep returned fmi2Warning 95 times, the last: warm",)
+    assert recorded.notes == (
+        "block bad: fmi2DoStep returned fmi2Warning 95 times, first at t = 0.05 s, the last: warm",
+    )
     assert len(recorded.t_ns) == 101
+
+
+def test_a_warning_before_a_failure_is_told_too() -> None:
+    warns = Foreign(
+        name="warns",
+        scalars=(Scalar("y", 0),),
+        step="if (t > 0.25) abort(); if (t > 0.15) { return fmi2Warning; }",
+    )
+    recorded = ran({"bad": warns})
+    assert recorded.failed is not None
+    assert recorded.notes == ("block bad: fmi2DoStep returned fmi2Warning once, at t = 0.2 s",)
 
 
 def test_only_the_last_lines_are_kept_of_a_long_log() -> None:
@@ -151,9 +164,11 @@ def test_a_refused_value_is_told() -> None:
 
 
 SCRIPT = """
-from foreign_fmus import TROUBLE, planned
+from dataclasses import replace
+from foreign_fmus import HANGS, TROUBLE, planned
 from urmpipe_fmus.cosim import simulate
-plan = planned({"bad": TROUBLE}, None, {"bad": {"kind": 9}}, step=0.01)
+forks = replace(TROUBLE, name="forks", start=f"{TROUBLE.start} if (!fork()) {HANGS}")
+plan = planned({"bad": forks}, None, {"bad": {"kind": 9}}, step=0.01)
 simulate(plan, progress=lambda share: print(share, flush=True))
 """
 
@@ -161,6 +176,15 @@ simulate(plan, progress=lambda share: print(share, flush=True))
 def children(pid: int) -> list[int]:
     found = Path(f"/proc/{pid}/task/{pid}/children")
     return [int(one) for one in found.read_text().split()] if found.exists() else []
+
+
+def ends(pid: int) -> bool:
+    """Return whether a process ends soon."""
+    until = time.monotonic() + 20.0
+    runs = Path(f"/proc/{pid}/exe")  # of a process that ended and was not yet waited for there is none
+    while runs.exists() and time.monotonic() < until:
+        time.sleep(0.05)
+    return not runs.exists()
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for the child in /proc")
@@ -172,14 +196,12 @@ def test_an_fmu_that_hangs_ends_with_who_started_it(how: signal.Signals, tmp_pat
     ) as one:
         while not there(one.stdout).readline().startswith(b"0.05"):
             assert one.poll() is None
-        (child,) = children(one.pid)
+        (worker,) = children(one.pid)
+        (forked,) = children(worker)
         one.send_signal(how)
         assert one.wait(20) != 0
-    until = time.monotonic() + 20.0
-    runs = Path(f"/proc/{child}/exe")  # of a process that ended and was not yet waited for there is none
-    while runs.exists() and time.monotonic() < until:
-        time.sleep(0.05)
-    assert not runs.exists()
+    assert ends(worker)
+    assert ends(forked)
     assert not list(tmp_path.glob("urmpipe-*"))
 
 
@@ -227,7 +249,7 @@ def test_a_process_that_ended_before_its_job_tells_by_its_exit_code() -> None:
     with Worker() as worker:
         worker._process.kill()
         worker._process.wait()
-        assert worker.work(lambda: None) == -signal.SIGKILL
+        assert worker.work(str) == "ended the process: Killed (SIGKILL)"
 
 
 ENDING = "ended the process with the exit code 0; it logged nothing"

@@ -73,10 +73,21 @@ def test_every_wrong_connection_is_told() -> None:
         "connections.i.u: output of arm: found 'rote' (did you mean rate?), allowed: p, rate, free",
         "connections.i.y: found i.y, causality output, allowed: an input of i: u",
         "connections.arm.length: found arm.length, causality parameter, allowed: an input of arm: phi",
-        "connections.n.by: found i.y, Real, allowed: Integer (numbers only)",
-        "connections.n.on: found n.n, Integer, allowed: Boolean (numbers only)",
+        "connections.n.by: found i.y, Real, allowed: Integer",
+        "connections.n.on: found n.n, Integer, allowed: Boolean",
         "connections.arm.phi[1]: found i.u, causality input, allowed: an output of i: y",
     ]  # and no input is said to have no source as well
+
+
+def test_texts_are_not_exchanged() -> None:
+    texts = Foreign(name="texts", scalars=(Scalar("s", 0, type="String"), Scalar("u", 1, "input", "String")))
+    said = "; allowed: numbers: texts are not exchanged, start gives one for the whole run"
+    assert told({"a": texts, "b": texts}, {"b.u": "a.s"}, {"a": {"u": "x"}}) == [
+        f"connections.b.u: found a.s, String, for u, String{said}"
+    ]
+    assert told({"a": gain(), "b": texts}, {"b.u": "a.y"}, {"a": {"u": 0.0}}) == [
+        f"connections.b.u: found a.y, Real, for u, String{said}"
+    ]
 
 
 def test_units_must_be_the_same_by_what_they_are_not_by_how_they_are_spelled() -> None:
@@ -264,7 +275,8 @@ def test_what_is_no_fmu_for_cosimulation_is_told(tmp_path: Path) -> None:
     assert refusal(
         CosimulationError, prepare, blocks, lambda block: broken if block.name == "a" else fmu(gain())
     ).splitlines() == [
-        f"blocks.a: {broken}: cannot be read as an FMU: File is not a zip file",
+        f"blocks.a: {broken}: found a zip that is cut off or damaged, allowed: an FMU, such as"
+        " urmpipe fmu build makes of a unit",
         f"blocks.b: found inputs without a source: u; {ALLOWED}",
     ]
 
@@ -278,7 +290,7 @@ def test_what_is_no_fmu_for_cosimulation_is_told(tmp_path: Path) -> None:
             "found FMI 2.0 for modelExchange, allowed: FMI 2.0 for coSimulation",
         ),
         ('modelIdentifier="gain"', 'modelIdentifier="loss"', "found binaries for {here}, allowed: {binary}"),
-        ("<Real", "<Imaginary", "cannot be read as an FMU: "),
+        ("<Real", "<Imaginary", "modelDescription.xml cannot be read: "),
         ('start="1"', 'min="low"', "cannot be read as an FMU: could not convert string to float: 'low'"),
     ],
 )

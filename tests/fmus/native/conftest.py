@@ -172,3 +172,36 @@ def player() -> Unit:
         outputs=outputs,
         table=Table(np.array([-5, 0, 10_000_000, 25_000_000]), np.array([[1.0, 5], [2, 6], [4, 7], [-1, 8]])),
     )
+
+
+@pytest.fixture
+def elementary() -> Unit:
+    """A unit with the elementary functions that a C library computes in its own way."""
+    ones = ("sin", "cos", "tan", "arctan", "tanh", "arcsinh")
+    damped = ("exp", "expm1", "sinh", "cosh")
+
+    def outputs(v: Any) -> dict[str, Any]:
+        small = np.tanh(v.x)
+        far = 1.0 + np.abs(v.x)
+        found = {name: getattr(np, name)(v.x) for name in ones}
+        found |= {name: getattr(np, name)(-np.abs(v.x)) for name in damped}
+        found |= {name: getattr(np, name)(small) for name in ("arcsin", "arccos")}
+        found |= {"log": np.log(far), "log1p": np.log1p(small * 0.5), "arccosh": np.arccosh(far)}
+        found |= {"hypot": np.hypot(v.x, v.y), "arctan2": np.arctan2(v.y, v.x)}
+        return found | {
+            "arctanh": np.arctanh(small * 0.5),
+            "cube": v.x**3,
+            "power": far**v.y,
+            "root": np.sqrt(far),
+        }
+
+    names = outputs(type("Given", (), {"x": 0.5, "y": 0.5}))
+    return Unit(
+        name="elementary",
+        description="",
+        variables=(
+            *(Input(name=name, description="", start=0.5) for name in "xy"),
+            *(Output(name=f"np_{name}", description="") for name in names),
+        ),
+        outputs=lambda v: {f"np_{name}": value for name, value in outputs(v).items()},
+    )

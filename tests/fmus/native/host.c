@@ -2,7 +2,8 @@
 
        host LIBRARY GUID RESOURCES < SCRIPT
 
-       set REFERENCE NUMBER ...    get REFERENCE ...    step TIME STEP    (a line each)
+       set REFERENCE NUMBER ...    get REFERENCE ...    step TIME STEP    state    (a line each)
+       steps COUNT STEP            instances COUNT      resident
 
    It is compiled for Linux and for Windows, and with a sanitizer. */
 #include <inttypes.h>
@@ -27,6 +28,9 @@ static void *symbol(const char *name) { return dlsym(library, name); }
 
 #define LONGEST_LINE 100000
 #define MOST 1000
+#define AT_ONCE 100
+
+static const char *guid, *resources;
 
 static void told(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
                  fmi2String message, ...) {
@@ -88,25 +92,69 @@ static void save_and_restore(fmi2Component me) {
     printf("state %d %d\n", status, state == NULL && again == NULL);
 }
 
+/* Many steps, from time 0 on. */
+static void steps(fmi2Component me, char *rest) {
+    fmi2DoStepTYPE *do_step = (fmi2DoStepTYPE *)symbol("fmi2DoStep");
+    long count = strtol(rest, &rest, 10);
+    double size = strtod(rest, NULL);
+    int status = 0;
+    for (long k = 0; k < count; k++) status |= do_step(me, (double)k * size, size, fmi2True);
+    printf("steps %d\n", status);
+}
+
+static fmi2Component made(void) {
+    static const fmi2CallbackFunctions callbacks = {told, calloc, free, NULL, NULL};
+    fmi2Component me = ((fmi2InstantiateTYPE *)symbol("fmi2Instantiate"))("host", fmi2CoSimulation, guid, resources,
+                                                                          &callbacks, fmi2False, fmi2False);
+    if (!me) return NULL;
+    ((fmi2SetupExperimentTYPE *)symbol("fmi2SetupExperiment"))(me, fmi2False, 0.0, 0.0, fmi2False, 0.0);
+    ((fmi2EnterInitializationModeTYPE *)symbol("fmi2EnterInitializationMode"))(me);
+    ((fmi2ExitInitializationModeTYPE *)symbol("fmi2ExitInitializationMode"))(me);
+    return me;
+}
+
+/* Make, step and free instances, a hundred of them at the same time. */
+static void instances(char *rest) {
+    long count = strtol(rest, NULL, 10);
+    fmi2Component all[AT_ONCE];
+    int status = 0;
+    for (long k = 0; k < count; k += AT_ONCE) {
+        for (int i = 0; i < AT_ONCE; i++) {
+            all[i] = made();
+            status |= !all[i] || ((fmi2DoStepTYPE *)symbol("fmi2DoStep"))(all[i], 0.0, 0.005, fmi2True);
+        }
+        for (int i = 0; i < AT_ONCE; i++) ((fmi2FreeInstanceTYPE *)symbol("fmi2FreeInstance"))(all[i]);
+    }
+    printf("instances %d\n", status);
+}
+
+/* What the process holds in memory, in kB, where the system tells. */
+static void resident(void) {
+    char line[200];
+    FILE *file = fopen("/proc/self/status", "r");
+    while (file && fgets(line, sizeof line, file))
+        if (strncmp(line, "VmRSS:", 6) == 0) printf("resident %ld\n", strtol(line + 6, NULL, 10));
+    if (file) fclose(file);
+}
+
 static void obey(fmi2Component me, char *line) {
     if (strncmp(line, "set ", 4) == 0) set(me, line + 4);
     if (strncmp(line, "get ", 4) == 0) get(me, line + 4);
     if (strncmp(line, "step ", 5) == 0) step(me, line + 5);
     if (strncmp(line, "state", 5) == 0) save_and_restore(me);
+    if (strncmp(line, "steps ", 6) == 0) steps(me, line + 6);
+    if (strncmp(line, "instances ", 10) == 0) instances(line + 10);
+    if (strncmp(line, "resident", 8) == 0) resident();
 }
 
 int main(int count, char **words) {
     static char line[LONGEST_LINE];
-    fmi2CallbackFunctions callbacks = {told, calloc, free, NULL, NULL};
     if (count != 4) return 2;
     open_library(words[1]);
     if (!library) return printf("no library\n"), 3;
-    fmi2Component me = ((fmi2InstantiateTYPE *)symbol("fmi2Instantiate"))("host", fmi2CoSimulation, words[2], words[3],
-                                                                          &callbacks, fmi2False, fmi2False);
+    guid = words[2], resources = words[3];
+    fmi2Component me = made();
     if (!me) return printf("no instance\n"), 4;
-    ((fmi2SetupExperimentTYPE *)symbol("fmi2SetupExperiment"))(me, fmi2False, 0.0, 0.0, fmi2False, 0.0);
-    ((fmi2EnterInitializationModeTYPE *)symbol("fmi2EnterInitializationMode"))(me);
-    ((fmi2ExitInitializationModeTYPE *)symbol("fmi2ExitInitializationMode"))(me);
     while (fgets(line, sizeof line, stdin)) obey(me, line);
     ((fmi2TerminateTYPE *)symbol("fmi2Terminate"))(me);
     ((fmi2FreeInstanceTYPE *)symbol("fmi2FreeInstance"))(me);

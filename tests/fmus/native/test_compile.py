@@ -2,45 +2,29 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import struct
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from made_masses import with_drives, with_masses
+from c_host import GUID, host, ran, script, write
 from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.native import guid_header, native_binaries, native_missing, native_sources, this_platform
+from urmpipe_fmus.native import native_binaries, native_missing, native_sources, this_platform
 from urmpipe_fmus.native.compile import TARGETS
 from urmpipe_fmus.platforms import suffix_of
-from urmpipe_fmus.table_file import TABLE_FILE, table_bytes
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
-from urmpipe_fmus.variable import Input, Output
 from urmpipe_models.errors import FmuError
 from urmpipe_models.robots.catalogue import load_robot
 
-GUID = "{12345678-0000-0000-0000-000000000000}"
-HOST = Path(__file__).with_name("host.c")
-
 needs_compiler = pytest.mark.skipif(native_missing() is not None, reason=f"needs {native_missing()}")
 needs_zig = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang")
-
-
-@needs_compiler
-def test_the_sources_compile_without_a_warning(
-    oscillator: Unit, player: Unit, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("CC", "cc -Werror -Wpedantic -Wshadow")
-    for unit in (oscillator, player):
-        assert native_binaries(unit, native_sources(unit), GUID, [this_platform()])
 
 
 @needs_compiler
@@ -111,95 +95,6 @@ def test_what_is_missing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     assert native_missing() == "casadi is not installed (pip install 'urmpipe[native]')"
 
 
-def script(unit: Unit, count: int, seed: int) -> str:
-    """Random inputs and steps for the host, in hexadecimal: not all strtod round decimals alike."""
-    rng = np.random.default_rng(seed)
-    inputs = [k for k, (_, one) in enumerate(unit.scalars) if one.causality == "input" and one.type == "Real"]
-    seen = [k for k, (_, one) in enumerate(unit.scalars) if one.type == "Real"]
-    lines = []
-    for k in range(count):
-        values = (rng.normal(size=len(inputs)) * rng.choice([0.01, 1.0, 10.0])).tolist()
-        lines.append(
-            "set " + " ".join(f"{one} {value.hex()}" for one, value in zip(inputs, values, strict=True))
-        )
-        lines.append("get " + " ".join(map(str, seen)))
-        lines.append(f"step {(k * 0.01).hex()} {(0.01).hex()}")
-        if k % 10 == 9:
-            lines.append("state")
-    return "\n".join(lines) + "\n"
-
-
-def headers() -> str:
-    import fmpy
-
-    return str(Path(fmpy.__file__).parent / "c-code")
-
-
-def host(folder: Path, command: Sequence[str], name: str = "host") -> str:
-    """Compile the host."""
-    program = str(folder / name)
-    subprocess.run(
-        [*command, "-O1", "-I", headers(), str(HOST), "-o", program], check=True, capture_output=True
-    )
-    return program
-
-
-def write(folder: Path, unit: Unit, platforms: Sequence[str]) -> None:
-    """Write sources and binaries of a unit."""
-    sources = native_sources(unit)
-    files = {**sources, "sources/guid.h": guid_header(GUID)}
-    files |= native_binaries(unit, sources, GUID, platforms) if platforms else {}
-    if unit.table is not None:
-        files[TABLE_FILE] = table_bytes(unit.table)
-    for name, content in files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
-
-
-def ran(command: Sequence[str], folder: Path, given: str, resources: str = "") -> list[str]:
-    """What the host prints."""
-    environment = {**os.environ, "WINEDEBUG": "-all", "ASAN_OPTIONS": "detect_leaks=1"}
-    place = resources or (folder / "resources").as_uri()
-    done = subprocess.run(
-        [*command, GUID, place], input=given, capture_output=True, text=True, env=environment, check=False
-    )
-    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
-    return done.stdout.splitlines()
-
-
-@pytest.fixture
-def elementary() -> Unit:
-    """A unit with the elementary functions that a C library computes in its own way."""
-    ones = ("sin", "cos", "tan", "arctan", "tanh", "arcsinh")
-    damped = ("exp", "expm1", "sinh", "cosh")
-
-    def outputs(v: Any) -> dict[str, Any]:
-        small = np.tanh(v.x)
-        far = 1.0 + np.abs(v.x)
-        found = {name: getattr(np, name)(v.x) for name in ones}
-        found |= {name: getattr(np, name)(-np.abs(v.x)) for name in damped}
-        found |= {name: getattr(np, name)(small) for name in ("arcsin", "arccos")}
-        found |= {"log": np.log(far), "log1p": np.log1p(small * 0.5), "arccosh": np.arccosh(far)}
-        found |= {"hypot": np.hypot(v.x, v.y), "arctan2": np.arctan2(v.y, v.x)}
-        return found | {
-            "arctanh": np.arctanh(small * 0.5),
-            "cube": v.x**3,
-            "power": far**v.y,
-            "root": np.sqrt(far),
-        }
-
-    names = outputs(type("Given", (), {"x": 0.5, "y": 0.5}))
-    return Unit(
-        name="elementary",
-        description="",
-        variables=(
-            *(Input(name=name, description="", start=0.5) for name in "xy"),
-            *(Output(name=f"np_{name}", description="") for name in names),
-        ),
-        outputs=lambda v: {f"np_{name}": value for name, value in outputs(v).items()},
-    )
-
-
 @pytest.mark.slow
 @needs_zig
 def test_windows_and_linux_give_the_same_bits(
@@ -263,24 +158,6 @@ def test_zig_compiles_for_this_platform_where_there_is_no_other_compiler(
         ]
         == one
     )
-
-
-@pytest.mark.slow
-@needs_compiler
-def test_sanitizers_find_nothing(oscillator: Unit, player: Unit, elementary: Unit, tmp_path: Path) -> None:
-    sanitized = ["cc", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
-    program = host(tmp_path, [*sanitized, "-ldl"])
-    arm = make_unit("driven_arm", robot=with_drives(with_masses(load_robot("urm6")), held=["phi6"]))
-    for unit in (oscillator, player, elementary, arm):
-        folder = tmp_path / unit.name
-        write(folder, unit, [])
-        library = folder / "unit.so"
-        c_files = [str(one) for one in sorted((folder / "sources").glob("*.c"))]
-        subprocess.run([*sanitized, "-shared", "-fPIC", "-o", str(library), *c_files, "-lm"], check=True)
-        wrong = "set 0 nan\nset 99999 1.0\nget 4000000000\nstep nan 1\nstep 1 -1\nstep 0 1e300\n"
-        seen = ran([program, str(library)], folder, script(unit, 100, 2) + wrong)
-        assert sum(line == "state 0 1" for line in seen) == 10
-        assert sum(line.startswith("log 3 unit") for line in seen) >= 5
 
 
 @pytest.mark.slow

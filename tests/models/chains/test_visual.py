@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -86,7 +87,7 @@ def test_the_base_link_carries_what_it_shows_wherever_the_chain_begins(tmp_path:
 
 def test_a_colour_is_a_material_s_own_or_that_of_its_name(tmp_path: Path) -> None:
     """A colour left out is white, a scale 1; materials without a name have nothing in common."""
-    shape = "<geometry><mesh filename='/a.stl'/></geometry>"
+    shape = "<geometry><mesh filename='a.stl'/></geometry>"
     materials = [
         "<material name='m'><color rgba='1 0 0 1'/></material>",
         "<material name='m'><color rgba='0 2 -1 1'/></material>",
@@ -103,7 +104,7 @@ def test_a_colour_is_a_material_s_own_or_that_of_its_name(tmp_path: Path) -> Non
     found = read_urdf(arm(tmp_path, text)).visuals
     red, green, blue, white = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0), (1.0,) * 4
     assert [one.colour for one in found] == [red, green, red, blue, None, white, None]
-    assert {one.shape for one in found} == {Mesh("/a.stl", (1.0, 1.0, 1.0))}
+    assert {one.shape for one in found} == {Mesh(str(tmp_path / "a.stl"), (1.0, 1.0, 1.0))}
 
 
 def test_what_is_wrong_with_a_visual_is_said_with_its_line(tmp_path: Path) -> None:
@@ -144,18 +145,67 @@ def test_what_stands_beside_the_chain_is_not_looked_at(tmp_path: Path) -> None:
     assert read_urdf(arm(tmp_path, text)).visuals == read_urdf(arm(tmp_path)).visuals
 
 
+def package(folder: Path) -> Path:
+    """Make a ROS package."""
+    folder.mkdir(parents=True)
+    (folder / "package.xml").touch()
+    return folder
+
+
 def test_meshes_are_looked_up_from_the_description(tmp_path: Path) -> None:
-    (tmp_path / "ws" / "my_arm" / "urdf").mkdir(parents=True)
-    (tmp_path / "ws" / "other" / "meshes").mkdir(parents=True)
-    folder = tmp_path / "ws" / "my_arm" / "urdf"
-    ws = str(tmp_path / "ws")
-    assert mesh_file("meshes/a.stl", folder) == f"{ws}/my_arm/urdf/meshes/a.stl"
-    assert mesh_file("/opt/a.stl", folder) == "/opt/a.stl"
-    assert mesh_file("file:///opt/a%20b.stl", folder) == "/opt/a b.stl"
+    ws = tmp_path / "ws"
+    folder = package(ws / "my_arm") / "urdf"
+    (folder / "tools").mkdir(parents=True)
+    package(ws / "other")
+    assert mesh_file("meshes/a.stl", folder) == f"{folder}/meshes/a.stl"
+    assert mesh_file(f"{folder}/a.stl", folder) == f"{folder}/a.stl"
+    assert mesh_file(f"file://{ws}/my_arm/urdf/a%20b.stl", folder) == f"{folder}/a b.stl"
+    assert mesh_file("../meshes/a.stl", folder) == f"{folder}/../meshes/a.stl"
     assert mesh_file("package://my_arm/meshes/a.stl", folder) == f"{ws}/my_arm/meshes/a.stl"
     assert mesh_file("package://other/meshes/a.stl", folder) == f"{ws}/other/meshes/a.stl"
-    assert mesh_file("package://nowhere/a.stl", folder) == "package://nowhere/a.stl"
-    assert mesh_file("package://", folder) == "package://"
+    assert mesh_file("package://tools/a.stl", folder) == f"{folder}/tools/a.stl"
+    for gone in ("package://nowhere/a.stl", "package://", "package://../a.stl", "package://./a.stl"):
+        assert mesh_file(gone, folder) == gone
+    assert mesh_file("a\0.stl", folder) == "a\0.stl"
+    assert mesh_file("https://example.org/a.stl", folder) == f"{folder}/https:/example.org/a.stl"
+
+
+def test_a_description_takes_no_mesh_from_elsewhere_unless_it_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Neither by its path nor by steps up, links, links in a circle, or a folder that is no ROS package."""
+    monkeypatch.delenv("ROS_PACKAGE_PATH", raising=False)
+    home, folder = tmp_path / "home", tmp_path / "home" / "my_arm"
+    folder.mkdir(parents=True)
+    kept = package(tmp_path / "kept")
+    for name in ("a.stl", "b c.stl"):
+        (home / name).touch()
+        (kept / name).touch()
+    (folder / "link.stl").symlink_to(home / "a.stl")
+    (folder / "there").symlink_to(home)
+    (folder / "circle.stl").symlink_to(folder / "circle.stl")
+    url = home.as_uri()
+    asked = {
+        "../a.stl": f"{url}/my_arm/../a.stl",
+        f"{home}/b c.stl": f"{url}/b%20c.stl",
+        f"{url}/b%20c.stl": f"{url}/b%20c.stl",
+        "link.stl": f"{url}/my_arm/link.stl",
+        "there/a.stl": f"{url}/my_arm/there/a.stl",
+        "circle.stl": f"{url}/my_arm/circle.stl",
+        "package://home/a.stl": f"{url}/a.stl",
+        "package://there/a.stl": f"{url}/my_arm/there/a.stl",
+        "package://kept/../home/a.stl": f"{kept.as_uri()}/../home/a.stl",
+    }
+    assert {one: mesh_file(one, folder) for one in asked} == asked
+    assert mesh_file("package://kept/a.stl", folder) == f"{kept}/a.stl"
+
+    monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path / 'gone'}{os.pathsep}{home}{os.pathsep}")
+    assert mesh_file("../a.stl", folder) == f"{folder}/../a.stl"
+    assert mesh_file(f"{url}/b%20c.stl", folder) == f"{home}/b c.stl"
+    assert mesh_file("package://there/a.stl", folder) == f"{folder}/there/a.stl"
+    assert mesh_file("circle.stl", folder) == f"{url}/my_arm/circle.stl"
+    far = tmp_path / "far"
+    assert mesh_file("package://my_arm/a.stl", far) == f"{folder}/a.stl"
 
 
 def test_a_visual_hangs_on_a_joint_of_the_chain() -> None:
@@ -175,7 +225,9 @@ SHAPES: SearchStrategy[Shape] = st.one_of(
     st.builds(Capsule, sizes, sizes),
     st.builds(Sphere, sizes),
     st.builds(
-        Mesh, st.sampled_from(["/a.stl", "package://p/b & c.obj"]), st.tuples(factors, factors, factors)
+        Mesh,
+        st.sampled_from(["file:///nowhere/a%20b.stl", "package://p/b & c.obj"]),
+        st.tuples(factors, factors, factors),
     ),
 )
 ORIGINS = st.tuples(*(st.floats(-3.0, 3.0),) * 6).map(from_offset)

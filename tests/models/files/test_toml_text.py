@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tomllib
 from pathlib import Path
 
@@ -45,7 +46,7 @@ def test_each_kind_of_value_is_written_as_toml_has_it() -> None:
         ("a = False\r\n", (1, 5), "; allowed: a = false"),
         ("a = .5", (1, 5), ""),
         ("a = [", None, ""),
-        ("a =", None, ""),
+        ("\n\na = [\n\n", None, ""),
     ],
 )
 def test_what_is_no_toml_is_told_with_its_line(
@@ -56,7 +57,8 @@ def test_what_is_no_toml_is_told_with_its_line(
     with pytest.raises(OptionError) as caught:
         parse_toml(Path("a.toml"), OptionError)
     if place is None:
-        assert str(caught.value) == "a.toml: not valid TOML: Invalid value (at end of document)"
+        line = 1 + written.rstrip("\n").count("\n")
+        assert str(caught.value) == f"a.toml:{line}: not valid TOML: Invalid value (at end of document)"
     else:
         at = f"(at line {place[0]}, column {place[1]})"
         assert str(caught.value) == f"a.toml:{place[0]}: not valid TOML: Invalid value {at}{hint}"
@@ -64,11 +66,71 @@ def test_what_is_no_toml_is_told_with_its_line(
 
 def test_what_cannot_be_read_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    Path("a.toml").write_bytes(b"a = '\xff'")
+    Path("a.toml").write_bytes(b"\na = '\xff'")
+    os.mkfifo("pipe.toml")
     for name, said in (
-        ("a.toml", "a.toml: byte 5 is no UTF-8; allowed: TOML in UTF-8"),
+        ("a.toml", "a.toml:2: byte 6 is no UTF-8; allowed: TOML in UTF-8"),
+        ("pipe.toml", "pipe.toml: found a pipe or a device, allowed: a file"),
+        ("a\0b.toml", "found 'a\\x00b.toml', allowed: the name of a file"),
         ("b.toml", "b.toml: cannot be read: No such file or directory"),
     ):
         assert refusal(OptionError, parse_toml, Path(name), OptionError) == said
     Path("a.toml").write_bytes(b"\xef\xbb\xbfa = 1")  # with a byte order mark, as Windows writes it
     assert parse_toml(Path("a.toml"), OptionError) == {"a": 1}
+
+
+DEEP = "found tables or lists nested more than 50 deep, allowed: 50"
+
+
+@pytest.mark.parametrize(
+    ("written", "said"),
+    [
+        ("a = 1\nb = " + "[" * 2000 + "]" * 2000, f"a.toml:2: {DEEP}"),
+        ("b = " + "{a=" * 2000 + "1" + "}" * 2000, f"a.toml:1: {DEEP}"),
+        ("\n\n[" + ".".join("a" * 2000) + "]", f"a.toml:3: {DEEP}"),
+        (".".join(["'a'"] * 2000) + " = 1", f"a.toml:1: {DEEP}"),
+        ("a = [\n" * 51, f"a.toml:51: {DEEP}"),
+        ("a = " + ("{" + ".".join("a" * 11) + " = ") * 9, f"a.toml:1: {DEEP}"),
+        ("a" * 10**6 + ".a" * 10**6, f"a.toml:1: {DEEP}"),
+        (
+            "a = 1\nb = " + "9" * 5000,
+            "a.toml:2: found an integer of too many digits, allowed: 64 bits at most",
+        ),
+        (
+            "b.c = [0, 0x" + "f" * 17 + "]",
+            "a.toml:1: b.c[1]: found an integer of 68 bits, allowed: 64 bits at most",
+        ),
+        (f"b = -{2**63 + 1}", "a.toml:1: b: found an integer of 64 bits, allowed: 64 bits at most"),
+        ("a" * 1001 + " = 1", f"a.toml: '{'a' * 56}...: found a key of 1001 letters, allowed: 1000 at most"),
+        (
+            "".join(f"a{k} = 1\n" for k in range(20_001)),
+            "a.toml: found 20001 keys, allowed: 20000 at most",
+        ),
+        ("a = '" + "x" * 10**7, "a.toml: found 10 MB, allowed: 10 MB at most"),
+        ("a = 2024-02-31", "a.toml:1: not valid TOML: Invalid date or datetime (at line 1, column 5)"),
+        ("a = 1\na = 2\n", "a.toml:2: not valid TOML: Cannot overwrite a value (at line 2, column 6)"),
+        ("a = 'x\0'", "a.toml:1: not valid TOML: Found invalid character '\\x00' (at line 1, column 7)"),
+    ],
+)
+def test_what_people_do_not_write_is_told_with_its_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: str, said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.toml").write_text(written, encoding="utf-8")
+    assert refusal(OptionError, parse_toml, Path("a.toml"), OptionError) == said
+
+
+def test_what_only_looks_deep_is_read(tmp_path: Path) -> None:
+    """Brackets in texts and remarks, dots of numbers, and as many of both as are allowed."""
+    signs = "[" * 100 + "." * 100
+    written = "\n".join(
+        [
+            f"# {signs}", f'a = "{signs} \\" {signs}" # {signs}', f"b = '{signs}\\'",
+            f'c = """{signs}\n"{signs}\\""" {signs}"""', f"d = '''{signs}\n'{signs}'''",
+            f"e = [{', '.join(['1.5'] * 100)}]", "f = " + "[" * 50 + "]" * 50, "g" + ".g" * 49 + " = 2.5",
+            "[" + ".".join("h" * 50) + "]", "i = { j = 1.5 }", f'"{signs}" = {-(2**63)}', f"k = {2**63 - 1}",
+        ]
+    )  # fmt: skip
+    path = tmp_path / "a.toml"
+    path.write_text(written, encoding="utf-8")
+    assert parse_toml(path, OptionError) == tomllib.loads(written)

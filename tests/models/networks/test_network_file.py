@@ -219,7 +219,7 @@ def test_a_network_that_is_not_shipped_is_refused() -> None:
 
 def test_a_file_that_is_not_there_is_refused(network: Any) -> None:
     assert complaints(network, "[joints]\na = ") == [
-        "net.toml: not valid TOML: Invalid value (at end of document)",
+        "net.toml:2: not valid TOML: Invalid value (at end of document)",
     ]
     assert refusal(NetworkError, load_network, "ned.toml") == (
         "ned.toml: cannot be read: No such file or directory (did you mean net.toml?)"
@@ -540,10 +540,20 @@ def test_a_urdf_in_a_network_begins_and_ends_at_its_links(network: Any, tmp_path
 
 def test_many_digits_remarks_and_brackets_are_refused_in_their_place(network: Any) -> None:
     (said,) = complaints(network, f"[controls.s]\nstart = {'9' * 5001}\n")
-    assert said.startswith("net.toml: not valid TOML: Exceeds the limit")
+    assert said == "net.toml:2: found an integer of too many digits, allowed: 64 bits at most"
     rest = 'kind = "revolute"\nbodies = ["ground", "b"]\n[bodies.b]\n'
     joint = 'angle_unit = "deg"\n[controls.s]\n[joints.A]\nvalue = "{}"\n' + rest
     (said,) = complaints(network, joint.format("s # x"))
     assert said.startswith("net.toml:4: joints.A.value: found 's # x', no arithmetic")
     (said,) = complaints(network, joint.format("(" * 60 + "s" + ")" * 60))
     assert said.endswith("nested 60 deep; allowed: 50")
+
+
+def test_a_network_too_large_to_be_assembled_is_refused(network: Any) -> None:
+    joints = "".join(
+        f'[joints.j{k}]\nkind = "revolute"\nbodies = ["b{k}", "b{k + 1}"]\n[bodies.b{k + 1}]\n'
+        for k in range(501)
+    )
+    assert complaints(network, joints.replace('"b0"', '"ground"')) == [
+        "net.toml: joints: found 501 with elements and those of chains, allowed: 500 at most"
+    ]

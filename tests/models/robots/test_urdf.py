@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 from typing import Any
 
@@ -314,6 +315,40 @@ def test_documents_that_could_expand_are_refused_unread(urdf: Any, doctype: str)
 )
 def test_files_that_are_no_urdf_get_one_line(urdf: Any, text: str, said: str) -> None:
     assert complaint(urdf, text) == [said]
+
+
+def test_a_file_larger_than_any_arm_is_refused(urdf: Any) -> None:
+    links = "".join(f'<link name="l{k}"/>' for k in range(1001))
+    assert complaint(urdf, f"<robot>{links}</robot>") == [
+        "arm.urdf: found 1001 links or joints, allowed: 1000 at most"
+    ]
+    assert complaint(urdf, f"<robot>\n<link name='{'a' * 10_001}'/></robot>") == [
+        "arm.urdf:2: found an attribute of 10001 letters, allowed: 10000 at most"
+    ]
+    assert complaint(urdf, "<robot>" + " " * 10**7) == ["arm.urdf: found 10 MB, allowed: 10 MB at most"]
+
+
+def test_what_nests_deep_or_is_no_file_is_one_line(urdf: Any) -> None:
+    assert complaint(urdf, "<robot>" + "<a>" * 10**5 + "</a>" * 10**5 + "</robot>") == [
+        "arm.urdf: found no link; allowed: one root, or a base link chosen by name"
+    ]
+    assert refusal(RobotError, read_urdf, "a\0.urdf") == "found 'a\\x00.urdf', allowed: the name of a file"
+    os.mkfifo("pipe.urdf")
+    assert (
+        refusal(RobotError, read_urdf, "pipe.urdf") == "pipe.urdf: found a pipe or a device, allowed: a file"
+    )
+
+
+def test_long_lists_of_links_are_cut_and_only_the_first_faults_ask(urdf: Any) -> None:
+    links = [link(f"l{k:02}") for k in range(20)]
+    assert complaint(urdf, robot(*links)) == [
+        f"arm.urdf: found 20 root links: {', '.join(f'l{k:02}' for k in range(16))} and 4 others; allowed:"
+        " one root, or a base link chosen by name"
+    ]
+    joints = [joint(f"j{k}", "l00", f"L{k:02}x") for k in range(20)]
+    said = complaint(urdf, robot(*links, *joints, joint("last", "l00", "L19x")))
+    assert sum("did you mean" in one for one in said) == 20
+    assert said[20].endswith("joint last: child 'L19x'; allowed: a link of the file")
 
 
 def test_xacro_files_are_told_the_command_that_expands_them(shared: Path) -> None:

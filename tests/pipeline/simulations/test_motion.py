@@ -13,7 +13,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.simulations.motion import FAILED, moving_blocks, run_of_block
+from urmpipe_pipeline.simulations.motion import moving_blocks, run_of_block
 from urmpipe_pipeline.simulations.simulation import Arm, Signal, Simulation
 
 MakeSimulation = Callable[..., Simulation]
@@ -123,7 +123,22 @@ def test_arrays_of_other_units_are_no_motion(make_simulation: MakeSimulation) ->
     assert moving_blocks(with_signals(simulation, *signals)) == ()
 
 
-def test_a_simulation_that_failed_says_so(make_simulation: MakeSimulation) -> None:
-    run = run_of_block(make_simulation(20, failed="meter: gone"), "chain")
-    said = "the simulation ended early, and so does the motion: meter: gone"
-    assert LogWarning(FAILED, said) in run.log.warnings
+def test_no_verdict_rests_on_the_motion_of_a_simulation_that_failed(make_simulation: MakeSimulation) -> None:
+    failed = make_simulation(20, failed="meter: gone")
+    assert refusal(LogError, run_of_block, failed, "chain") == (
+        "log-to-delta: found a simulation that ended early, allowed: a whole one; meter: gone"
+    )
+
+
+def test_nor_on_one_to_which_leads_what_is_not_finite(make_simulation: MakeSimulation) -> None:
+    simulation = make_simulation(20)
+    assert "chain" in {to.split(".")[0] for to in simulation.connections}
+    odd = LogWarning(
+        "not-finite", "found nan at t = 0.4 s; values that are not finite: 2", about="log", column="q"
+    )
+    other = replace(odd, about="meter")
+    assert refusal(LogError, run_of_block, replace(simulation, warnings=(odd, other)), "chain") == (
+        "log-to-delta: log.q: found nan at t = 0.4 s; values that are not finite: 2; allowed: none where"
+        " block chain is judged"
+    )
+    assert other in run_of_block(replace(simulation, warnings=(other,)), "chain").log.warnings

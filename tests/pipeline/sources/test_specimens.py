@@ -147,6 +147,7 @@ GOOD = [
     Good("clock_date_and_time", joints=Q[:6]),
     Good("clock_time_of_day", joints=Q[:6]),
     Good("clock_time_of_day_midnight", joints=Q[:6]),
+    Good("clock_seconds_of_day", joints=Q[:6]),
     Good("clock_micros_not_padded", joints=Q[:6]),
     Good("clock_micros_point_not_padded", joints=Q[:6]),
     Good("clock_minutes", joints=Q[:6]),
@@ -181,6 +182,10 @@ GOOD = [
 WRONG = [
     # the clock
     Wrong("time_backwards", [r"^log:13, column t: found 0\.12 s after 0\.2 s, allowed: "]),
+    Wrong(
+        "midnight_among_rows",
+        [r"^log:15, column t: found 23:59:59\.995 after 24:00:00\.005, allowed: times that increase"],
+    ),
     Wrong("time_repeated", [r"^log:10, column t: found 0\.14 s again, allowed: "]),
     Wrong("time_missing", [r"^log:7, column t: found no time, allowed: a time in every row"]),
     Wrong("time_of_one_second", [r"(?=.*rows repeat a time)(?=.*period=)"]),
@@ -201,6 +206,7 @@ WRONG = [
     # the table
     Wrong("header_only", [r"^log:1: found a header and no rows, allowed: "]),
     Wrong("no_bytes", [r"^log: found .*, allowed: "]),
+    Wrong("rows_of_one_cell", [r"^log:1: found 2 names over rows of 1 cell, allowed: a name a column"]),
     Wrong("header_with_fewer_names", [r"^log:1: found 6 names over rows of 7 cells, allowed: "]),
     Wrong("header_with_more_names", [r"^log:1: found 8 names over rows of 7 cells, allowed: "]),
     Wrong("header_with_a_name_twice", [r"^log:1, column q3: found as columns 4, 5, allowed: once"]),

@@ -79,7 +79,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
 /* Go from one phase to another. */
 static fmi2Status go(Instance *me, const char *function, int from, Phase to) {
     if (!may(me, function, from)) return fmi2Error;
-    me->state.phase = to;
+    me->state.phase = (int)to;
     return fmi2OK;
 }
 
@@ -113,7 +113,8 @@ fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
         if (get_values(c, INTEGER, vr + k, 1, &found) != fmi2OK) return fmi2Error;
         if (!(fabs(found) < 2147483647.5))
             return report(c, "%s: found %.17g, allowed: an integer of 32 bits", model_variables[vr[k]].name, found);
-        value[k] = (fmi2Integer)nearbyint(found);
+        found = nearbyint(found);
+        value[k] = (fmi2Integer)found;
     }
     return fmi2OK;
 }

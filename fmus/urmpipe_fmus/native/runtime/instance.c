@@ -90,7 +90,7 @@ Instance *make_instance(const char *name, const char *guid, const char *resource
         blank.logger = callbacks->logger;
         blank.environment = callbacks->componentEnvironment;
     }
-    blank.name = (char *)name; /* to be told only */
+    blank.name = name;
     if (!is_ours(&blank, guid, type)) return NULL;
     Instance *me = blank.allocate(1, sizeof *me);
     if (!me) {
@@ -98,10 +98,10 @@ Instance *make_instance(const char *name, const char *guid, const char *resource
         return NULL;
     }
     *me = blank;
-    me->name = copied_name(me, name ? name : "");
+    me->name = me->copy = copied_name(me, name ? name : "");
     set_start_values(me);
-    if (!me->name) report(&blank, "found no memory for the name of an instance");
-    if (me->name && fetch_table(me, resources)) return me;
+    if (!me->copy) report(&blank, "found no memory for the name of an instance");
+    if (me->copy && fetch_table(me, resources)) return me;
     free_instance(me);
     return NULL;
 }
@@ -109,6 +109,6 @@ Instance *make_instance(const char *name, const char *guid, const char *resource
 void free_instance(Instance *me) {
     if (!me) return;
     if (me->table.block) me->release(me->table.block);
-    if (me->name) me->release(me->name);
+    if (me->copy) me->release(me->copy);
     me->release(me);
 }

@@ -22,7 +22,8 @@ typedef struct {
     int stale; /* whether the outputs in state.value are older than what they are computed from */
     double stop; /* where the simulation ends, s; infinite if that is not said */
     Table table;
-    char *name;
+    const char *name; /* to be told: the tool's text, and then `copy` */
+    char *copy;
     fmi2CallbackLogger logger;
     fmi2ComponentEnvironment environment;
     void (*release)(void *); /* frees what `allocate` gave */

@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.inverse.closed.loop_equations import nearest_point
-from urmpipe_models.inverse.closed.spherical_wrist import meeting_point
+from urmpipe_models.inverse.closed.spherical_wrist import TILT, meeting_point
 from urmpipe_models.kinematics.screws import Screws
 
 NEARLY = 1e-2
@@ -31,6 +31,8 @@ def with_spherical_wrist(screws: Screws) -> Iterator[Screws]:
     arm = compact(screws)
     if len(arm.revolute) != 6 or not arm.revolute[3:].all():
         return
+    if np.linalg.norm(np.cross(arm.direction[3:5], arm.direction[4:]), axis=1).min() <= TILT:
+        return  # parallel axes meet nowhere, and no such wrist has a closed form
     centre = meeting_point(arm.direction[3:], arm.point[3:])
     passing = np.linalg.norm(np.cross(centre - arm.point[3:], arm.direction[3:]), axis=1)
     if passing.max() > NEARLY * arm.size:

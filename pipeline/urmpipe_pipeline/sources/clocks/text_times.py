@@ -153,19 +153,28 @@ def _read(columns: Sequence[TextCells], forms: Combination) -> Reading:
         total[part <= UNREADABLE] = part[part <= UNREADABLE]
     nights = 0
     if all(form.unit == TIME_OF_DAY for form in forms):
-        nights = _add_nights(total)
+        nights = add_nights(total)
     return Reading(forms, total, nights)
 
 
-def _add_nights(times: IntArray) -> int:
-    """Put times of day that fall back by nearly 24 h on the next day, in place; return how often."""
+def add_nights(times: IntArray) -> int:
+    """Put times of day that fall back by nearly 24 h on the next day, in place; return how often.
+
+    One that jumps ahead by as much, behind a midnight, is a row of the evening among those of the morning: it
+    stays on its day, where it runs backwards.
+
+    Args:
+        times: In [ns], those from `UNREADABLE` down are none, shape (n,).
+    """
     rows = np.flatnonzero(times > UNREADABLE)
     valid = times[rows]
     if not len(valid) or valid.min() < 0 or valid.max() >= DAY_NS:
         return 0
-    nights = np.cumsum(np.diff(valid, prepend=valid[0]) <= -MIDNIGHT_NS)
-    times[rows] += nights * DAY_NS
-    return int(nights[-1])
+    steps = np.diff(valid, prepend=valid[0])
+    days = np.cumsum((steps <= -MIDNIGHT_NS).astype(np.int64) - (steps >= MIDNIGHT_NS))
+    days -= np.minimum(np.minimum.accumulate(days), 0)
+    times[rows] += days * DAY_NS
+    return int(days.max())
 
 
 def _said(reading: Reading, columns: Sequence[TextCells], evidence: Sequence[str]) -> tuple[Inference, ...]:

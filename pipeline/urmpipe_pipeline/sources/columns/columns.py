@@ -10,6 +10,8 @@ from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.sources.cells.cell import is_missing, is_text
 from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables.limits import refuse_wide
+from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import Patterns, Quantity, Unit, key, split_unit, vocabulary
 
@@ -17,6 +19,9 @@ _UNIT_WORDS = re.compile(r"_(rad|deg)(_(per_)?s(ec)?2?)?(?=_|$)")
 _GLUED = re.compile(r"(?<![a-z])q(?=(act|actual|cmd|des|fb|meas|msr|ref|set|target)_?\d)")
 _RANGE = re.compile(r"(?P<first>\d{1,5})-(?P<last>\d{1,5})")
 _NAME_COLUMN = re.compile(r"(?P<before>.*?)name_?(?P<n>\d+)\Z")
+SHOWN_TWINS = 12
+"""Columns of one name that are told by their numbers."""
+
 _NUMBERED = re.compile(r"(?P<before>.*?)(position|velocity|effort)_?(?P<n>\d+)\Z")
 
 
@@ -80,6 +85,7 @@ def columns_of(layouts: Sequence[Layout], titles: Sequence[str]) -> tuple[Column
     """
     found: list[Column] = []
     for table, layout in enumerate(layouts):
+        refuse_wide(len(layout.names), layout.file, layout.header_line)
         earlier = {column.name for column in found}
         for index, header in enumerate(layout.names):
             label, unit = split_unit(header) if layout.header else (header, None)
@@ -224,17 +230,22 @@ def refuse_twins(
     Raises:
         LogError: With a finding for each such column.
     """
+    named: dict[str, list[Column]] = {}
+    for one in columns:
+        if one.key and not one.text:
+            named.setdefault(one.key, []).append(one)
     findings = []
     for column in used:
-        named = [one for one in columns if one.key == column.key != "" and one is not column]
-        twins = [one for one in named if not one.text and _alike(one, column)]
+        twins = [one for one in named.get(column.key, ()) if one is not column and _alike(one, column)]
         if twins:
-            numbers = ", ".join(str(n) for n in sorted(c.number for c in (column, *twins)))
-            layout, said = layouts[column.table], f"found as columns {numbers}, allowed: once"
+            numbers = sorted(c.number for c in (column, *twins))
+            more = f" and {len(numbers) - SHOWN_TWINS} more" if len(numbers) > SHOWN_TWINS else ""
+            said = f"found as columns {', '.join(map(str, numbers[:SHOWN_TWINS]))}{more}, allowed: once"
+            layout = layouts[column.table]
             place = (layout.file, layout.header_line, None, column.header)
             findings.append(Finding(said, *place, hints=(remedy,)))
     if findings:
-        raise LogError(*findings)
+        raise LogError(*capped(findings, layouts[used[0].table].file))
 
 
 def _alike(one: Column, other: Column) -> bool:

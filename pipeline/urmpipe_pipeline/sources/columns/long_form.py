@@ -27,9 +27,11 @@ def refuse_long_form(
     Raises:
         LogError: With the command that makes a row a sample of it.
     """
+    if len(joints) != 1 or layout.header is None:
+        return
     others = [column for column in columns if column not in joints]
     names = [column for column in others if _goes_round(layout.cells(column.index))]
-    if len(joints) != 1 or not names or layout.header is None:
+    if not names:
         return
     found = f"a row a joint: {names[0].header} goes round {len(set(layout.cells(names[0].index)))} names"
     hints = () if len(clock) != 1 else (Hint("", does=_command(joints[0], names[0], clock[0], layout)),)

@@ -277,7 +277,8 @@ def _as_written(row: Sequence[str], layout: Layout) -> Iterator[str]:
 def _with_rest(
     roles: Roles, said: list[Inference], numeric: Sequence[Column], layouts: Sequence[Layout]
 ) -> Roles:
-    rest = [column for column in numeric if column not in roles.columns]
+    used = frozenset(roles.columns)
+    rest = [column for column in numeric if column not in used]
     said += not_used(rest, "no role is known for them")
     warnings = about_odd_rows(rest, layouts) or ([] if roles.position else about_tcp(rest))
     return replace(roles, inferences=tuple(said), warnings=tuple(warnings))

@@ -82,8 +82,7 @@ def _pose(columns: Sequence[Column], whole: Whole) -> Pose | None:
     """Return the pose that columns hold in every row, alone or behind one of them."""
     for count in (*TRANSFORMS, QUATERNION):
         held = columns[-count:]
-        numbers = all(column.index in whole.columns for column in columns)
-        if len(columns) - count not in (0, 1) or not numbers:
+        if len(columns) - count not in (0, 1) or not {c.index for c in columns}.issubset(whole.columns):
             continue
         values = whole.values([column.index for column in held])
         values = values[np.isfinite(values).all(axis=1)]

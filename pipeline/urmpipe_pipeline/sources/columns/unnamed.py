@@ -81,7 +81,8 @@ def unlike_joints(values: FloatArray) -> BoolArray:
     in_rad = int(2 * np.count_nonzero(size <= TWO_TURNS[1]) > len(size))
     steps = np.diff(values, axis=0)
     moves = (steps != 0.0).mean(axis=0)
-    whole = (values[0] % 1.0 == 0.0) & (steps[0] % 1.0 == 0.0)
+    with np.errstate(invalid="ignore"):  # infinite numbers have no remainder
+        whole = (values[0] % 1.0 == 0.0) & (steps[0] % 1.0 == 0.0)
     counts = whole & (steps[0] > 0.0) & (steps == steps[0]).all(axis=0)
     seldom = (moves > 0.0) & (moves < SELDOM * np.median(moves))
     return np.asarray((size > TWO_TURNS[in_rad]) | seldom | (counts & (len(values) > FEW)))

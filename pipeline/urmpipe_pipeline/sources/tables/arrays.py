@@ -46,7 +46,7 @@ def sniff_arrays(segment: Segment, delimiter: str | None = None, decimal: str | 
     if opening is None:
         return None
     form = Form((), (), ",", opening=opening, continued=_goes_on(lines, opening))
-    rows = _joined(form, lines, whole=segment.end - segment.start <= len(segment.head))
+    rows = _joined(form, lines, whole=not segment.has_more)
     form = replace(form, words=words_around(row.text for row in rows))
     outer = sniff(
         segment, delimiter, decimal, [replace(row, text=_with_plain(form, row.text)) for row in rows]

@@ -6,6 +6,7 @@ Structs become a column a field, NAME.FIELD; lists a column an entry, NAME_1, NA
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
 
 import numpy as np
 import pyarrow as pa
@@ -16,6 +17,7 @@ from urmpipe_pipeline.sources.cells.cell import printable
 from urmpipe_pipeline.sources.tables import numpy_columns
 from urmpipe_pipeline.sources.tables.column_facts import is_number
 from urmpipe_pipeline.sources.tables.form import spread_names
+from urmpipe_pipeline.sources.tables.limits import MOST_COLUMNS, refuse_wide
 
 MOST_ALIKE = 0.9
 """Share of the lists of a column that have one length where the others are damaged."""
@@ -37,7 +39,9 @@ def plain_table(table: pa.Table, place: str) -> pa.Table:
         LogError: If a list has another length than those of nearly all other rows.
     """
     pairs = zip(table.schema, table.columns, strict=True)
-    columns = [plain for field, column in pairs for plain in _flat(field, column, place)]
+    flat = (plain for field, column in pairs for plain in _flat(field, column, place))
+    columns = list(islice(flat, MOST_COLUMNS + 1))
+    refuse_wide(len(columns), place)
     fields = [
         pa.field(printable(field.name.strip()), column.type, metadata=field.metadata)
         for field, column in columns
@@ -83,6 +87,7 @@ def _spread(field: pa.Field, column: pa.ChunkedArray, place: str) -> Iterator[Na
         found = f"{lengths[row]} entries"
         allowed = f"{usual}, as in the other rows"
         raise LogError(Finding(file=place, row=row + 1, column=field.name, found=found, allowed=allowed))
+    refuse_wide(usual, place)
     for k, name in enumerate(spread_names([field.name], [usual])):
         yield from _flat(field.with_name(name), pc.list_element(column, k), place)
 

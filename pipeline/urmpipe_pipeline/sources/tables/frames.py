@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeGuard
 import pyarrow as pa
 
 from urmpipe_pipeline.sources.tables.held import Held
-from urmpipe_pipeline.sources.tables.own_tables import MARK, attributes_of, of_result
+from urmpipe_pipeline.sources.tables.own_tables import MARK, attributes_of, of_result, told_in
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -92,9 +91,8 @@ def _array(values: pd.Series) -> pa.Array:
 
 def index_first(table: pa.Table) -> pa.Table:
     """Return a table that pandas made with its index in front, without a name where that has none."""
-    text = (table.schema.metadata or {}).get(b"pandas")
-    told = json.loads(text).get("index_columns", []) if text else []
-    index = [name for name in told if isinstance(name, str) and name in table.column_names]
+    told = told_in(table.schema.metadata, "pandas").get("index_columns")
+    index = [name for name in (told if isinstance(told, list) else ()) if isinstance(name, str) and name in table.column_names]
     others = [name for name in table.column_names if name not in index]
     if not index or len(set(table.column_names)) < table.num_columns:
         return table

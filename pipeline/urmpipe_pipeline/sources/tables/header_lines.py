@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from itertools import groupby, pairwise
 
-from urmpipe_pipeline.sources.cells.cell import DELIMITERS, count_up, printable, split_line
+from urmpipe_pipeline.sources.cells.cell import DELIMITERS, SPACE, count_up, printable, split_line
 from urmpipe_pipeline.sources.tables.text import HeadLine
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
@@ -94,11 +94,25 @@ def _repeat(names: Row) -> bool:
 
 def _header_cells(text: str, delimiter: str, width: int) -> Row:
     """Split a header line, with its own delimiter if only that gives a name a column (numpy.savetxt)."""
+    if width == 1:
+        return _over_one_column(text)
     text = text.strip(" " if delimiter == "\t" else None)  # a tab before the first name: an unnamed index
     for comment in ("#", "//", "% "):
         text = text.removeprefix(comment)
     tried = [split_line(text, sign) for sign in (delimiter, *DELIMITERS)]
     return next((cells for cells in tried if len(cells) == width), tried[0])
+
+
+def _over_one_column(text: str) -> Row:
+    """Split a header line over rows of one cell, which show no sign between cells: by what parts most names.
+
+    A name with its unit behind a comma is one, and so is a comment in words.
+    """
+    plain = text.strip().lstrip("#%/ ")
+    parts = max((split_line(plain, sign) for sign in DELIMITERS if sign != SPACE), key=len)
+    with_unit = len(parts) == 2 and vocabulary().unit(parts[1]) is not None  # noqa: PLR2004
+    in_words = plain != text.strip() and any(" " in part for part in parts)
+    return split_line(plain, "\t") if with_unit or in_words else parts
 
 
 def _all_units(cells: Row, above: Sequence[Row]) -> bool:

@@ -87,7 +87,7 @@ def layout_of(held: Held) -> Layout:
     sample = tuple(tuple(cell or "" for cell in row) for row in zip(*columns, strict=True))
     named = held.named and not only_count(table.column_names)
     names = tuple(table.column_names) if named else tuple(str(k + 1) for k in range(table.num_columns))
-    units = tuple((field.metadata or {}).get(UNIT, b"").decode() for field in table.schema)
+    units = tuple((field.metadata or {}).get(UNIT, b"").decode(errors="replace") for field in table.schema)
     known = tuple(unit if vocabulary().unit(unit) else "" for unit in units)
     return Layout(
         segment=Segment(held.place, "", 0, 0, 1, ""),

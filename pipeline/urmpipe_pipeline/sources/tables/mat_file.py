@@ -7,6 +7,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -98,8 +99,10 @@ def _unpacked(path: Path) -> int:
         while len(tag := file.read(8)) == 8:  # noqa: PLR2004 (kind and length)
             kind, length = struct.unpack(f"{order}II", tag)
             begun = file.tell()
-            inner = zlib.decompressobj().decompress(file.read(256), 8) if kind == COMPRESSED else tag
-            total += struct.unpack(f"{order}II", inner)[1] if len(inner) == 8 else 0  # noqa: PLR2004
+            if kind == COMPRESSED:
+                with suppress(zlib.error):  # damaged, as reading tells
+                    tag = zlib.decompressobj().decompress(file.read(256), 8)
+            total += struct.unpack(f"{order}II", tag)[1] if len(tag) == 8 else 0  # noqa: PLR2004
             file.seek(begun + length)
     return total
 

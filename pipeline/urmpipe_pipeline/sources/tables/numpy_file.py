@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
+import struct
+import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from tokenize import TokenError
 from typing import IO, Any, TypeAlias
 from zipfile import BadZipFile, ZipFile
 
@@ -17,6 +21,7 @@ from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.tables.held import Held
+from urmpipe_pipeline.sources.tables.limits import refuse_unpacked, refuse_wide
 from urmpipe_pipeline.sources.tables.numpy_columns import column
 from urmpipe_pipeline.sources.vocabulary import SURELY_SECONDS, key, split_unit, vocabulary
 
@@ -27,6 +32,12 @@ ROWS = 16
 
 _SHOWN = 6
 """Arrays that are named where their lengths differ."""
+
+_DAMAGED = (
+    OSError, ValueError, TypeError, EOFError, BadZipFile, NotImplementedError, RuntimeError, zlib.error, SyntaxError,
+    TokenError, OverflowError, struct.error,
+)
+"""What NumPy and zipfile raise of files that are not whole, or packed in a way that Python does not unpack."""
 
 Array: TypeAlias = npt.NDArray[Any]
 
@@ -39,8 +50,8 @@ def read_numpy(path: Path) -> Held:
     """
     try:
         arrays = dict(_arrays(path))
-    except (OSError, ValueError, EOFError, BadZipFile, NotImplementedError, RuntimeError) as error:
-        reason = str(error).splitlines()[0].rstrip(".")
+    except _DAMAGED as error:
+        reason = (str(error) or type(error).__name__).splitlines()[0].rstrip(".")
         raise LogError(Finding(f"cannot be read: {reason}", file=str(path))) from None
     tables = {name: array for name, array in arrays.items() if array is not None and _is_table(array)}
     if not tables:
@@ -101,23 +112,32 @@ def _arrays(path: Path) -> Iterator[tuple[str, Array | None]]:
     with path.open("rb") as file:
         if file.read(len(_NPY)) == _NPY:
             file.seek(0)
-            yield "", _array(file, file)
+            yield "", _array(file, file, path.stat().st_size)
             return
     with ZipFile(path) as archive:
-        for member in archive.namelist():
-            with archive.open(member) as header, archive.open(member) as data:
-                yield member.removesuffix(".npy"), _array(header, data)
+        members = archive.infolist()
+        refuse_wide(len(members), str(path))
+        refuse_unpacked(path, sum(one.file_size for one in members))
+        for one in members:
+            with archive.open(one) as header, archive.open(one) as data:
+                yield one.filename.removesuffix(".npy"), _array(header, data, one.file_size)
 
 
-def _array(header: IO[bytes], data: IO[bytes]) -> Array | None:
-    """Return an array, its header read before from the same bytes; None of one of objects."""
+def _array(header: IO[bytes], data: IO[bytes], size: int) -> Array | None:
+    """Return an array, its header read before from the same bytes of some size; None of one of objects.
+
+    Raises:
+        ValueError: If the header tells of more numbers than the bytes can hold.
+    """
     version = np.lib.format.read_magic(header)
     read_header = (
         np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     )
-    _, _, kind = read_header(header)
+    shape, _, kind = read_header(header)
     if kind.hasobject:
         return None
+    if not 0 <= math.prod(shape) * max(kind.itemsize, 1) <= size:
+        raise ValueError(f"{kind} {shape} is more than {size} bytes hold")
     if data is header:
         data.seek(0)
     return np.asarray(np.lib.format.read_array(data, allow_pickle=False))

@@ -21,7 +21,7 @@ from urmpipe_pipeline.sources.tables.padding import without_end_rows
 from urmpipe_pipeline.sources.tables.programs.program_text import read_program
 from urmpipe_pipeline.sources.tables.ros2 import with_names
 from urmpipe_pipeline.sources.tables.sniff import Layout, across, sniff
-from urmpipe_pipeline.sources.tables.text import Segment, open_text
+from urmpipe_pipeline.sources.tables.text import Segment, open_text, refuse_long_lines
 from urmpipe_pipeline.sources.tables.turned import turned
 from urmpipe_pipeline.sources.tables.typed_files import read_typed
 from urmpipe_pipeline.sources.tables.whole import Whole
@@ -120,7 +120,10 @@ def _opened(one: Path | Held, options: ReadOptions) -> Segment | Held:
     if (typed := read_typed(one)) is not None:
         return typed
     text = open_text(one, any_suffix=options.source is not None)
-    return read_program(text, options) or text
+    program = read_program(text, options)
+    if program is None:
+        refuse_long_lines(text)
+    return program or text
 
 
 def _shaped(layouts: Sequence[Layout], options: ReadOptions) -> list[Layout]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, get_args
 
 import pyarrow as pa
 
@@ -36,6 +37,9 @@ POINT = [("px", "m"), ("py", "m"), ("pz", "m"), ("rz", "rad"), ("ry", "rad"), ("
 RECORDED = "recorded_"
 """What stands before the name of a column that the log recorded itself."""
 
+_TOLD_ROLE = re.compile(rf"(?P<role>{'|'.join(get_args(Role))}) (?P<place>\d{{1,9}})", re.ASCII)
+"""Role and place of a column in its metadata; others write what they like there."""
+
 Head = Sequence[tuple[str, str]]
 """Name and unit of each column."""
 
@@ -53,8 +57,9 @@ def roles_of(layout: Layout) -> dict[int, Role]:
     Of other tables it is nothing.
     """
     if layout.held is not None:
-        texts = ((field.metadata or {}).get(ROLE, b"").decode().split() for field in layout.held.schema)
-        told = [(int(text[1]), index, text[0]) for index, text in enumerate(texts) if text]
+        texts = ((field.metadata or {}).get(ROLE, b"").decode(errors="replace") for field in layout.held.schema)
+        found = ((index, _TOLD_ROLE.fullmatch(text)) for index, text in enumerate(texts))
+        told = [(int(match["place"]), index, match["role"]) for index, match in found if match]
         if told:
             return {index: role for _, index, role in sorted(told)}
     return grid_roles(head_of(layout)) if layout.header is not None and layout.form is None else {}
@@ -63,7 +68,8 @@ def roles_of(layout: Layout) -> dict[int, Role]:
 def form_of(layout: Layout) -> str:
     """Return the form of the orientation in a table of ours; empty where it does not tell one."""
     metadata = {} if layout.held is None else layout.held.schema.metadata or {}
-    return str(metadata.get(FORM, b"").decode())
+    told = metadata.get(FORM, b"").decode(errors="replace")
+    return told if told in NAMES else ""
 
 
 def grid_roles(head: Head) -> dict[int, Role]:
@@ -118,14 +124,15 @@ def with_roles(table: pa.Table, about: Mapping[str, Any]) -> pa.Table:
         about: Under `columns` the role of each and its place among those of the role, under `units` its unit
             where that is told here, under `rotation_form` the form of the orientation.
     """
-    roles, units, form = (about.get(key) or {} for key in ("columns", "units", "rotation_form"))
+    roles, units = (mapping(about.get(key)) for key in ("columns", "units"))
+    form = about.get("rotation_form")
     fields = []
     for field in table.schema:
         told = dict(field.metadata or {})
-        told |= {ROLE: " ".join(map(str, roles[field.name])).encode()} if field.name in roles else {}
-        told |= {UNIT: units[field.name].encode()} if field.name in units else {}
+        told |= {ROLE: _words(roles[field.name])} if field.name in roles else {}
+        told |= {UNIT: str(units[field.name])} if field.name in units else {}
         fields.append(field.with_metadata(told))
-    return table.cast(pa.schema(fields, {FORM: form} if form else None))
+    return table.cast(pa.schema(fields, {FORM: str(form)} if form else None))
 
 
 def of_result(table: pa.Table, told: Mapping[str, Any]) -> pa.Table:
@@ -135,7 +142,21 @@ def of_result(table: pa.Table, told: Mapping[str, Any]) -> pa.Table:
 
 def attributes_of(metadata: Mapping[bytes, bytes] | None) -> Mapping[str, Any]:
     """Return what our results tell of their columns in the attributes of a table that pandas wrote."""
-    text = (metadata or {}).get(b"pandas")
-    attributes = json.loads(text).get("attributes") or {} if text else {}
-    told = attributes.get(MARK)
-    return told if isinstance(told, Mapping) else {}
+    return mapping(mapping(told_in(metadata, "pandas").get("attributes")).get(MARK))
+
+
+def told_in(metadata: Mapping[bytes, bytes] | None, key: str) -> Mapping[str, Any]:
+    """Return what JSON in the metadata of a table tells; nothing where it is none, since others write it too."""
+    try:
+        return mapping(json.loads((metadata or {}).get(key.encode(), b"null")))
+    except (ValueError, RecursionError):
+        return {}
+
+
+def mapping(value: object) -> Mapping[str, Any]:
+    """Return a value that is a mapping; an empty one in the place of any other."""
+    return value if isinstance(value, Mapping) else {}
+
+
+def _words(value: object) -> str:
+    return " ".join(map(str, value if isinstance(value, list) else [value]))

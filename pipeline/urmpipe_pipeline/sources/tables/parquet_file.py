@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,8 @@ from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.sources.tables.exact_clock import exact_times
 from urmpipe_pipeline.sources.tables.frames import index_first
 from urmpipe_pipeline.sources.tables.held import Held
-from urmpipe_pipeline.sources.tables.own_tables import MARK, attributes_of, of_result, with_roles
+from urmpipe_pipeline.sources.tables.limits import refuse_unpacked
+from urmpipe_pipeline.sources.tables.own_tables import MARK, attributes_of, of_result, told_in, with_roles
 
 CLOCK = "clock [ns]"
 """The exact clock of our own files; their times in s, ms and us are doubles."""
@@ -30,7 +30,13 @@ def read_parquet(path: Path, head: bytes) -> Held:
     if head.startswith(b"PARE"):
         found = "found an encrypted Parquet file, allowed: one without encryption"
         raise LogError(Finding(found, str(path)))
-    return _held(path, lambda: pq.ParquetFile(path).read(), "Parquet")
+
+    def read() -> pa.Table:
+        with pq.ParquetFile(path) as file:
+            refuse_unpacked(path, _unpacked(file.metadata))
+            return file.read()
+
+    return _held(path, read, "Parquet")
 
 
 def read_feather(path: Path) -> Held:
@@ -39,24 +45,45 @@ def read_feather(path: Path) -> Held:
     Raises:
         LogError: If it is damaged.
     """
-    return _held(path, lambda: pa.ipc.open_file(pa.memory_map(str(path))).read_all(), "Feather")
+
+    def read() -> pa.Table:
+        unpacked, batches = 0, []
+        with pa.OSFile(str(path)) as source, pa.ipc.open_file(source) as file:  # mapped, it could shrink under us
+            for number in range(file.num_record_batches):
+                batches.append(file.get_batch(number))
+                unpacked += batches[-1].nbytes
+                refuse_unpacked(path, unpacked)
+            return pa.Table.from_batches(batches, file.schema)
+
+    return _held(path, read, "Feather")
+
+
+def _unpacked(about: Any) -> int:
+    """Return the bytes that the columns of a Parquet file take, by its metadata: repeated values are one there."""
+    groups = map(about.row_group, range(about.num_row_groups))
+    chunks = (group.column(k) for group in groups for k in range(group.num_columns))
+    return sum(max(chunk.total_uncompressed_size, 8 * chunk.num_values) for chunk in chunks)
 
 
 def _held(path: Path, read: Callable[[], pa.Table], what: str) -> Held:
     try:
         table = read()
+        table.validate()
     except (pa.ArrowException, OSError) as error:
         reason = str(error).partition("\n")[0].partition(": ")[0].strip(" .")
         found = f"found a {what} file that cannot be read ({reason})"
         raise LogError(Finding(f"{found}, allowed: a whole one", str(path))) from None
-    about = json.loads((table.schema.metadata or {}).get(MARK.encode(), b"null"))
-    if about is None:
+    about = told_in(table.schema.metadata, MARK)
+    if not about and MARK.encode() in (table.schema.metadata or {}):
+        found = f"found a {what} file of urmpipe whose metadata are damaged"
+        raise LogError(Finding(f"{found}, allowed: as `export` wrote it", str(path)))
+    if not about:
         told = attributes_of(table.schema.metadata)
         return Held(path.stem, of_result(index_first(table), told), path=path)
     return Held(path.stem, _ours(table, about), path=path)
 
 
-def _ours(table: pa.Table, about: Any) -> pa.Table:
+def _ours(table: pa.Table, about: Mapping[str, Any]) -> pa.Table:
     """Return the table of a file of ours with what it tells of its columns, and its exact clock."""
     table = with_roles(table, about if about.get("rows") == "file" else {})
     if CLOCK not in table.column_names:

@@ -30,7 +30,7 @@ from urmpipe_pipeline.sources.tables.numbers import (
     RowFault,
 )
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.tables.text import COMMENTS
+from urmpipe_pipeline.sources.tables.text import COMMENTS, MOST_HEAD
 from urmpipe_pipeline.sources.vocabulary import split_unit
 from urmpipe_pipeline.text import counted
 
@@ -199,6 +199,9 @@ class RowReader:
     def _cells(self, text: str) -> list[str] | None:
         """Return the cells of a row; None if it is not written like the others, or has no numbers at all."""
         form = self.layout.form
+        if len(text) > MOST_HEAD:
+            self._report(f"found a line of {len(text)} letters, allowed: {len(self.layout.names)} cells")
+            return None
         try:
             values: list[Value] = (
                 [*split_line(text, self.layout.delimiter)] if form is None else form.values(text)

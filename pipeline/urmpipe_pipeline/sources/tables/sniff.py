@@ -29,7 +29,7 @@ from urmpipe_pipeline.sources.cells.text_clock import looks_like_a_clock
 from urmpipe_pipeline.sources.tables.form import Form
 from urmpipe_pipeline.sources.tables.header_lines import header_of, numbered, only_count
 from urmpipe_pipeline.sources.tables.numbers import capped
-from urmpipe_pipeline.sources.tables.text import HEAD_BYTES, HeadLine, Segment, head_lines
+from urmpipe_pipeline.sources.tables.text import FEWEST_LINES, HeadLine, Segment, head_lines
 from urmpipe_pipeline.text import counted
 
 LEAST_FIT = 0.2
@@ -202,7 +202,7 @@ def across(layout: Layout) -> Layout:
     lines = layout.segment.lines()
     if any(line.strip() for number, line in lines if number > layout.first_line):
         return layout
-    longer = layout.segment.end - layout.segment.start > HEAD_BYTES  # then the last value is cut
+    longer = layout.segment.has_more  # then the last value is cut
     cells = layout.sample[0][: -1 if longer else None][:SAMPLED_LINES]
     column = tuple((cell,) for cell in cells)
     return replace(layout, names=("1",), sample=column, across=True)
@@ -341,7 +341,7 @@ def _names(
         _refuse_few(segment, lines, rows, ends, -1, f"no cell behind what line {line} names")
     number = abs(len(cells) - width)
     remedy = f"{'add' if len(cells) < width else 'take out'} {counted(number, 'name')}"
-    wrong = f"found {len(cells)} names over rows of {width} cells, allowed: a name a column; {remedy}"
+    wrong = f"found {len(cells)} names over rows of {counted(width, 'cell')}, allowed: a name a column; {remedy}"
     wrong += f", or delete line {line}: without names the columns are taken as joints in order"
     raise LogError(Finding(wrong, file=str(segment.path), line=line))
 
@@ -387,6 +387,9 @@ def _refuse_prose(segment: Segment, lines: Sequence[HeadLine], widths: Sequence[
 def _no_rows(segment: Segment, body: Sequence[HeadLine], given: Mapping[str, str]) -> Finding:
     """Say why no row of numbers was found with the signs that were given."""
     file = str(segment.path)
+    if segment.has_more and len(body) < FEWEST_LINES:
+        found = f"no row of numbers in the first {len(segment.head)} letters"
+        return Finding(file=file, found=found, allowed="a table with a row a sample")
     if not body:
         return Finding("found no line with content, allowed: a table with a row a sample", file=file)
     cells = [cell for line in body for cell in split_line(line.text, ",")]

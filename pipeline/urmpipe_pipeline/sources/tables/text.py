@@ -7,16 +7,24 @@ import hashlib
 import io
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.files.missing import meant_by
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import SourceFile
+from urmpipe_pipeline.sources.tables.limits import LONGEST_LINE, long_line
 from urmpipe_pipeline.sources.vocabulary import Container, vocabulary
 
 HEAD_BYTES = 64 * 1024
 """What is looked at to find out how a file is written."""
+
+MOST_HEAD = 1 << 20
+"""What is looked at where that holds few lines: they are long, or below many comments."""
+
+FEWEST_LINES = 4
+"""So many lines, but for comments, show a header, units and rows."""
 
 _BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
@@ -58,12 +66,14 @@ class Segment:
         """What ends a line: a line feed, or a carriage return in files that have no line feeds."""
         return "\r" if "\r" in self.head and "\n" not in self.head else "\n"
 
+    @property
+    def has_more(self) -> bool:
+        """Whether more stands behind its head."""
+        return len(self.head.encode(self.encoding, _errors(self.encoding))) < self.end - self.start
+
     def cut(self, start: int, end: int, first_line: int) -> Segment:
         """Return a stretch of the same file, with its own head."""
-        with self.path.open("rb") as file:
-            file.seek(start)
-            raw = file.read(min(HEAD_BYTES, end - start))
-        head = _decoded_head(raw, self.encoding, whole=end - start <= HEAD_BYTES)
+        head = _head(self.path, self.encoding, start, end)
         return replace(self, start=start, end=end, first_line=first_line, head=head)
 
     def text(self) -> str:
@@ -133,8 +143,32 @@ def open_text(path: Path, *, any_suffix: bool = False) -> Segment:
     mark, encoding = _encoding(raw)
     if encoding is None:
         raise LogError(_no_text(path, raw))
-    head = _decoded_head(raw[mark:], encoding, whole=size <= HEAD_BYTES)
-    return Segment(path, encoding, mark, size, 1, head)
+    return Segment(path, encoding, mark, size, 1, _head(path, encoding, mark, size))
+
+
+def refuse_long_lines(segment: Segment) -> None:
+    """Raise a `LogError` if a line is so long that it is none of a table.
+
+    Such a line spans blocks of which the next holds no end of a line, as is quickly seen.
+    """
+    if segment.end <= LONGEST_LINE:
+        return
+    sign, since = segment.newline.encode(), 0
+    with segment.path.open("rb", buffering=0) as file:
+        while block := file.read(LONGEST_LINE // 8):
+            first = block.find(sign)
+            if since + (len(block) if first < 0 else first) > LONGEST_LINE:
+                raise long_line(str(segment.path), _lines_before(segment, file.tell() - len(block) - since))
+            since = since + len(block) if first < 0 else len(block) - 1 - block.rfind(sign)
+
+
+def _lines_before(segment: Segment, offset: int) -> int:
+    """Return the line, from 1, that begins at an offset in bytes."""
+    sign, line = segment.newline.encode(), 1
+    with segment.path.open("rb", buffering=0) as file:
+        while offset > 0 and (block := file.read(min(offset, LONGEST_LINE))):
+            line, offset = line + block.count(sign), offset - len(block)
+    return line
 
 
 def fingerprint(path: Path) -> SourceFile:
@@ -219,6 +253,26 @@ def _encoding(raw: bytes) -> tuple[int, str | None]:
 def _errors(encoding: str) -> str:
     """Return what becomes of bytes that are no text: in UTF-8 they come back, so that lengths stay."""
     return "surrogateescape" if encoding == "utf-8" else "replace"
+
+
+def _head(path: Path, encoding: str, start: int, end: int) -> str:
+    """Return the beginning of a stretch of a file as text: all of it, or some lines that show what they are."""
+    head, size = "", HEAD_BYTES
+    with path.open("rb") as file:
+        while size <= MOST_HEAD:
+            file.seek(start)
+            head = _decoded_head(file.read(min(size, end - start)), encoding, whole=size >= end - start)
+            if size >= end - start or _shows_rows(head):
+                return head
+            size *= 4
+    return head if "\n" in head or "\r" in head else head[:HEAD_BYTES]
+
+
+def _shows_rows(head: str) -> bool:
+    """Return whether there are enough lines with content, but for comments."""
+    lines = (line.lstrip() for line in head.splitlines())
+    content = (line for line in lines if line and not line.startswith(COMMENTS))
+    return len([*islice(content, FEWEST_LINES)]) == FEWEST_LINES
 
 
 def _decoded_head(raw: bytes, encoding: str, *, whole: bool) -> str:

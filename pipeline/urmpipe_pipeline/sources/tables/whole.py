@@ -71,9 +71,10 @@ class Whole:
         """Return some, shape (n, columns), in the file's units; NaN where one is missing or wrong."""
         numbers = self.numbers.values
         values = np.full((len(numbers), len(columns)), np.nan)
+        places = {column: place for place, column in enumerate(self.columns)}
         for place, column in enumerate(columns):
-            if column in self.columns:
-                values[:, place] = numbers[:, self.columns.index(column)]
+            if column in places:
+                values[:, place] = numbers[:, places[column]]
         return values
 
     @cached_property

@@ -20,6 +20,7 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
 from urmpipe_pipeline.sources.tables.numbers import RowFault
 from urmpipe_pipeline.sources.tables.opening import PATH, open_tables
+from urmpipe_pipeline.sources.tables.reachable import unchanged
 from urmpipe_pipeline.sources.targets.row_faults import ExtraColumn, Rows, read_rows
 from urmpipe_pipeline.sources.targets.sniff_targets import sniff_targets
 from urmpipe_pipeline.sources.targets.target_rotation import rotation_units, target_form, target_rotations
@@ -95,6 +96,14 @@ def read_pose_table(
     if named_file(options.time):
         allowed = "a column of the table of targets"
         raise OptionError(Finding(parameter="time", found=shown(options.time or ""), allowed=allowed))
+    with unchanged([file]):
+        return _read(file, options, further, naming)
+
+
+def _read(
+    file: Path, options: ReadOptions, further: Mapping[str, ExtraColumn], naming: str
+) -> PoseTable:
+    """Return the rows of a table as `read_pose_table` does."""
     asked, length = _plain_length(replace(options, joints=(), names=(), signs=(), offsets=()))
     tables = open_tables([file], asked, partial(sniff_targets, position=asked.position))
     names = {name: one.patterns for name, one in further.items()}

@@ -26,11 +26,11 @@ _EXTERNAL = [f"E{k}" for k in range(1, 7)]
 _ALL = "A1 to A6, or X, Y, Z, A, B, C"
 
 _AGGREGATE = re.compile(
-    r"(?:(?P<move>\bS?(?:PTP|LIN|CIRC)(?:_REL)?)\s+|(?P<name>[$\w]+)(?P<index>\[[\d\s,]*\])?\s*=\s*)"
-    r"(?:\{\s*(?:\w+\s*:)?(?P<fields>[^{}]*)\}|(?P<point>[A-Z_]\w*)[ \t]*(?=[\n,]|C_|$))",
+    r"(?:(?P<move>\bS?(?:PTP|LIN|CIRC)(?:_REL)?)\s+|(?<![$\w])(?P<name>[$\w]++)(?P<index>\[[\d\s,]*+\])?\s*+=\s*+)"
+    r"(?:\{\s*+(?:\w++\s*+:)?+(?P<fields>[^{}]*+)\}|(?P<point>[A-Z_]\w*)[ \t]*(?=[\n,]|C_|$))",
     re.IGNORECASE,
 )
-_FIELD = re.compile(r"\b([A-Z]\d?)\s+([-+]?[\d.]+(?:E[-+]?\d+)?)\s*(?=,|$)", re.IGNORECASE)
+_FIELD = re.compile(r"\b([A-Z]\d?)\s+([-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?)\s*(?=,|$)", re.IGNORECASE)
 _NO_POINTS = re.compile(r"\$|.*(?:TOOL|BASE)", re.IGNORECASE)
 
 

@@ -46,7 +46,7 @@ _LANGUAGES = (
     _Language(
         "a RAPID program",
         _line(
-            r"MODULE\s+\w+\s*(?:\([\w,\s]*\))?\s*$(?=[\s\S]*\b(?:ENDMODULE|PROC\s|(?:CONST|PERS|VAR)\s+\w+\s+\w))",
+            r"MODULE\s+\w+\s*(?:\([\w,\s]*\))?\s*$(?=[\s\S]{0,2000}?\b(?:ENDMODULE|PROC\s|(?:CONST|PERS|VAR)\s+\w+\s+\w))",
             r"(?:(?:LOCAL|TASK)\s+)?(?:CONST|PERS|VAR)\s+(?:joint|rob)target\s",
             r"Move(?:AbsJ|J|L|C)\s+\\?\w*\s*\[",
         ),
@@ -70,10 +70,11 @@ _LANGUAGES = (
     _Language(
         "a program in structured text",
         _line(
-            r"VAR(?:_[A-Z_]+)?(?:\s+(?:CONSTANT|RETAIN|PERSISTENT))*\s+(?:\(\*.*\s+|//.*\s+)*[\w, ]+:(?!=)",
+            r"VAR(?:_[A-Z_]+)?(?:\s++(?:CONSTANT|RETAIN|PERSISTENT))*+\s++"
+            r"(?>(?:\(\*(?:[^*\n]|\*(?!\)))*\*\)\s*|(?:\(\*|//).*\n\s*)*)\w[\w, ]*:(?!=)",
             r"\w+(?:\s+AT\s*%\S+)?\s*:\s*(?:ARRAY\s*\[.*\bOF\b|(?:L?REAL|U?[SDL]?INT|L?TIME)\s*:=)",
         ),
-        re.compile(r"\(\*.*?\*\)|//[^\n]*", re.DOTALL),
+        re.compile(r"\(\*.*?(?:\*\)|\Z)|//[^\n]*", re.DOTALL),
         structured_text.read,
         (r"VAR(?:_[A-Z_]+)?", "END_VAR"),
     ),

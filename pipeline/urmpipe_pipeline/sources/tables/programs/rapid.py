@@ -36,12 +36,15 @@ _COLUMNS = {
 }
 """Kind and columns of a position by the lengths of its lists; the configuration of the axes has none."""
 
-_ASSIGNED = re.compile(r"(\w+)\s*(\{[^}]*\})?\s*:=\s*(\[.*)", re.DOTALL)
-_TYPED = re.compile(r"\b(?:joint|rob)target\s+\w+\s*(\{[^}]*\})?\s*:=", re.IGNORECASE)
+_ASSIGNED = re.compile(r"(?<!\w)(\w++)\s*+(\{[^{}]*+\}\s*+)?:=\s*+(\[.*)", re.DOTALL)
+_TYPED = re.compile(r"\b(?:joint|rob)target\s++\w++\s*+(\{[^{}]*+\}\s*+)?:=", re.IGNORECASE)
 _MOVE = re.compile(r"\bMove(?:AbsJ|J|L|C)(?:DO|Sync|AO|GO)?\b(.*)", re.DOTALL | re.IGNORECASE)
-_SWITCHES = re.compile(r"(?:\s*\\\w+(?:\s*:=\s*[\w.]+)?\s*,?)*\s*")
+_SWITCHES = re.compile(r"(?:\s*+\\\w++(?:\s*+:=\s*+[\w.]++)?\s*+,?)*+\s*+")
 _NAME = re.compile(r"(\w+)\s*(?=[,\\]|$)")
 _TOKENS = re.compile(r"[^\[\],\s]+|[\[\],]")
+
+DEEPEST = 8
+"""Lists within lists: a position in an array has three."""
 
 Lists: TypeAlias = Any
 """A number, or a list of such, nested."""
@@ -88,14 +91,14 @@ def _lists(text: str) -> Lists:
     """Return the list that a text begins with; None if it holds anything but numbers, or does not end."""
     open_lists: list[list[Lists]] = [[]]
     for token in _TOKENS.findall(text):
-        if token == "[":
+        if token == "[" and len(open_lists) <= DEEPEST:
             open_lists.append([])
         elif token == "]":
             closed = open_lists.pop()
             open_lists[-1].append(closed)
             if len(open_lists) == 1:
                 return closed
-        elif token != ",":
+        elif token != ",":  # a number, or one bracket too many
             try:
                 open_lists[-1].append(float(token))
             except ValueError:

@@ -27,7 +27,8 @@ from urmpipe_pipeline.sources.vocabulary import SURELY_SECONDS, key, split_unit,
 from urmpipe_pipeline.text import counted
 
 _DECLARED = re.compile(
-    r"(?P<name>\w+)\s*(?:AT\s*%[\w.*]+\s*)?:\s*(?P<arrays>(?:ARRAY\s*\[[^\]]*\]\s*OF\s+)*)\w+[^:\[\]]*$",
+    r"(?<!\w)(?P<name>\w+)\s*(?:AT\s*%[\w.*]+\s*)?:\s*"
+    r"(?P<arrays>(?:ARRAY\s*\[[^\[\]]{0,200}\]\s*OF\s+)*)\w++[^:\[\]]*+$",
     re.IGNORECASE,
 )
 _BOUNDS = re.compile(r"([^\[,]+)\.\.([^\],]+)")
@@ -37,8 +38,8 @@ _PARTS = re.compile(r"([\d.]+)(d|h|ms|us|ns|m|s)", re.IGNORECASE)
 _SECONDS = {"d": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _NUMBER = re.compile(r"(?:\w+#)?([+-]?\d[\d_]*(?:\.[\d_]+)?(?:e[+-]?\d+)?)", re.IGNORECASE)
 
-_MOST = 10**8
-"""Values of an array whose bounds are not known."""
+_MOST = 4_000_000
+"""Values of an array: repetitions would make more of a few letters."""
 
 _WIDEST = 32
 """Columns of an array of two dimensions, at the most, that are believed where it has fewer rows."""
@@ -117,7 +118,7 @@ def _declarations(program: Program) -> Iterator[_Raw | _Scalar]:
 def _number(text: str) -> float | None:
     """Return the number that a literal is; of a length of time such as T#4ms that in [s]; None of others."""
     if (match := _NUMBER.fullmatch(text)) is not None and not re.match(r"\d+#", text):
-        return float(match[1])
+        return float(match[1].replace("_", ""))
     if (match := _LENGTH.fullmatch(text.replace("_", ""))) is not None:
         return math.fsum(float(count) * _SECONDS[unit.lower()] for count, unit in _PARTS.findall(match[1]))
     return {"true": 1.0, "false": 0.0}.get(text.lower())
@@ -136,6 +137,8 @@ def _array(program: Program, raw: _Raw, scalars: Mapping[str, _Scalar]) -> Itera
     known = math.prod(size for size in shape if size)
     try:
         values = _values(raw.text, _MOST if 0 in shape else known)
+    except OverflowError:
+        raise program.error(f"more than {_MOST} values in {raw.name}", "as many as that", raw.offset) from None
     except ValueError:
         return
     if len(values) == 1 < known:
@@ -153,8 +156,9 @@ def _array(program: Program, raw: _Raw, scalars: Mapping[str, _Scalar]) -> Itera
 def _shape(raw: _Raw, scalars: Mapping[str, _Scalar]) -> tuple[list[int], int]:
     """Return the sizes of an array's dimensions, 0 for an unknown one, and the first index of the last."""
     sides = [tuple(_bound(end, scalars) for end in ends) for ends in raw.bounds]
-    shape = [0 if low is None or high is None else max(0, int(high - low) + 1) for low, high in sides]
-    first = sides[-1][0] if sides else None
+    sizes = (math.nan if low is None or high is None else high - low + 1 for low, high in sides)
+    shape = [max(0, int(size)) if math.isfinite(size) else 0 for size in sizes]
+    first = sides[-1][0] if sides and math.isfinite(sides[-1][0] or 0) else None
     return shape or [0], 1 if first is None else int(first)
 
 
@@ -171,6 +175,7 @@ def _values(text: str, most: int) -> FloatArray:
 
     Raises:
         ValueError: If it holds something else than numbers.
+        OverflowError: If they are more than `_MOST`.
     """
     inside = text.removeprefix("[").removesuffix("]").replace("_", "")
     try:
@@ -187,7 +192,10 @@ def _values(text: str, most: int) -> FloatArray:
             kept.append([])
         elif token == ")" and times:
             repeated, count = kept.pop(), times.pop()
-            kept[-1] += repeated * min(count, most + 1)
+            count = min(count, most + 1)
+            if len(kept[-1]) + len(repeated) * count > _MOST:
+                raise OverflowError
+            kept[-1] += repeated * count
         elif token not in "[],":
             number = _number(token)
             if number is None:

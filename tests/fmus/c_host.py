@@ -1,0 +1,73 @@
+"""The host in C that runs an FMU's binary by a script."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from urmpipe_fmus.native import guid_header, native_binaries, native_sources
+from urmpipe_fmus.table_file import TABLE_FILE, table_bytes
+from urmpipe_fmus.unit import Unit
+
+GUID = "{12345678-0000-0000-0000-000000000000}"
+HOST = Path(__file__).parent / "native" / "host.c"
+
+
+def script(unit: Unit, count: int, seed: int) -> str:
+    """Random inputs and steps for the host, in hexadecimal: not all strtod round decimals alike."""
+    rng = np.random.default_rng(seed)
+    inputs = [k for k, (_, one) in enumerate(unit.scalars) if one.causality == "input" and one.type == "Real"]
+    seen = [k for k, (_, one) in enumerate(unit.scalars) if one.type == "Real"]
+    lines = []
+    for k in range(count):
+        values = (rng.normal(size=len(inputs)) * rng.choice([0.01, 1.0, 10.0])).tolist()
+        lines.append(
+            "set " + " ".join(f"{one} {value.hex()}" for one, value in zip(inputs, values, strict=True))
+        )
+        lines.append("get " + " ".join(map(str, seen)))
+        lines.append(f"step {(k * 0.01).hex()} {(0.01).hex()}")
+        if k % 10 == 9:
+            lines.append("state")
+    return "\n".join(lines) + "\n"
+
+
+def headers() -> str:
+    import fmpy
+
+    return str(Path(fmpy.__file__).parent / "c-code")
+
+
+def host(folder: Path, command: Sequence[str], name: str = "host") -> str:
+    """Compile the host."""
+    program = str(folder / name)
+    subprocess.run(
+        [*command, "-O1", "-I", headers(), str(HOST), "-o", program], check=True, capture_output=True
+    )
+    return program
+
+
+def write(folder: Path, unit: Unit, platforms: Sequence[str]) -> None:
+    """Write sources and binaries of a unit."""
+    sources = native_sources(unit)
+    files = {**sources, "sources/guid.h": guid_header(GUID)}
+    files |= native_binaries(unit, sources, GUID, platforms) if platforms else {}
+    if unit.table is not None:
+        files[TABLE_FILE] = table_bytes(unit.table)
+    for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+
+
+def ran(command: Sequence[str], folder: Path, given: str, resources: str = "") -> list[str]:
+    """What the host prints."""
+    environment = {**os.environ, "WINEDEBUG": "-all", "ASAN_OPTIONS": "detect_leaks=1"}
+    place = resources or (folder / "resources").as_uri()
+    done = subprocess.run(
+        [*command, GUID, place], input=given, capture_output=True, text=True, env=environment, check=False
+    )
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
+    return done.stdout.splitlines()

@@ -1,0 +1,174 @@
+"""The runtime in C: no warning, nothing that a sanitizer finds, and memory that stays flat."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from c_host import host, ran, script, write
+from made_masses import with_drives, with_masses
+from urmpipe_fmus.native import native_missing, this_platform
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.units import make_unit
+from urmpipe_fmus.variable import Input, Memory, State
+from urmpipe_models.robots.catalogue import load_robot
+
+HERE = Path(__file__).parent
+
+SANITIZED = ["cc", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+
+WARNINGS = [
+    "-Wall",
+    "-Wextra",
+    "-Wpedantic",
+    "-Wconversion",
+    "-Wsign-conversion",
+    "-Wshadow",
+    "-Wstrict-prototypes",
+    "-Wmissing-prototypes",
+    "-Wold-style-definition",
+    "-Wcast-qual",
+    "-Wcast-align",
+    "-Wpointer-arith",
+    "-Wwrite-strings",
+    "-Wformat=2",
+    "-Wundef",
+    "-Wvla",
+    "-Wnull-dereference",
+    "-Wbad-function-cast",
+    "-Wswitch-enum",
+    "-Wswitch-default",
+]
+
+pytestmark = pytest.mark.skipif(
+    native_missing() is not None or shutil.which("cc") is None, reason=f"needs cc; {native_missing()}"
+)
+
+
+@pytest.fixture
+def units(oscillator: Unit, player: Unit, elementary: Unit) -> Sequence[Unit]:
+    """Units with states and memories, a table, elementary functions, and an arm with drives."""
+    arm = make_unit("driven_arm", robot=with_drives(with_masses(load_robot("urm6")), held=["phi6"]))
+    return (oscillator, player, elementary, arm)
+
+
+@pytest.fixture
+def cheap() -> Unit:
+    """A unit with a state and a memory, whose step takes little."""
+    return Unit(
+        name="cheap",
+        description="",
+        variables=(
+            Input(name="u", description="", start=1e-3),
+            State(name="x", description=""),
+            Memory(name="n", description=""),
+        ),
+        derivatives=lambda v: {"x": v.u - v.x},
+        update=lambda v: {"n": v.n + 1.0},
+    )
+
+
+def c_files(folder: Path) -> list[str]:
+    return [str(one) for one in sorted((folder / "sources").glob("*.c"))]
+
+
+@pytest.mark.slow
+def test_the_sources_compile_without_a_warning(units: Sequence[Unit], tmp_path: Path) -> None:
+    for k, unit in enumerate(units):
+        folder = tmp_path / unit.name
+        write(folder, unit, [])
+        # optimized, as some warnings come of it; but for model.c the sources are the same, with other sizes
+        files = c_files(folder) if k < 2 else [str(folder / "sources" / "model.c")]
+        flags = ["-std=c99", "-O2", "-ffp-contract=off", "-fPIC", *WARNINGS, "-Werror"]
+        done = subprocess.run(
+            ["cc", *flags, "-c", *files], cwd=folder, capture_output=True, text=True, check=False
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.slow
+def test_sanitizers_find_nothing(units: Sequence[Unit], tmp_path: Path) -> None:
+    program = host(tmp_path, [*SANITIZED, "-ldl"])
+    for unit in units:
+        folder = tmp_path / unit.name
+        write(folder, unit, [])
+        library = folder / "unit.so"
+        sources = c_files(folder)
+        subprocess.run([*SANITIZED, "-shared", "-fPIC", "-o", str(library), *sources, "-lm"], check=True)
+        wrong = "set 0 nan\nset 99999 1.0\nget 4000000000\nstep nan 1\nstep 1 -1\nstep 0 1e300\n"
+        seen = ran([program, str(library)], folder, script(unit, 100, 2) + wrong)
+        assert sum(line == "state 0 1" for line in seen) == 10
+        assert sum(line.startswith("log 3 unit") for line in seen) >= 5
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="needs LD_PRELOAD")
+def test_the_tests_of_the_runtime_pass_with_sanitizers() -> None:
+    """Strings, types and refusals that the host does not call: through FMPy, with the sanitizer in Python."""
+    library = subprocess.run(
+        ["cc", "-print-file-name=libasan.so"], capture_output=True, text=True, check=True
+    ).stdout.strip()
+    if not Path(library).is_file():
+        pytest.skip("needs gcc's libasan.so, to be loaded before Python")
+    tests = [str(HERE / f"test_{name}.py") for name in ("states", "refusals")]
+    environment = {
+        **os.environ,
+        "CC": " ".join(SANITIZED),
+        "LD_PRELOAD": library,
+        "ASAN_OPTIONS": "detect_leaks=0",  # Python's own; those of the runtime the host would show
+    }
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-n0", "-p", "no:cacheprovider", *tests],
+        env=environment,
+        cwd=HERE.parents[2],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
+    assert " passed" in done.stdout
+    assert "skipped" not in done.stdout
+
+
+FLAT = 128
+"""kB that the heap may grow by while nothing is lost: the least block, of 32 bytes, lost in each of 10,000
+instances is 320 kB."""
+
+
+def grown(seen: Sequence[str]) -> int:
+    """Return by how many kB memory grew between the first and the last line that tells it."""
+    told = [int(line.split()[1]) for line in seen if line.startswith("resident ")]
+    return told[-1] - told[0]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
+def test_memory_is_flat_over_ten_million_steps(cheap: Unit, tmp_path: Path) -> None:
+    write(tmp_path, cheap, [this_platform()])
+    (library,) = tmp_path.glob("binaries/*/cheap*")
+    given = "steps 10000 0.001\nresident\nsteps 10000000 0.001\nresident\nget 0 1 2\n"
+    seen = ran([host(tmp_path, ["cc", "-O1"]), str(library)], tmp_path, given)
+    assert [line for line in seen if line.startswith("steps")] == ["steps 0", "steps 0"]
+    assert grown(seen) < FLAT
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
+@pytest.mark.parametrize("name", ["oscillator", "player"])
+def test_memory_is_flat_over_ten_thousand_instances(
+    name: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    unit: Any = request.getfixturevalue(name)
+    write(tmp_path, unit, [this_platform()])
+    (library,) = tmp_path.glob(f"binaries/*/{name}*")
+    given = "instances 1000\nresident\ninstances 10000\nresident\n"
+    seen = ran([host(tmp_path, ["cc"]), str(library)], tmp_path, given)
+    assert [line for line in seen if line.startswith("instances")] == ["instances 0", "instances 0"]
+    assert grown(seen) < FLAT
