@@ -181,13 +181,14 @@ def loops_of(plan: Plan, folder: Path) -> dict[str, Callable[[], object]]:
     callbacks = callbacks_with(Log(folder / "log.txt", job, progress).take)
     ours, theirs = np.zeros((job.rows, job.columns)), np.zeros((job.rows, job.columns))
     odd = np.zeros((3, job.recorded["Real"]))
-    Master(job, progress, ours, odd, callbacks).run()
+    warned = np.zeros((2, job.calls))
+    Master(job, progress, ours, odd, warned, callbacks).run()
     run_bare(job, theirs)
     if not np.array_equal(ours, theirs):
         raise RuntimeError("the two loops differ")
     return {
         "bare ctypes loop": lambda: run_bare(job, theirs),
-        "urmpipe": lambda: Master(job, progress, ours, odd, callbacks).run(),
+        "urmpipe": lambda: Master(job, progress, ours, odd, warned, callbacks).run(),
     }
 
 

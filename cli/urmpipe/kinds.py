@@ -229,6 +229,7 @@ KINDS = {
     "system": Kind(_is_path, "the name of a system, or a system file (TOML)"),
     "targets": Kind(lambda value: _is_text(value) or not isinstance(value, str), "a file, or an array"),
     "tcp": _one_of("fk", "recorded"),
+    "timeout": SECONDS,
     "tip_link": LINK,
     "term": _one_of("all", "inertia", "centrifugal", "coriolis", "gravity", "tool"),
     "to": _one_of("csv", "parquet", "mat", "tum"),

@@ -12,6 +12,7 @@ from typing import Any
 
 from urmpipe_fmus.check_process import Run, run_job
 from urmpipe_fmus.fmu_file import FmuFile, open_fmu
+from urmpipe_fmus.fmu_process import TIMEOUT
 from urmpipe_fmus.platforms import platforms_here
 from urmpipe_fmus.python_fmu.place import why_not_in
 from urmpipe_models.errors import Finding, FmuError
@@ -21,9 +22,6 @@ STEPS = 20
 
 STEP = 0.005
 """The communication step in [s] of an FMU that tells none."""
-
-TIMEOUT = 60.0
-"""A call that takes so many seconds has hung."""
 
 LINES = 5
 """So many of the last lines of its log are shown where an FMU fails."""

@@ -126,5 +126,5 @@ def _started(folder: Path, printed: Path) -> Iterator[subprocess.Popen[bytes]]:
             if sys.platform == "win32":
                 process.kill()
             else:
-                with suppress(ProcessLookupError):
+                with suppress(OSError):  # it and all that it started have ended
                     os.killpg(process.pid, signal.SIGKILL)

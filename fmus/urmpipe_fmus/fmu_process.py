@@ -1,10 +1,13 @@
-"""What the processes share in which FMUs run: what an FMU is given to log and to take memory with."""
+"""What the processes share in which FMUs run: what an FMU is given, and how long its calls may take."""
 
 from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
 from typing import Any
+
+TIMEOUT = 60.0
+"""Seconds that a call of an FMU may take; one that takes longer has hung."""
 
 
 def callbacks_with(take: Callable[..., None]) -> Any:

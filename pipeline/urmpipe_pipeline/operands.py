@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from os.path import isdir, isfile  # of a name that no file may have Path raises
 from pathlib import Path
 from typing import TypeAlias
 
@@ -239,7 +240,7 @@ def is_log(operand: object) -> bool:
 
 
 def _is_recording(operand: Path) -> bool:
-    return operand.suffix == ".rrd" or (operand.is_file() and is_recording(operand))
+    return operand.suffix == ".rrd" or (isfile(operand) and is_recording(operand))  # noqa: PTH113
 
 
 def log_files(operand: Path) -> list[Path]:
@@ -248,7 +249,7 @@ def log_files(operand: Path) -> list[Path]:
     Raises:
         LogError: If a folder holds no CSV file.
     """
-    if not operand.is_dir():
+    if not isdir(operand):  # noqa: PTH112
         return [operand]
     files = sorted(path for path in operand.iterdir() if path.suffix.lower() in (".csv", ".txt"))
     if not files:

@@ -117,12 +117,13 @@ def is_report(path: Path) -> bool:
 
 def is_fmu(path: Path) -> bool:
     """Tell whether a file is an FMU that urmpipe wrote: its model description names urmpipe as the tool."""
+    import struct
     from zipfile import BadZipFile, ZipFile
 
     try:
         with ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
             return GENERATION_TOOL.search(file.read(HEAD)) is not None
-    except (BadZipFile, KeyError, NotImplementedError, RuntimeError, zlib.error):
+    except (BadZipFile, EOFError, KeyError, RuntimeError, ValueError, struct.error, zlib.error):
         return False  # no archive, none with a model description, or packed in a way that zipfile cannot read
 
 

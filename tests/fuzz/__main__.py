@@ -84,7 +84,8 @@ def fuzz(asked: argparse.Namespace, keep: Path, folder: Path) -> Findings:
 
     if not asked.guided:  # else atheris must see the imports
         warm()
-    kinds = [one for one in KINDS if not asked.kind or one.name in asked.kind]
+    wanted = asked.kind or [one.name for one in KINDS if one.share or asked.again]
+    kinds = [one for one in KINDS if one.name in wanted]
     findings = Findings(keep, asked.seed, asked.limit)
     made = made_in(folder / "made")
     if asked.guided:
@@ -99,9 +100,9 @@ def _batches(asked: argparse.Namespace, kinds: Sequence[Kind], findings: Finding
     from tests.fuzz.campaign import kept_in, shared_out, until
 
     if asked.again:
-        return kept_in(asked.again)
+        return kept_in(asked.again, [one.name for one in kinds])
     if asked.inputs:
-        return shared_out({one.name: max(1, round(asked.inputs * one.share)) for one in kinds})
+        return shared_out({one.name: max(1, round(asked.inputs * (one.share or 1.0))) for one in kinds})
     return until(time.monotonic() + 60.0 * asked.minutes, [one.name for one in kinds], findings)
 
 

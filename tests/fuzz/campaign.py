@@ -132,11 +132,12 @@ def shared_out(counts: Mapping[str, int]) -> Iterator[Batch]:
             yield Batch(kind, first, min(first + BATCH, count))
 
 
-def kept_in(folder: Path) -> Iterator[Batch]:
-    """Yield the inputs that were kept in a folder."""
+def kept_in(folder: Path, kinds: Iterable[str]) -> Iterator[Batch]:
+    """Yield the inputs of some kinds that were kept in a folder."""
     for line in (folder / "findings.jsonl").read_text("utf-8").splitlines():
         one = json.loads(line)
-        yield Batch(one["kind"], 0, 1, (Specimen(one["name"], (folder / one["file"]).read_bytes()),))
+        if one["kind"] in kinds:
+            yield Batch(one["kind"], 0, 1, (Specimen(one["name"], (folder / one["file"]).read_bytes()),))
 
 
 def until(end: float, kinds: Iterable[str], findings: Findings) -> Iterator[Batch]:

@@ -24,12 +24,12 @@ def run_guided(
         end = time.monotonic() + seconds / len(kinds)
         own = folder / kind.name
         own.mkdir()
-        while (left := int(end - time.monotonic())) > 0:
-            _one(kind, findings, own, made, (seed, left))
+        while time.monotonic() < end:
+            _one(kind, findings, own, made, (seed, end))
             seed += 1
 
 
-def _one(kind: Kind, findings: Findings, folder: Path, made: Path, drawn: tuple[int, int]) -> None:
+def _one(kind: Kind, findings: Findings, folder: Path, made: Path, drawn: tuple[int, float]) -> None:
     """Read inputs of a kind until a time is over, or one of them ends the process or does not return."""
     pipe, end = FORK.Pipe()
     process = FORK.Process(target=explore, args=(end, kind.name, folder, made, drawn), daemon=True)
@@ -59,7 +59,7 @@ def _one(kind: Kind, findings: Findings, folder: Path, made: Path, drawn: tuple[
         findings.keep(kind.name, number, folder / name, found)
 
 
-def explore(pipe: Connection, name: str, folder: Path, made: Path, drawn: tuple[int, int]) -> None:
+def explore(pipe: Connection, name: str, folder: Path, made: Path, drawn: tuple[int, float]) -> None:
     """Let atheris choose inputs: what the process does.
 
     An input of atheris is the name of a file, NUL, and what stands in the file.
@@ -85,10 +85,10 @@ def explore(pipe: Connection, name: str, folder: Path, made: Path, drawn: tuple[
     def mutate(data: bytes, largest: int, seed: int) -> bytes:
         return _joined(changed(kind, specimens, _parted(data, specimens), Random(seed)))[:largest]
 
-    seed, seconds = drawn
+    seed, end = drawn
     flags = {
         "seed": seed + 1,
-        "max_total_time": seconds,
+        "max_total_time": max(1, int(end - time.monotonic())),  # imports took some of it
         "max_len": LARGEST,
         "timeout": 10**6,  # who asked for the inputs looks at the clock
         "rss_limit_mb": 0,

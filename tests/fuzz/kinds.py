@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
@@ -31,7 +32,7 @@ class Kind:
         mutators: How.
         read: Does with a file what the commands that take it do, and writes nothing; the folder of what was
             made is given, too.
-        share: Of the inputs of a short run, by what one takes.
+        share: Of the inputs of `--inputs`, by what one takes; 0 for a kind that is read only by its name.
     """
 
     name: str
@@ -177,13 +178,34 @@ def recording(path: Path, made: Path, rng: Random) -> None:
         urmpipe.compare(found, found)
 
 
-def metadata(path: Path, made: Path, rng: Random) -> None:
-    """Read a recording whose metadata are another text, its arrays as they were."""
-    from urmpipe_pipeline.recording.store import Store
+@contextmanager
+def forged(path: Path, made: Path) -> Iterator[Path]:
+    """Let a recording have other metadata with a checksum that fits, its arrays as they were."""
+    from urmpipe_pipeline.recording.store import Store, checksum
 
     name, _, text = path.read_text("utf-8", "replace").partition("\n")
-    with patch.object(Store, "_metadata", lambda store: text):
-        recording(made / Path(name.strip()).name, made, rng)
+    opened = Store.__init__
+
+    def changed(store: Store, path: Path) -> None:
+        opened(store, path)
+        store.metadata, store.checksum = text, checksum(text)
+
+    with patch.object(Store, "__init__", changed):
+        yield made / Path(name.strip()).name
+
+
+def metadata(path: Path, made: Path, rng: Random) -> None:
+    """Read a recording with other metadata: every field is of its type, or it is refused."""
+    import urmpipe
+
+    with forged(path, made) as file:
+        urmpipe.read_recording(file)
+
+
+def forgery(path: Path, made: Path, rng: Random) -> None:
+    """Read a recording with other metadata, and what is made of it, whatever the metadata tell."""
+    with forged(path, made) as file:
+        recording(file, made, rng)
 
 
 def behind_name(*mutators: Mutator) -> list[Mutator]:
@@ -224,6 +246,7 @@ KINDS: tuple[Kind, ...] = (
     Kind("targets", lambda made: texts(corpus.TARGETS), (*BYTES, *TEXT, *TEXT), targets, 2.0),
     Kind("path", lambda made: texts(corpus.PATHS), (*BYTES, *TEXT, *TEXT), planned, 2.0),
     Kind("metadata", corpus.metadata, behind_name(*BYTES[:1], *[json_tree] * 20), metadata, 5.0),
+    Kind("forgery", corpus.metadata, behind_name(*[json_tree] * 20), forgery, 0.0),
     Kind("recording", corpus.recordings, BYTES, recording, 0.4),
     Kind("fmu", lambda made: corpus.fmus(), (*BYTES, *ZIP), fmu, 3.0),
     Kind("description", lambda made: corpus.fmus(), [within("modelDescription.xml", XML)], fmu, 4.0),

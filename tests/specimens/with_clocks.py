@@ -259,7 +259,11 @@ def clock_time_of_day_midnight() -> Made:
 def clock_seconds_of_day() -> Made:
     """Seconds of the day past midnight: 86399.98 is followed by 0.00."""
     return clocked(
-        "clock_seconds_of_day", "time [s]", lambda t: f"{(86399.8 + t) % 86400:.2f}", motion(ROWS), start=86399.8
+        "clock_seconds_of_day",
+        "time [s]",
+        lambda t: f"{(86399.8 + t) % 86400:.2f}",
+        motion(ROWS),
+        start=86399.8,
     )
 
 

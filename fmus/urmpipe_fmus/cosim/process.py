@@ -19,9 +19,6 @@ from urmpipe_models.processes import command, ending, environment
 POLL = 0.02
 """How often it is looked at, in [s]."""
 
-TIMEOUT = 60.0
-"""Seconds that a call of an FMU may take."""
-
 BETWEEN_LOOKS = 1.0
 """So many seconds count at most between two looks at a call: the processes may have been stopped."""
 

@@ -32,9 +32,10 @@ from urmpipe_fmus.cosim.job import (
     called,
 )
 from urmpipe_fmus.cosim.plan import Plan
-from urmpipe_fmus.cosim.process import TIMEOUT, CallWatch, Worker
+from urmpipe_fmus.cosim.process import CallWatch, Worker
 from urmpipe_fmus.cosim.system import Port
 from urmpipe_fmus.fmu_file import open_fmu
+from urmpipe_fmus.fmu_process import TIMEOUT
 from urmpipe_fmus.python_fmu.place import why_not_in
 from urmpipe_models.errors import CosimulationError
 from urmpipe_models.messages import one_line

@@ -25,6 +25,9 @@ JointKind = Literal["revolute", "prismatic", "fixed"]
 AXIS_TOLERANCE = 1e-9
 """An axis may differ from unit length by this: rounding, not a forgotten normalisation."""
 
+FARTHEST = 1e6
+"""Largest offset of a frame in [m]: products of several of much larger ones are no numbers any more."""
+
 
 @dataclass(frozen=True, slots=True)
 class Mimic:
@@ -146,11 +149,21 @@ class Chain(Shown):
             carriers = {one.joint for one in carried if one.joint is not None}
             for carrier in sorted(carriers - set(names)):
                 yield f"{kind} hangs on {carrier}, no joint of the chain; allowed: {', '.join(names)}"
+        yield from self._far_frames()
         if not all(math.isfinite(one) for one in self.gravity if isinstance(one, Real)):
             yield f"gravity {[*self.gravity]}; allowed: finite numbers"
         yield from self._drive_faults()
         if len(self.start) != len(self.coordinates):
             yield f"start has {len(self.start)} values; allowed: {len(self.coordinates)}, one a coordinate"
+
+    def _far_frames(self) -> Iterator[str]:
+        """Yield the frames that are farther away than can be computed with."""
+        frames = {"the tip": self.tip, "the base": self.base, "the tool": self.tool}
+        frames |= {f"joint {joint.name}": joint.origin for joint in self.joints}
+        for where, frame in frames.items():
+            numbers = [one for one in frame.translation if isinstance(one, Real)]
+            if not all(abs(one) <= FARTHEST for one in numbers):
+                yield f"{where} stands at {[*map(float, numbers)]} m; allowed: {FARTHEST:g} m at most"
 
     def _drive_faults(self) -> Iterator[str]:
         """Yield the faults of the drives, and drives of joints that have no coordinate or have two."""

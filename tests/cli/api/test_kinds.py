@@ -45,6 +45,7 @@ RIGHT = {
         "sync",
         "step",
         "duration",
+        "timeout",
         "restarts",
         "seed",
         "period",

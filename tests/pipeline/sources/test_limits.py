@@ -24,20 +24,24 @@ from urmpipe_pipeline.sources.tables.limits import LONGEST_LINE, MOST_COLUMNS
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
 
-WIDE = f"found more than {MOST_COLUMNS} columns, allowed: as many as that; write a row a sample, a column a joint"
+A_ROW = "write a row a sample, a column a joint"
+WIDE = f"found more than {MOST_COLUMNS} columns, allowed: as many as that; {A_ROW}"
 PLC = "VAR\n x : ARRAY[1..{}] OF REAL := [{}];\nEND_VAR\n"
 
 
 def _table(columns: int, rows: int = 5) -> str:
     names = ["t", *(f"q{k}" for k in range(1, 7)), *(f"x{k}" for k in range(columns - 7))]
-    cells = (["%.3f" % (0.01 * r), *(f"{0.1 * k + 0.001 * r:.4f}" for k in range(columns - 1))] for r in range(rows))
+    cells = (
+        ["%.3f" % (0.01 * r), *(f"{0.1 * k + 0.001 * r:.4f}" for k in range(columns - 1))]
+        for r in range(rows)
+    )
     return "\n".join(map(",".join, (names, *cells))) + "\n"
 
 
 def test_a_header_longer_than_the_first_look_is_read(read: Read) -> None:
     """9000 columns: names and rows of 60 kB and more each."""
-    log = read(_table(9000))
-    assert (log.joints, log.rows) == (("q1", "q2", "q3", "q4", "q5", "q6"), 5)
+    log = read(_table(9000, 3))
+    assert (log.joints, log.rows) == (("q1", "q2", "q3", "q4", "q5", "q6"), 3)
 
 
 def test_rows_below_many_comments_are_read(read: Read) -> None:
@@ -45,7 +49,7 @@ def test_rows_below_many_comments_are_read(read: Read) -> None:
     assert (log.joints, log.rows) == (("q1", "q2", "q3", "q4", "q5", "q6"), 5)
 
 
-@pytest.mark.parametrize("text", ["1 " * 200_000, "1,2,3," * 60_000], ids=["spaces", "commas"])
+@pytest.mark.parametrize("text", ["1 " * 200_000, "1," * 200_000], ids=["spaces", "commas"])
 def test_a_line_of_too_many_columns(wrong: Wrong, text: str) -> None:
     assert wrong(text) == [f"log.csv: {WIDE}"]
 
@@ -57,15 +61,15 @@ def test_too_many_names(wrong: Wrong) -> None:
 def test_too_many_joints(wrong: Wrong) -> None:
     names = ",".join(["t", *(f"q{k}" for k in range(1, 502))])
     rows = "".join(f"{0.01 * r:.2f}" + ",0.1" * 501 + "\n" for r in range(3))
-    assert wrong(f"{names}\n{rows}") == ["log.csv: found 501 joints, allowed: 500 at most; joints=[A, B, C] names them"]
+    assert wrong(f"{names}\n{rows}") == [
+        "log.csv: found 501 joints, allowed: 500 at most; use joints=[A, B, C]"
+    ]
 
 
 def test_a_line_that_is_too_long(wrong: Wrong) -> None:
     """It is found where it begins, wherever that is."""
     text = _table(7) + "0.05," + "1" * LONGEST_LINE + "\n" + _table(7)
-    assert wrong(text) == [
-        "log.csv:7: found a line of more than 8 MiB, allowed: shorter lines; write a row a sample, a column a joint"
-    ]
+    assert wrong(text) == [f"log.csv:7: found a line of more than 8 MiB, allowed: shorter lines; {A_ROW}"]
 
 
 def test_a_long_line_among_short_ones_is_not_split(wrong: Wrong) -> None:
@@ -96,7 +100,9 @@ def test_a_numpy_header_that_claims_too_much(tmp_path: Path, shape: str, kind: s
 
 
 def test_a_numpy_header_that_does_not_end(tmp_path: Path) -> None:
-    (path := tmp_path / "log.npy").write_bytes(b"\x93NUMPY\x01\0" + struct.pack("<H", 500) + b"(" * 499 + b"\n")
+    (path := tmp_path / "log.npy").write_bytes(
+        b"\x93NUMPY\x01\0" + struct.pack("<H", 500) + b"(" * 499 + b"\n"
+    )
     assert refusal(LogError, read_log, [path]).startswith(f"{path}: cannot be read: ")
 
 
@@ -110,10 +116,15 @@ def test_archives_packed_in_other_ways(tmp_path: Path, method: int) -> None:
         start = data.index(sign) + place
         data[start : start + 2] = struct.pack("<H", method)
     (path := tmp_path / "log.npz").write_bytes(data)
-    assert refusal(LogError, read_log, [path]) == f"{path}: cannot be read: That compression method is not supported"
+    assert (
+        refusal(LogError, read_log, [path])
+        == f"{path}: cannot be read: That compression method is not supported"
+    )
     table = tmp_path / "log.csv"
     table.write_bytes(data)
-    assert refusal(LogError, read_log, [table]).startswith(f"{table}: found an Excel workbook, allowed: a text table")
+    assert refusal(LogError, read_log, [table]).startswith(
+        f"{table}: found an Excel workbook, allowed: a text table"
+    )
 
 
 def _packed_numpy(path: Path, rows: int) -> None:
@@ -141,7 +152,9 @@ def _packed_feather(path: Path, rows: int) -> None:
         ("log.feather", _packed_feather),
     ],
 )
-def test_a_file_that_unpacks_to_far_more(tmp_path: Path, name: str, write: Callable[[Path, int], None]) -> None:
+def test_a_file_that_unpacks_to_far_more(
+    tmp_path: Path, name: str, write: Callable[[Path, int], None]
+) -> None:
     """1.3 million rows of zeros, 73 MB, in less than 1.4 MB."""
     write(path := tmp_path / name, 1_300_000)
     said = refusal(LogError, read_log, [path])
@@ -149,7 +162,9 @@ def test_a_file_that_unpacks_to_far_more(tmp_path: Path, name: str, write: Calla
     assert said.endswith(f", allowed: {max(64 << 20, 50 * path.stat().st_size)} at most")
 
 
-@pytest.mark.parametrize("said", ["{", "5", "[]", '"a"', "[" * 50_000, '{"rows": 5}', '{"columns": {"q1": 5}}'])
+@pytest.mark.parametrize(
+    "said", ["{", "5", "[]", '"a"', "[" * 50_000, '{"rows": 5}', '{"columns": {"q1": 5}}']
+)
 @pytest.mark.parametrize("key", ["pandas", "urmpipe"])
 def test_metadata_that_others_wrote(tmp_path: Path, key: str, said: str) -> None:
     """They are passed over; where they are ours and tell nothing, the file is damaged."""
@@ -163,7 +178,10 @@ def test_metadata_that_others_wrote(tmp_path: Path, key: str, said: str) -> None
 
 
 def test_roles_that_others_wrote(tmp_path: Path) -> None:
-    fields = [pa.field("t", pa.float64()), pa.field("q1", pa.float64(), metadata={"role": "joint", "unit": b"\xff"})]
+    fields = [
+        pa.field("t", pa.float64()),
+        pa.field("q1", pa.float64(), metadata={"role": "joint", "unit": b"\xff"}),
+    ]
     pq.write_table(pa.table([[0.0, 0.1], [0.0, 0.1]], pa.schema(fields)), path := tmp_path / "log.parquet")
     assert read_log([path]).joints == ("q1",)
 
@@ -178,11 +196,23 @@ def test_lists_that_would_be_too_many_columns(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (PLC.format("*", "100000000(0.5)"), "log.csv:2: found more than 4000000 values in x, allowed: as many as that"),
-        (PLC.format("*", "9999(9999(9999(0.5)))"), "log.csv:2: found more than 4000000 values in x, allowed: as many as that"),
+        (
+            PLC.format("*", "100000000(0.5)"),
+            "log.csv:2: found more than 4000000 values in x, allowed: as many as that",
+        ),
+        (
+            PLC.format("*", "9999(9999(9999(0.5)))"),
+            "log.csv:2: found more than 4000000 values in x, allowed: as many as that",
+        ),
         (PLC.format("1e999", "0.1, 0.2"), "log.csv: found no joint columns in x"),
-        ("PTP {A1 1.1.1,A2 0,A3 0,A4 0,A5 0,A6 0}\n", "log.csv:1: found 'PTP {A1 1.1.1,A2 0,A3 0,A4 0,A5 0,A6 0}'"),
-        ("PROC a()\nCONST jointtarget p{1} := " + "[" * 9000 + "0" + "]" * 9000 + ";\n", "log.csv:2: found '[[[["),
+        (
+            "PTP {A1 1.1.1,A2 0,A3 0,A4 0,A5 0,A6 0}\n",
+            "log.csv:1: found 'PTP {A1 1.1.1,A2 0,A3 0,A4 0,A5 0,A6 0}'",
+        ),
+        (
+            "PROC a()\nCONST jointtarget p{1} := " + "[" * 9000 + "0" + "]" * 9000 + ";\n",
+            "log.csv:2: found '[[[[",
+        ),
     ],
     ids=["repeated", "repeated repetitions", "endless bounds", "points", "brackets"],
 )
@@ -207,5 +237,3 @@ def test_programs_of_too_much(wrong: Wrong, text: str, said: str) -> None:
 def test_programs_whose_patterns_could_take_for_ever(wrong: Wrong, text: str) -> None:
     """Each took minutes: that it ends is the test."""
     assert len(wrong(text)) == 1
-
-

@@ -29,6 +29,9 @@ static void drop_last(char text[]) {
 
 /* Say what happened. The message stands where the logger expects a format, with its percent signs doubled and
    without further arguments: loggers that are no C functions cannot read those. */
+#if defined __GNUC__
+__attribute__((format(printf, 2, 0)))
+#endif
 static void log_error(const Instance *me, const char *format, va_list arguments) {
     char message[LONGEST_MESSAGE], escaped[2 * LONGEST_MESSAGE];
     if (!me->logger) return;

@@ -13,6 +13,7 @@ from urmpipe_pipeline.sources.clocks.clock import Clock
 from urmpipe_pipeline.sources.clocks.text_times import MIDNIGHT_NS, add_nights
 from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, Numbers
 
+
 def over_midnight(numbers: Numbers, clock: Clock) -> Numbers:
     """Return the numbers with a clock that goes on where seconds of the day begin again, as it does else."""
     times = numbers.clock

@@ -14,6 +14,9 @@ T = TypeVar("T", Column, "Family")
 
 _AXES = {name: k for names in ("xyzw", "abc", ("roll", "pitch", "yaw")) for k, name in enumerate(names)}
 
+LONGEST = 200
+"""Letters of a name that may be one of a family: no recorder writes longer ones."""
+
 
 @dataclass(slots=True)
 class Family:
@@ -85,7 +88,7 @@ def measured(items: Sequence[T]) -> list[T]:
 
 
 def _first_match(column: Column, patterns: Patterns) -> tuple[int, re.Match[str]] | None:
-    if "n" in patterns[0].groupindex and column.words & vocabulary().other:
+    if len(column.plain) > LONGEST or ("n" in patterns[0].groupindex and column.words & vocabulary().other):
         return None
     for rank, pattern in enumerate(patterns):
         match = pattern.search(column.plain)

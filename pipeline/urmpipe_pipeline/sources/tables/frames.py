@@ -92,7 +92,11 @@ def _array(values: pd.Series) -> pa.Array:
 def index_first(table: pa.Table) -> pa.Table:
     """Return a table that pandas made with its index in front, without a name where that has none."""
     told = told_in(table.schema.metadata, "pandas").get("index_columns")
-    index = [name for name in (told if isinstance(told, list) else ()) if isinstance(name, str) and name in table.column_names]
+    index = [
+        name
+        for name in (told if isinstance(told, list) else ())
+        if isinstance(name, str) and name in table.column_names
+    ]
     others = [name for name in table.column_names if name not in index]
     if not index or len(set(table.column_names)) < table.num_columns:
         return table

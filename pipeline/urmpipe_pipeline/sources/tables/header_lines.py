@@ -110,7 +110,7 @@ def _over_one_column(text: str) -> Row:
     """
     plain = text.strip().lstrip("#%/ ")
     parts = max((split_line(plain, sign) for sign in DELIMITERS if sign != SPACE), key=len)
-    with_unit = len(parts) == 2 and vocabulary().unit(parts[1]) is not None  # noqa: PLR2004
+    with_unit = len(parts) == 2 and vocabulary().unit(parts[1]) is not None
     in_words = plain != text.strip() and any(" " in part for part in parts)
     return split_line(plain, "\t") if with_unit or in_words else parts
 

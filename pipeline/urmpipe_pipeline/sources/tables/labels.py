@@ -20,10 +20,10 @@ _ARRAY = r"\[[^\[\]]*\]|\([^()]*\)"
 _NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eE][-+]?\d+)?(?![\w.:]|\s*[:=])"
 _WORD = r"\"[^\"]*\"|[^\s,;|\[\](){}\"]+"
 _PAIR = re.compile(
-    rf"""(?P<before>[\s,;|{{]*["']?[^\W\d][^:=\[\](){{}}"',;|]*?["']?)
-    (?: \s*[:=]\s*(?P<told>{_ARRAY}|{_NUMBER}|{_WORD})
-      | \s*(?P<array>{_ARRAY})
-      | \s+(?P<number>{_NUMBER})
+    rf"""(?P<before>[\s,;|{{]*+["']?[^\W\d][^:=\[\](){{}}"',;|]{{0,200}}?["']?)
+    (?: \s*+[:=]\s*+(?P<told>{_ARRAY}|{_NUMBER}|{_WORD})
+      | \s*+(?P<array>{_ARRAY})
+      | \s++(?P<number>{_NUMBER})
       | (?P<glued>[-+]?\d+\.\d+(?![\w.:]|\s*[:=])) )""",
     re.VERBOSE,
 )

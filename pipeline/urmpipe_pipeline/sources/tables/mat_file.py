@@ -7,7 +7,6 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -96,13 +95,13 @@ def _unpacked(path: Path) -> int:
     total = 0
     with path.open("rb") as file:
         order = "<" if file.read(HEADER)[-2:] == b"IM" else ">"
-        while len(tag := file.read(8)) == 8:  # noqa: PLR2004 (kind and length)
+        while len(tag := file.read(8)) == 8:
             kind, length = struct.unpack(f"{order}II", tag)
             begun = file.tell()
             if kind == COMPRESSED:
                 with suppress(zlib.error):  # damaged, as reading tells
                     tag = zlib.decompressobj().decompress(file.read(256), 8)
-            total += struct.unpack(f"{order}II", tag)[1] if len(tag) == 8 else 0  # noqa: PLR2004
+            total += struct.unpack(f"{order}II", tag)[1] if len(tag) == 8 else 0
             file.seek(begun + length)
     return total
 

@@ -34,10 +34,20 @@ _SHOWN = 6
 """Arrays that are named where their lengths differ."""
 
 _DAMAGED = (
-    OSError, ValueError, TypeError, EOFError, BadZipFile, NotImplementedError, RuntimeError, zlib.error, SyntaxError,
-    TokenError, OverflowError, struct.error,
+    OSError,
+    ValueError,
+    TypeError,
+    EOFError,
+    BadZipFile,
+    NotImplementedError,
+    RuntimeError,
+    zlib.error,
+    SyntaxError,
+    TokenError,
+    OverflowError,
+    struct.error,
 )
-"""What NumPy and zipfile raise of files that are not whole, or packed in a way that Python does not unpack."""
+"""What NumPy and zipfile raise of files that are damaged, or packed as Python does not unpack them."""
 
 Array: TypeAlias = npt.NDArray[Any]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any, get_args
+from typing import Any, cast, get_args
 
 import pyarrow as pa
 
@@ -57,9 +57,11 @@ def roles_of(layout: Layout) -> dict[int, Role]:
     Of other tables it is nothing.
     """
     if layout.held is not None:
-        texts = ((field.metadata or {}).get(ROLE, b"").decode(errors="replace") for field in layout.held.schema)
+        texts = (
+            (field.metadata or {}).get(ROLE, b"").decode(errors="replace") for field in layout.held.schema
+        )
         found = ((index, _TOLD_ROLE.fullmatch(text)) for index, text in enumerate(texts))
-        told = [(int(match["place"]), index, match["role"]) for index, match in found if match]
+        told = [(int(match["place"]), index, cast(Role, match["role"])) for index, match in found if match]
         if told:
             return {index: role for _, index, role in sorted(told)}
     return grid_roles(head_of(layout)) if layout.header is not None and layout.form is None else {}
@@ -146,7 +148,7 @@ def attributes_of(metadata: Mapping[bytes, bytes] | None) -> Mapping[str, Any]:
 
 
 def told_in(metadata: Mapping[bytes, bytes] | None, key: str) -> Mapping[str, Any]:
-    """Return what JSON in the metadata of a table tells; nothing where it is none, since others write it too."""
+    """Return what JSON in the metadata of a table tells; nothing of what others wrote there."""
     try:
         return mapping(json.loads((metadata or {}).get(key.encode(), b"null")))
     except (ValueError, RecursionError):

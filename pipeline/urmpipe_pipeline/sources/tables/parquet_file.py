@@ -48,7 +48,10 @@ def read_feather(path: Path) -> Held:
 
     def read() -> pa.Table:
         unpacked, batches = 0, []
-        with pa.OSFile(str(path)) as source, pa.ipc.open_file(source) as file:  # mapped, it could shrink under us
+        with (
+            pa.OSFile(str(path)) as source,
+            pa.ipc.open_file(source) as file,
+        ):  # mapped, it could shrink under us
             for number in range(file.num_record_batches):
                 batches.append(file.get_batch(number))
                 unpacked += batches[-1].nbytes
@@ -59,7 +62,7 @@ def read_feather(path: Path) -> Held:
 
 
 def _unpacked(about: Any) -> int:
-    """Return the bytes that the columns of a Parquet file take, by its metadata: repeated values are one there."""
+    """Return the bytes that a Parquet file says its columns take: of repeated values it holds one."""
     groups = map(about.row_group, range(about.num_row_groups))
     chunks = (group.column(k) for group in groups for k in range(group.num_columns))
     return sum(max(chunk.total_uncompressed_size, 8 * chunk.num_values) for chunk in chunks)

@@ -1,7 +1,8 @@
 """Files that stay: each is read several times, so what a pipe of ours brings is kept first.
 
-A pipe in the place of a file, as a shell makes for `<(command)`, is open here under the number in its name: its
-bytes go into a file without a name that takes over that number. Named pipes, sockets and devices are no logs.
+A pipe in the place of a file, as a shell makes for `<(command)`, is open here under the number in its name:
+its bytes go into a file without a name that takes over that number. Other pipes, sockets and devices are no
+logs.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ def made_regular(path: Path) -> None:
     """Keep what a pipe of this process brings, so that its name can be opened again and again.
 
     Raises:
-        LogError: If the path is another thing that is no file or folder, or the pipe brings nothing, or too much.
+        LogError: If it is neither such a pipe nor a file or folder, or brings nothing, or too much.
     """
     state = _state(path)
     if state is None or stat.S_IFMT(state[0]) not in _KINDS:
@@ -65,18 +66,22 @@ def _blocks(path: Path, number: int) -> Iterator[bytes]:
     while block := _block(path, number):
         left -= len(block)
         if left < 0:
-            raise LogError(Finding(f"found more than {MOST_PIPED >> 30} GiB in a pipe, allowed: a file", str(path)))
+            raise LogError(
+                Finding(f"found more than {MOST_PIPED >> 30} GiB in a pipe, allowed: a file", str(path))
+            )
         yield block
 
 
 def _block(path: Path, number: int) -> bytes:
     """Return what a pipe brings next, nothing at its end."""
-    for wait in WAITS_S:
+    for told, wait in enumerate(WAITS_S):
         if select([number], [], [], wait)[0]:
             return os.read(number, 1 << 20)
-        if wait == WAITS_S[0]:
+        if not told:
             print(f"waiting for {path}, a pipe that brings nothing so far", file=sys.stderr, flush=True)
-    raise LogError(Finding(f"found a pipe that brings nothing for {sum(WAITS_S):g} s, allowed: a log", str(path)))
+    raise LogError(
+        Finding(f"found a pipe that brings nothing for {sum(WAITS_S):g} s, allowed: a log", str(path))
+    )
 
 
 @contextmanager
@@ -112,7 +117,7 @@ def _refuse_changed(paths: Sequence[Path], before: Sequence[State | None]) -> No
 
 
 def _state(path: Path) -> State | None:
-    """Return what a file has until it is written to: kind, identity, size and time; None if it is not there."""
+    """Return kind, identity, size and time of a file, which writing changes; None if it is none."""
     try:
         found = path.stat()
     except OSError:

@@ -341,7 +341,9 @@ def _names(
         _refuse_few(segment, lines, rows, ends, -1, f"no cell behind what line {line} names")
     number = abs(len(cells) - width)
     remedy = f"{'add' if len(cells) < width else 'take out'} {counted(number, 'name')}"
-    wrong = f"found {len(cells)} names over rows of {counted(width, 'cell')}, allowed: a name a column; {remedy}"
+    wrong = (
+        f"found {len(cells)} names over rows of {counted(width, 'cell')}, allowed: a name a column; {remedy}"
+    )
     wrong += f", or delete line {line}: without names the columns are taken as joints in order"
     raise LogError(Finding(wrong, file=str(segment.path), line=line))
 

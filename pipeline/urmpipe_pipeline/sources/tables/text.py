@@ -256,7 +256,7 @@ def _errors(encoding: str) -> str:
 
 
 def _head(path: Path, encoding: str, start: int, end: int) -> str:
-    """Return the beginning of a stretch of a file as text: all of it, or some lines that show what they are."""
+    """Return the beginning of a stretch of a file as text: enough lines to show what they are."""
     head, size = "", HEAD_BYTES
     with path.open("rb") as file:
         while size <= MOST_HEAD:

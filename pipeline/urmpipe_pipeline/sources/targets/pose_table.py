@@ -100,9 +100,7 @@ def read_pose_table(
         return _read(file, options, further, naming)
 
 
-def _read(
-    file: Path, options: ReadOptions, further: Mapping[str, ExtraColumn], naming: str
-) -> PoseTable:
+def _read(file: Path, options: ReadOptions, further: Mapping[str, ExtraColumn], naming: str) -> PoseTable:
     """Return the rows of a table as `read_pose_table` does."""
     asked, length = _plain_length(replace(options, joints=(), names=(), signs=(), offsets=()))
     tables = open_tables([file], asked, partial(sniff_targets, position=asked.position))

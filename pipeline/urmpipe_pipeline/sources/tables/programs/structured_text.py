@@ -138,7 +138,9 @@ def _array(program: Program, raw: _Raw, scalars: Mapping[str, _Scalar]) -> Itera
     try:
         values = _values(raw.text, _MOST if 0 in shape else known)
     except OverflowError:
-        raise program.error(f"more than {_MOST} values in {raw.name}", "as many as that", raw.offset) from None
+        raise program.error(
+            f"more than {_MOST} values in {raw.name}", "as many as that", raw.offset
+        ) from None
     except ValueError:
         return
     if len(values) == 1 < known:
