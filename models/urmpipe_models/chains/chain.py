@@ -161,9 +161,9 @@ class Chain(Shown):
         frames = {"the tip": self.tip, "the base": self.base, "the tool": self.tool}
         frames |= {f"joint {joint.name}": joint.origin for joint in self.joints}
         for where, frame in frames.items():
-            numbers = [one for one in frame.translation if isinstance(one, Real)]
+            numbers = [float(one) for one in frame.translation if isinstance(one, Real)]
             if not all(abs(one) <= FARTHEST for one in numbers):
-                yield f"{where} stands at {[*map(float, numbers)]} m; allowed: {FARTHEST:g} m at most"
+                yield f"{where} stands at {numbers} m; allowed: {FARTHEST:g} m at most"
 
     def _drive_faults(self) -> Iterator[str]:
         """Yield the faults of the drives, and drives of joints that have no coordinate or have two."""

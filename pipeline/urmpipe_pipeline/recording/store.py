@@ -191,7 +191,7 @@ def document(
 
 
 def checksum(values: NDArray[Any] | str) -> int:
-    """Return the checksum (CRC-32) of an array of any unit and shape, or of a text: a changed byte changes it."""
+    """Return the checksum (CRC-32) of an array, any unit and shape, or a text: a changed byte changes it."""
     return zlib.crc32(values.encode() if isinstance(values, str) else np.ascontiguousarray(values).data)
 
 
