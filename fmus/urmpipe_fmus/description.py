@@ -151,7 +151,7 @@ def _type_attributes(name: str, one: Variable) -> dict[str, str]:
         elif one.type == "Integer" and abs(bound) <= LARGEST_INTEGER:
             attributes[key] = str(inside(bound))
     if not isinstance(one, Output):
-        attributes["start"] = _number(one, one.starts[one.names.index(name)])
+        attributes["start"] = _number(one, one.start_of(name))
     return attributes
 
 

@@ -75,6 +75,11 @@ class Variable(ABC):
             return self.start
         return (float(self.start),) * self.width
 
+    def start_of(self, scalar: str) -> float:
+        """Return the start value of one of its scalars, by the name of that."""
+        index = 0 if self.size is None else int(scalar[len(self.name) + 1 : -1]) - 1
+        return self.starts[index]
+
     def faults(self) -> Iterator[str]:
         """Yield what is wrong with the variable."""
         if not (self.name.isidentifier() and self.name.isascii()) or self.name.startswith("_"):
@@ -188,6 +193,11 @@ class Remembered(Variable):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class State(Remembered):
     """A continuous state: the unit's `derivatives` gives its derivative in [unit/s]."""
+
+    def start_of(self, scalar: str) -> float:
+        """Return the start value of one of its scalars, by the name of that."""
+        index = 0 if self.size is None else int(scalar[len(self.name) + 1 : -1]) - 1
+        return self.starts[index]
 
     def faults(self) -> Iterator[str]:
         """Yield what is wrong with the variable."""

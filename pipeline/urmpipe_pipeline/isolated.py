@@ -6,17 +6,19 @@ expect, and no `except` catches that. A file that ended such a process is not re
 
 from __future__ import annotations
 
+import pickle
 import sys
 from collections import deque
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from subprocess import DEVNULL, Popen, TimeoutExpired
-from typing import TypeAlias
+from tempfile import TemporaryFile
+from typing import Any, TypeAlias
 
 from urmpipe_models.processes import command, ending, environment, limit_memory
 
-PATIENCE, RATE = 60.0, 5e6
+PATIENCE, RATE = 15.0, 5e6
 """Time in [s] that reading may take, and the bytes a second that give it more, far below any disk."""
 
 Mark: TypeAlias = tuple[int, int, int, int]
@@ -26,7 +28,29 @@ _whole: deque[Mark] = deque(maxlen=256)
 
 
 def abort_of(path: Path, reader: str, meanwhile: Sequence[str] = ()) -> str:
-    """Return how reading a file ends the process that does it; empty if it does not.
+    """Return how reading a file ends the process that does it; empty if it does not, see `read_apart`.
+
+    What a process has read once, or written, is not tried again as long as it stays as it is.
+
+    Raises:
+        OSError: If there is no such file.
+    """
+    if _mark(path) in _whole:
+        return ""
+    try:
+        read_apart(path, reader, meanwhile)
+    except AbortError as error:
+        return str(error)
+    believe(path)
+    return ""
+
+
+class AbortError(Exception):
+    """Reading a file ended the process that did it."""
+
+
+def read_apart(path: Path, reader: str, meanwhile: Sequence[str] = ()) -> Any:
+    """Return what a reader returns of a file, in a process of its own.
 
     Args:
         path: The file.
@@ -34,28 +58,26 @@ def abort_of(path: Path, reader: str, meanwhile: Sequence[str] = ()) -> str:
         meanwhile: Modules that are needed afterwards, imported while the other process runs.
 
     Raises:
+        AbortError: With how that process ended.
         OSError: If there is no such file.
     """
-    mark = _mark(path)
-    if mark in _whole:
-        return ""
-    process = Popen(
-        command(__name__, reader, str(path)), stdin=DEVNULL, stdout=DEVNULL, stderr=DEVNULL, env=environment()
-    )
-    limit = PATIENCE + mark[2] / RATE
-    try:
-        for name in meanwhile:
-            import_module(name)
-        code = process.wait(limit)
-    except TimeoutExpired:
-        return f"took more than {limit:.0f} s"
-    finally:
-        process.kill()
-        process.wait()
-    if code:
-        return ending(code)
-    believe(path)
-    return ""
+    limit = PATIENCE + path.stat().st_size / RATE
+    with TemporaryFile() as found:
+        line = command(__name__, reader, str(path))
+        process = Popen(line, stdin=DEVNULL, stdout=found, stderr=DEVNULL, env=environment())
+        try:
+            for name in meanwhile:
+                import_module(name)
+            code = process.wait(limit)
+        except TimeoutExpired:
+            raise AbortError(f"took more than {limit:.0f} s") from None
+        finally:
+            process.kill()
+            process.wait()
+        if code:
+            raise AbortError(ending(code))
+        found.seek(0)
+        return pickle.load(found)
 
 
 def believe(path: Path) -> None:
@@ -71,4 +93,5 @@ def _mark(path: Path) -> Mark:
 
 if __name__ == "__main__":
     limit_memory()
-    import_module(sys.argv[1]).read_through(sys.argv[2])
+    found = import_module(sys.argv[1]).read_through(sys.argv[2])
+    pickle.dump(found, sys.stdout.buffer, protocol=pickle.HIGHEST_PROTOCOL)

@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tests.fuzz.corpus import Specimen, make
+from tests.fuzz.corpus import Specimen
 from tests.fuzz.examine import ABORT, FAULT, LARGE, SLOW, Outcome
 from tests.fuzz.kinds import BY_NAME
+from tests.fuzz.made import make
 from tests.fuzz.workers import FORK, Batch, Worker, run
 
 BATCH = 20

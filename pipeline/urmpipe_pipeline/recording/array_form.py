@@ -130,7 +130,10 @@ def read_array(tree: Any, kinds: str, at: In) -> Any:
         raise at.wrong(tree, "what stands for an array")
     if not re.fullmatch(rf"[<>|=][{kinds}]\d*", tree[DTYPE]):
         raise at.wrong(tree[DTYPE], f"an array of {' or '.join(KINDS[kind] for kind in kinds)}")
-    shape, dtype = tree.get(SHAPE), np.dtype(tree[DTYPE])
+    try:
+        shape, dtype = tree.get(SHAPE), np.dtype(tree[DTYPE])
+    except TypeError:  # a size that no type has
+        raise at.wrong(tree[DTYPE], "a type of NumPy's") from None
     if TEXT in tree:
         return _texts(tree, dtype, at)
     if not isinstance(shape, list) or not all(type(one) is int and one >= 0 for one in shape):

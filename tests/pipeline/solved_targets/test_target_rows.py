@@ -225,6 +225,7 @@ def test_empty_rows_of_a_spreadsheet_at_the_end_are_none(read: Read) -> None:
         2: "columns x, y, z: found no number, allowed: a finite number"
     }
     assert list(read("x,y,z\n0.3,0.1,0.5\nnan,nan,nan\n").faults) == [2]
+    assert list(read('x,y,z\n0.3,0.1,0.5\n"').faults) == [2]
 
 
 def test_rows_are_counted_as_ingest_counts_them(read: Read, tmp_path: Path) -> None:

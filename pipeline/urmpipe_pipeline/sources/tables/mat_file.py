@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
-from urmpipe_pipeline.isolated import abort_of
+from urmpipe_pipeline.isolated import AbortError, read_apart
 from urmpipe_pipeline.outputs import EXPORT_HEADER
 from urmpipe_pipeline.sources.tables import numpy_columns
 from urmpipe_pipeline.sources.tables.column_facts import UNIT
@@ -47,9 +47,6 @@ def read_mat(path: Path, head: bytes) -> Held:
     Raises:
         LogError: If it is damaged, or holds no such numbers.
     """
-    if how := abort_of(path, __name__, meanwhile=("scipy.io",)):
-        said = f"found a MAT file that cannot be read (it {how}), allowed: a whole one"
-        raise LogError(Finding(said, str(path)))
     found = _loaded(path)
     run = found.get("run")
     if EXPORT_HEADER.encode() in head and isinstance(run, Mapping) and "rows" in run:
@@ -70,24 +67,27 @@ def read_mat(path: Path, head: bytes) -> Held:
     return Held(path.stem, _table(columns), path=path)
 
 
-def read_through(path: str) -> None:
-    """Read a file to its end: a damaged one can abort SciPy's reader, see `urmpipe_pipeline.isolated`."""
-    with suppress(LogError):
-        _loaded(Path(path))
-
-
 def _loaded(path: Path) -> dict[str, Any]:
-    """Return the variables of a file, structs as dictionaries."""
-    from scipy.io import loadmat
-
+    """Return the variables of a file, structs as dictionaries: damaged bytes can end SciPy's process."""
     refuse_unpacked(path, _unpacked(path))
     try:
-        found = loadmat(path, appendmat=False, simplify_cells=True)
-    except Exception as error:  # of damaged bytes SciPy's reader raises anything, an UnboundLocalError too
-        reason = str(error).partition("\n")[0].strip(" .") or type(error).__name__
+        found, reason = read_apart(path, __name__)
+    except AbortError as error:
+        found, reason = {}, str(error)
+    if reason:
         found_out = f"found a MAT file that cannot be read ({reason}), allowed: a whole one"
-        raise LogError(Finding(found_out, str(path))) from None
+        raise LogError(Finding(found_out, str(path)))
     return {name: value for name, value in found.items() if not name.startswith("__")}
+
+
+def read_through(path: str) -> tuple[dict[str, Any], str]:
+    """Return the variables of a file, or why there are none; in a process of its own, see `read_apart`."""
+    from scipy.io import loadmat
+
+    try:
+        return loadmat(path, appendmat=False, simplify_cells=True), ""
+    except Exception as error:  # of damaged bytes SciPy's reader raises anything, an UnboundLocalError too
+        return {}, str(error).partition("\n")[0].strip(" .") or type(error).__name__
 
 
 def _unpacked(path: Path) -> int:

@@ -44,6 +44,9 @@ SCORED_LINES = 60
 SAMPLED_LINES = 250
 """Lines that decide on everything else."""
 
+COUNTED = 9
+"""So many digits a number of a row may have: no table has a billion rows."""
+
 _NAMES = {",": "comma", ";": "semicolon", "\t": "tab", SPACE: "spaces", "|": "bar", ".": "point"}
 _SIGNS = {name: sign for sign, name in _NAMES.items()} | {"\\t": "\t", "space": SPACE, "pipe": "|"}
 
@@ -354,8 +357,9 @@ def _uncounted(rows: Sequence[Row], width: int) -> list[int]:
     for k, row in enumerate(rows):
         if len(row) != width:
             continue
-        if row[0].isdecimal() and 1 <= int(row[0]) - count <= k - last:
-            last, count = k, int(row[0])
+        cell = row[0]
+        if cell.isdecimal() and len(cell) <= COUNTED and 1 <= int(cell) - count <= k - last:
+            last, count = k, int(cell)
         else:
             found.append(k)
     return found

@@ -137,10 +137,10 @@ def _without_blank_end(layout: Layout, numbers: Numbers) -> Numbers:
     """Return the numbers without rows at the end whose cells are all empty, as spreadsheets leave them."""
     if not len(numbers.values) or not np.isnan(numbers.values[-1]).all():
         return numbers
-    last = 0
+    last = max((row + 1 for row in numbers.unread), default=0)
     for row, (_, text) in enumerate(data_lines(layout, layout.segment.lines()), start=1):
         if any(split_line(text, layout.delimiter)):
-            last = row
+            last = max(last, row)
     return numbers.at(slice(last))
 
 
