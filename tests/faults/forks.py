@@ -102,6 +102,7 @@ def _answer_orders() -> None:
     libraries = ("fmpy", "pandas", "plotly.graph_objects", "pyarrow.parquet", "rerun.blueprint", "scipy.io")
     for name in (*libraries, *(f"urmpipe.commands.{name}" for name in COMMANDS)):
         import_module(name)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # of a fork that is not the command yet
     while line := sys.stdin.readline():
         print(json.dumps(asdict(_ended(json.loads(line)))), flush=True)
 
@@ -149,6 +150,7 @@ def _be_the_command(order: dict[str, Any], out: int, err: int) -> None:
     if order["limit"] is not None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (order["limit"], resource.RLIM_INFINITY))
     sys.argv = ["urmpipe", *order["arguments"]]
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     main()
 
 

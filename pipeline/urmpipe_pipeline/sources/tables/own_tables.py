@@ -161,4 +161,4 @@ def mapping(value: object) -> Mapping[str, Any]:
 
 
 def _words(value: object) -> str:
-    return " ".join(map(str, value if isinstance(value, list) else [value]))
+    return " ".join(map(str, value if isinstance(value, (list, tuple)) else [value]))
