@@ -1,9 +1,9 @@
 """Measure what docs/reliability.md promises, and write its table of figures.
 
-    python docs/reliability_figures.py [--minutes N]
+    python docs/reliability_figures.py [--minutes N] [--moments N]
 
-It runs everything at many more moments, sizes and inputs than the tests do, for about an hour beside the
-minutes of changed files. What is not as promised ends it with an error.
+It runs everything at more moments, sizes and inputs than the tests do, for about half an hour with 30 moments,
+beside the minutes of changed files. What is not as promised ends it with an error.
 """
 
 from __future__ import annotations
@@ -33,7 +33,6 @@ from trials import full, interrupted, limited, small_disk  # noqa: E402
 PAGE = HERE / "reliability.md"
 START, END = "<!-- figures: python docs/reliability_figures.py -->", "<!-- end of figures -->"
 
-MOMENTS = SIZES = 30
 ROUNDS = 334
 """Of three calls each: a thousand."""
 
@@ -44,9 +43,10 @@ def main() -> None:
     """Measure, and put the table into the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--minutes", type=float, default=30.0, help="for how long changed files are read")
-    minutes = parser.parse_args().minutes
+    parser.add_argument("--moments", type=int, default=30, help="moments, and sizes, of each command")
+    asked = parser.parse_args()
     lines = [*machine("rerun-sdk", "fmpy", "pyarrow"), "", "| provoked | times | found |", "|---|---|---|"]
-    for found in (changed_files(minutes), stopped_and_out_of_room(), calls()):
+    for found in (changed_files(asked.minutes), stopped_and_out_of_room(asked.moments), calls()):
         for row in found:
             print(row, flush=True)
             lines.append(row)
@@ -74,13 +74,13 @@ FINDINGS = {
 """What is counted of changed files, and in which words."""
 
 
-def stopped_and_out_of_room() -> Iterator[str]:
+def stopped_and_out_of_room(moments: int) -> Iterator[str]:
     """Yield the rows of commands that were stopped, or had no room for what they write."""
     trials: dict[str, Callable[[Forks, Job, Path], Counter[str]]] = {
-        name: partial(interrupted, number=number, moments=MOMENTS) for name, number in SIGNALS.items()
+        name: partial(interrupted, number=number, moments=moments) for name, number in SIGNALS.items()
     }
-    trials["a file may not grow"] = partial(limited, sizes=SIZES)
-    trials["the disk is full"] = partial(full, sizes=SIZES)
+    trials["a file may not grow"] = partial(limited, sizes=moments)
+    trials["the disk is full"] = partial(full, sizes=moments)
     with forks() as forked, tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with small_disk(folder, "12m") as mounted:

@@ -45,7 +45,7 @@ def test_a_stopped_comparison_leaves_all_outputs_or_none(forked: Forks, number: 
 def test_a_stopped_command_leaves_all_outputs_or_none(
     forked: Forks, job: Job, number: int, folder: Path
 ) -> None:
-    interrupted(forked, job, folder, number, moments=2)
+    assert interrupted(forked, job, folder, number, moments=2).total() == 2
 
 
 @pytest.mark.slow

@@ -130,8 +130,8 @@ def _check_end(job: Job, ended: Ended, *, killed: bool) -> None:
     assert not ended.hung, (job.name, ended)
     assert not ended.left, (job.name, ended)
     assert FAULT not in ended.err, (job.name, ended)
-    if not killed:
-        assert "Traceback" not in ended.err, (job.name, ended)
+    if not killed:  # Python itself may lose a Ctrl-C in an import, and says so without a file of ours
+        assert not re.search(r'^  File "[^<]', ended.err, re.MULTILINE), (job.name, ended)
 
 
 def _remove_parts(folder: Path) -> None:
@@ -170,7 +170,7 @@ def small_disk(folder: Path, size: str) -> Iterator[bool]:
         yield mounted
     finally:
         if mounted:
-            subprocess.run(["umount", str(folder)], check=True)
+            subprocess.run(["umount", "--lazy", str(folder)], check=True)  # a recording may still be open
 
 
 def total(counts: Sequence[Counter[str]]) -> Counter[str]:
