@@ -2,8 +2,8 @@
 
     python docs/reliability_figures.py [--minutes N] [--moments N]
 
-It runs everything at more moments, sizes and inputs than the tests do: with 30 moments for half an hour, beside
-the minutes of changed files. What is not as promised ends it with an error.
+It runs everything at more moments, sizes and inputs than the tests do: with 30 moments for half an hour,
+beside the minutes of changed files. What is not as promised ends it with an error.
 """
 
 from __future__ import annotations
