@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import click
@@ -123,12 +124,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = list(sys.argv[1:] if arguments is None else arguments)
     gc.set_threshold(COLLECT_AT)
     open_streams()
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # what ends us asks for order, as Ctrl-C does
+    for number in (signal.SIGINT, signal.SIGTERM):  # what ends us asks for order, as Ctrl-C does
+        signal.signal(number, _stop)
     code = run(given)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done: there is nothing left to stop
     close_streams()
     gc.freeze()  # else Python looks for cycles among all modules before it exits
     sys.exit(code)
+
+
+_stopped: list[int] = []
+"""The signals that asked this process to stop."""
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    """Stop what is done now."""
+    _stopped.append(number)
+    raise KeyboardInterrupt
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -145,13 +157,14 @@ def run(arguments: Sequence[str]) -> int:
         return 0
     except click.exceptions.NoArgsIsHelpError as error:  # a group alone, which is answered by its help
         error.show()
-    except (Exception, KeyboardInterrupt) as error:
+    except (Exception, KeyboardInterrupt) as raised:
+        why = KeyboardInterrupt() if _stopped else raised  # an import may have made another error of it
         if "--debug" in arguments:
             import traceback
 
-            traceback.print_exception(error)
-        findings = findings_of(error)
+            traceback.print_exception(raised)
+        findings = findings_of(why)
         print_findings(findings, as_json)
-        if not isinstance(error, (KeyboardInterrupt, click.Abort)):  # Ctrl-C: all files stay as they were
+        if not isinstance(why, (KeyboardInterrupt, click.Abort)):  # Ctrl-C: all files stay as they were
             tell_junit_of(arguments, findings)
     return 2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -245,3 +246,18 @@ def test_a_long_value_is_cut_where_an_error_shows_it(
     told = capsys.readouterr().err
     assert "x" * 20 in told
     assert "x" * 61 not in told
+
+
+def test_an_error_that_a_stop_caused_is_a_stop(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Ctrl-C in the import of a library in C comes out of it as an ImportError."""
+
+    def fail(*_: object, **__: object) -> None:
+        """Fail as such an import does."""
+        raise ImportError("initialization failed")
+
+    monkeypatch.setattr("urmpipe.main._stopped", [signal.SIGINT])
+    monkeypatch.setattr(cli, "main", fail)
+    assert run(["ingest", "log.csv"]) == 2
+    assert capsys.readouterr().err == "error: stopped before it was done; no file is left half written\n"
