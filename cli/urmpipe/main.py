@@ -10,6 +10,7 @@ import gc
 import signal
 import sys
 import warnings
+from _thread import interrupt_main
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -126,6 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     open_streams()
     for number in (signal.SIGINT, signal.SIGTERM):  # what ends us asks for order, as Ctrl-C does
         signal.signal(number, _stop)
+    sys.unraisablehook = _stop_again
     code = run(given)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done: there is nothing left to stop
     close_streams()
@@ -141,6 +143,14 @@ def _stop(number: int, frame: FrameType | None) -> None:
     """Stop what is done now."""
     _stopped.append(number)
     raise KeyboardInterrupt
+
+
+def _stop_again(dropped: sys.UnraisableHookArgs) -> None:
+    """Stop after all, where Python dropped the error: in a callback of its own, such as of an import."""
+    if isinstance(dropped.exc_value, KeyboardInterrupt):
+        interrupt_main()
+    else:
+        sys.__unraisablehook__(dropped)
 
 
 def run(arguments: Sequence[str]) -> int:
