@@ -75,7 +75,7 @@ def _refused(
         outcome = _outputs(job, folder, before)
         if outcome == "old":
             named = "|".join(map(re.escape, job.outputs))
-            told = rf"^error: (({named}): cannot be written: {why}|found no room for .*)$"
+            told = rf"^error: (({named}): cannot be written: {why}|.*[.]fmu: .*: {why}|found no room .*)$"
             assert ended.code == 2, (job.name, ended)
             assert re.search(told, ended.err, re.MULTILINE), (job.name, ended)
         found[outcome] += 1
