@@ -45,7 +45,7 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=30.0, help="for how long changed files are read")
     parser.add_argument("--moments", type=int, default=30, help="moments, and sizes, of each command")
     asked = parser.parse_args()
-    lines = [*machine("rerun-sdk", "fmpy", "pyarrow"), "", "| provoked | times | found |", "|---|---|---|"]
+    lines = [*machine("rerun-sdk", "fmpy", "pyarrow"), "| provoked | times | found |", "|---|---|---|"]
     for found in (changed_files(asked.minutes), stopped_and_out_of_room(asked.moments), calls()):
         for row in found:
             print(row, flush=True)
