@@ -1,12 +1,10 @@
-"""The README's promises: its commands are those that run, its robot is one, its Python works."""
+"""The README's promises: its commands are those that run, its Python works."""
 
-import tomllib
 from pathlib import Path
 
 import pytest
 
 from pages import ROOT, indented, lay_files, text_of
-from urmpipe_models.robots.robot_file import read_robot_file
 
 README = text_of("README.md")
 COMMANDS = [line.strip() for line in README.splitlines() if line.startswith("    python")]
@@ -28,14 +26,6 @@ def test_each_command_stands_in_both_shells() -> None:
     ]
     assert len(unix) == 2
     assert windows == as_windows
-
-
-def test_the_robot_of_the_readme_is_one(tmp_path: Path) -> None:
-    text = indented("README.md", "name = ")
-    tomllib.loads(text)
-    path = tmp_path / "my-arm.toml"
-    path.write_text(text, encoding="utf-8")
-    assert len(read_robot_file(path).coordinates) == 3
 
 
 def test_the_python_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
