@@ -1,6 +1,6 @@
 """Maps: what a lab says once about its logs - columns, units, order, signs, offsets, clock, base, tool.
 
-An example stands in docs/logs.md, "Saying it once".
+docs/logs.md has an example: "Maps and defaults".
 """
 
 from __future__ import annotations
