@@ -69,5 +69,5 @@ def test_the_system_of_the_page_goes_straight_between_the_points_of_a_coarse_pat
 
 def test_each_shipped_system_has_its_line() -> None:
     page = (DOCS / "simulate.md").read_text(encoding="utf-8")
-    section = page.split("\n## The systems that come along\n")[1].split("\n## ")[0]
+    section = page.split("\n## The systems of the catalogue\n")[1].split("\n## ")[0]
     assert tuple(sorted(re.findall(r"^- \*\*(.+?)\*\*", section, re.MULTILINE))) == system_names()
