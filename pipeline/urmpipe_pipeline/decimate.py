@@ -13,6 +13,21 @@ EACH = 4
 """Points that M4 keeps of a column's bucket: the first, the least, the largest and the last."""
 
 
+UNEVEN = 8.0
+"""Longest over shortest time between rows: from there on a bucket of time hides more than a pixel should."""
+
+
+def points_for(t_ns: IntArray | None) -> int:
+    """Return how many points a line may have: twice as many where it leaves its course within a few rows.
+
+    Its rows are at times in [ns], shape (n,); None without times.
+    """
+    if t_ns is None or len(t_ns) < 3:
+        return POINTS
+    between = np.diff(t_ns[:])
+    return 2 * POINTS if between.max() > UNEVEN * between.min() else POINTS
+
+
 def decimate(values: FloatArray, points: int = POINTS, t: FloatArray | None = None) -> IntArray:
     """Return the samples that a drawing of `values` needs, in order.
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby
 
 import numpy as np
 
 from urmpipe_models.arrays import IntArray
+from urmpipe_pipeline.presentation.curves import Span, axis_of, by_axis, panels_of, place_of, span_of
 from urmpipe_pipeline.presentation.figure import Figure, Over, Panel
 from urmpipe_pipeline.report import spec
-from urmpipe_pipeline.report.panels import MARKED, Names, Span, across, axis_of, drawn_panel, place_of
+from urmpipe_pipeline.report.panels import MARKED, Names, drawn_panel
 from urmpipe_pipeline.report.spec import Spec
 from urmpipe_pipeline.report.traces import instant, label
 
@@ -31,9 +31,9 @@ LEGEND_Y, OVER_LEGEND_Y = 1.025, 1.06
 figure over a quantity, which is lower."""
 
 
-def span_of(figures: Iterable[Figure]) -> Span:
+def time_span(figures: Iterable[Figure]) -> Span:
     """Return the time from the first to the last row of all panels over time; 0 to 0 without one."""
-    return _span(panel for figure in figures for panel in _panels(figure) if axis_of(panel) == "t")
+    return span_of(panel for figure in figures for panel in panels_of(figure) if axis_of(panel) == "t")
 
 
 class Links:
@@ -45,7 +45,7 @@ class Links:
 
     def of(self, figures: Iterable[Figure], ident: str) -> str:
         """Return what the figures of a section share their time axis by."""
-        times = [panel.t_ns for one in figures for panel in _panels(one) if panel.t_ns is not None]
+        times = [panel.t_ns for one in figures for panel in panels_of(one) if panel.t_ns is not None]
         found = next((link for known, link in self._known if any(known is t_ns for t_ns in times)), ident)
         self._known += [(t_ns, found) for t_ns in times]
         return found
@@ -56,28 +56,16 @@ def drawn_figures(figure: Figure, times: Span) -> Iterator[spec.Figure]:
 
     Axes of time span the same times in all figures that stand together.
     """
-    groups = [(over, list(panels)) for over, panels in groupby(_panels(figure), axis_of)]
-    for over, panels in groups:
-        span = times if over == "t" else _span(panels)
+    for title, over, panels in by_axis(figure):
+        span = times if over == "t" else span_of(panels)
         yield spec.Figure(
-            figure.title if over == groups[0][0] else f"{figure.title} over {over}",
+            title,
             f"{figure.caption}{_left_out(panels)}",
             figure.alt if isinstance(figure.alt, str) else figure.alt(),
             _spec(figure, panels, span),
             _height(panels),
             over=over,
         )
-
-
-def _panels(figure: Figure) -> Iterator[Panel]:
-    return (panel for view in figure.views for panel in view.panels)
-
-
-def _span(panels: Iterable[Panel]) -> Span:
-    """Return from the first to the last row of all lines."""
-    found = [x for panel in panels for one in panel.lines if len(x := across(panel, one))]
-    ends = [(float(x[0]), float(x[-1])) for x in found] or [(0.0, 0.0)]
-    return Span(min(start for start, _ in ends), max(end for _, end in ends))
 
 
 def _left_out(panels: Sequence[Panel]) -> str:

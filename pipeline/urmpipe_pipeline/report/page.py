@@ -9,11 +9,11 @@ from itertools import groupby
 from typing import TypeAlias
 
 from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.presentation.curves import Span
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure, Text
 from urmpipe_pipeline.presentation.figure import Figure as GivenFigure
 from urmpipe_pipeline.presentation.section import Block, Presentation, Ref, Section, Table
-from urmpipe_pipeline.report.figures import SMALL_PX, Links, drawn_figures, span_of
-from urmpipe_pipeline.report.panels import Span
+from urmpipe_pipeline.report.figures import SMALL_PX, Links, drawn_figures, time_span
 from urmpipe_pipeline.report.space import drawn_space
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.report.summary import (
@@ -148,7 +148,7 @@ def _part(section: Section, anchors: Anchors, links: Links, which: str = "") -> 
     ident = anchors.ident(section)
     blocks = [*section.figures(), *section.blocks()]
     figures = [block for block in blocks if isinstance(block, GivenFigure)]
-    span, link = span_of(figures), links.of(figures, ident)
+    span, link = time_span(figures), links.of(figures, ident)
     first = [one for one in section.tables if not (anchors.is_body(section) and one in _ranking(section))]
     return Part(
         f"{section.title}{which}",

@@ -8,12 +8,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline import text
-from urmpipe_pipeline.decimate import decimate
-from urmpipe_pipeline.joint_log import seconds
+from urmpipe_pipeline.decimate import decimate, points_for
 from urmpipe_pipeline.palette import rgb
-from urmpipe_pipeline.presentation.figure import Line, Mark, Over, Panel, Shape
+from urmpipe_pipeline.presentation.curves import (
+    Curve,
+    Span,
+    across,
+    cloud_rows,
+    curves_of,
+    is_switch,
+    logarithmic_ends,
+    out_of_limit,
+    place_of,
+    shown_unit,
+)
+from urmpipe_pipeline.presentation.figure import Mark, Over, Panel, Shape
 from urmpipe_pipeline.report import spec
 from urmpipe_pipeline.report.spec import MUTED, Spec, typed
 from urmpipe_pipeline.report.traces import (
@@ -24,7 +33,6 @@ from urmpipe_pipeline.report.traces import (
     line,
     marks,
     pointer_digits,
-    points_for,
     precision,
     shaded,
     stroke,
@@ -33,9 +41,6 @@ from urmpipe_pipeline.report.traces import (
 
 LOW = 3.0
 """Largest values above so many limits leave no room for words between the limit and 0."""
-
-DOTS = 1500
-"""Points of a cloud: a browser draws no more of them with ease."""
 
 MARKED = 1000
 """Marks of a panel at most: a browser draws no more of them with ease."""
@@ -49,9 +54,6 @@ WIDTHS = (1.4, 2.8)
 AREA = 0.6
 """Opacity of the parts of a sum."""
 
-DEPTH = 1000.0
-"""So far below the least of the lines' largest values a logarithmic axis reaches."""
-
 SYMBOLS: Mapping[Shape, str] = {
     "up": "triangle-up",
     "down": "triangle-down",
@@ -59,19 +61,6 @@ SYMBOLS: Mapping[Shape, str] = {
     "diamond": "diamond",
 }
 """The shapes of marks in plotly.js's words."""
-
-
-@dataclass(frozen=True, slots=True)
-class Span:
-    """From where to where a horizontal axis goes: in [s], or in rows."""
-
-    start: float
-    end: float
-
-    @property
-    def length(self) -> float:
-        """How long it is."""
-        return self.end - self.start
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,72 +95,17 @@ class Names:
         return f"<extra>{label(panel)} {label(name)}</extra>" if name in self.often else ""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Curve:
-    """A column of a line.
-
-    Attributes:
-        line: The line.
-        name: Of the column.
-        colour: As #rrggbb.
-        t_ns: Times in [ns], shape (n,); None without.
-        x: Times in [s] or row numbers, shape (n,).
-        raw: Values in the unit of the panel, shape (n,).
-        values: In the unit that is shown, shape (n,).
-    """
-
-    line: Line
-    name: str
-    colour: str
-    t_ns: IntArray | None
-    x: FloatArray
-    raw: FloatArray
-    values: FloatArray
-
-
-def axis_of(panel: Panel) -> str:
-    """Return what the horizontal axis of a panel measures: t, row, or the title of a quantity."""
-    if panel.over is not None:
-        return panel.over.title
-    timed = panel.t_ns is not None or any(one.t_ns is not None for one in panel.lines)
-    return "t" if timed else "row"
-
-
-def across(panel: Panel, one: Line) -> FloatArray:
-    """Return the times of a line in [s] or its row numbers from 1, shape (n,)."""
-    t_ns = _times(panel, one)
-    return np.arange(1.0, len(one.values) + 1.0) if t_ns is None else seconds(t_ns[:])
-
-
-def place_of(panel: Panel, at: int) -> float:
-    """Return where a time in [ns], or a row from 0, stands on the horizontal axis of a panel."""
-    if panel.over is not None:
-        return float(panel.over.values[at])
-    return at / 1e9 if axis_of(panel) == "t" else at + 1.0
-
-
-def _times(panel: Panel, one: Line) -> IntArray | None:
-    return panel.t_ns if one.t_ns is None else one.t_ns
-
-
-def _shown_unit(panel: Panel) -> tuple[str, float]:
-    """Return the unit that a panel is drawn in, and how many of it one of its own is."""
-    if panel.small and panel.unit in text.SHOWN:
-        return text.SHOWN[panel.unit]
-    unit, factor = text.display_unit(panel.unit, panel.display_unit)
-    return unit.replace("/s2", "/s²").replace("/s3", "/s³"), factor
-
-
 def drawn_panel(panel: Panel, number: int, names: Names, span: Span) -> spec.Panel:
     """Return a panel of a figure, the first of number 0, for `stacked`: its axis spans what it is given."""
-    unit, factor = _shown_unit(panel)
-    curves = list(_curves(panel, factor))
+    unit, factor = shown_unit(panel)
+    curves = list(curves_of(panel, factor))
     title = f"{label(panel.title)} [{label(unit) if unit not in ('', '1') else '-'}]"
     look: Spec = {"rangemode": "normal" if panel.signed else "tozero"}
     if panel.logarithmic:
         joined = panel.over is not None and panel.over.joined
-        look = _logarithmic(curves, (panel.limit or 0.0) * factor, whole=joined)
-    elif all(one.line.steps and np.isin(one.raw[np.isfinite(one.raw)], (0.0, 1.0)).all() for one in curves):
+        ends = logarithmic_ends(curves, (panel.limit or 0.0) * factor, whole=joined)
+        look = {"type": "log", "range": np.log10(ends).tolist()}
+    elif is_switch(curves):
         look = {"range": [-0.1, 1.1], "tickvals": [0, 1]}  # yes or no
     if panel.over is not None:
         return _over(panel, panel.over, curves, spec.Panel(title, (), (), panel.share, look), names, number)
@@ -184,18 +118,7 @@ def drawn_panel(panel: Panel, number: int, names: Names, span: Span) -> spec.Pan
     return spec.Panel(title, traces, _shapes(panel, curves, span, unit, factor), panel.share, look)
 
 
-def _curves(panel: Panel, factor: float) -> Iterator[_Curve]:
-    for one in panel.lines:
-        t_ns, x = _times(panel, one), across(panel, one)
-        columns = np.asarray(one.values[:], dtype=np.float64)
-        columns = columns if columns.ndim == 2 else columns[:, np.newaxis]
-        with np.errstate(over="ignore"):
-            scaled = factor * columns
-        for name, colour, raw, values in zip(one.names, one.colours, columns.T, scaled.T, strict=True):
-            yield _Curve(one, name, colour, t_ns, x, raw, values)
-
-
-def _lines(panel: Panel, curves: Sequence[_Curve], number: int, names: Names, unit: str) -> Iterator[Spec]:
+def _lines(panel: Panel, curves: Sequence[Curve], number: int, names: Names, unit: str) -> Iterator[Spec]:
     """Yield each curve as a line, or as points where nothing joins the rows."""
     seen: Counter[str] = Counter()  # colours repeat, dashes do not
     for one in curves:
@@ -211,7 +134,7 @@ def _lines(panel: Panel, curves: Sequence[_Curve], number: int, names: Names, un
         yield trace
 
 
-def _areas(panel: Panel, curves: Sequence[_Curve], number: int, names: Names, unit: str) -> Iterator[Spec]:
+def _areas(panel: Panel, curves: Sequence[Curve], number: int, names: Names, unit: str) -> Iterator[Spec]:
     """Yield the parts of a sum as areas from 0 upwards and from 0 downwards, at the same rows in all.
 
     What the pointer tells is the part, not the height of the stack.
@@ -246,7 +169,7 @@ def _areas(panel: Panel, curves: Sequence[_Curve], number: int, names: Names, un
             }  # fmt: skip
 
 
-def _peaks(panel: Panel, curves: Sequence[_Curve]) -> Iterator[Spec]:
+def _peaks(panel: Panel, curves: Sequence[Curve]) -> Iterator[Spec]:
     """Yield a diamond at each row that is marked as the largest, on each curve that was measured."""
     rows = np.asarray(panel.peaks, dtype=np.int64)
     for one in curves:
@@ -274,7 +197,7 @@ def _marks(panel: Panel, factor: float, names: Names, number: int) -> Iterator[S
         )
 
 
-def _shapes(panel: Panel, curves: Sequence[_Curve], span: Span, unit: str, factor: float) -> list[Spec]:
+def _shapes(panel: Panel, curves: Sequence[Curve], span: Span, unit: str, factor: float) -> list[Spec]:
     """Return the limit as a band between dashed lines, and what is tinted: out of it, or doubtful."""
     found: list[Spec] = []
     if panel.tinted is not None:
@@ -285,33 +208,20 @@ def _shapes(panel: Panel, curves: Sequence[_Curve], span: Span, unit: str, facto
     words = f"{'±' if panel.signed else ''}{high:.6g} {label(unit)}".rstrip()
     if panel.logarithmic:  # there is no band around 0, and no low end
         return [*found, level(high, words)]
-    measured = [one for one in curves if not one.line.dashed]
-    if measured:
-        out = np.unique(np.concatenate([one.x[np.abs(one.raw) > panel.limit] for one in measured]))
-        found += shaded(out, np.ones(len(out), dtype=np.bool_), span.length)
+    out = out_of_limit(panel, curves)
+    found += shaded(out, np.ones(len(out), dtype=np.bool_), span.length)
     if panel.signed:
         return [band(-high, high), *found, level(high, words), level(-high)]
+    measured = (one for one in curves if not one.line.dashed)
     largest = max((float(np.nanmax(np.abs(one.raw), initial=0.0)) for one in measured), default=0.0)
     return [band(0.0, high), *found, level(high, words, above=largest > LOW * panel.limit)]
 
 
-def _logarithmic(curves: Sequence[_Curve], limit: float, *, whole: bool) -> Spec:
-    """Return a logarithmic axis that reaches the limit, and all values, or far below the largest."""
-    every = np.concatenate([[limit], *(one.values for one in curves)])
-    if whole and (every > 0.0).any():
-        every = every[every > 0.0]
-        return {"type": "log", "range": np.log10([every.min() / 1.5, 1.5 * every.max()]).tolist()}
-    most = np.array([np.nanmax(np.abs(one.values), initial=0.0) for one in curves])
-    most = most[most > 0.0] if (most > 0.0).any() else np.ones(1)
-    top = max(float(most.max()), limit)
-    return {"type": "log", "range": np.log10([most.min() / DEPTH, 1.5 * top]).tolist()}
-
-
 def _over(
-    panel: Panel, over: Over, curves: Sequence[_Curve], empty: spec.Panel, names: Names, number: int
+    panel: Panel, over: Over, curves: Sequence[Curve], empty: spec.Panel, names: Names, number: int
 ) -> spec.Panel:
     """Return a panel over a quantity: clouds of points, or lines with marks and what is allowed."""
-    unit, factor = _shown_unit(panel)
+    unit, factor = shown_unit(panel)
     if not over.joined:
         return replace(empty, traces=list(_clouds(curves, over, panel.peaks, unit)))
     traces = [*_joined(curves, over, unit, names, number), *_marks(panel, factor, names, number)]
@@ -322,7 +232,7 @@ def _over(
     return replace(empty, traces=traces, shapes=[level(high, words, above=True)])
 
 
-def _joined(curves: Sequence[_Curve], over: Over, unit: str, names: Names, number: int) -> Iterator[Spec]:
+def _joined(curves: Sequence[Curve], over: Over, unit: str, names: Names, number: int) -> Iterator[Spec]:
     """Yield each curve over a quantity as a line through its known rows, or as points."""
     quantity = np.asarray(over.values[:], dtype=np.float64)
     for one in curves:
@@ -343,20 +253,18 @@ def _joined(curves: Sequence[_Curve], over: Over, unit: str, names: Names, numbe
         } | names.entry(one.name, number)
 
 
-def _mode(curve: _Curve, rows: int) -> str:
+def _mode(curve: Curve, rows: int) -> str:
     """Return whether a curve over a quantity is points, or a line, its rows as points if they are few."""
     if curve.line.points:
         return "markers"
     return "lines" if curve.line.dashed or rows > FEW else "lines+markers"
 
 
-def _clouds(curves: Sequence[_Curve], over: Over, peaks: Sequence[int], unit: str) -> Iterator[Spec]:
+def _clouds(curves: Sequence[Curve], over: Over, peaks: Sequence[int], unit: str) -> Iterator[Spec]:
     """Yield each curve over a quantity, as points spread evenly over the rows; no peak is missing."""
     quantity = np.asarray(over.values[:], dtype=np.float64)
     for one in curves:
-        known = np.flatnonzero(np.isfinite(quantity) & np.isfinite(one.values))
-        evenly = np.linspace(0, len(known) - 1, min(DOTS, len(known))).astype(np.int64)
-        kept = np.union1d(known[np.unique(evenly)], np.intersect1d(peaks, known)).astype(np.int64)
+        kept = cloud_rows(one, over, peaks)
         x, y = quantity[kept], one.values[kept]
         digits = [pointer_digits(*pair) for pair in ((over.unit, x), (unit, y))]
         row = "row %{customdata}" if one.t_ns is None else "t %{customdata:.6~f} s"

@@ -8,13 +8,13 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.decimate import decimate
+from urmpipe_pipeline.decimate import decimate, points_for
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.palette import VALUE_SCALE
 from urmpipe_pipeline.presentation.figure import SpaceFigure
 from urmpipe_pipeline.presentation.scene import Arrows, Path, Sheets, Solid, Spot
 from urmpipe_pipeline.report.spec import Figure, Spec, base_layout, space_axis, typed
-from urmpipe_pipeline.report.traces import label, points_for
+from urmpipe_pipeline.report.traces import label
 
 CAMERA = {"eye": {"x": 1.5, "y": -1.5, "z": 0.86}, "center": {"x": 0.0, "y": 0.0, "z": -0.2}}
 """Looked at from the front right, a little from above; in lengths of the scene."""

@@ -13,6 +13,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.messages import inert
 from urmpipe_pipeline import text
 from urmpipe_pipeline.decimate import POINTS, decimate
+from urmpipe_pipeline.presentation.curves import stretches
 from urmpipe_pipeline.report.spec import BAND, FAULT, INK, MUTED, Spec, typed
 from urmpipe_pipeline.text import DIGITS
 
@@ -30,15 +31,6 @@ SMALL = 1e-3
 
 EXPONENT = ".3e"
 """Exponent form with four digits."""
-
-UNEVEN = 8.0
-"""Longest over shortest time between rows: from there on a bucket of time hides more than a pixel should."""
-
-NEAR = 1 / 200
-"""Stretches of time nearer to each other than this share of the whole are shaded as one."""
-
-THINNEST = 1 / 1000
-"""What is shaded is at least this share of the whole wide, so that a single sample is seen."""
 
 
 def label(said: str) -> str:
@@ -82,17 +74,6 @@ def line(
         "hovertemplate": f"%{{y:{told(shown, digits)}}} {label(unit)}".rstrip(),
         "showlegend": False,
     } | settings
-
-
-def points_for(t_ns: IntArray | None) -> int:
-    """Return how many points a line may have: twice as many where it leaves its course within a few rows.
-
-    Its rows are at times in [ns], shape (n,); None without times.
-    """
-    if t_ns is None or len(t_ns) < 3:
-        return POINTS
-    between = np.diff(t_ns[:])
-    return 2 * POINTS if between.max() > UNEVEN * between.min() else POINTS
 
 
 def pointer_digits(unit: str, values: FloatArray) -> int:
@@ -174,16 +155,9 @@ def shaded(t: FloatArray, where: NDArray[np.bool_], duration: float, colour: str
 
     What is nearer than a two-hundredth of the time axis, its duration in [s], is drawn as one.
     """
-    at = t[where]
-    if not len(at):
-        return []
-    apart = np.flatnonzero(np.diff(at) > NEAR * duration)
-    starts, ends = at[np.append(0, apart + 1)], at[np.append(apart, len(at) - 1)]
-    wider = np.maximum(THINNEST * duration - (ends - starts), 0.0) / 2.0
     look = {"type": "rect", "fillcolor": colour, "opacity": 0.13, "line": {"width": 0}, "layer": "below"}
     height = {"xref": "x", "yref": " domain", "y0": 0, "y1": 1}
-    spans = zip((starts - wider).tolist(), (ends + wider).tolist(), strict=True)
-    return [look | height | {"x0": start, "x1": end} for start, end in spans]
+    return [look | height | {"x0": start, "x1": end} for start, end in stretches(t, where, duration)]
 
 
 def instant(at: float, words: str, start: float, end: float) -> Spec:

@@ -25,7 +25,7 @@ from urmpipe_pipeline.presentation.figure import (
 from urmpipe_pipeline.presentation.scene import Arrows, Path, Sheets, Spot
 from urmpipe_pipeline.presentation.section import Block, Fact, Presentation, Section
 from urmpipe_pipeline.report import spec
-from urmpipe_pipeline.report.figures import drawn_figures, span_of
+from urmpipe_pipeline.report.figures import drawn_figures, time_span
 from urmpipe_pipeline.report.page import Page, lay_out
 from urmpipe_pipeline.report.render import data_address
 from urmpipe_pipeline.report.space import drawn_space
@@ -57,7 +57,7 @@ def figure(*panels: Panel, **more: Any) -> Figure:
 
 
 def drawn(one: Figure) -> spec.Figure:
-    (found,) = drawn_figures(one, span_of([one]))
+    (found,) = drawn_figures(one, time_span([one]))
     go.Figure(found.spec)  # raises on an unknown word or a wrong value
     return found
 
@@ -269,7 +269,7 @@ def test_rows_without_times_are_points_that_nothing_joins() -> None:
 
 def test_panels_of_other_axes_become_figures_of_their_own() -> None:
     both = figure(panel(WAVE), panel(WAVE, over=Over(T, "‖v‖", "m/s")))
-    first, second = drawn_figures(both, span_of([both]))
+    first, second = drawn_figures(both, time_span([both]))
     assert (first.title, first.over) == ("Title", "t")
     assert (second.title, second.over) == ("Title over ‖v‖", "‖v‖")
 
