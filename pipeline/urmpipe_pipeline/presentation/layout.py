@@ -1,0 +1,124 @@
+"""Decisions about a panel that every renderer shares: an axis of two scales, and a plot a pair of lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.presentation.figure import Computed, Line, Panel
+
+FAINT = 12.0
+"""Largest value over the limit from which on a linear axis leaves the tolerance too few pixels."""
+
+BAND_SHARE = 0.3
+"""Share of an axis of two scales that the tolerance takes."""
+
+MANY = 3
+"""So many set points with their answers are plotted apart, a pair a plot."""
+
+STEPS = (1.0, 2.0, 5.0)
+"""Distances between ticks, times a power of ten."""
+
+CLEAR = 0.2
+"""Share of an axis of two scales between the tick at the limit and the next one: their words do not meet."""
+
+
+@dataclass(frozen=True, slots=True)
+class TwoScales:
+    """An axis with one linear scale up to the limit and a smaller one beyond it; it grows everywhere.
+
+    The height above 0 is `BAND_SHARE` at the limit and 1 at `top`; below 0 it is the negative of that.
+
+    Attributes:
+        limit: Largest absolute value allowed, in any unit, above 0.
+        top: Largest absolute value drawn, in the same unit, above `limit`.
+    """
+
+    limit: float
+    top: float
+
+    def height(self, values: FloatArray) -> FloatArray:
+        """Return where values of the limit's unit stand on the axis, in any shape; NaN stays NaN."""
+        sizes = np.array([0.0, self.limit, self.top])
+        return self._odd(values, sizes, np.array([0.0, BAND_SHARE, 1.0]))
+
+    def value(self, heights: FloatArray) -> FloatArray:
+        """Return the values that stand at some heights, in any shape: the inverse of `height`."""
+        sizes = np.array([0.0, self.limit, self.top])
+        return self._odd(heights, np.array([0.0, BAND_SHARE, 1.0]), sizes)
+
+    def ticks(self) -> list[float]:
+        """Return the sizes that have a tick: 0, the limit, and round values beyond it where there is room."""
+        power = 10.0 ** np.floor(np.log10(self.top / 2.0))
+        step = max(one * power for one in STEPS if one * power <= self.top / 2.0)
+        beyond = np.arange(step, 1.001 * self.top, step)
+        clear = self.height(beyond) >= BAND_SHARE + CLEAR
+        return [0.0, self.limit, *beyond[clear].tolist()]
+
+    @staticmethod
+    def _odd(values: FloatArray, known: FloatArray, shown: FloatArray) -> FloatArray:
+        """Return an odd function that is linear between known places, and goes on beyond the last."""
+        size = np.abs(values)
+        slope = (shown[2] - shown[1]) / (known[2] - known[1])
+        beyond = shown[2] + slope * (size - known[2])
+        return np.asarray(np.sign(values) * np.where(size > known[2], beyond, np.interp(size, known, shown)))
+
+
+def band_vanishes(panel: Panel) -> bool:
+    """Tell whether a linear axis would show the tolerance as a line: the lines go far beyond it."""
+    return two_scales(panel) is not None
+
+
+def two_scales(panel: Panel) -> TwoScales | None:
+    """Return the axis that shows the tolerance of a panel and all its values, in the unit of the panel.
+
+    None where a linear or the panel's logarithmic axis shows both, and where nothing is allowed or limited.
+    """
+    if not panel.limit or panel.logarithmic or panel.over is not None:
+        return None
+    largest = max((_largest(one) for one in panel.lines), default=0.0)
+    return TwoScales(panel.limit, largest) if largest > FAINT * panel.limit else None
+
+
+def small_multiples(panel: Panel) -> tuple[Panel, ...]:
+    """Return a panel for each answer with its set point, dashed; the panel itself where they are few.
+
+    Set points are the dashed columns. As many of them as answers belong together in their order; a single
+    one belongs to all. Any other number cannot be told apart: the panel stays whole.
+    """
+    wanted = [one for line in panel.lines if line.dashed for one in _columns(line)]
+    answers = [one for line in panel.lines if not line.dashed for one in _columns(line)]
+    if len(answers) < MANY or len(wanted) not in (1, len(answers)):
+        return (panel,)
+    pairs = zip(wanted * (len(answers) // len(wanted)), answers, strict=True)
+    return tuple(
+        replace(
+            panel,
+            title=answer.names[0],
+            lines=(want, answer),
+            marks=tuple(mark for mark in panel.marks if mark.name in (*want.names, *answer.names)),
+        )
+        for want, answer in pairs
+    )
+
+
+def _columns(line: Line) -> Iterator[Line]:
+    """Yield each column of a line as a line of its own; its values are read where it is drawn."""
+    for k, (name, colour) in enumerate(zip(line.names, line.colours, strict=True)):
+        values = Computed(len(line.values), partial(_column, line, k))
+        yield replace(line, values=values, names=(name,), colours=(colour,))
+
+
+def _column(line: Line, k: int) -> FloatArray:
+    values = np.asarray(line.values[:], dtype=np.float64)
+    return values if values.ndim == 1 else np.asarray(values[:, k])
+
+
+def _largest(line: Line) -> float:
+    """Return the largest absolute value of a line that is finite; 0 without one."""
+    values = np.abs(np.asarray(line.values[:], dtype=np.float64))
+    return float(np.max(values, initial=0.0, where=np.isfinite(values)))
