@@ -189,8 +189,13 @@ KINDS = {
     "figures": PATH,
     "force": NUMBERS,
     "form": _one_of("text", "c"),
-    "formats": Kind(
-        _one_or_many(lambda one: isinstance(one, str) and one in ("svg", "png")), "svg, png or a list of both"
+    "formats": Kind(_one_or_many(_is_text), "pdf, svg, png or a list of them"),
+    "figure_dpi": Kind(_is_count, "a whole number, 0 or more"),
+    "figure_font": Kind(_is_number, "a number, in pt"),
+    "figure_names": Kind(_one_or_many(_is_text), 'a title or a list of titles, such as "Deviation*"'),
+    "figure_width": Kind(
+        lambda value: _is_text(value) or _is_number(value),
+        'column, page, a text such as "85mm", or a number in m',
     ),
     "ingest.name": Kind(_is_text, "a text, not empty"),
     "ik.tolerance": Kind(_is_number, "a number, in m"),

@@ -64,6 +64,9 @@ DRAWING_HEADER = "<!-- Generator: urmpipe "
 FIGURE = re.compile(rb"\A<!-- Generator: urmpipe |\A\x89PNG.{29}.{4}tEXtSoftware\0urmpipe ", re.DOTALL)
 """How a figure of ours (SVG, PNG) tells where it comes from."""
 
+PDF_HEAD, PDF_CREATOR = b"%PDF-", b"/Creator (urmpipe "
+"""How a PDF begins, and how one of ours tells near its end where it comes from."""
+
 TARGET_ROW = "urmpipe_target_row"
 """The last column of a joint log of ours: the data row of each target. A log of anybody else has none of this
 name; a remark above the header would tell as well, but not every reader of CSV passes over it."""
@@ -82,7 +85,6 @@ FIRST_LINES = {
     "junit": JUNIT_HEADER, "drawing": DRAWING_HEADER,
 }  # fmt: skip
 _MARKS: dict[str, re.Pattern[bytes]] = {
-    "figure": FIGURE,
     **{
         kind: re.compile(rb"\A[^\n]*," + last.encode() + rb"\r?\n")
         for kind, last in (("joints", TARGET_ROW), ("plan", PATH_ROW))
@@ -91,8 +93,8 @@ _MARKS: dict[str, re.Pattern[bytes]] = {
 }
 """How the head of an output of ours matches, by kind."""
 
-HEAD = 4096
-"""The mark of an output stands within so many bytes of its start."""
+HEAD, TAIL = 4096, 65536
+"""The mark of an output stands within so many bytes of its start, that of a PDF of its end."""
 
 
 @contextmanager
@@ -127,7 +129,19 @@ def is_fmu(path: Path) -> bool:
         return False  # no archive, none with a model description, or packed in a way that zipfile cannot read
 
 
-_known: dict[OutputKind, Callable[[Path], bool]] = {"report": is_report, "fmu": is_fmu}
+def is_figure(path: Path) -> bool:
+    """Tell whether a file is a figure that urmpipe drew: an SVG or PNG by its head, a PDF by its creator."""
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+        if not head.startswith(PDF_HEAD):
+            return FIGURE.match(head) is not None
+        file.seek(max(path.stat().st_size - TAIL, 0))
+        return PDF_CREATOR in file.read()
+
+
+_known: dict[OutputKind, Callable[[Path], bool]] = {
+    "report": is_report, "fmu": is_fmu, "figure": is_figure,
+}  # fmt: skip
 
 
 def know_own(kind: OutputKind, is_ours: Callable[[Path], bool]) -> None:

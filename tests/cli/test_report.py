@@ -29,13 +29,6 @@ def recording(urmpipe: RunCommand, tmp_path: Path) -> Path:
     return path
 
 
-def test_a_format_without_a_folder_is_refused(urmpipe: RunCommand, recording: Path) -> None:
-    ran = urmpipe("report", recording, "--format", "svg")
-    assert (ran.code, ran.out) == (2, "")
-    assert "--formats: found without figures; --figures FIGURES names their folder" in ran.err
-    assert not recording.with_suffix(".html").exists()
-
-
 def test_json_lists_no_figures_where_none_were_asked_for(urmpipe: RunCommand, recording: Path) -> None:
     ran = urmpipe("report", recording, "--json")
     assert json.loads(ran.out) == {
@@ -84,19 +77,3 @@ def test_the_numbers_of_compare_stand_in_the_report_of_its_recording(
     for one in (run["angle"], *run["joints"].values()):
         for key in ("max", "rms", "mean", "std", "p95"):
             assert f">{one[key] * 180 / 3.141592653589793:.4f}<" in page
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(
-    not Path("/usr/bin/chromium").exists(), reason="no /usr/bin/chromium: apt-get install chromium"
-)
-def test_figures_are_written_as_files_and_listed(
-    urmpipe: RunCommand, recording: Path, tmp_path: Path
-) -> None:
-    pytest.importorskip("kaleido")
-    ran = urmpipe("report", recording, "--figures", "new/figures", "--format", "svg", "--json")
-    assert (ran.code, ran.err) == (0, "")
-    listed = json.loads(ran.out)["figures"]
-    assert {tmp_path / one["file"] for one in listed} == set((tmp_path / "new/figures").iterdir())
-    assert all(one["file"].endswith(".svg") and one["title"] for one in listed)
-    assert {one["part"] for one in listed} >= {"coppeliasim"}

@@ -17,8 +17,8 @@ from urmpipe_pipeline.results import present, read_recording, whole
 if TYPE_CHECKING:
     import pandas as pd
 
-    from urmpipe_pipeline.report import FigureFile
-    from urmpipe_pipeline.report.headless import FigureFormat
+    from urmpipe_pipeline.figures import FigureFile
+    from urmpipe_pipeline.figures.files import FigureFormat
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -78,7 +78,11 @@ def report(
     output: PathLike,
     *,
     figures: PathLike | None = None,
-    formats: FigureFormat | Sequence[FigureFormat] = ("svg", "png"),
+    formats: FigureFormat | Sequence[FigureFormat] = ("pdf", "png"),
+    figure_names: str | Sequence[str] = (),
+    figure_width: str | float = "page",
+    figure_font: float = 8.0,
+    figure_dpi: int = 300,
     inputs: Sequence[PathLike] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Report:
@@ -88,17 +92,29 @@ def report(
         results: Recordings (.rrd), what `ingest`, `compare`, `diagnose` and `simulate` returned, or
             one of them.
         output: The HTML file to write.
-        figures: A folder to write every figure to as a file; needs the extra `figures` and Chromium.
-        formats: svg, png or both.
+        figures: A folder to write the figures to as files; needs the extra `figures`. Drawings, such as
+            that of a simulated system, are SVG in any case.
+        formats: pdf, svg, png, or several of them.
+        figure_names: Titles of the figures to write, or patterns of them such as "Deviation*"; with the
+            heading of their part before them, such as "log-2/Deviation over time". By default all.
+        figure_width: column (88 mm), page (180 mm), a text such as "85mm" or "3.5in", or a number in [m].
+        figure_font: Size of the text in figures in [pt].
+        figure_dpi: Dots an inch of a PNG.
         inputs: Files besides the recordings that are never replaced.
         progress: Told the share that is done, 0..1.
 
     Raises:
         UrmpipeError: With everything that is wrong with the recordings or the output.
     """
-    from urmpipe_pipeline.report import FigureOptions, write_report
+    from urmpipe_pipeline.figures import FigureOptions
+    from urmpipe_pipeline.report import write_report
 
-    wanted = None if figures is None else FigureOptions(Path(figures), tuple(one_or_many(formats)))
+    def wanted(folder: PathLike) -> FigureOptions:
+        """Return which figures are written, all checked."""
+        chosen = tuple(one_or_many(formats)), tuple(one_or_many(figure_names))
+        return FigureOptions(Path(folder), *chosen, figure_width, figure_font, figure_dpi)
+
+    of_figures = None if figures is None else wanted(figures)
     given = one_or_many(results)
     refuse_others("results", given, (Result,), SHOWN)
     files = [Path(one) for one in given if isinstance(one, (str, Path))]
@@ -114,7 +130,7 @@ def report(
 
     found = for_each(read, enumerate(given, start=1))
     shown = [present(one) for one in found]
-    written = write_report(shown, Path(output), [*files, *paths(inputs)], wanted, writing)
+    written = write_report(shown, Path(output), [*files, *paths(inputs)], of_figures, writing)
     return Report(written.path, tuple(found), written.figures)
 
 

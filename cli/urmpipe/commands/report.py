@@ -3,26 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import urmpipe
 from urmpipe.options.given import options_given
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.types import OneOf
+from urmpipe.options.types import NamesType, NumberType, WholeType
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.messages import Hint
 
 if TYPE_CHECKING:
     from urmpipe.api.report import Report
-    from urmpipe_pipeline.report.headless import FigureFormat
 
-FORMATS: dict[str, tuple[FigureFormat, ...]] = {
-    "svg": ("svg",),
-    "png": ("png",),
-    "both": ("svg", "png"),
-}
+OF_FIGURES = ("formats", "figure_names", "figure_width", "figure_font", "figure_dpi")
+"""Options that mean nothing without the folder of figures."""
 
 
 @click.command(short_help="Write the HTML report of recordings.")
@@ -32,16 +28,38 @@ FORMATS: dict[str, tuple[FigureFormat, ...]] = {
     "--figures",
     metavar="DIR",
     type=click.Path(path_type=Path),
-    help="Write every figure as a file into this folder, too.",
+    help="Write the figures as files into this folder, too.",
 )
 @click.option(
     "--formats",
     "--format",
-    type=OneOf(list(FORMATS)),
-    default="both",
+    metavar="FORMATS",
+    type=NamesType(),
+    default="pdf,png",
     show_default=True,
-    help="What the files of figures are.",
+    help="Formats of figures: pdf, svg, png.",
 )
+@click.option(
+    "--figure-names",
+    metavar="TITLE",
+    multiple=True,
+    help="Write only figures of this title or pattern (repeatable).",
+)
+@click.option(
+    "--figure-width",
+    metavar="WIDTH",
+    default="page",
+    show_default=True,
+    help="column (88 mm), page (180 mm), or a length such as 85mm or 3.5in.",
+)
+@click.option(
+    "--figure-font",
+    type=NumberType("PT", "pt"),
+    default=8.0,
+    show_default=True,
+    help="Size of the text in figures in pt.",
+)
+@click.option("--figure-dpi", type=WholeType(), default=300, show_default=True, help="Dots an inch of a PNG.")
 @output_options
 @click.pass_context
 def report(
@@ -50,30 +68,32 @@ def report(
     recordings: tuple[Path, ...],
     output: Path | None,
     figures: Path | None,
-    formats: str,
     terminal: Terminal,
+    **of_figures: Any,
 ) -> int:
     """Write one self-contained HTML file about recordings that ingest, compare or simulate wrote.
 
     It needs no network: verdicts, figures, statistics, the audit of repolarizations, the drawing of a
-    simulated system, warnings and provenance are inside. --figures needs Chromium and: pip install
-    'urmpipe[figures]'.
+    simulated system, warnings and provenance are inside. --figures needs: pip install
+    'urmpipe[figures]'. Drawings that are no plots, such as that of a system, are SVG files always.
 
     \b
     Examples:
       urmpipe report log-against-path.rrd
       urmpipe report monday.rrd tuesday.rrd -o week.html
-      urmpipe report log-against-path.rrd --figures figures --format svg
+      urmpipe report log-against-path.rrd --figures figures --formats pdf,svg
+      urmpipe report compared.rrd --figures DIR --figure-names "Deviation*"
     """
-    if figures is None and options_given(ctx, "formats".__eq__):
+    without = [one for one in OF_FIGURES if options_given(ctx, one.__eq__)] if figures is None else []
+    if without:
         hint = Hint("figures", None, "names their folder")
-        raise OptionError(Finding("found without figures", parameter="formats", hints=(hint,)))
+        raise OptionError(
+            *(Finding("found without figures", parameter=one, hints=(hint,)) for one in without)
+        )
     target = output or Path(f"{recordings[0].stem}.html")
     replaces = target.is_file()
     with terminal.progress(f"Writing {target}") as progress:
-        result = urmpipe.report(
-            recordings, target, figures=figures, formats=FORMATS[formats], progress=progress
-        )
+        result = urmpipe.report(recordings, target, figures=figures, **of_figures, progress=progress)
     terminal.answer(result.to_dict, lambda: _print(result, figures, replaces))
     return 0
 

@@ -2,10 +2,9 @@
 
 Data goes one way: presentations -> `summary` (banner, cards, results side by side), `tables` (cells and
 facts), `figures` and `space` (for plotly.js as plain dicts, built on `spec` and `traces`) -> `page` (what
-stands where) -> `render` (assets/template.html.jinja) and `figure_files` (SVG, PNG, drawn by `headless`).
+stands where) -> `render` (assets/template.html.jinja).
 """
 
-from urmpipe_pipeline.report.figure_files import FigureFile, FigureOptions
 from urmpipe_pipeline.report.render import Written, render_report, write_report
 
-__all__ = ["FigureFile", "FigureOptions", "Written", "render_report", "write_report"]
+__all__ = ["Written", "render_report", "write_report"]

@@ -16,9 +16,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from urmpipe_models.messages import inert
+from urmpipe_pipeline.figures.files import FigureFile, FigureOptions, figure_stem, write_figures
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.presentation.section import Presentation
-from urmpipe_pipeline.report.figure_files import FigureFile, FigureOptions, figure_stem, write_figures
 from urmpipe_pipeline.report.page import Page, lay_out
 
 
@@ -63,19 +63,20 @@ def write_report(
         presentations: As `render_report` takes them.
         path: Where to.
         inputs: Files that must not be overwritten.
-        figures: Where the figures go, and in which formats.
+        figures: Which figures go where, in which formats, and how large.
         progress: Told the share that is done, 0..1.
 
     Raises:
-        OptionError: If there is nothing to report.
+        OptionError: If there is nothing to report, or no figure of a name.
         OutputError: If it may not be written there, or the figures cannot be drawn.
     """
-    page = lay_out(presentations)
     with guarded_output(path, inputs, kind="report") as part:
-        part.write_bytes(_render(page).encode("utf-8", "replace"))  # a file name may hold bytes of no text
+        part.write_bytes(
+            render_report(presentations).encode("utf-8", "replace")
+        )  # a file name may hold bytes of no text
         if progress and figures is None:
             progress(1.0)
-        drawn = () if figures is None else write_figures(page.figures, figures, inputs, progress)
+        drawn = () if figures is None else write_figures(presentations, figures, inputs, progress)
     return Written(path, drawn)
 
 
