@@ -21,6 +21,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.display import Shown
+from urmpipe_pipeline.presentation.result import Result
 
 if TYPE_CHECKING:
     from urmpipe.api.accuracy import accuracy as accuracy
@@ -157,7 +158,16 @@ def _page(result: Any) -> str | None:
     return notebook_page(result)
 
 
+def _draw(result: Result, title: str | None, width: str | float, font: float) -> Any:
+    """Return a figure of a result."""
+    from urmpipe_pipeline.figures.plot import plot
+    from urmpipe_pipeline.results import present, whole
+
+    return plot(present(whole(result)), title, width, font)
+
+
 Shown.page = staticmethod(_page)
+Result.draw = staticmethod(_draw)
 
 
 def __getattr__(name: str) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from html import escape
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import urmpipe
 from diagnoses import diagnosis_of
@@ -17,6 +19,7 @@ from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.chains.inertial import Inertial
 from urmpipe_models.display import Shown
 from urmpipe_pipeline.comparison.change import Absent, BaselineComparison
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 
 OTHERS = {
@@ -135,3 +138,22 @@ def test_warnings_are_counted_in_the_line_and_told_in_the_notebook(tmp_path: Pat
         run = urmpipe.ingest(log)
     assert repr(run).endswith(f", {len(run.warnings)} warning{'s' if len(run.warnings) > 1 else ''}>")
     assert all(escape(str(warning)) in run._repr_html_() for warning in run.warnings)
+
+
+def test_each_result_plots_its_main_figure_and_names_those_there_are(results: dict[str, Any]) -> None:
+    whole = replace(results["Diagnosis"], comparison=results["Comparison"])  # as urmpipe.diagnose returns it
+    plotted = [one for one in (results | {"Diagnosis": whole}).values() if isinstance(one, Result)]
+    assert len(plotted) == 8
+    for one in plotted:
+        made = one.plot(width="column", font=7.0)
+        assert isinstance(made, Figure)
+        assert made.get_figwidth() == pytest.approx(0.088 / 0.0254)
+        assert made.axes
+        with pytest.raises(urmpipe.OptionError, match=r"^title: found 'nothing such'.*, allowed: "):
+            one.plot("nothing such")
+    assert "pyplot" not in {name.partition(".")[2] for name in sys.modules if name.startswith("matplotlib.")}
+
+
+def test_a_frame_plots_itself_with_the_extra_as_docs_say(results: dict[str, Any]) -> None:
+    axes = results["Deviation"].to_frame().set_index("t").plot()
+    assert {"x", "y", "z", "norm"} <= {line.get_label() for line in axes.lines}
