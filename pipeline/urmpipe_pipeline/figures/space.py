@@ -143,7 +143,7 @@ def _fitted(made: Sheet, axes: Axes3D) -> tuple[Bbox, Bbox]:
         box = _extent(made, axes)
         grown = min(room.width / box.width, room.height / box.height)
         middle = np.add(square.p0, square.p1) / 2.0
-        away = made.bbox.size / 2.0 - middle - grown * (np.add(box.p0, box.p1) / 2.0 - middle)
+        away = np.array(made.bbox.size) / 2.0 - middle - grown * (np.add(box.p0, box.p1) / 2.0 - middle)
         half = grown * square.width / 2.0
         square = Bbox([middle + away - half, middle + away + half])
     axes.set_position(square.transformed(made.transFigure.inverted()))

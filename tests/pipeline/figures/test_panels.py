@@ -75,11 +75,8 @@ def test_a_line_keeps_its_peaks_and_is_shown_in_mm() -> None:
     np.testing.assert_array_equal(y, 1e3 * values[np.searchsorted(T, x)])
     assert (line.get_color(), axes.get_ylabel(), axes.get_xlabel()) == (RED, "Δx in mm", "t in s")
     assert axes.get_xlim() == (T[0], T[-1])
-    assert (peak.get_marker(), [*peak.get_xdata()], [*peak.get_ydata()]) == (
-        "D",
-        [T[2000]],
-        [1e3 * WAVE[2000]],
-    )
+    assert peak.get_marker() == "D"
+    assert points(peak) == [(T[2000], 1e3 * WAVE[2000])]
 
 
 def test_a_limit_is_a_band_and_rows_out_of_it_are_tinted() -> None:
