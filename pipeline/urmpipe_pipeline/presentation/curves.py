@@ -175,7 +175,7 @@ def stretches(t: FloatArray, where: BoolArray, duration: float) -> list[tuple[fl
 
 
 def cloud_rows(curve: Curve, over: Over, peaks: Sequence[int]) -> IntArray:
-    """Return the rows [-] of a curve over a quantity that are drawn, shape (n,): spread evenly, with all peaks."""
+    """Return the rows of a curve over a quantity to draw, shape (n,): spread evenly, with all peaks."""
     known = np.flatnonzero(np.isfinite(over.values[:]) & np.isfinite(curve.values))
     evenly = np.linspace(0, len(known) - 1, min(DOTS, len(known))).astype(np.int64)
     return np.union1d(known[np.unique(evenly)], np.intersect1d(peaks, known)).astype(np.int64)
