@@ -159,19 +159,18 @@ def test_each_ghost_is_drawn_where_its_joints_put_it_and_gone_elsewhere(
 def test_the_arm_is_gone_where_a_target_has_no_solution(make_solved: MakeSolved, tmp_path: Path) -> None:
     path = write_recording(make_solved(), tmp_path / "solved.rrd")
     expected = dict.fromkeys((*range(5), *range(9, 40)), 1) | {5: 0}
-    for entity, name in (
-        ("robot/joints", "Points3D:positions"),
-        ("robot/links", "LineStrips3D:strips"),
-        ("point/targets", "Points3D:positions"),
-    ):
-        found = drawn(path, entity, name, timed=True)
+    for entity in ("robot/tip", "point/targets"):
+        found = drawn(path, entity, "Points3D:positions", timed=True)
         assert {row: min(len(values), 1) for row, values in found.items()} == expected
 
 
+@pytest.mark.parametrize("own", [True, False])
 def test_the_shapes_of_the_arm_are_too_small_to_be_seen_where_it_is_gone(
-    make_solved: MakeSolved, shapes: Path, tmp_path: Path
+    own: bool, make_solved: MakeSolved, shapes: Path, tmp_path: Path
 ) -> None:
-    path = write_recording(make_solved(robot=read_urdf(shapes)), tmp_path / "solved.rrd")
+    robot = read_urdf(shapes)
+    robot = robot if own else replace(robot, visuals=())
+    path = write_recording(make_solved(robot=robot), tmp_path / "solved.rrd")
     root = "/".join(
         next(
             chunk.entity_path for chunk in RrdReader(path).store().stream() if "turn1" in chunk.entity_path

@@ -16,20 +16,22 @@ from toys import STEP_NS, eye_of, recorded, shown, toy
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.chains.visual import Sphere, Visual
+from urmpipe_models.chains.solids import solids_of
+from urmpipe_models.chains.visual import Box, Mesh, Sphere, Visual
 from urmpipe_models.dynamics.over_log import mass_centres_over_log
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_models.orientation import quaternions
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.transform import from_offset
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import JOINT_COLOURS, REFERENCE_COLOUR, run_colour
-from urmpipe_pipeline.presentation.scene import Balls, Scene, Spot
+from urmpipe_pipeline.presentation.scene import ArmMark, Balls, Scene, Spot
 from urmpipe_pipeline.presentation.scene import Path as Way
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW, FILLED, WIDE
 from urmpipe_pipeline.recording.views.geometry import drawn_arm, drawn_path, extent
-from urmpipe_pipeline.recording.views.shapes import SEEN_THROUGH, bodies_over_log, lacks_shapes
+from urmpipe_pipeline.recording.views.shapes import SEEN_THROUGH, bodies_over_log, own_shapes
 from urmpipe_pipeline.recording.views.tracks import DASHES, LEAST_DASH, MOST, POSE_PERIOD
 from urmpipe_pipeline.results import present, read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
@@ -244,7 +246,7 @@ def test_meshes_are_in_the_recording_and_not_in_its_metadata(
     assert told["shape"] == {"$is": "Mesh", "file": str(mesh), "scale": [1.0, 1.0, 1.0]}
 
 
-def test_an_arm_read_back_looks_as_it_did_and_without_its_meshes_has_lines(
+def test_an_arm_read_back_looks_as_it_did_and_a_solid_stands_for_a_mesh_that_is_gone(
     make_run: MakeRun, shapes: Path, tmp_path: Path
 ) -> None:
     robot = read_urdf(shapes)
@@ -256,32 +258,83 @@ def test_an_arm_read_back_looks_as_it_did_and_without_its_meshes_has_lines(
     assert below(again, "robot") == below(path, "robot")
     (shapes.parent / "meshes" / "bar.stl").unlink()
     bare = write_recording(back, tmp_path / "bare.rrd")
-    assert below(bare, "robot") == {
-        *(name for name in below(path, "robot") if not name.startswith("joint/turn3")),
-        "links",
+    assert below(bare, "robot") == {*below(path, "robot"), "joint/turn3/visual\\ 2"}
+    joint, link = (f"robot/joint/turn3/visual\\ {k}" for k in (1, 2))
+    assert column(bare, joint, "Cylinders3D:lengths").shape == (1, 1)
+    assert column(bare, link, "Capsules3D:lengths").tolist() == [[pytest.approx(0.2)]]
+
+
+def test_an_arm_that_shows_nothing_is_drawn_in_solids_that_its_frames_move(
+    make_run: MakeRun, tmp_path: Path
+) -> None:
+    run = make_run(rows=200)
+    path = write_recording(run, tmp_path / "run.rrd")
+    assert run.robot is not None
+    solids = solids_of(run.robot)
+    carriers = ["base", *(f"joint/{name}" for name in run.robot.coordinates)]
+    on = [sum(one.joint == joint for one in solids) for joint in (None, *run.robot.coordinates)]
+    shapes = {
+        f"{at}/visual\\ {k}" for at, count in zip(carriers, on, strict=True) for k in range(1, count + 1)
     }
+    assert sum(on) == len(solids) == len(shapes)
+    assert below(path, "robot") == {*carriers, *shapes, "joint/phi6/tool", "tip"}
+    drawn = np.searchsorted(run.t_ns, times_of(path, f"{SCENE}/robot/joint/phi4"))
+    position, _ = frames_over_log(run.robot, run.q[drawn])
+    moved = column(path, "robot/joint/phi4", "Transform3D:translation")[:, 0]
+    np.testing.assert_allclose(moved, position[:, 4], atol=1e-6)  # single precision
+    for shape in shapes:
+        assert column(path, f"robot/{shape}", "Transform3D:translation").shape == (
+            1,
+            1,
+            3,
+        )  # once, at all times
 
 
-def test_lines_stand_for_links_without_shapes(make_run: MakeRun, shapes: Path) -> None:
-    for robot, count in ((None, 0), (read_urdf(shapes), 7)):
-        arm = drawn_arm(scene_of(make_run(rows=5, robot=robot)).arms[0])
-        assert arm is not None
-        assert (len(arm.bodies), lacks_shapes(arm.chain, arm.bodies)) == (count, not count)
+def test_solids_of_joints_have_their_colours_and_the_tool_its_axes(make_run: MakeRun, tmp_path: Path) -> None:
+    run = make_run(rows=20)
+    assert run.robot is not None
+    tool = from_offset([0.01, 0.02, 0.1, 0.3, 0.2, 0.1])
+    robot = run.robot.placed(tool=tool)
+    path = write_recording(replace(run, robot=robot), tmp_path / "run.rrd")
+    for name, colour in zip(robot.coordinates, JOINT_COLOURS, strict=False):
+        (found,) = column(path, f"robot/joint/{name}/visual\\ 1", "Cylinders3D:colors").tolist()
+        assert found == [int(colour[1:], 16) << 8 | 0xFF]
+    effector = robot.joints[-1].origin @ robot.tip @ tool
+    strips = np.array(static(path, f"{SCENE}/robot/joint/phi6/tool", "LineStrips3D:strips"))
+    np.testing.assert_allclose(strips[:, 0], np.tile(effector.translation, (3, 1)), atol=1e-6)
+    axes = (strips[:, 1] - strips[:, 0]).T
+    np.testing.assert_allclose(axes / np.linalg.norm(axes, axis=0), effector.rotation, atol=1e-5)
 
 
-def test_what_is_fixed_to_a_link_counts_as_the_link() -> None:
+def test_own_shapes_win_and_only_moving_links_without_any_get_solids() -> None:
+    """What is fixed to a link counts as the link."""
     joints = (Joint("mount", "fixed"), Joint("a"), Joint("plate", "fixed"), Joint("b"))
     q = np.zeros((1, 2))
 
-    def bare(*carriers: str | None) -> bool:
-        visuals = tuple(Visual(carrier, Sphere(0.1)) for carrier in carriers)
-        robot = Chain("arm", joints, visuals=visuals)
-        return lacks_shapes(robot, bodies_over_log(robot, q))
+    def added(*carriers: str | None) -> set[str | None]:
+        own = tuple(Visual(carrier, Sphere(0.1)) for carrier in carriers)
+        robot = Chain("arm", joints, visuals=own)
+        bodies = bodies_over_log(robot, q, {})
+        assert [one for body in bodies for one in body.visuals if one in own] == own_shapes(robot)
+        return {body.joint for body in bodies if set(body.visuals) - set(own)}
 
-    assert bare()
-    assert bare(None, "mount", "b")
-    assert not bare("a", "b")
-    assert not bare("plate", "b")
+    assert added() == {None, "a", "b"}
+    assert added(None, "mount", "b") == {"a"}
+    assert added("a", "b") == added("plate", "b") == set()
+
+
+def test_a_mark_is_seen_around_the_solid_that_it_marks(make_run: MakeRun) -> None:
+    arm = drawn_arm(scene_of(make_run(rows=5)).arms[0])
+    assert arm is not None
+    for k, joint in enumerate(arm.chain.coordinates, start=1):
+        housing = solids_of(arm.chain)
+        radii = [
+            one.shape.radius
+            for one in housing
+            if one.joint == joint and not isinstance(one.shape, (Box, Mesh))
+        ]
+        assert arm.thickness(ArmMark(k, "", "#000000")) == max(radii) > 0.02
+    assert arm.thickness(ArmMark(7, "", "#000000")) == 0.0  # the effector, which is fixed
 
 
 # --- masses ----------------------------------------------------------------------------------------
@@ -307,7 +360,7 @@ def test_mass_centres_are_dots_as_large_as_balls_that_move_with_the_arm(
 
 def test_an_arm_without_masses_has_no_dots(make_run: MakeRun, tmp_path: Path) -> None:
     path = write_recording(make_run(rows=20), tmp_path / "run.rrd")
-    assert below(path, "robot") == {"joints", "links"}
+    assert "masses" not in below(path, "robot")
 
 
 def test_links_are_seen_through_where_masses_are_in_them(

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.visual import Box, Mesh
 from urmpipe_models.dynamics.over_log import mass_centres_over_log
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_models.orientation import matrices
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, rgb
 from urmpipe_pipeline.presentation.scene import Arm, ArmMark, Arrows, Balls, Path, Scene, Solid, Targets
 from urmpipe_pipeline.recording.views.label_places import name_places, placed_names
-from urmpipe_pipeline.recording.views.shapes import Body, bodies_over_log
+from urmpipe_pipeline.recording.views.shapes import Body, bodies_over_log, opaque, own_shapes
 from urmpipe_pipeline.recording.views.tracks import (
     MOST,
     beginnings,
@@ -66,7 +67,8 @@ class DrawnArm:
         moving: When.
         skeleton: Base, p1..pn of each pose in [m], shape (m, n + 1, 3).
         colours: One a point: a joint's own, or the reference's where nothing moves.
-        bodies: Its links as they look; none where that is not known.
+        bodies: Its links as they look.
+        shows_joints: True if all of them are solids made from its geometry, which have the joints' colours.
         marks: Words at its points.
         masses: The centres of its masses in each pose in [m], shape (m, inertials, 3); none where they are
             not drawn.
@@ -77,6 +79,7 @@ class DrawnArm:
     skeleton: FloatArray
     colours: tuple[str, ...]
     bodies: tuple[Body, ...]
+    shows_joints: bool
     marks: tuple[ArmMark, ...] = ()
     masses: FloatArray = field(default_factory=lambda: np.empty((0, 0, 3)))
 
@@ -84,6 +87,12 @@ class DrawnArm:
         """Return where a mark is in each pose in [m], shape (m, 3)."""
         end = self.skeleton[:, mark.point]
         return (end + self.skeleton[:, mark.point - 1]) / 2.0 if mark.segment else end
+
+    def thickness(self, mark: ArmMark) -> float:
+        """Return the largest radius of the round shapes on the link that ends at a mark in [m], 0 of none."""
+        carrier = (None, *(joint.name for joint in self.chain.joints))[mark.point]
+        shapes = [one.shape for body in self.bodies if body.joint == carrier for one in body.visuals]
+        return max((one.radius for one in shapes if not isinstance(one, (Box, Mesh))), default=0.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,8 +176,10 @@ def drawn_arm(arm: Arm) -> DrawnArm | None:
     colours = _point_colours(arm.chain, arm.colour)
     skeleton = points_over_log(arm.chain, poses)
     masses = mass_centres_over_log(arm.chain, poses) if arm.masses else np.empty((len(poses), 0, 3))
-    bodies = bodies_over_log(arm.chain, poses)
-    return DrawnArm(arm.chain, moving, skeleton, colours, bodies, arm.marks, masses)
+    names = (joint.name for joint in arm.chain.joints)
+    bodies = bodies_over_log(arm.chain, poses, dict(zip(names, map(opaque, colours), strict=False)))
+    solid = not own_shapes(arm.chain)
+    return DrawnArm(arm.chain, moving, skeleton, colours, bodies, solid, arm.marks, masses)
 
 
 def drawn_ghosts(arms: Sequence[Arm]) -> tuple[DrawnGhost, ...]:

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.transform import product
 from urmpipe_pipeline.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
     MASS_COLOUR,
-    NEUTRAL_COLOUR,
     REFERENCE_COLOUR,
     rgb,
     value_colours,
@@ -37,7 +38,7 @@ from urmpipe_pipeline.recording.views.geometry import (
     extent,
     opens_row,
 )
-from urmpipe_pipeline.recording.views.shapes import draw_body, hide_body, lacks_shapes
+from urmpipe_pipeline.recording.views.shapes import carrier_path, draw_body, hide_body
 from urmpipe_pipeline.recording.views.solids import draw_solids
 from urmpipe_pipeline.text import encodable
 
@@ -50,14 +51,14 @@ ASKED, DONE, THREAD = 0.0065, 0.0035, 0.002
 FRAME_LENGTH, FRAME, TARGET, MISSED = 0.09, 0.004, 0.012, 0.02
 """Sizes in the 3D view, as shares of the radius of everything in it."""
 
+AROUND = 1.2
+"""Radius of a marked place in radii of the thickest solid there, at least: a mark inside it is not seen."""
+
 THIN = 0.5
 """Thickness of every second ghost beside the others."""
 
 OPACITY = 90
 """Of balls and the bones of a ghost, of 255: seven, one in front of the other, let the arm itself through."""
-
-STRIPS = 256
-"""Poses of the skeleton sent at a time: decoding a chunk of strips takes time by the square of its rows."""
 
 LABELLED = 8
 """Reasons that are written beside the targets missed; of more each is told where its point is selected."""
@@ -97,7 +98,8 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
     for number, label in enumerate(labels):
         _draw_label(stream, label, shown_path("scene", "label", str(number)))
     if arm is not None:
-        _draw_arm(stream, arm, size)
+        inside = arm.masses.size > 0 or (arm.shows_joints and len(ghosts) > 0)
+        _draw_arm(stream, arm, size, seen_through=inside)
     hidden = draw_solids(stream, scene.solids, THREAD * size)
     return _view(scene.title, points, hidden)
 
@@ -134,22 +136,22 @@ def _send_gone(stream: RecordingStream, entity: str, moving: Moving, columns: Co
         stream.send_columns(entity, times_at(moving.t_ns, moving.gone), parts)
 
 
-def _draw_arm(stream: RecordingStream, arm: DrawnArm, size: float) -> None:
-    """Draw the links, as they look or as lines, and a ball at each joint in its colour."""
+def _draw_arm(stream: RecordingStream, arm: DrawnArm, size: float, *, seen_through: bool) -> None:
+    """Draw the links, and a ball at each joint in its colour, or at the tip alone where the joints show."""
     import rerun as rr
 
-    moving, entity = arm.moving, shown_path("scene", "robot", "joints")
+    moving, entity = arm.moving, shown_path("scene", "robot", "tip" if arm.shows_joints else "joints")
     for body in arm.bodies:
-        draw_body(stream, body, times_at(moving.t_ns, moving.rows), seen_through=arm.masses.size > 0)
+        draw_body(stream, body, times_at(moving.t_ns, moving.rows), seen_through=seen_through)
         if len(moving.gone):
             hide_body(stream, body, times_at(moving.t_ns, moving.gone), len(moving.gone))
-    skeleton = arm.skeleton.astype(np.float32)
-    if lacks_shapes(arm.chain, arm.bodies):
-        _draw_links(stream, moving, skeleton, size)
-    colours = [rgb(colour) for colour in arm.colours]
+    if arm.shows_joints:
+        _draw_tool(stream, arm.chain, size)
+    balls = slice(-1, None) if arm.shows_joints else slice(None)
+    places, colours = arm.skeleton[:, balls].astype(np.float32), [rgb(one) for one in arm.colours[balls]]
     stream.log(entity, rr.Points3D.from_fields(colors=colours, radii=[JOINT * size]), static=True)
-    columns = rr.Points3D.columns(positions=skeleton.reshape(-1, 3))
-    _send(stream, entity, moving, columns, skeleton.shape[1])
+    columns = rr.Points3D.columns(positions=places.reshape(-1, 3))
+    _send(stream, entity, moving, columns, places.shape[1])
     _send_gone(stream, entity, moving, rr.Points3D.columns(positions=[]))
     if arm.masses.size:
         _draw_masses(stream, arm, size)
@@ -175,7 +177,8 @@ def _draw_mark(stream: RecordingStream, arm: DrawnArm, mark: ArmMark, entity: st
     """Draw a ball with a word that moves with a point of an arm."""
     import rerun as rr
 
-    stream.log(entity, rr.Points3D.from_fields(colors=[rgb(mark.colour)], radii=[MARK * size]), static=True)
+    radius = max(MARK * size, AROUND * arm.thickness(mark))
+    stream.log(entity, rr.Points3D.from_fields(colors=[rgb(mark.colour)], radii=[radius]), static=True)
     stream.log(f"{entity}/label", _label(mark.words), static=True)
     for one in (entity, f"{entity}/label"):
         columns = rr.Points3D.columns(positions=arm.place(mark).astype(np.float32))
@@ -183,18 +186,12 @@ def _draw_mark(stream: RecordingStream, arm: DrawnArm, mark: ArmMark, entity: st
         _send_gone(stream, one, arm.moving, rr.Points3D.columns(positions=[]))
 
 
-def _draw_links(stream: RecordingStream, moving: Moving, skeleton: NDArray[np.float32], size: float) -> None:
-    """Draw a line through the points of an arm in each pose, shape (m, n + 1, 3)."""
-    import rerun as rr
-
-    entity = shown_path("scene", "robot", "links")
-    links = rr.LineStrips3D.from_fields(colors=[rgb(NEUTRAL_COLOUR)], radii=[LINK * size])
-    stream.log(entity, links, static=True)
-    for start in range(0, len(skeleton), STRIPS):
-        rows = slice(start, start + STRIPS)
-        times = times_at(moving.t_ns, moving.rows[rows])
-        stream.send_columns(entity, times, rr.LineStrips3D.columns(strips=skeleton[rows]))
-    _send_gone(stream, entity, moving, rr.LineStrips3D.columns(strips=[]))
+def _draw_tool(stream: RecordingStream, chain: Chain, size: float) -> None:
+    """Draw the axes of the tool centre point, which the last moving joint carries."""
+    last = max(k for k, joint in enumerate(chain.joints) if joint.kind != "fixed")
+    tool = product([*(joint.origin for joint in chain.joints[last + 1 :]), chain.tip, chain.tool])
+    axes = _frames(np.array([tool.translation], float), np.array([tool.rotation], float), size)
+    stream.log(f"{shown_path(*carrier_path(chain.joints[last].name))}/tool", axes, static=True)
 
 
 def _draw_path(stream: RecordingStream, drawn: DrawnPath, key: str, size: float) -> None:
@@ -327,7 +324,7 @@ def _draw_targets(stream: RecordingStream, targets: DrawnTargets, size: float) -
         points = rr.Points3D(targets.points, colors=[grey], radii=[TARGET * size])
         stream.log(f"{root}/points", points, static=True)
     if len(targets.origin):
-        stream.log(f"{root}/frames", _frames(targets, size), static=True)
+        stream.log(f"{root}/frames", _frames(targets.origin, targets.axes, size), static=True)
     if len(targets.missed):
         stream.log(f"{root}/missed", _missed(targets, size), static=True)
 
@@ -342,12 +339,12 @@ def _missed(targets: DrawnTargets, size: float) -> Points3D:
     return rr.Points3D(targets.missed, colors=colours, radii=radii, labels=labels, show_labels=few)
 
 
-def _frames(targets: DrawnTargets, size: float) -> LineStrips3D:
-    """Return the axes of the targets, in the colours of the coordinates."""
+def _frames(origin: FloatArray, rotation: FloatArray, size: float) -> LineStrips3D:
+    """Return the axes of frames in [m], shape (n, 3) and (n, 3, 3), in the colours of the coordinates."""
     import rerun as rr
 
-    ends = targets.origin[:, None] + FRAME_LENGTH * size * targets.axes.transpose(0, 2, 1)
-    starts = np.broadcast_to(targets.origin[:, None], ends.shape)
+    ends = origin[:, None] + FRAME_LENGTH * size * rotation.transpose(0, 2, 1)
+    starts = np.broadcast_to(origin[:, None], ends.shape)
     strips = np.stack((starts, ends), axis=2).reshape(-1, 2, 3).astype(np.float32)
-    colours = [rgb(AXIS_COLOURS[axis]) for axis in "xyz"] * len(targets.origin)
+    colours = [rgb(AXIS_COLOURS[axis]) for axis in "xyz"] * len(origin)
     return rr.LineStrips3D(strips, colors=colours, radii=[FRAME * size])

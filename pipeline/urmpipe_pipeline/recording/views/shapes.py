@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +11,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.solids import solids_of
 from urmpipe_models.chains.visual import Box, Capsule, Colour, Cylinder, Mesh, Visual
 from urmpipe_models.kinematics.forward import frames_over_log
 from urmpipe_models.orientation import quaternions
@@ -48,34 +49,35 @@ class Body:
     visuals: tuple[Visual, ...]
 
 
-def bodies_over_log(robot: Chain, q: FloatArray) -> tuple[Body, ...]:
-    """Return the links of an arm that have shapes which can be drawn.
+def own_shapes(robot: Chain) -> list[Visual]:
+    """Return the shapes of an arm's description that can be drawn."""
+    return [visual for visual in robot.visuals if drawable(visual)]
 
-    Its joint values are in [rad] or [m], shape (m, joints).
+
+def bodies_over_log(robot: Chain, q: FloatArray, colours: Mapping[str, Colour]) -> tuple[Body, ...]:
+    """Return the links of an arm as its description shows them, and solids for moving links that it does not.
+
+    An arm that shows nothing at all is all solids. Frames fixed to a link count as the link.
+
+    Args:
+        robot: The arm.
+        q: Joint values in [rad] or [m], shape (m, coordinates).
+        colours: Of its joints, by name; the solids of joints have them.
     """
-    shown = [visual for visual in robot.visuals if drawable(visual)]
-    if not shown:
-        return ()
+    shown, solids = own_shapes(robot), solids_of(robot, colours)
+    if shown:
+        moving = np.cumsum([joint.kind != "fixed" for joint in robot.joints]).tolist()
+        link = dict(zip((None, *(joint.name for joint in robot.joints)), (0, *moving), strict=True))
+        done = {0, *(link[visual.joint] for visual in shown)}
+        solids = tuple(visual for visual in solids if link[visual.joint] not in done)
     position, rotation = frames_over_log(robot, q)
     carriers = [None, *(joint.name for joint in robot.joints)]
+    on = {carrier: tuple(one for one in (*shown, *solids) if one.joint == carrier) for carrier in carriers}
     return tuple(
-        Body(
-            carrier,
-            position[:, k],
-            quaternions(rotation[:, k].reshape(-1, 9), "matrix"),
-            tuple(visual for visual in shown if visual.joint == carrier),
-        )
-        for k, carrier in enumerate(carriers)
-        if any(visual.joint == carrier for visual in shown)
+        Body(carrier, position[:, k], quaternions(rotation[:, k].reshape(-1, 9), "matrix"), visuals)
+        for k, (carrier, visuals) in enumerate(on.items())
+        if visuals
     )
-
-
-def lacks_shapes(robot: Chain, bodies: Sequence[Body]) -> bool:
-    """Tell whether a moving link shows nothing; frames fixed to it count as the link."""
-    moving = np.cumsum([joint.kind != "fixed" for joint in robot.joints])
-    link = dict(zip((joint.name for joint in robot.joints), moving.tolist(), strict=True))
-    shown = {link[body.joint] for body in bodies if body.joint is not None}
-    return not set(range(1, int(moving[-1]) + 1)) <= shown
 
 
 def draw_body(
@@ -87,7 +89,7 @@ def draw_body(
     """
     import rerun as rr
 
-    place = _carrier(body.joint)
+    place = carrier_path(body.joint)
     position, rotation = body.position.astype(np.float32), body.quat_xyzw.astype(np.float32)
     if body.joint is None:  # the base does not move
         still = rr.Transform3D(translation=position[0], quaternion=rotation[0])
@@ -102,9 +104,16 @@ def draw_body(
             stream.log(entity, shape, static=True)
 
 
+def opaque(colour: str) -> Colour:
+    """Return #rrggbb as a colour that is not seen through."""
+    red, green, blue = (share / 255.0 for share in rgb(colour))
+    return red, green, blue, 1.0
+
+
 def _seen_through(visual: Visual) -> Visual:
     """Return a shape that is translucent, so that the masses inside it show."""
-    red, green, blue, opacity = visual.colour or WHITE
+    plain = WHITE if isinstance(visual.shape, Mesh) else opaque(NEUTRAL_COLOUR)
+    red, green, blue, opacity = visual.colour or plain
     return replace(visual, colour=(red, green, blue, SEEN_THROUGH * opacity))
 
 
@@ -117,10 +126,10 @@ def hide_body(stream: RecordingStream, body: Body, times: list[TimeColumn], coun
 
     if body.joint is not None:
         columns = rr.Transform3D.columns(translation=np.zeros((count, 3)), scale=np.full((count, 3), UNSEEN))
-        stream.send_columns(shown_path(*_carrier(body.joint)), times, columns)
+        stream.send_columns(shown_path(*carrier_path(body.joint)), times, columns)
 
 
-def _carrier(joint: str | None) -> tuple[str, ...]:
+def carrier_path(joint: str | None) -> tuple[str, ...]:
     """Return where the frame of a joint stands, or that of the base."""
     return ("scene", "robot", "base") if joint is None else ("scene", "robot", "joint", *keys([joint]))
 
