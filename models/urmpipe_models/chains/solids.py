@@ -29,8 +29,8 @@ HOUSING = 1.3
 """Radius and half the length of a joint's cylinder in radii of the link that begins there."""
 
 PLATE, NECK, FLANGE, ROD = 1.9, 0.6, 0.85, 0.25
-"""Radius of the plate under the base, of the last piece, of the flange at its end, and of the rod to the tool
-centre point, in radii of the link there: what is at that point must not be inside the arm."""
+"""Radius of the plate under the base, of the last link, of the flange at its end, and of the rod to the tool
+centre point, in radii that a link has there."""
 
 SHORT = 0.01
 """Links below this share of the length of all do not count for `SLENDER`: they are calibrated offsets."""
@@ -90,20 +90,13 @@ def solids_of(chain: Chain, colours: Mapping[str, Colour] | None = None) -> tupl
     """
     size, links = _links(chain)
     base, tip = links[0], links[-1]
-    last = [piece for link in links for piece in link.pieces][-1:]
+    ending = next((link for link in reversed(links) if link.pieces), tip)
     found = [base.shape(Cylinder(PLATE * base.radius, base.radius), -base.radius / 2.0 * Z, Z)]
     drawn = _drawn_joints(links)
     for previous, link in zip([None, *links[:-1]], links, strict=True):
         if previous is not None and link.joint.name in drawn:
             found.append(_joint_solid(previous, link, (colours or {}).get(link.joint.name)))
-        for piece in link.pieces:
-            at_tip = last[0] is piece  # where half a ball would cover the tool centre point
-            shape = (
-                Cylinder(NECK * link.radius, _length(piece))
-                if at_tip
-                else Capsule(link.radius, _length(piece))
-            )
-            found.append(link.shape(shape, (piece[0] + piece[1]) / 2.0, _direction(piece)))
+        found += _bars(link, at_tip=link is ending)
         found += _rails(link, size)
     return (*found, *_ends(tip, chain.tool, size))
 
@@ -205,6 +198,14 @@ def _housing(previous: _Link, link: _Link, half: float) -> tuple[float, float]:
                 far = min(far, room / 2.0)
                 return way * math.copysign(far, along), min(half, room - far)
     return 0.0, half
+
+
+def _bars(link: _Link, *, at_tip: bool) -> Iterator[Visual]:
+    """Yield the pieces of a link; at the tip thinner and flat, else they would hide the tool centre point."""
+    radius = NECK * link.radius if at_tip else link.radius
+    for piece in link.pieces:
+        shape = Cylinder if at_tip and piece is link.pieces[-1] else Capsule
+        yield link.shape(shape(radius, _length(piece)), (piece[0] + piece[1]) / 2.0, _direction(piece))
 
 
 def _rails(link: _Link, size: float) -> Iterator[Visual]:
