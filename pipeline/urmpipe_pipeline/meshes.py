@@ -55,7 +55,7 @@ def missing_visuals(robot: Chain) -> list[LogWarning]:
         LogWarning(
             VISUAL_MISSING,
             f"{len(files)} of {len(meshes)} mesh files of robot {robot.name} {said}, the first"
-            f" {unquote(files[0].removeprefix(FILE))}: lines stand for the links; allowed: {allowed}",
+            f" {unquote(files[0].removeprefix(FILE))}: solids stand for the links; allowed: {allowed}",
         )
         for files, said, allowed in found
         if files

@@ -32,7 +32,7 @@ def test_one_warning_tells_of_all_meshes_that_are_missing(tmp_path: Path) -> Non
         LogWarning(
             "visual-missing",
             f"4 of 5 mesh files of robot arm cannot be drawn, the first {tmp_path / 'gone.stl'}:"
-            " lines stand for the links; allowed: .stl, .obj, .glb, .gltf, .dae files that are there",
+            " solids stand for the links; allowed: .stl, .obj, .glb, .gltf, .dae files that are there",
         )
     ]
     assert missing_visuals(replace(robot, visuals=visuals[:2])) == []
@@ -54,7 +54,7 @@ def test_a_mesh_that_the_description_may_not_take_is_told_and_not_drawn(tmp_path
             LogWarning(
                 "visual-missing",
                 "1 of 1 mesh files of robot arm are outside its folder and not drawn, the first"
-                f" {tmp_path}/my arm/../secret.stl: lines stand for the links; allowed: files in the folder"
+                f" {tmp_path}/my arm/../secret.stl: solids stand for the links; allowed: files in the folder"
                 " of its description, in ROS packages around it, and in folders of ROS_PACKAGE_PATH",
             )
         ]

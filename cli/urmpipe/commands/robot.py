@@ -109,7 +109,7 @@ def show(
 @placing_options
 @output_options
 def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -> int:
-    """Write a robot as URDF (its visuals, else cylinders for its links) or as a TOML robot file.
+    """Write a robot as URDF (its visuals, else solids from its geometry) or as a TOML robot file.
 
     Read back, the file is the same arm: of a TOML bit by bit, of a URDF to rounding. It replaces only
     another export.

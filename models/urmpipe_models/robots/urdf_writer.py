@@ -1,16 +1,17 @@
-"""URDF out: a chain as links and joints, with what it looks like, or cylinders to look at."""
+"""URDF out: a chain as links and joints, with what it looks like, or solids to look at."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.chains.visual import Box, Mesh, Shape, Sphere, Visual
-from urmpipe_models.elementwise import ZERO, Vector
+from urmpipe_models.chains.solids import solids_of
+from urmpipe_models.chains.visual import Box, Capsule, Cylinder, Mesh, Shape, Sphere, Visual
 from urmpipe_models.errors import RobotError
 from urmpipe_models.messages import in_xml
 from urmpipe_models.robots.urdf_inertials import MOMENTS
@@ -23,10 +24,7 @@ from urmpipe_models.robots.urdf_tree import (
     UNLIMITED,
 )
 from urmpipe_models.robots.written import EXPORT_MARK, replace_text
-from urmpipe_models.transform import rpy_of
-
-SLENDERNESS = 40.0
-"""The arm's stretched length by the cylinders' radius: a choice for the eye."""
+from urmpipe_models.transform import rpy_of, translation
 
 
 def write_urdf(chain: Chain, path: str | Path) -> None:
@@ -43,13 +41,14 @@ def urdf_text(chain: Chain) -> str:
     """Return a chain as URDF. Read back with `read_urdf` it is the same chain, to rounding.
 
     Links: `world`, `base_link`, then `link1`, `link2`, ... carried by the chain's joints, the fixed ones
-    too, then `tip` and `tool0`. The fixed joints `urmpipe_base`, `urmpipe_tip` and `urmpipe_tool` hold
-    the chain's base, tip and tool. Point p_k is where joint k + 1 sits on link k, so the origin of link
-    k + 1 if that joint does not slide; the last one is the origin of tool0. A revolute joint without
-    limits is `continuous`; elsewhere the largest double stands for infinity. Limits of acceleration make it
-    URDF 1.2, which has them. An arm without visuals gets a cylinder a link, which `read_urdf` leaves out
-    again. A link has one mass; further ones of a joint are links of their own, fixed to it by joints whose
-    names begin with `urmpipe_mass_`. URDF has no gravity, no drives and no sources of masses.
+    too, then `tip` and `tool0`. The fixed joints `urmpipe_base`, `urmpipe_tip` and `urmpipe_tool` hold the
+    chain's base, tip and tool. Point p_k is where joint k + 1 sits on link k, so the origin of link k + 1
+    if that joint does not slide; the last one is the origin of tool0. A revolute joint without limits is
+    `continuous`; elsewhere the largest double stands for infinity. Limits of acceleration make it URDF 1.2,
+    which has them. An arm without visuals gets those of `solids_of`, which `read_urdf` leaves out again; as
+    URDF has no capsules, each is a cylinder and two spheres. A link has one mass; further ones of a joint
+    are links of their own, fixed to it by joints whose names begin with `urmpipe_mass_`. URDF has no
+    gravity, no drives and no sources of masses.
 
     Raises:
         RobotError: If a joint has one of these names.
@@ -68,12 +67,12 @@ def urdf_text(chain: Chain) -> str:
     ]
     links = ["world", "base_link", *(f"link{k}" for k in range(1, len(chain.joints) + 1)), "tip", "tool0"]
     on = dict(zip(links[1:-2], [None, *names], strict=True))
+    looks, material = (chain.visuals, None) if chain.visuals else (tuple(_without_capsules(chain)), STAND_IN)
     shown = {
-        link: [line for one in chain.visuals if one.joint == joint for line in _visual_lines(one)]
+        link: [line for one in looks if one.joint == joint for line in _visual_lines(one, material)]
         for link, joint in on.items()
     }
     masses = {link: [one for one in chain.inertials if one.joint == joint] for link, joint in on.items()}
-    radius = sum(math.hypot(*joint.origin.translation) for joint in frames[1:]) / SLENDERNESS
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
         f"<!-- {EXPORT_MARK}: lengths in m, angles in rad -->",
@@ -81,12 +80,8 @@ def urdf_text(chain: Chain) -> str:
         f'  <material name="{STAND_IN}"><color rgba="0.35 0.55 0.75 1.0"/></material>',
         '  <link name="world"/>',
     ]
-    for joint, following, parent, child in zip(
-        frames, [*frames[1:], None], links[:-1], links[1:], strict=True
-    ):
-        end = following.origin.translation if following else ZERO
-        looks = shown.get(child, []) if chain.visuals else _stand_in_lines(end, radius)
-        lines += _link_lines(child, [*looks, *_inertial_lines(masses.get(child, [])[:1])])
+    for joint, parent, child in zip(frames, links[:-1], links[1:], strict=True):
+        lines += _link_lines(child, [*shown.get(child, []), *_inertial_lines(masses.get(child, [])[:1])])
         lines += _joint_lines(joint, parent, child)
         for k, one in enumerate(masses.get(child, [])[1:], start=2):
             lines += _link_lines(f"{child}_mass{k}", _inertial_lines([one]))
@@ -129,32 +124,29 @@ def _attributes(values: Mapping[str, float]) -> str:
     return " ".join(f'{key}="{float(value)!r}"' for key, value in values.items())
 
 
-def _stand_in_lines(end: Vector, radius: float) -> list[str]:
-    """Return a cylinder from a link's frame to the next one at `end`; nothing where that is no way off."""
-    length = math.hypot(*end)
-    if length == 0.0:
-        return []
-    x, y, z = end
-    middle = (x / 2.0, y / 2.0, z / 2.0)
-    along = (0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x))  # turns the cylinder's z towards the end
-    return [
-        "    <visual>",
-        f'      <origin xyz="{_numbers(middle)}" rpy="{_numbers(along)}"/>',
-        f'      <geometry><cylinder radius="{float(radius)!r}" length="{length!r}"/></geometry>',
-        f'      <material name="{STAND_IN}"/>',
-        "    </visual>",
-    ]
+def _without_capsules(chain: Chain) -> Iterator[Visual]:
+    """Yield the solids of an arm; a capsule as a cylinder and a sphere at each end."""
+    for solid in solids_of(chain):
+        if not isinstance(solid.shape, Capsule):
+            yield solid
+            continue
+        radius, length = solid.shape.radius, solid.shape.length
+        yield replace(solid, shape=Cylinder(radius, length))
+        for z in (-length / 2.0, length / 2.0):
+            yield replace(solid, shape=Sphere(radius), origin=solid.origin @ translation(0.0, 0.0, z))
 
 
-def _visual_lines(visual: Visual) -> list[str]:
-    """Return a shape that the arm shows."""
+def _visual_lines(visual: Visual, material: str | None) -> list[str]:
+    """Return a shape that the arm shows, of a material of this name, else of its own colour."""
     xyz, rpy = _numbers(visual.origin.translation), _numbers(rpy_of(visual.origin.rotation))
     lines = [
         "    <visual>",
         f'      <origin xyz="{xyz}" rpy="{rpy}"/>',
         f"      <geometry>{_shape(visual.shape)}</geometry>",
     ]
-    if visual.colour is not None:
+    if material is not None:
+        lines.append(f'      <material name="{material}"/>')
+    elif visual.colour is not None:
         rgba = _numbers(visual.colour)
         lines.append(f'      <material name="{rgba}"><color rgba="{rgba}"/></material>')
     return [*lines, "    </visual>"]

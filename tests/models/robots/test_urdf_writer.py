@@ -14,6 +14,8 @@ from hypothesis.strategies import SearchStrategy
 
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.chains.dh import DHRow, dh_chain
+from urmpipe_models.chains.solids import solids_of
+from urmpipe_models.chains.visual import Capsule, Cylinder, Sphere
 from urmpipe_models.errors import OutputError, RobotError
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.kinematics.frames import joint_values
@@ -108,17 +110,29 @@ def test_pinocchio_reads_the_file_as_the_same_chain(
     ],
     ids=lambda chain: str(chain.name),
 )
-def test_links_are_cylinders_from_frame_to_frame(chain: Chain) -> None:
-    pin = pytest.importorskip("pinocchio")
-    text = urdf_text(chain)
-    model = pin.buildModelFromXML(text)
-    visuals = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL).geometryObjects
-    ways = [joint.origin.translation for joint in chain.joints[1:]] + [chain.tip.translation]
-    assert len(visuals) == len(ways)
-    for geometry, way in zip(visuals, ways, strict=True):
-        half, link = geometry.geometry.halfLength, model.frames[geometry.parentFrame].placement
-        ends = [link.actInv(geometry.placement.act(np.array([0.0, 0.0, z]))) for z in (-half, half)]
-        np.testing.assert_allclose(ends, [(0.0, 0.0, 0.0), way], atol=1e-15)  # rounding
+def test_an_arm_that_shows_nothing_gets_solids_in_shapes_that_urdf_has(chain: Chain, tmp_path: Path) -> None:
+    """They are read by another name of their material; by ours they are left out."""
+    path = tmp_path / "arm.urdf"
+    write_urdf(chain, path)
+    assert read_urdf(path).visuals == ()
+    text = path.read_text(encoding="utf-8")
+    assert "<capsule" not in text
+    path.write_text(text.replace('material name="urmpipe"', 'material name="mine"'), encoding="utf-8")
+    found = iter(read_urdf(path).visuals)
+    for solid in solids_of(chain):
+        one, origin = next(found), solid.origin
+        shape = solid.shape
+        if isinstance(shape, Capsule):
+            shape = Cylinder(shape.radius, shape.length)
+            for half in (-shape.length / 2.0, shape.length / 2.0):
+                ball = next(found)
+                assert (ball.joint, ball.shape) == (solid.joint, Sphere(shape.radius))
+                end = origin.point((0.0, 0.0, half))
+                np.testing.assert_allclose(ball.origin.translation, end, rtol=0.0, atol=SAME)
+        assert (one.joint, one.shape) == (solid.joint, shape)
+        np.testing.assert_allclose(one.origin.translation, origin.translation, rtol=0.0, atol=SAME)
+        np.testing.assert_allclose(one.origin.rotation, origin.rotation, rtol=0.0, atol=SAME)
+    assert not list(found)
 
 
 def test_limits_of_acceleration_make_it_the_version_of_urdf_that_has_them() -> None:
