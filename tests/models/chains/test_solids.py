@@ -52,11 +52,7 @@ def scaled(chain: Chain, factor: float) -> Chain:
         x, y, z = frame.translation
         return Transform(frame.rotation, (x * factor, y * factor, z * factor))
 
-    def limits(joint: Joint) -> dict[str, float]:
-        sliding = joint.kind == "prismatic"
-        return {"lower": joint.lower * factor, "upper": joint.upper * factor} if sliding else {}
-
-    joints = tuple(replace(one, origin=larger(one.origin), **limits(one)) for one in chain.joints)
+    joints = tuple(replace(one, origin=larger(one.origin)) for one in chain.joints)
     return replace(chain, joints=joints, tip=larger(chain.tip), tool=larger(chain.tool))
 
 
@@ -75,7 +71,7 @@ def test_solids_of_any_arm_can_be_drawn_and_hang_on_moving_joints(
     assert len(solids) <= 2 + 5 * len(moving) + 5
     for one in solids:
         assert not list(one.faults())
-        rotation = np.array(one.origin.rotation)
+        rotation: FloatArray = np.array(one.origin.rotation, float)
         np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)  # rounding of unit vectors
         assert np.isfinite(ends_of(one)).all()
     assert replace(chain, visuals=solids).visuals == solids  # the chain takes them
@@ -206,7 +202,7 @@ def test_a_sliding_joint_is_a_box_on_a_rail_as_long_as_its_limits(
 def test_a_gantry_of_rails_alone_is_as_thick_as_they_are_long() -> None:
     axes: list[Vector] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0)]
     joints = tuple(
-        Joint(f"q{k}", SLIDING, axis=(float(x), float(y), float(z)), lower=0.0, upper=0.8)  # type: ignore[arg-type]
+        Joint(f"q{k}", SLIDING, axis=(float(x), float(y), float(z)), lower=0.0, upper=0.8)
         for k, (x, y, z) in enumerate(axes)
     )
     rails = [one.shape for one in solids_of(Chain("gantry", joints)) if isinstance(one.shape, Box)]
@@ -242,7 +238,8 @@ def test_a_thin_rod_leads_from_the_flange_to_the_tool_centre_point() -> None:
     last = chain.coordinates[-1]
     flange = [one for one in bare if one.joint == last][-1]
     assert rod.joint == last and isinstance(rod.shape, Cylinder) and isinstance(flange.shape, Cylinder)
-    tip = np.array(chain.tip.translation, float)
+    tip: FloatArray = np.array(chain.tip.translation, float)
+    tcp: FloatArray = np.array((chain.tip @ tool).translation, float)
     np.testing.assert_allclose(ends_of(flange)[1], tip, atol=1e-12)
-    np.testing.assert_allclose(ends_of(rod), [tip, (chain.tip @ tool).translation], atol=1e-12)
+    np.testing.assert_allclose(ends_of(rod), [tip, tcp], atol=1e-12)
     assert rod.shape.radius < flange.shape.radius / 2.0

@@ -39,6 +39,7 @@ from urmpipe_pipeline.recording.views.geometry import (
 )
 from urmpipe_pipeline.recording.views.label_places import name_places
 from urmpipe_pipeline.recording.views.scene_drawing import AXIS, LINK, OPACITY, THIN, capsules
+from urmpipe_pipeline.recording.views.shapes import SEEN_THROUGH
 from urmpipe_pipeline.results import present, read_recording, write_recording
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.solved_targets.scene import ghosts, scene
@@ -342,3 +343,10 @@ def test_all_of_the_arms_is_in_view(make_solved: MakeSolved) -> None:
     centre, radius = ball(extent(arm, beside, [], None))
     for ghost in beside:
         assert np.linalg.norm(ghost.end - centre, axis=2).max() <= radius * (1 + 1e-12)
+
+
+def test_solids_are_seen_through_where_ghosts_can_be_inside(make_solved: MakeSolved, tmp_path: Path) -> None:
+    for names, opacity in ((("a", "b"), round(255 * SEEN_THROUGH)), ((), 255)):
+        path = write_recording(make_solved(names=names, rows=5), tmp_path / f"{opacity}.rrd")
+        entity = f"{SCENE}/robot/joint/elbow_joint/visual\\ 1"
+        assert [colour & 0xFF for colour in static(path, entity, "Cylinders3D:colors")] == [opacity]

@@ -314,7 +314,7 @@ def test_own_shapes_win_and_only_moving_links_without_any_get_solids() -> None:
     def added(*carriers: str | None) -> set[str | None]:
         own = tuple(Visual(carrier, Sphere(0.1)) for carrier in carriers)
         robot = Chain("arm", joints, visuals=own)
-        bodies = bodies_over_log(robot, q, {})
+        bodies = bodies_over_log(robot, q)
         assert [one for body in bodies for one in body.visuals if one in own] == own_shapes(robot)
         return {body.joint for body in bodies if set(body.visuals) - set(own)}
 

@@ -54,7 +54,9 @@ def own_shapes(robot: Chain) -> list[Visual]:
     return [visual for visual in robot.visuals if drawable(visual)]
 
 
-def bodies_over_log(robot: Chain, q: FloatArray, colours: Mapping[str, Colour]) -> tuple[Body, ...]:
+def bodies_over_log(
+    robot: Chain, q: FloatArray, colours: Mapping[str, Colour] | None = None
+) -> tuple[Body, ...]:
     """Return the links of an arm as its description shows them, and solids for moving links that it does not.
 
     An arm that shows nothing at all is all solids. Frames fixed to a link count as the link.
