@@ -23,6 +23,7 @@ from urmpipe_models.elementwise import (
     subtract,
     times,
 )
+from urmpipe_models.sine_cosine import cosine_sine
 
 SINGULAR_COSINE = 1e-9
 """Below this cosine of ry, rz and rx are not separately defined (double precision leaves no digits)."""
@@ -108,9 +109,9 @@ class Transform:
             axis: Unit vector [-].
             angle: In [rad], any element.
         """
-        if sorted(map(abs, axis)) != [0.0, 0.0, 1.0]:
+        along = _along(axis)
+        if along is None:
             return Transform((self @ rotation_about(axis, angle)).rotation, self.translation)
-        along = next(i for i in range(3) if axis[i] != 0.0)
         c, s = _cosine_sine(angle)
         s = times(axis[along], s)
         columns = list(self.columns)
@@ -118,6 +119,28 @@ class Transform:
         columns[along - 2] = add(scale(c, first), scale(s, second))
         columns[along - 1] = subtract(scale(c, second), scale(s, first))
         return Transform(Transform((columns[0], columns[1], columns[2])).columns, self.translation)
+
+
+def turned_vector(vector: Vector, axis: Sequence[float], angle: Element) -> Vector:
+    """Return a vector after a rotation about an axis, in its own unit.
+
+    About x, y or z the other two coordinates a, b become c a - s b, c b + s a: 4 products instead of 9.
+
+    Args:
+        vector: Any elements.
+        axis: Unit vector [-].
+        angle: In [rad], any element.
+    """
+    along = _along(axis)
+    if along is None:
+        return rotation_about(axis, angle).rotate(vector)
+    c, s = _cosine_sine(angle)
+    s = times(axis[along], s)
+    turned = list(vector)
+    first, second = vector[along - 2], vector[along - 1]
+    turned[along - 2] = minus(times(c, first), times(s, second))
+    turned[along - 1] = plus(times(c, second), times(s, first))
+    return turned[0], turned[1], turned[2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -303,17 +326,21 @@ def rpy_of(rotation: tuple[Vector, Vector, Vector]) -> tuple[float, float, float
     return rx, ry, rz
 
 
+def _along(axis: Sequence[float]) -> int | None:
+    """Return which of x, y and z an axis lies along, either way; None for any other axis."""
+    return [*map(abs, axis)].index(1.0) if sorted(map(abs, axis)) == [0.0, 0.0, 1.0] else None
+
+
 def _cosine_sine(angle: Element) -> tuple[Element, Element]:
     """Return cos and sin; of the constants 0, +-pi/2, +-pi, ... +-2 pi exactly, as 0 and +-1 fold away.
 
     A right angle in a robot's description is meant as one: cos(pi/2) in double precision is 6e-17.
     """
-    if not isinstance(angle, float):
-        return np.cos(angle), np.sin(angle)
-    quarters, rest = divmod(angle, math.pi / 2)
-    if rest == 0.0 and abs(quarters) <= 4:
-        return _QUARTERS[int(quarters) % 4]
-    return float(np.cos(angle)), float(np.sin(angle))
+    if isinstance(angle, float):
+        quarters, rest = divmod(angle, math.pi / 2)
+        if rest == 0.0 and abs(quarters) <= 4:
+            return _QUARTERS[int(quarters) % 4]
+    return cosine_sine(angle)
 
 
 def _cosine_entry(c: Element, v: Element, u: float) -> Element:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.elementwise import ZERO, Element, Vector, cross, plus, subtract, times
-from urmpipe_models.kinematics.frames import frames, joint_values, moved
+from urmpipe_models.kinematics.frames import frames, joint_values, moved, tip_position
 from urmpipe_models.kinematics.motion import each_motion
 from urmpipe_models.row_blocks import row_blocks, side_by_side
 from urmpipe_models.transform import Transform, euler_zyx
@@ -130,7 +130,7 @@ def positions_over_log(chain: Chain, q: FloatArray) -> FloatArray:
 
     def work(block: slice) -> None:
         """Fill the rows of a block."""
-        _fill(position[:, block], tip_pose(chain, _columns(q[block])).translation)
+        _fill(position[:, block], tip_position(chain, _columns(q[block])))
 
     side_by_side(work, row_blocks(len(q)))
     return position.T

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.elementwise import Element, plus, scale, times
-from urmpipe_models.transform import Transform
+from urmpipe_models.elementwise import Element, Vector, add, plus, scale, times
+from urmpipe_models.transform import Transform, turned_vector
 
 
 def joint_values(chain: Chain, q: Sequence[Element]) -> list[Element]:
@@ -45,6 +45,26 @@ def moved(at_joint: Transform, joint: Joint, value: Element) -> Transform:
     if joint.kind == "prismatic":
         return Transform(at_joint.rotation, at_joint.point(scale(value, joint.axis)))
     return at_joint
+
+
+def tip_position(chain: Chain, q: Sequence[Element]) -> Vector:
+    """Return the tool centre point in the world [m], without its orientation.
+
+    Inward recursion: the point in a link's frame becomes the same point in the frame before,
+    p' = o + R Rot(axis, q) p, from the tool to the base. It turns a vector where `frames` turns three.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+    """
+    point = chain.tip.point(chain.tool.translation)
+    for joint, value in zip(reversed(chain.joints), reversed(joint_values(chain, q)), strict=True):
+        if joint.kind == "revolute":
+            point = turned_vector(point, joint.axis, value)
+        elif joint.kind == "prismatic":
+            point = add(point, scale(value, joint.axis))
+        point = joint.origin.point(point)
+    return chain.base.point(point)
 
 
 def _value(joint: Joint, of: dict[str, Element]) -> Element:
