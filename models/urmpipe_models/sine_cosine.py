@@ -1,7 +1,7 @@
 """Sine and cosine, the same to the last bit on every platform, of a float as of each element of an array.
 
-np.sin and np.cos differ in the last bit between processors and versions of NumPy. Here only +, - and * of IEEE
-754 are used: x = k h + r with h = 2 pi / 4096 and |r| <= h / 2, sine and cosine of k h from a table, and
+np.sin and np.cos differ in the last bit between processors and versions of NumPy. Here only +, - and * of
+IEEE 754 are used: x = k h + r with h = 2 pi / 4096 and |r| <= h / 2, sine and cosine of k h from a table, and
 
     sin(x) = s + (s (cos r - 1) + c sin r),    cos(x) = c + (c (cos r - 1) - s sin r)
 
@@ -21,7 +21,7 @@ from urmpipe_models.elementwise import Element
 _STEPS = 4096
 _BITS = 128
 _PI = 0x3243F6A8885A308D313198A2E03707344
-"""pi in units of 2^-128; Python divides whole numbers with one rounding, so that what comes of it is exact."""
+"""pi in units of 2^-128: Python divides whole numbers with a single rounding."""
 
 _COARSE = 90
 """Bits that the first part of a step lacks: it has 29, so that up to 2^24 steps are exact."""
@@ -42,7 +42,7 @@ _SHIFT = 1.5 * 2.0**52
 def cosine_sine(angle: Element) -> tuple[Element, Element]:
     """Return cos and sin of an angle in [rad]: within 1.2e-16 up to 2.5e4 rad, within 6e-16 up to 1e15 rad.
 
-    An angle that is not finite gives NaN; what is neither a float nor an array of float64, such as a symbol,
+    Beyond, where doubles are 0.1 rad apart and more, they are of some angle, alike on every platform. An angle that is not finite gives NaN; what is neither a float nor an array of float64, such as a symbol,
     goes to np.cos and np.sin.
 
     Args:

@@ -15,7 +15,7 @@ from urmpipe_fmus.units.driven_arm import driven_arm, starts_under
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.drives.joint_drives import DrivenJoint
-from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.repolarizer import FULL_TURN
 from urmpipe_pipeline.accuracy.driven_motion import Diverged, DrivenMotion
 from urmpipe_pipeline.planned_paths.result import PlannedPath
@@ -119,7 +119,7 @@ class ArmUnit:
             set_q=joints.q[:rows],
             set_qd=joints.qd[:rows],
             speed=plan.motion.v[:rows],
-            position=poses_over_log(self.robot, q)[0],
+            position=positions_over_log(self.robot, q),
             q=q,
             qd=qd,
             voltage=voltage,

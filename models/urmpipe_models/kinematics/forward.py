@@ -127,12 +127,8 @@ def positions_over_log(chain: Chain, q: FloatArray) -> FloatArray:
         q: Joint values in [rad] or [m], shape (n, joints).
     """
     position = np.empty((3, len(q)))
-
-    def work(block: slice) -> None:
-        """Fill the rows of a block."""
+    for block in row_blocks(len(q)):  # one after the other: two threads are no faster at products this short
         _fill(position[:, block], tip_position(chain, _columns(q[block])))
-
-    side_by_side(work, row_blocks(len(q)))
     return position.T
 
 
@@ -147,15 +143,11 @@ def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]
         Both in the world: x_world = R x_tool + p.
     """
     position, rotation = np.empty((3, len(q))), np.empty((3, 3, len(q)))
-
-    def work(block: slice) -> None:
-        """Fill the rows of a block."""
+    for block in row_blocks(len(q)):  # see `positions_over_log`
         pose = tip_pose(chain, _columns(q[block]))
         _fill(position[:, block], pose.translation)
         for row in range(3):
             _fill(rotation[row, :, block], pose.rotation[row])
-
-    side_by_side(work, row_blocks(len(q)))
     return position.T, rotation.transpose(2, 0, 1)
 
 
