@@ -71,11 +71,10 @@ def main() -> None:
     for _ in range(options.rounds):
         for name, job in jobs.items():
             taken[name].append(min(timed(job) for _ in range(TRIES)))
-    mine = poses_over_log(chain, q)
-    error = max(np.abs(mine[0] - position).max(), np.abs(mine[1] - rotation).max())
-    base = taken["urmpipe poses_over_log"]
+    pairs = zip(poses_over_log(chain, q), (position, rotation), strict=True)
+    error = max(np.abs(mine - peers).max() for mine, peers in pairs)
     lines = [
-        f"# Forward kinematics of {options.poses} urm6 poses: {options.rounds} rounds in turn, one process, one thread",
+        f"# Forward kinematics of {options.poses} urm6 poses: {options.rounds} rounds in turn, one thread",
         "",
         *machine("pin"),
         f"Of each job the shortest of {TRIES} runs in a row counts in a round: memory that was not in use",
@@ -88,19 +87,21 @@ def main() -> None:
     ratios: dict[str, float] = {}
     for name, seconds in taken.items():
         middle = statistics.median(seconds)
-        ratios[name] = statistics.median(a / b for a, b in zip(seconds, base, strict=True))
+        ratios[name] = statistics.median(
+            a / b for a, b in zip(seconds, taken["urmpipe poses_over_log"], strict=True)
+        )
         span = f"{middle:.3f} ({min(seconds):.3f}-{max(seconds):.3f})"
         lines.append(f"| {name} | {span} | {options.poses / middle / 1e3:.0f} | {ratios[name]:.2f} |")
-    loop = ratios["Pinocchio loop, poses computed and dropped"]
-    bounds = [
-        Bound("Pinocchio's bare loop / urmpipe's poses", loop, least=3.3),
-        Bound(
-            "Pinocchio's bare loop / urmpipe's positions",
-            loop / ratios["urmpipe positions_over_log"],
-            least=5.0,
-        ),
-    ]
-    write_results("kinematics", lines, bounds)
+    bare_loop = ratios["Pinocchio loop, poses computed and dropped"]
+    positions = bare_loop / ratios["urmpipe positions_over_log"]
+    write_results(
+        "kinematics",
+        lines,
+        [
+            Bound("Pinocchio's bare loop / urmpipe's poses", bare_loop, least=3.3),
+            Bound("Pinocchio's bare loop / urmpipe's positions", positions, least=5.0),
+        ],
+    )
 
 
 if __name__ == "__main__":

@@ -42,7 +42,8 @@ _SHIFT = 1.5 * 2.0**52
 def cosine_sine(angle: Element) -> tuple[Element, Element]:
     """Return cos and sin of an angle in [rad]: within 1.2e-16 up to 2.5e4 rad, within 6e-16 up to 1e15 rad.
 
-    Beyond, where doubles are 0.1 rad apart and more, they are of some angle, alike on every platform. An angle that is not finite gives NaN; what is neither a float nor an array of float64, such as a symbol,
+    Beyond, doubles are 0.1 rad apart and more: the results are those of some angle, alike on every platform.
+    An angle that is not finite gives NaN. What is neither a float nor an array of float64, such as a symbol,
     goes to np.cos and np.sin.
 
     Args:
