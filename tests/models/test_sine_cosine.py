@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Callable
 from fractions import Fraction
 
 import numpy as np
@@ -115,7 +116,13 @@ def test_any_shape_and_strides_give_the_same_values() -> None:
     x = np.random.default_rng(4).uniform(-9.0, 9.0, (6, 8))
     before = x.copy()
     whole = cosine_sine(np.ascontiguousarray(x))
-    for view in (lambda a: a.T, lambda a: a[::-2, ::3], lambda a: a[2:2], lambda a: a[1, 2, ...]):
+    views: list[Callable[[FloatArray], FloatArray]] = [
+        lambda a: a.T,
+        lambda a: a[::-2, ::3],
+        lambda a: a[2:2],
+        lambda a: a[1, 2, ...],
+    ]
+    for view in views:
         for got, of_all in zip(cosine_sine(view(x)), whole, strict=True):
             assert got.shape == view(x).shape
             np.testing.assert_array_equal(got, view(of_all))
