@@ -1,4 +1,4 @@
-"""Write docs/commands.md: what `--help` of every command says, on one page.
+"""Write docs/commands.md: the `--help` of every command on one page.
 
     python docs/write_commands.py
 
@@ -15,7 +15,7 @@ import click
 from urmpipe.main import COMMANDS, cli
 
 PAGE = Path(__file__).resolve().parent / "commands.md"
-WIDTH = 100
+WIDTH = 80
 
 PAGES = {
     "ingest": "[logs.md](logs.md), [recording-logs.md](recording-logs.md)",
@@ -32,26 +32,25 @@ PAGES = {
 INTRODUCTION = """\
 # Commands
 
-What `urmpipe COMMAND --help` says, written by `docs/write_commands.py`. The same in Python:
-[python.md](python.md); what `--json` prints: [json.md](json.md).
+The output of `urmpipe COMMAND --help`, written by `docs/write_commands.py`. The same in Python:
+[python.md](python.md); the output of `--json`: [json.md](json.md).
 
 | command | what it does | more |
 |---|---|---|
 """
 
 SHARED = """
-**Values.** A time is in s or has its unit (`5ms`), lengths of `--tool`, `--base` and `--tolerance` are in m
-or have theirs (`3.5mm`), angles are in rad or have theirs (`0.5deg`). Names of robots, units and systems
-complete in the shell.
+**Values.** Times are in s, lengths in m and angles in rad, unless a unit follows: `5ms`, `3.5mm`, `0.5deg`.
+The shell completes options, names, files of the right kind, columns of the log and kinds of tolerance.
 
-**Exit codes.** 0 within tolerance (done, reached, nothing found), 1 not so, 2 bad input or usage. An error
-says what was found, what is allowed, and the next step; with `--json` it is an object on standard output,
-too. A reader that leaves a pipe early, as `head` does, does not change the exit code.
+**Exit codes.** 0 within tolerance (done, reached, no problems), 1 otherwise, 2 bad input or usage. An error
+names what was found, what is allowed, and the next step; with `--json` it is also an object on standard
+output. Closing a pipe early, as `head` does, does not change the exit code.
 
-**Defaults.** `urmpipe.toml`, in the working folder or above it, says options once for all commands, or for
-one in its table. Each command names what it took from there; options on the command line come first. What
-one call is to give (`output`, `json`, `junit`, `csv`, `baseline`, `audit`, `write-map`, `explain`, `draw`,
-`list`) has no default.
+**Defaults.** `urmpipe.toml`, in the working folder or above it, sets options for all commands, or for one
+command in its table. Each command prints the defaults that it uses; options on the command line override
+them. Options for the output of a single call (`output`, `json`, `junit`, `csv`, `baseline`, `audit`,
+`write-map`, `explain`, `draw`, `list`) have no default.
 
     robot = "ur5e"
     tool = [0, 0, 0.15]
@@ -85,7 +84,7 @@ def page() -> str:
 
 
 def _context(command: click.Command, path: str) -> click.Context:
-    """Return a context in which the help of a command is as wide on every terminal."""
+    """Return a context in which the help of a command has one width on every terminal."""
     settings = {"help_option_names": ["-h", "--help"], "terminal_width": WIDTH, "max_content_width": WIDTH}
     return click.Context(command, info_name=path, **settings)  # type: ignore[arg-type]
 

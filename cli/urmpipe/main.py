@@ -32,18 +32,18 @@ from urmpipe.error_boundary import (
 from urmpipe.usage import Defaults, Group
 
 COMMANDS = {
-    "demo": "Run the whole way on bundled logs.",
+    "demo": "Run the whole workflow on example logs.",
     "ingest": "Turn one log into a recording.",
-    "compare": "Hold logs against a reference and give a verdict.",
-    "diagnose": "Say why a log deviates from its reference.",
+    "compare": "Compare logs with a reference and give a verdict.",
+    "diagnose": "Find out why a log deviates from its reference.",
     "report": "Write the HTML report of recordings.",
     "view": "Open recordings in the viewer.",
     "export": "Write a recording as CSV, Parquet, MAT or TUM.",
     "robot": "List, show and export robots.",
     "ik": "Find joint values for poses of the tool.",
-    "plan": "Plan a path of lines and arcs, and its time.",
-    "accuracy": "Measure how far a driven arm is from its path.",
-    "network": "Assemble kinematic networks, and count how they move.",
+    "plan": "Plan a path of lines and arcs, and its timing.",
+    "accuracy": "Measure the path error of an arm with drives.",
+    "network": "Assemble kinematic networks and compute their mobility.",
     "fmu": "List units, build and check FMUs.",
     "simulate": "Run a system of blocks.",
 }
@@ -96,10 +96,10 @@ class LazyGroup(Group):
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="urmpipe")
 def cli() -> None:
-    """Hold the motion of a robot arm against the motion that was asked for.
+    """Compare the motion of a robot arm with the commanded motion.
 
-    Joint logs of any environment go in as CSV; a verdict, a recording (.rrd, viewed offline in Rerun)
-    and an HTML report come out.
+    urmpipe reads joint logs of any program as CSV. It gives a verdict, a recording (.rrd, for Rerun's
+    offline viewer) and an HTML report.
 
     \b
     Examples:
@@ -115,8 +115,8 @@ def cli() -> None:
       urmpipe network check four-bar
 
     Exit codes: 0 within tolerance, 1 out of tolerance (ik: a target not reached, a jump, or a joint too
-    fast; plan: the arm cannot move so; accuracy: an error above the limit; network: it does not close; fmu
-    check: a problem), 2 bad input or usage.
+    fast; plan: the arm cannot follow the path; accuracy: an error above the limit; network: a loop does not
+    close; fmu check: a problem), 2 bad input or usage.
     """
 
 

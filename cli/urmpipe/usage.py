@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from urmpipe.headings import HeadedCommand
+
 if TYPE_CHECKING:
     from urmpipe_models.errors import Finding
 
@@ -40,6 +42,8 @@ def _shown(value: Any) -> str:
 
 class Group(click.Group):
     """A group of commands that knows what a wrong name may have meant."""
+
+    command_class = HeadedCommand
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command that is named; click tells of an option without its value by no command."""

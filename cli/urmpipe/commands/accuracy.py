@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
+from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.planning import law_options, start_option
 from urmpipe.options.reading import path_options
@@ -17,53 +18,59 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.accuracy.result import Accuracy
 
 
-@click.command(short_help="Measure how far a driven arm is from its path.")
-@click.option(
+@click.command(cls=HeadedCommand, short_help="Measure the path error of an arm with drives.")
+@option(
+    Heading.PLANNING,
     "--path",
     required=True,
     metavar="PATH.csv|cube:...",
-    help="Rows x, y, z and r, or a test cube, as of plan.",
+    help="Path of lines and arcs, or a test cube, as for plan.",
 )
-@click.option(
+@option(
+    Heading.PLANNING,
     "--velocities",
     type=NumbersType("V1,V2,...", "m/s", "0.1,0.2"),
     default="0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8,0.9,1.0",
     show_default=True,
-    help="Largest speeds along the path, in m/s.",
+    help="Speeds along the path to run, in m/s.",
 )
 @law_options
-@click.option(
+@option(
+    Heading.JUDGING,
     "--limit",
     type=LENGTH,
-    help="Largest error allowed, as 0.4mm: judge the velocities, and find the largest within it.",
+    help="Largest allowed error, such as 0.4mm: judge each velocity, and find the largest within it.",
 )
-@click.option(
+@option(
+    Heading.JUDGING,
     "--error",
     type=OneOf(["time", "path"]),
     default="time",
     show_default=True,
-    help="What is judged: the distance from the set point of the same time, or from the path.",
+    help="Judged error: distance from the set point at the same time, or from the path.",
 )
-@click.option(
+@option(
+    Heading.RUNNING,
     "--force",
     type=NumbersType("FX,FY,FZ", "N", "0,0,-50"),
-    help="What acts on the tool from outside, in N, along the axes of the world [default: nothing].",
+    help="External force on the tool in N, in the world frame [default: none].",
 )
 @start_option
-@click.option(
+@option(
+    Heading.RUNNING,
     "--backend",
     type=OneOf(["native", "python"]),
-    help="What the arm runs as [default: native if it can be built here].",
+    help="Run the arm as compiled C or in Python [default: native if a compiler is found].",
 )
-@output_option("RUN.rrd", "Write a recording of the runs.")
+@output_option("RUN.rrd", "Recording to write.")
 @path_options
 @output_options
 def accuracy(path: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
-    """Run an arm with drives along a path at some velocities, and tell how far it is from it.
+    """Run an arm with drives along a path at several velocities, and measure its path error.
 
-    The path is planned at each velocity, its set points lead the arm's controllers. With --limit there is a
-    verdict, and the running speed is found: the largest velocity within the limit, to 1 %. The robot needs
-    masses, and a drive or a spring for every joint.
+    The path is planned at each velocity; its set points are the inputs of the arm's controllers. With
+    --limit, the command gives a verdict and finds the running speed: the largest velocity within the limit,
+    to 1 %. The robot needs masses, and a drive or a spring for every joint.
 
     \b
     Examples:
@@ -72,7 +79,8 @@ def accuracy(path: str, output: Path | None, terminal: Terminal, **options: Any)
       urmpipe accuracy --robot my-arm.toml --path contour.csv --error path --json
       urmpipe accuracy --robot my-arm.toml --path contour.csv --force 0,0,-50
 
-    Exit codes: 0 done, with --limit every velocity is within it, 1 one is not, 2 bad input or usage.
+    Exit codes: 0 done, and with --limit every velocity within it, 1 a velocity above the limit, 2 bad input
+    or usage.
     """
     from urmpipe.systems.blocks import ON_PYTHON
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
+from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.comparing import comparing_options
 from urmpipe.options.given import for_logs, options_given
 from urmpipe.options.grouped import Command
@@ -37,71 +38,92 @@ def _cycles(text: str) -> tuple[tuple[int, int], ...]:
     return parse_cycles(text)
 
 
-def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command], Command]:
+def _file(heading: Heading, name: str, *, metavar: str, help: str) -> Callable[[Command], Command]:
     """Return an option that names a file to write or to read."""
-    return click.option(name, *names, metavar=metavar, type=click.Path(path_type=Path), help=help)
+    return option(heading, name, metavar=metavar, type=click.Path(path_type=Path), help=help)
 
 
-@click.command(short_help="Hold logs against a reference and give a verdict.")
+@click.command(cls=HeadedCommand, short_help="Compare logs with a reference and give a verdict.")
 @click.argument("reference", type=click.Path(path_type=Path))
 @click.argument("logs", metavar="[LOG...]", nargs=-1, type=click.Path(path_type=Path))
-@output_option("RUN.rrd", "The recording [default: LOG-against-REFERENCE.rrd here].")
+@output_option("RUN.rrd", "Recording to write [default: LOG-against-REFERENCE.rrd].")
 @comparing_options
-@click.option(
+@option(
+    Heading.ALIGNING,
     "--align",
     type=OneOf(["none", "start", "rigid", "tool", "base+tool"]),
     default="none",
     show_default=True,
-    help="Move the log first: to the same start pose, by the best rigid motion, by the best tool offset, by"
-    " the best base and tool at once (measured from outside).",
+    help="Align the log first: start pose, best rigid motion, best tool offset, or best base and tool"
+    " together (for an external measuring device).",
 )
-@click.option(
+@option(
+    Heading.JUDGING,
     "--diagnose",
     is_flag=True,
-    help="Say why each log deviates, too: docs/diagnose.md. Base and tool are causes then: not with --align.",
+    help="Also diagnose why each log deviates (docs/diagnose.md). Not with --align: base and tool are"
+    " possible causes.",
 )
-@click.option(
+@option(
+    Heading.ISO,
     "--iso",
     is_flag=True,
     is_eager=True,  # what a tolerance is of depends on it
-    help="The logs are the cycles of a test after ISO 9283, or one log in which the motion repeats: accuracy"
-    " and repeatability of poses, paths and speed (docs/iso.md). --tolerance is of criteria then, as"
+    help="Evaluate accuracy and repeatability of poses, paths and speed after ISO 9283 (docs/iso.md). Each"
+    " log is a cycle of the test, or one log repeats the motion. --tolerance then takes criteria, such as"
     " AP=0.4mm,RP=0.1mm,AT=1mm,AV=5%, and has no default.",
 )
-@click.option(
+@option(
+    Heading.ISO,
     "--cycles",
     metavar="FIRST:LAST,...",
     type=ParsedType("FIRST:LAST,...", _cycles),
-    help="With --iso: the rows of each cycle of one log, from 1 [default: found by returns to the start].",
+    help="With --iso: rows of each cycle of one log, from 1 [default: from each return to the start].",
 )
-@click.option(
-    "--planes", type=int, metavar="N", help="With --iso: planes that cut the command path [default: 50]."
+@option(
+    Heading.ISO,
+    "--planes",
+    type=int,
+    metavar="N",
+    help="With --iso: number of planes that cut the command path [default: 50].",
 )
-@click.option(
-    "--band", type=LENGTH, help="With --iso: half width of the band round a final pose [default: 0.1mm]."
+@option(
+    Heading.ISO,
+    "--band",
+    type=LENGTH,
+    help="With --iso: half width of the band around a final pose [default: 0.1mm].",
 )
-@click.option(
+@option(
+    Heading.ISO,
     "--targets",
     metavar="FILE.csv",
     type=click.Path(path_type=Path),
-    help="With --iso: the poses to judge, a row each: x, y, z, perhaps an orientation [default: the rests of"
-    " REFERENCE].",
+    help="With --iso: poses to judge, one per row: x, y, z and optionally an orientation [default: the poses"
+    " at which REFERENCE rests].",
 )
-@_file("--junit", metavar="FILE.xml", help="Write the verdicts as JUnit XML, for GitLab, Jenkins and GitHub.")
 @_file(
+    Heading.OUTPUT,
+    "--junit",
+    metavar="FILE.xml",
+    help="Write the verdicts as JUnit XML for GitLab, Jenkins and GitHub.",
+)
+@_file(
+    Heading.OUTPUT,
     "--csv",
     metavar="FILE.csv",
-    help="Write the statistics as a table, one line a log and quantity.",
+    help="Write the statistics as a table, one row per log and quantity.",
 )
 @_file(
+    Heading.BASELINE,
     "--baseline",
     metavar="RUN.rrd",
-    help="Tell what changed since an earlier comparison (its .rrd); worse is exit code 1.",
+    help="Report changes since an earlier comparison (.rrd); exit code 1 if worse.",
 )
-@click.option(
+@option(
+    Heading.BASELINE,
     "--noise",
     type=ParsedType("M|KIND=VALUE,...", _noise),
-    help="Changes since the baseline that mean nothing, as --tolerance [default: 1um, 1e-6 rad].",
+    help="Ignore smaller changes since the baseline; written like --tolerance [default: 1um, 1e-6 rad].",
 )
 @log_options
 @output_options
@@ -115,14 +137,13 @@ def compare(
     terminal: Terminal,
     **options: Any,
 ) -> int:
-    """Hold logs against a reference: deviation, statistics, verdict.
+    """Compare logs with a reference: deviation, statistics, verdict.
 
-    REFERENCE is a path (t, x, y, z), a log, or a recording; so is each LOG. Of the recording of a
-    simulation, --block names the block whose motion is meant. With REFERENCE alone, the
-    forward kinematics of that log are held against the tool centre point that it recorded itself. A
-    folder stands for the files of one log. With --sides, REFERENCE holds what was asked for and what was
-    done. With --baseline, REFERENCE alone may be the recording of a
-    comparison, which stands as it was made.
+    REFERENCE is a path (t, x, y, z), a log, or a recording; so is each LOG. A folder stands for the files
+    of one log. With REFERENCE alone, its forward kinematics are compared with the tool centre point (TCP)
+    that it recorded. With --sides, REFERENCE holds commanded and measured motion. For the recording of a
+    simulation, --block selects the block. With --baseline, REFERENCE alone may be the recording of a
+    comparison, which is used unchanged.
 
     \b
     Examples:
@@ -136,7 +157,8 @@ def compare(
       urmpipe compare path.csv simulation.rrd --block arm
       urmpipe compare today.rrd --baseline released.rrd --noise 5um
 
-    Exit codes: 0 within tolerance and not worse than the baseline, 1 not so, 2 bad input or usage.
+    Exit codes: 0 within tolerance and not worse than the baseline, 1 out of tolerance or worse, 2 bad input
+    or usage.
     """
     options, note = for_logs(ctx, (reference, *logs), options)
     if note:

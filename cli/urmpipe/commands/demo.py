@@ -15,17 +15,16 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.comparison.comparison import Comparison
 
 EXPECTED = {"coppeliasim": "pass", "matlab": "pass", "solidworks": "pass", "counter_rotating": "fail"}
-"""The bundled logs and the verdict each should get: the last comes from an arm with one module the wrong
-way round."""
+"""The example logs and their expected verdicts: the last comes from an arm with a counter-rotating module."""
 
-EXPLAINED = """Four logs of one motion: three should pass; the fourth, of an arm with one module the wrong way
-round, should fail, and so does all of it. Which module that is, is to be found."""
+EXPLAINED = """Four logs of one motion. Three should pass. The fourth comes from an arm with one module that
+counter-rotates: it should fail, and so should the overall verdict. The diagnosis should name the module."""
 
-AS_EXPECTED = """The verdicts are as they should be: the three environments agree with the path, the arm with
-the counter-rotating module does not. Why each deviates:"""
+AS_EXPECTED = """All verdicts are as expected: three logs agree with the path, the log of the arm with the
+counter-rotating module does not. Why each log deviates:"""
 
 
-@click.command(short_help="Run the whole way on bundled logs.")
+@click.command(short_help="Run the whole workflow on example logs.")
 @click.option(
     "-o",
     "--output",
@@ -37,10 +36,10 @@ the counter-rotating module does not. Why each deviates:"""
 )
 @output_options
 def demo(output: Path, terminal: Terminal) -> int:
-    """Run the whole way on bundled logs: ingest, compare and diagnose, report.
+    """Run the whole workflow on example logs: ingest, compare, diagnose, report.
 
-    One motion of the six-module URM arm, as three environments logged it and as an arm with a
-    counter-rotating module did. Exit code 0 if the verdicts are as they should be.
+    Three programs and an arm with a counter-rotating module logged one motion of the six-module URM arm.
+    Exit code 0 if the verdicts are as expected.
 
     \b
     Examples:
@@ -80,10 +79,10 @@ def _print(result: Comparison, report: Report, as_expected: bool) -> None:
 
     click.echo(f"{EXPLAINED}\n")
     print_presentation(present(result))
-    click.echo(AS_EXPECTED if as_expected else f"These are not the verdicts expected: {EXPECTED}")
+    click.echo(AS_EXPECTED if as_expected else f"These verdicts differ from the expected ones: {EXPECTED}")
     for one in result.runs:
         if one.diagnosis is not None:
             say(f"  {one.name}: {one.diagnosis.sentence}")
-    say(f"Logs:      {LOGS}  (to look at, or to try the commands with)")
+    say(f"Logs:      {LOGS}  (try the commands with them)")
     say(f"Report:    {report.path}  (open it in any browser)")
     print_recording(result.recording)

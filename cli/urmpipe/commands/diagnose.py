@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
+from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.comparing import comparing_options
 from urmpipe.options.given import for_logs
 from urmpipe.options.output import Terminal, output_option, output_options
@@ -32,17 +33,18 @@ def _not_aligned(text: str) -> str:
     return text
 
 
-@click.command(short_help="Say why a log deviates from its reference.")
+@click.command(cls=HeadedCommand, short_help="Find out why a log deviates from its reference.")
 @click.argument("reference", type=click.Path(path_type=Path))
 @click.argument("log", required=False, type=click.Path(path_type=Path))
-@output_option("RUN.rrd", "The recording [default: LOG-diagnosed.rrd here].")
+@output_option("RUN.rrd", "Recording to write [default: LOG-diagnosed.rrd].")
 @comparing_options
-@click.option(
+@option(
+    Heading.ALIGNING,
     "--align",
     type=ParsedType("MODE", _not_aligned),
     hidden=True,
     expose_value=False,
-    help="Refused: base and tool are causes.",
+    help="Not allowed: base and tool are possible causes.",
 )
 @log_options
 @output_options
@@ -56,13 +58,12 @@ def diagnose(
     terminal: Terminal,
     **options: Any,
 ) -> int:
-    """Say why a log deviates from its reference, and how sure that is.
+    """Find out why a log deviates from its reference, with confidence intervals.
 
-    Looks for the causes that make both agree: joints that count the other way, are exchanged, have
-    another zero or scale; lengths and angles of the arm; base and tool; the unit of the path; the clock;
-    another arm. REFERENCE and LOG are those of compare, and so are verdict and exit code; with REFERENCE
-    alone, that log is held against the tool centre point that it recorded itself. What these two sides
-    cannot tell is said.
+    The command tests possible causes: joints with reversed sign, exchanged joints, joint offsets and
+    scales, lengths and angles of the arm, base and tool, unit of the path, clock, a different arm. It also
+    names the causes that this data cannot distinguish. REFERENCE, LOG, verdict and exit code are those of
+    compare; with REFERENCE alone, the log is compared with the tool centre point (TCP) that it recorded.
 
     \b
     Examples:

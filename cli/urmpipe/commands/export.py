@@ -20,32 +20,33 @@ if TYPE_CHECKING:
 @click.option(
     "--to",
     type=OneOf(["csv", "parquet", "mat", "tum"]),
-    help="The format [default: by the suffix of the output, else csv].",
+    help="Format [default: by the suffix of the output, else csv].",
 )
-@output_option("FILE", "The file [default: RUN-ROWS.FORMAT here].")
+@output_option("FILE", "File to write [default: RUN-ROWS.FORMAT].")
 @click.option(
     "--rows",
     type=OneOf(["grid", "file", "velocities", "samples", "criteria"]),
-    help="The run on its grid in SI, or the file's own rows, names and units [default: grid]; of an accuracy"
-    " its velocities or all samples [default: velocities]; of a test (compare --iso) its criteria.",
+    help="Rows of a log: grid, in SI on the time grid, or file, with the file's own names and units [default:"
+    " grid]; of accuracy: velocities or samples [default: velocities]; of compare --iso: criteria.",
 )
 @click.option(
     "--tcp",
     type=OneOf(["fk", "recorded"]),
-    help="Poses for --to tum: by the joints, or as the log recorded them [default: fk].",
+    help="Source of the tool poses for --to tum: fk, from the joint values; recorded, from the log"
+    " [default: fk].",
 )
 @output_options
 def export(recording: Path, output: Path | None, terminal: Terminal, **options: Any) -> int:
-    """Write what a recording holds, for other tools.
+    """Export the data of a recording for other tools.
 
-    --rows grid is what urmpipe made of a log: t, the repolarized joints, their rates, their torques where
-    the robot has masses, and the motion of the tool centre point, in SI. --rows file is what the log said:
-    its columns under their own names, in their own units, with its own clock; nothing is repolarized or
-    resampled. Columns that ingest did not use are not in a recording.
+    --rows grid has the processed log in SI: t, repolarized joint values (phase unwrapping that keeps real
+    jumps), rates, torques where the robot has masses, and the motion of the tool centre point (TCP). --rows
+    file has the log as it was: its own columns, names, units and clock, not repolarized or resampled.
+    Columns that ingest did not use are not in a recording.
 
-    A comparison leaves as its deviations; as TUM, reference and actual become two trajectories for evo. A
-    simulation leaves as its signals, each under BLOCK.VARIABLE with its unit; as TUM, the tip of each arm. A
-    CSV carries no mark of whose it is, so an existing one is never replaced.
+    A comparison is exported as its deviations, in TUM as two trajectories for evo, reference and log. A
+    simulation is exported as its signals BLOCK.VARIABLE with their units, in TUM as the tip of each arm. An
+    existing CSV file is never replaced.
 
     \b
     Examples:

@@ -32,18 +32,19 @@ def _platforms(
 
 @click.group(cls=Group, short_help="List units, build and check FMUs.")
 def fmu() -> None:
-    """List the units that urmpipe brings along, package them or your own as FMUs, and check any FMU.
+    """List the built-in units, package units as FMUs, and check any FMU.
 
-    A unit is a model with FMI variables: the kinematics of an arm, the repolarizer, a DC drive, a log that
-    is played. Its FMU (FMI 2.0 co-simulation) runs in Simulink, Dymola, OpenModelica, OSP and FMPy.
+    A unit is a model with FMI variables: the kinematics of an arm, the repolarizer (phase unwrapping that
+    keeps real jumps), a DC drive, a log that is played back. Its FMU (FMI 2.0 co-simulation) runs in
+    Simulink, Dymola, OpenModelica, OSP and FMPy.
     """
 
 
-@fmu.command("list", short_help="List the units that urmpipe brings along.")
+@fmu.command("list", short_help="List the built-in units.")
 @click.argument("unit", metavar="[UNIT|FILE.py]", type=UNIT, required=False)
 @output_options
 def list_(unit: str | None, terminal: Terminal) -> int:
-    """List the units that urmpipe brings along, and the options that each takes; of one its variables.
+    """List the built-in units with their options, or the variables of one unit.
 
     \b
     Examples:
@@ -62,12 +63,12 @@ def list_(unit: str | None, terminal: Terminal) -> int:
 
 @fmu.command(short_help="Package a unit as an FMU.")
 @click.argument("unit", metavar="UNIT|FILE.py", type=UNIT)
-@click.option("--robot", type=ROBOT, help="The arm of a unit that has one.")
+@click.option("--robot", type=ROBOT, help="Robot, for units that need one.")
 @click.option(
     "--log",
     metavar="LOG",
     type=click.Path(path_type=Path),
-    help="The log of a unit that plays one.",
+    help="Log, for units that play one back.",
 )
 @MAP_OPTION
 @click.option(
@@ -78,13 +79,13 @@ def list_(unit: str | None, terminal: Terminal) -> int:
     multiple=True,
     callback=named_values,
     metavar="NAME=VALUE",
-    help="A further option of the unit, such as joints=6 or rates=true; `urmpipe fmu list` shows them.",
+    help="Another option of the unit, such as joints=6 or rates=true; see `urmpipe fmu list`.",
 )
 @click.option(
     "--backend",
     type=OneOf(["native", "python"]),
-    help="native: C inside, needs nothing on the target. python: needs Python with NumPy there"
-    " [default: native if it can be built here].",
+    help="native: compiled C, needs nothing on the target. python: needs Python with NumPy there"
+    " [default: native if a compiler is found].",
 )
 @click.option(
     "--platforms",
@@ -92,7 +93,7 @@ def list_(unit: str | None, terminal: Terminal) -> int:
     multiple=True,
     callback=_platforms,
     metavar="A,B",
-    help="linux64, win64, or both, with the extra `cross` [default: this one; python: all].",
+    help="linux64, win64, or both with the extra `cross` [default: this platform; python: all].",
 )
 @click.option(
     "-o",
@@ -100,7 +101,7 @@ def list_(unit: str | None, terminal: Terminal) -> int:
     type=click.Path(path_type=Path),
     default=".",
     metavar="DIR|FILE.fmu",
-    help="Folder for UNIT.fmu, or the file [default: here].",
+    help="Folder for UNIT.fmu, or the file to write [default: the working folder].",
 )
 @output_options
 def build(
@@ -114,9 +115,9 @@ def build(
     output: Path,
     terminal: Terminal,
 ) -> int:
-    """Package a unit as an FMU: one of `urmpipe fmu list`, or a Python file of your own with a unit in it.
+    """Package a unit as an FMU: a name of `urmpipe fmu list`, or your own unit in a Python file.
 
-    Built twice, the same unit is the same file, bit by bit. An FMU of another tool is never replaced.
+    Building the same unit twice gives identical files. An FMU of another tool is never replaced.
 
     \b
     Examples:
@@ -164,7 +165,7 @@ def build(
     "--timeout",
     type=DURATION,
     default=60.0,
-    help="How long a call of the FMU may take [default: 60 s].",
+    help="Longest time that a call of the FMU may take [default: 60 s].",
 )
 @output_options
 def check(file: Path, timeout: float, terminal: Terminal) -> int:
@@ -176,7 +177,7 @@ def check(file: Path, timeout: float, terminal: Terminal) -> int:
       urmpipe fmu check other.fmu --json
       urmpipe fmu check slow.fmu --timeout 600
 
-    Exit codes: 0 nothing found, 1 problems found, 2 no FMU.
+    Exit codes: 0 no problems, 1 problems found, 2 not an FMU.
     """
     from urmpipe.printing.fmu import checked_dict, print_checked
     from urmpipe_fmus.check import check_fmu

@@ -9,6 +9,7 @@ import click
 from click.core import ParameterSource
 
 import urmpipe
+from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import table_options
 from urmpipe.options.types import DURATION, JOINT_VALUES, OneOf, WholeType
@@ -37,45 +38,65 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
     return kinds.get("axis")
 
 
-@click.command(short_help="Find joint values for poses of the tool.")
+@click.command(cls=HeadedCommand, short_help="Find joint values for poses of the tool.")
 @click.argument("targets", metavar="TARGETS|PATH", type=click.Path(path_type=Path))
-@output_option("LOG.csv|RUN.rrd", "Write a joint log that ingest reads, or a recording.")
-@click.option(
+@output_option("LOG.csv|RUN.rrd", "Write a joint log for ingest, or a recording.")
+@option(
+    Heading.SOLVING,
     "--every",
     "--all",
     is_flag=True,
-    help="Print all solutions, and record every branch as a ghost arm; without a closed form by restarts.",
+    help="Find all solutions, and record each as a ghost arm; arms without a closed form use random starts.",
 )
-@click.option(
+@option(
+    Heading.SOLVING,
     "--start",
     type=JOINT_VALUES,
-    help="Joint values to be near to, in rad and m [default: the robot's own].",
+    help="Prefer solutions near these joint values, in rad and m [default: the robot's start pose].",
 )
-@click.option(
+@option(
+    Heading.SOLVING,
     "--tolerance",
     metavar="M",
     callback=_on_axes,
-    help="Let a target out of reach take the nearest point within this on each axis, such as 3.5mm.",
+    help="Allow the nearest reachable point within this distance on each axis, such as 3.5mm.",
 )
-@click.option("--tsp", type=DURATION, help="Time from row to row of a file without times: it is a path then.")
-@click.option(
-    "--within-pi", is_flag=True, help="Write joints without limits within -pi to pi, as CoppeliaSim does."
+@option(
+    Heading.SOLVING,
+    "--tsp",
+    type=DURATION,
+    help="Sample period of a table without time column; its rows are then a path.",
 )
-@click.option(
+@option(
+    Heading.SOLVING,
+    "--within-pi",
+    is_flag=True,
+    help="Wrap joints without limits to -pi..pi, as CoppeliaSim does.",
+)
+@option(
+    Heading.SOLVING,
     "--method",
     type=OneOf(["auto", "closed", "iterative"]),
     default="auto",
     show_default=True,
-    help="How it is solved; auto: by the closed form of the arm if it has one.",
+    help="Solver; auto: the closed form if the arm has one, else iterative.",
 )
-@click.option(
+@option(
+    Heading.SOLVING,
     "--restarts",
     type=WholeType(),
     default=20,
     show_default=True,
-    help="Random starts of the iterative solver where the first fails.",
+    help="Random starts of the iterative solver if the first one fails.",
 )
-@click.option("--seed", type=WholeType(), default=0, show_default=True, help="Of the random starts.")
+@option(
+    Heading.SOLVING,
+    "--seed",
+    type=WholeType(),
+    default=0,
+    show_default=True,
+    help="Seed of the random starts.",
+)
 @table_options
 @output_options
 def ik(
@@ -84,11 +105,11 @@ def ik(
     terminal: Terminal,
     **options: Any,
 ) -> int:
-    """Find joint values that bring the tool centre point of an arm to targets.
+    """Find joint values that bring the tool centre point (TCP) of an arm to targets.
 
-    TARGETS is a table of x, y, z (m) and, if the orientation counts, rz, ry, rx (rad) or a quaternion: each
-    row stands for itself. A PATH has a time, too (or --tsp): its rows are reached one after the other,
-    without a jump where the arm can.
+    TARGETS is a table of x, y, z (m) and, if the orientation matters, rz, ry, rx (rad) or a quaternion. Each
+    row is solved on its own. A PATH also has a time column (or --tsp): its rows are solved in order, without
+    jumps where the arm allows it.
 
     \b
     Examples:
@@ -98,8 +119,8 @@ def ik(
       urmpipe ik path.csv --robot urm6 -o joints.csv
       urmpipe ik path.csv --robot ur5e --tolerance 3.5mm -o run.rrd
 
-    Exit codes: 0 every target reached, 1 not so (rows that hold no target count, and along a path jumps and
-    joints that are too fast), 2 bad input or usage.
+    Exit codes: 0 every target reached, 1 not every target reached (rows without a target count, and on a
+    path also jumps and joints that are too fast), 2 bad input or usage.
     """
     replaces = output is not None and output.exists()
     with terminal.progress(f"Solving {targets}") as progress:

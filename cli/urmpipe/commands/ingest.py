@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
+from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.given import for_logs
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import log_options
@@ -18,25 +19,28 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.runs.results import Run
 
 
-@click.command(short_help="Turn one log into a recording.")
+@click.command(cls=HeadedCommand, short_help="Turn one log into a recording.")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@output_option("RUN.rrd", "The recording [default: LOG.rrd here].")
-@click.option(
+@output_option("RUN.rrd", "Recording to write [default: LOG.rrd].")
+@option(
+    Heading.OUTPUT,
     "--explain",
     is_flag=True,
-    help="Print each decision with its evidence and alternative; write no recording.",
+    help="Print each decision with its evidence and the option that changes it; write no recording.",
 )
-@click.option(
+@option(
+    Heading.OUTPUT,
     "--write-map",
     metavar="FILE.toml",
     type=click.Path(path_type=Path),
-    help="Save what was inferred as a map for --map.",
+    help="Save the inferred columns and units as a map for --map.",
 )
-@click.option(
+@option(
+    Heading.OUTPUT,
     "--audit",
     metavar="FILE.csv",
     type=click.Path(path_type=Path),
-    help="Write every wrap, repair and open question, one a line.",
+    help="Write every wrap, repair and open question, one per row.",
 )
 @log_options
 @output_options
@@ -50,10 +54,11 @@ def ingest(
     terminal: Terminal,
     **options: Any,
 ) -> int:
-    """Turn one log into a recording: checked, repolarized, with the arm's kinematics.
+    """Turn one log into a recording: check it, repolarize it, compute the arm's kinematics.
 
-    Several files are one log whose source writes one a plot (SolidWorks); a folder stands for the
-    files in it. Of a recording it shows the run inside.
+    Repolarizing is phase unwrapping that keeps real jumps. Several files are one log if the program writes
+    a file per plot (SolidWorks); a folder stands for its files. For a recording, the command shows the run
+    in it.
 
     \b
     Examples:

@@ -19,19 +19,19 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.networks.result import NetworkResult
 
 
-@click.group(cls=Group, short_help="Assemble kinematic networks, and count how they move.")
+@click.group(cls=Group, short_help="Assemble kinematic networks and compute their mobility.")
 def network() -> None:
-    """Assemble kinematic networks of joints, constraint elements and controls, and count how they move.
+    """Assemble kinematic networks of joints, constraint elements and controls, and compute their mobility.
 
-    A network is a name of the list, or a TOML file of bodies, joints, elements and controls;
-    docs/networks.md has every key of it.
+    A network is a name of `urmpipe network list`, or a TOML file of bodies, joints, elements and controls;
+    docs/networks.md lists its keys.
     """
 
 
-@network.command("list", short_help="List the networks that urmpipe brings along.")
+@network.command("list", short_help="List the built-in networks.")
 @output_options
 def list_(terminal: Terminal) -> int:
-    """List the networks that urmpipe brings along.
+    """List the built-in networks.
 
     \b
     Examples:
@@ -57,37 +57,39 @@ def _search_options(command: Command) -> Command:
             multiple=True,
             callback=named_numbers,
             metavar="CONTROL=VALUE",
-            help="A value of a control, in the units of the network's file [default: its start].",
+            help="Value of a control, in the units of the network's file [default: its start value].",
         ),
         click.option(
             "--restarts",
             type=WholeType(),
             default=2000,
             show_default=True,
-            help="Random starts in a row that find nothing new before the search ends.",
+            help="End the search after this many random starts without a new assembly.",
         ),
-        click.option("--seed", type=WholeType(), default=0, show_default=True, help="Of the random starts."),
+        click.option(
+            "--seed", type=WholeType(), default=0, show_default=True, help="Seed of the random starts."
+        ),
         click.option(
             "--draw",
             metavar="FILE.svg",
             type=click.Path(path_type=Path),
-            help="Draw the graph and the mechanism into a file.",
+            help="Draw the graph and the mechanism.",
         ),
-        output_option("RUN.rrd", "Write a recording."),
+        output_option("RUN.rrd", "Recording to write."),
         STRICT_OPTION,
     )
 
 
-@network.command(short_help="Assemble a network, and count how it moves.")
+@network.command(short_help="Assemble a network and compute its mobility.")
 @click.argument("name", metavar="NAME|FILE", type=NETWORK)
 @_search_options
 @output_options
 def check(name: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
-    """Assemble a network from its start, and count how it moves.
+    """Assemble a network from its start values, and compute its mobility.
 
     Prints its loops and clusters, its mobility by the rank of the Jacobian and by Kutzbach's formula, and
-    why the two differ: redundant constraints. Idle spins and special configurations are named. What does
-    not close is told with its loop and its gap.
+    the redundant constraints that explain a difference. It names idle spins and special configurations. If
+    a loop does not close, it names the loop and its gap.
 
     \b
     Examples:
@@ -95,7 +97,7 @@ def check(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
       urmpipe network check bennett --set turn=0.7 --json
       urmpipe network check my-linkage.toml --draw my-linkage.svg
 
-    Exit codes: 0 assembled, 1 not, 2 bad file or usage.
+    Exit codes: 0 assembled, 1 not assembled, 2 bad file or usage.
     """
     replaces = output is not None and output.exists()
     with terminal.progress(f"Assembling {name}") as progress:
@@ -103,18 +105,16 @@ def check(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
     return _answered(result, terminal, replaces)
 
 
-@network.command(short_help="Find the configurations in which a network closes.")
+@network.command(short_help="Find configurations in which a network closes.")
 @click.argument("name", metavar="NAME|FILE", type=NETWORK)
-@click.option(
-    "--every", "--all", is_flag=True, help="Find all assemblies, and record them beside each other as ghosts."
-)
+@click.option("--every", "--all", is_flag=True, help="Find all assemblies, and record each as a ghost.")
 @_search_options
 @output_options
 def solve(name: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
-    """Find the configuration near its start in which a network closes, with its controls held; or every one.
+    """Find the configuration nearest to the start in which a network closes, or with --all every one.
 
-    Random starts are tried where the start does not close, and with --all until so many in a row find
-    nothing new.
+    Controls keep their values. The command tries random starts if the start does not close; with --all it
+    ends after --restarts random starts without a new assembly.
 
     \b
     Examples:
@@ -122,7 +122,7 @@ def solve(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
       urmpipe network solve four-bar --all --json
       urmpipe network solve stewart-gough --all --draw sg.svg -o sg.rrd
 
-    Exit codes: 0 an assembly was found, 1 none, 2 bad file or usage.
+    Exit codes: 0 assembly found, 1 no assembly found, 2 bad file or usage.
     """
     replaces = output is not None and output.exists()
     with terminal.progress(f"Assembling {name}") as progress:

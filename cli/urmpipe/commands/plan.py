@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
+from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.planning import law_options, start_option
 from urmpipe.options.reading import path_options
@@ -21,27 +22,35 @@ PLACED = ("base", "tool", "base_link", "tip_link")
 """Options that place the arm: what reads the plan needs them again."""
 
 
-@click.command(short_help="Plan a path of lines and arcs, and its time.")
+@click.command(cls=HeadedCommand, short_help="Plan a path of lines and arcs, and its timing.")
 @click.argument("path", metavar="PATH.csv|cube:...")
-@output_option("PLAN.csv|PLAN.rrd", "Write a log that every command reads, or a recording.")
-@click.option(
+@output_option("PLAN.csv|PLAN.rrd", "Write a log for the other commands, or a recording.")
+@option(
+    Heading.PLANNING,
     "--velocity",
     type=NumberType("M/S", "m/s"),
-    help="Largest speed [default: 0.5; with --law limits none].",
+    help="Largest speed along the path [default: 0.5; none with --law limits].",
 )
 @law_options
-@click.option("--tsp", type=DURATION, default="5ms", show_default=True, help="Time from sample to sample.")
+@option(
+    Heading.PLANNING,
+    "--tsp",
+    type=DURATION,
+    default="5ms",
+    show_default=True,
+    help="Sample period.",
+)
 @start_option
 @path_options
 @output_options
 def plan(path: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
-    """Plan a path of lines and arcs, the time along it, and the joints of an arm that follows it.
+    """Plan a path of lines and arcs, its timing, and the joint values of an arm that follows it.
 
-    PATH.csv is a table of x, y, z (m) and r: the radius of an arc that begins at the row; as corner_r: that
-    rounds the corner at the row. Where it is 0 the path stops. rz, ry, rx (rad) or a quaternion turn the
-    tool.
-    cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1 is a test path after ISO 9283 (cube:diagonal is the other); plane=
-    names its plane (xy, xz, yz; c1 to c4). Without --robot path and time alone are planned.
+    PATH.csv is a table of x, y, z (m) and r, the radius of an arc that begins at the row; corner_r instead
+    is the radius that rounds the corner at the row. The path stops where the radius is 0. rz, ry, rx (rad)
+    or a quaternion give the orientation of the tool. cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1 is a test path
+    after ISO 9283, cube:diagonal the other; plane= selects its plane (xy, xz, yz; c1 to c4). Without
+    --robot, only path and timing are planned.
 
     \b
     Examples:
@@ -51,8 +60,8 @@ def plan(path: str, output: Path | None, terminal: Terminal, **options: Any) -> 
       urmpipe plan contour.csv --robot ur5e --law jerk --jerk 60
       urmpipe plan contour.csv --robot my-arm.toml --law limits --json
 
-    Exit codes: 0 the arm can move so (its speeds reduced to what the joints allow), 1 not so (a jump, a
-    singular pose, samples out of reach, less than 1 % of the speed left), 2 bad input or usage.
+    Exit codes: 0 the arm can follow the plan (at reduced speed where joint limits require it), 1 it cannot
+    (a jump, a singular pose, samples out of reach, less than 1 % of the speed left), 2 bad input or usage.
     """
     replaces = output is not None and output.exists()
     with terminal.progress(f"Planning {path}") as progress:

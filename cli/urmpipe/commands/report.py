@@ -23,7 +23,7 @@ OF_FIGURES = ("formats", "figure_names", "figure_width", "figure_font", "figure_
 
 @click.command(short_help="Write the HTML report of recordings.")
 @click.argument("recordings", metavar="RUN.rrd...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@output_option("FILE.html", "The report [default: RUN.html here].")
+@output_option("FILE.html", "Report to write [default: RUN.html].")
 @click.option(
     "--figures",
     metavar="DIR",
@@ -71,11 +71,11 @@ def report(
     terminal: Terminal,
     **of_figures: Any,
 ) -> int:
-    """Write one self-contained HTML file about recordings that ingest, compare or simulate wrote.
+    """Write one self-contained HTML report of recordings that ingest, compare or simulate wrote.
 
-    It needs no network: verdicts, figures, statistics, the audit of repolarizations, the drawing of a
-    simulated system, warnings and provenance are inside. --figures needs: pip install
-    'urmpipe[figures]'. Drawings that are no plots, such as that of a system, are SVG files always.
+    It needs no network. It contains verdicts, figures, statistics, the audit of repolarizations (phase
+    unwrapping that keeps real jumps), the drawing of a simulated system, warnings and provenance. --figures
+    needs: pip install 'urmpipe[figures]'. Drawings such as that of a system are always SVG files.
 
     \b
     Examples:

@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 @click.group(cls=Group, short_help="List, show and export robots.")
 def robot() -> None:
-    """List, show and export robots: those that urmpipe brings along, and your own files.
+    """List, show and export robots: built-in ones, and your own files.
 
-    A robot is a name of the list, a URDF, or a TOML file of URM modules, DH parameters or frames;
-    docs/robots.md has every key of it.
+    A robot is a name of `urmpipe robot list`, a URDF, or a TOML file of URM modules, DH parameters or
+    frames; docs/robots.md lists its keys.
     """
 
 
-@robot.command("list", short_help="List the robots that urmpipe brings along.")
+@robot.command("list", short_help="List the built-in robots.")
 @output_options
 def list_(terminal: Terminal) -> int:
-    """List the robots that urmpipe brings along.
+    """List the built-in robots.
 
     \b
     Examples:
@@ -49,9 +49,9 @@ def list_(terminal: Terminal) -> int:
 @click.option(
     "--q",
     type=JOINT_VALUES,
-    help="Its pose, in rad and m [default: the start pose].",
+    help="Joint values in rad and m [default: the start pose].",
 )
-@click.option("--picture", metavar="FILE.svg", type=click.Path(path_type=Path), help="Draw it into a file.")
+@click.option("--picture", metavar="FILE.svg", type=click.Path(path_type=Path), help="Draw the robot.")
 @placing_options
 @output_options
 def show(
@@ -61,10 +61,10 @@ def show(
     terminal: Terminal,
     **placing: Any,
 ) -> int:
-    """Print the parameters of a robot and where its points are; --picture draws it from two sides.
+    """Print the parameters of a robot and the positions of its points; --picture draws it from two sides.
 
-    The points p1..pn are the ends of its segments, the last one the tool centre point. The picture has the
-    centres of its masses, too.
+    The points p1..pn are the ends of its segments; the last one is the tool centre point (TCP). The picture
+    also shows the centres of mass.
 
     \b
     Examples:
@@ -105,14 +105,14 @@ def show(
 
 @robot.command(short_help="Write a robot as URDF or TOML.")
 @click.argument("name", metavar="NAME|FILE", type=ROBOT)
-@output_option("FILE", "A .urdf or .toml file [default: NAME.urdf here].")
+@output_option("FILE", "File to write, .urdf or .toml [default: NAME.urdf].")
 @placing_options
 @output_options
 def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -> int:
-    """Write a robot as URDF (its visuals, else solids from its geometry) or as a TOML robot file.
+    """Write a robot as URDF (with its visuals, else solids from its geometry) or as a TOML robot file.
 
-    Read back, the file is the same arm: of a TOML bit by bit, of a URDF to rounding. It replaces only
-    another export.
+    Reading the file back gives the same arm: exactly from TOML, to rounding from URDF. The command replaces
+    earlier exports only.
 
     \b
     Examples:
@@ -140,29 +140,29 @@ def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -
     return 0
 
 
-@robot.command(short_help="Write the equations of motion of a robot as formulas.")
+@robot.command(short_help="Write the equations of motion of a robot.")
 @click.argument("name", metavar="NAME|FILE", type=ROBOT)
-@output_option("FILE", "Write them into a file [default: print them].")
+@output_option("FILE", "File to write [default: print the equations].")
 @click.option(
     "--form",
     type=OneOf(["text", "c"]),
-    help="Text, or functions in C99 [default: c for a .c file, else text].",
+    help="Text, or C99 functions [default: c for a .c file, else text].",
 )
 @click.option(
     "--term",
     type=OneOf(["all", "inertia", "centrifugal", "coriolis", "gravity", "tool"]),
     default="all",
     show_default=True,
-    help="One term alone.",
+    help="Term of the equations.",
 )
 @placing_options
 @output_options
 def equations(name: str, terminal: Terminal, **options: Any) -> int:
     """Write the equations of motion of a robot with masses and up to 4 coordinates as formulas.
 
-    Lagrange's equations of the second kind, term by term, with the additions and multiplications that they
-    take before and after reduction. Needs SymPy: pip install "urmpipe[planning]". The file replaces only
-    another export of a robot.
+    Lagrange's equations of the second kind, term by term, with their number of additions and
+    multiplications before and after simplification. Needs SymPy: pip install "urmpipe[planning]". The
+    command replaces earlier exports of a robot only.
 
     \b
     Examples:

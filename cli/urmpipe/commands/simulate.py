@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
+from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.named import NamedType, argument_names, named_values
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import STRICT_OPTION, row_options
@@ -18,43 +19,52 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.simulations.simulation import Simulation
 
 
-@click.command(short_help="Run a system of blocks.")
+@click.command(cls=HeadedCommand, short_help="Run a system of blocks.")
 @click.argument("system", metavar="[SYSTEM|FILE.toml]", type=SYSTEM, required=False)
-@click.option("--list", "listed", is_flag=True, help="List the systems that urmpipe brings along.")
-@output_option("RUN.rrd", "The recording [default: SYSTEM.rrd, of a file FILE.rrd, here].")
-@click.option(
+@option(Heading.OUTPUT, "--list", "listed", is_flag=True, help="List the built-in systems.")
+@output_option("RUN.rrd", "Recording to write [default: SYSTEM.rrd or FILE.rrd].")
+@option(
+    Heading.RUNNING,
     "--arguments",
     "--set",
     type=NamedType(argument_names),
     multiple=True,
     callback=named_values,
     metavar="NAME=VALUE",
-    help="An argument of the system, such as log=log.csv or robot=urm6.",
+    help="Argument of the system, such as log=log.csv or robot=urm6.",
 )
-@click.option("--step", type=DURATION, help="Communication step [default: that of the system].")
-@click.option(
+@option(Heading.RUNNING, "--step", type=DURATION, help="Communication step [default: the system's own].")
+@option(
+    Heading.RUNNING,
     "--duration",
     type=DURATION,
-    help="How long [default: that of the system, else of the longest log it reads].",
+    help="Simulated time [default: the system's own, else the length of its longest log].",
 )
-@click.option(
+@option(
+    Heading.OUTPUT,
     "--write-system",
     metavar="FILE.toml",
     type=click.Path(path_type=Path),
-    help="Write the file of a system that came along, to be changed, and do not run it.",
+    help="Write the file of a built-in system for you to change, and do not run it.",
 )
-@click.option(
-    "--draw", metavar="FILE.svg", type=click.Path(path_type=Path), help="Draw the system into a file, too."
+@option(
+    Heading.OUTPUT,
+    "--draw",
+    metavar="FILE.svg",
+    type=click.Path(path_type=Path),
+    help="Also draw the system.",
 )
-@click.option(
+@option(
+    Heading.RUNNING,
     "--backend",
     type=OneOf(["native", "python"]),
-    help="What the units run as [default: native if it can be built here].",
+    help="Run the units as compiled C or in Python [default: native if a compiler is found].",
 )
-@click.option(
+@option(
+    Heading.RUNNING,
     "--timeout",
     type=DURATION,
-    help="How long a call of an FMU may take [default: 60 s].",
+    help="Longest time that a call of an FMU may take [default: 60 s].",
 )
 @row_options
 @STRICT_OPTION
@@ -71,10 +81,10 @@ def simulate(
     terminal: Terminal,
     **options: Any,
 ) -> int:
-    """Run a system of blocks: units of urmpipe, your own, and FMUs of any tool, connected to each other.
+    """Run a system of connected blocks: urmpipe's units, your own, and FMUs of any tool.
 
-    SYSTEM is one of --list, or a system file (TOML): blocks, connections, start values, inputs from logs.
-    Everything that is wrong with it is told before the first step.
+    SYSTEM is a name of --list, or a system file (TOML) with blocks, connections, start values and inputs
+    from logs. All errors in it are reported before the first step.
 
     \b
     Examples:
@@ -85,7 +95,7 @@ def simulate(
       urmpipe simulate one-drive --write-system my-drive.toml
       urmpipe simulate my-system.toml -o run.rrd --json
 
-    Exit codes: 0 done and within tolerance, 1 a delta meter out of tolerance or in doubt, 2 bad input or a
+    Exit codes: 0 done and within tolerance, 1 a delta meter out of tolerance or undecided, 2 bad input or a
     failed FMU.
     """
     if listed == (system is not None):

@@ -15,11 +15,11 @@ from urmpipe.options.output import debug_option, version_option
 @debug_option
 @version_option
 def view(recordings: tuple[Path, ...]) -> int:
-    """Open recordings that urmpipe wrote in Rerun's viewer, each paused where its verdict was decided.
+    """Open recordings in Rerun's viewer, each paused at the sample that decided its verdict.
 
-    Each opens in a window of its own; the command ends when all are closed, and Ctrl-C closes them. The
-    viewer is the one that was installed with urmpipe; it needs no network and listens on 127.0.0.1 only.
-    Where there is no display, the command says how to look at a recording from another computer.
+    Each recording opens in its own window. The command ends when all windows are closed; Ctrl-C closes
+    them. The viewer is installed with urmpipe; it needs no network and listens on 127.0.0.1 only. Without a
+    display, the command explains how to view a recording from another computer.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""Options of how a log is held against a reference, which compare and diagnose share."""
+"""Options of how a log is compared with a reference, which compare and diagnose share."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from functools import partial
 
 import click
 
+from urmpipe.headings import Heading, option
 from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.types import OneOf, ParsedType, parsed
 from urmpipe_models.measure_units import TIMES, quantity
@@ -14,7 +15,7 @@ from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 
 
 def _sync(text: str) -> str | float:
-    """Return how the clocks are put together: start, auto, or an offset in [s].
+    """Return how the clocks are aligned: start, auto, or an offset in [s].
 
     Raises:
         OptionError: If it is none of them.
@@ -54,49 +55,54 @@ def _sides(text: str) -> tuple[str, ...]:
 SIDES = ParsedType("REFERENCE,LOG", _sides)
 SYNC = ParsedType("sync", _sync)
 
-TOLERANCE_OPTION = click.option(
+TOLERANCE_OPTION = option(
+    Heading.JUDGING,
     "--tolerance",
     default=[str(DEFAULT_TOLERANCE)],
     show_default=True,
     multiple=True,
     callback=_tolerance,
     metavar="M|KIND=VALUE,...",
-    help="Largest deviation allowed: on an axis in m, or of kinds: axis, x, y, z, norm, path (m, mm, um),"
-    " angle, joint (rad, mrad, deg; m of joints that slide), as axis=3.5mm,norm=5mm,angle=0.5deg. It replaces"
-    " the default whole: what is not named is not judged.",
+    help="Largest allowed deviation on each axis in m, or per kind, such as axis=3.5mm,norm=5mm,angle=0.5deg."
+    " Kinds: axis, x, y, z, norm, path (m, mm, um), angle, joint (rad, mrad, deg; m for sliding joints). It"
+    " replaces the default completely: kinds that are not named are not judged.",
 )
-TCP_OPTION = click.option(
+TCP_OPTION = option(
+    Heading.COMPARED,
     "--tcp",
     type=OneOf(["fk", "recorded"]),
     default="fk",
     show_default=True,
-    help="Where a log was: by its joints, or as it recorded itself.",
+    help="Source of the tool position: fk, from the joint values; recorded, from the log.",
 )
-SYNC_OPTION = click.option(
+SYNC_OPTION = option(
+    Heading.ALIGNING,
     "--sync",
     default="start",
     show_default=True,
     type=SYNC,
     metavar="start|auto|SECONDS",
-    help="Start both together, find the offset by the motion, or t_reference = t_log + SECONDS (below 0 for a"
-    " late log).",
+    help="Align the clocks: at the first samples (start), by the motion (auto), or by an offset: t_reference"
+    " = t_log + SECONDS, negative if the log is late.",
 )
-SIDES_OPTION = click.option(
+SIDES_OPTION = option(
+    Heading.COMPARED,
     "--sides",
     type=SIDES,
-    help="Both sides of one log, by words in the names of its columns: target,actual; desired,actual;"
-    " commanded,measured. rest: the columns without the other word.",
+    help="Compare two sets of columns of one log, selected by words in their names: target,actual;"
+    " desired,actual; commanded,measured. rest: all columns without the other word.",
 )
-BLOCK_OPTION = click.option(
+BLOCK_OPTION = option(
+    Heading.COMPARED,
     "--block",
     metavar="NAME",
     multiple=True,
     callback=lambda ctx, param, names: names or None,
-    help="Of a simulation: the block whose motion is meant; of several once for all, or once for each in"
-    " their order [default: the only block that has a motion].",
+    help="Block of a simulation whose motion is compared; for several simulations once for all, or once for"
+    " each in their order [default: the only block with a motion].",
 )
 
 
 def comparing_options(command: Command) -> Command:
-    """Add what is allowed, where a log was, how clocks are put together, sides of a log and blocks."""
+    """Add tolerance, source of the tool position, alignment of clocks, sides of a log, and blocks."""
     return with_options(command, TOLERANCE_OPTION, TCP_OPTION, SYNC_OPTION, SIDES_OPTION, BLOCK_OPTION)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from urmpipe import __version__
+from urmpipe.headings import HeadedOption, Heading, option
 from urmpipe.options.grouped import Command, grouped, with_options
 
 if TYPE_CHECKING:
@@ -94,33 +95,44 @@ def output_option(metavar: str, told: str) -> Callable[[Command], Command]:
         metavar: What the file is called in the help.
         told: The help.
     """
-    return click.option("-o", "--output", metavar=metavar, type=click.Path(path_type=Path), help=told)
+    return option(
+        Heading.OUTPUT, "-o", "--output", metavar=metavar, type=click.Path(path_type=Path), help=told
+    )
 
 
 def debug_option(command: Command) -> Command:
     """Add --debug, which the error boundary looks for."""
-    return click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")(
-        command
-    )
+    return option(
+        Heading.GENERAL, "--debug", is_flag=True, expose_value=False, help="Show the traceback of an error."
+    )(command)
 
 
 def version_option(command: Command) -> Command:
     """Add --version."""
-    return click.version_option(__version__, prog_name="urmpipe")(command)
+    return click.version_option(__version__, prog_name="urmpipe", cls=HeadedOption, heading=Heading.GENERAL)(
+        command
+    )
 
 
 def output_options(command: Command) -> Command:
     """Add --json, -q, --debug and --version; the command takes them as `terminal`."""
     return with_options(
         grouped(Terminal, "terminal")(command),
-        click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output."),
-        click.option(
+        option(
+            Heading.OUTPUT,
+            "--json",
+            "as_json",
+            is_flag=True,
+            help="Print one JSON object on standard output.",
+        ),
+        option(
+            Heading.OUTPUT,
             "-q",
             "--quiet",
             is_flag=True,
             is_eager=True,
             callback=_tell_defaults,
-            help="Print nothing but errors.",
+            help="Print errors only.",
         ),
         debug_option,
         version_option,

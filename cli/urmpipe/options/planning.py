@@ -2,40 +2,47 @@
 
 from __future__ import annotations
 
-import click
-
+from urmpipe.headings import Heading, option
 from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.types import JOINT_VALUES, NumberType, OneOf
 
 LAW = (
-    click.option(
+    option(
+        Heading.PLANNING,
         "--acceleration",
         type=NumberType("M/S2", "m/s2"),
-        help="Largest acceleration along the path [default: 6; with --law limits none].",
+        help="Largest acceleration along the path [default: 6; none with --law limits].",
     ),
-    click.option(
+    option(
+        Heading.PLANNING,
         "--law",
         type=OneOf(["trapezoid", "jerk", "limits"]),
         default="trapezoid",
         show_default=True,
-        help="Within speed and acceleration; within --jerk, too; or as fast as the joints' limits allow.",
+        help="Law of motion: trapezoid limits speed and acceleration, jerk also the jerk; limits uses all"
+        " that the joint limits allow.",
     ),
-    click.option(
-        "--jerk", type=NumberType("M/S3", "m/s3"), help="Largest jerk along the path, of --law jerk."
+    option(
+        Heading.PLANNING,
+        "--jerk",
+        type=NumberType("M/S3", "m/s3"),
+        help="Largest jerk along the path, for --law jerk.",
     ),
-    click.option(
+    option(
+        Heading.PLANNING,
         "--arcs",
         type=OneOf(["tangential", "total"]),
         default="tangential",
         show_default=True,
-        help="What the acceleration limits on arcs; total: v^2 / r counts, too.",
+        help="Acceleration that is limited on arcs: tangential, or total with v^2 / r.",
     ),
 )
 
-start_option = click.option(
+start_option = option(
+    Heading.PLANNING,
     "--start",
     type=JOINT_VALUES,
-    help="Joint values to be near to at the first sample, in rad and m [default: the robot's own].",
+    help="Prefer joint values near these at the first sample (rad, m) [default: the robot's start pose].",
 )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from urmpipe.headings import Heading, option
 from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.types import DURATION, ROBOT, NamesType, OffsetType, OneOf
 from urmpipe_models.errors import shown
@@ -45,93 +46,145 @@ def _intervals(
     return intervals or None
 
 
-ROBOT_OPTION = click.option(
-    "--robot", type=ROBOT, help="The arm: a name of `urmpipe robot list`, a TOML or a URDF."
+ROBOT_OPTION = option(
+    Heading.ROBOT, "--robot", type=ROBOT, help="Robot: a name of `urmpipe robot list`, a TOML file or a URDF."
 )
-MAP_OPTION = click.option(
+MAP_OPTION = option(
+    Heading.READING,
     "--log-map",
     "--map",
     metavar="FILE.toml",
     type=click.Path(dir_okay=False, path_type=Path),
-    help="How to read the log, as ingest --write-map wrote it; options given here come first.",
+    help="Map of the log, written by ingest; other options override it.",
 )
-STRICT_OPTION = click.option("--strict", is_flag=True, help="Warnings are errors (exit 2).")
+STRICT_OPTION = option(
+    Heading.JUDGING, "--strict", is_flag=True, help="Treat warnings as errors (exit code 2)."
+)
 
 PLACING = (
-    click.option("--base", type=OffsetType(), help="Where the arm stands in the world (m, rad)."),
-    click.option(
-        "--tool", type=OffsetType(), help="Tool centre point in the tip's frame (m, rad), as 0,0,150mm."
+    option(
+        Heading.ROBOT,
+        "--tool",
+        type=OffsetType(),
+        help="Tool centre point (TCP) in the frame of the arm's tip (m, rad), such as 0,0,150mm.",
     ),
-    click.option("--base-link", metavar="LINK", help="Link of a URDF where it begins [default: the root]."),
-    click.option(
-        "--tip-link", "--tip", metavar="LINK", help="Link of a URDF where the arm ends [default: its end]."
+    option(Heading.ROBOT, "--base", type=OffsetType(), help="Base of the arm in the world frame (m, rad)."),
+    option(
+        Heading.ROBOT,
+        "--tip-link",
+        "--tip",
+        metavar="LINK",
+        help="Last link of a URDF [default: its only end].",
     ),
+    option(Heading.ROBOT, "--base-link", metavar="LINK", help="First link of a URDF [default: its root]."),
 )
 
 
 def _unit_option(help: str) -> Callable[[Command], Command]:
     """Return the option --unit."""
-    return click.option("--unit", multiple=True, callback=_units, metavar="[COLUMN=]UNIT", help=help)
+    return option(
+        Heading.READING, "--unit", multiple=True, callback=_units, metavar="[COLUMN=]UNIT", help=help
+    )
 
 
 UNTIMED = (
-    MAP_OPTION,
-    click.option("--rotation", type=OneOf(FORMS), help="Form of the recorded orientation, if it is open."),
-    click.option(
+    option(
+        Heading.READING,
         "--delimiter",
         metavar="comma|semicolon|tab|spaces|bar",
-        help="What parts the columns, or the sign itself in quotes.",
+        help="Column separator, by name or as the character itself in quotes.",
     ),
-    click.option("--decimal", type=OneOf(["point", "comma", ".", ","]), help="The decimal sign."),
+    option(Heading.READING, "--decimal", type=OneOf(["point", "comma", ".", ","]), help="Decimal separator."),
+    option(
+        Heading.READING,
+        "--rotation",
+        type=OneOf(FORMS),
+        help="Form of the recorded orientation, where the column names leave it open.",
+    ),
+    MAP_OPTION,
 )
 
 
 def _of_table(time: str) -> tuple[Callable[[Command], Command], ...]:
     """Return the options of a table; `time` is what --time takes."""
     return (
+        option(Heading.READING, "--time", metavar=time, help="Time column; none if the log has none."),
+        _unit_option("Unit of angles (rad, deg) where the names give none, or unit of one column."),
         *UNTIMED,
-        click.option("--time", metavar=time, help="The time column; none if there is none."),
-        _unit_option("Unit of angles whose names tell none (rad, deg), or of one column."),
     )
 
 
 TABLE = _of_table("COLUMN")
 ROWS = (
-    click.option("--source", metavar="NAME", help="Who wrote the log: coppeliasim, solidworks, ..."),
-    click.option(
-        "--joints", type=NamesType(), help="The joint columns, in the robot's order; of numbers also 2-7."
+    option(
+        Heading.READING,
+        "--joints",
+        type=NamesType(),
+        help="Joint columns in the robot's order: names, or column numbers such as 2-7.",
     ),
     *_of_table("[FILE:]COLUMN"),
-    click.option(
+    option(
+        Heading.READING,
+        "--source",
+        metavar="NAME",
+        help="Program that wrote the log: coppeliasim, solidworks, ...",
+    ),
+    option(
+        Heading.READING,
+        "--period",
+        type=DURATION,
+        help="Sample period of a log without a time column [default: 5ms].",
+    ),
+    option(
+        Heading.READING,
         "--layout",
         metavar="table|transposed|flat:N|flat-by-joint:N",
-        help="What rows are: samples, joints, or numbers one by one, N a sample [default: table].",
+        help="table: one sample per row; transposed: one joint per row; flat: a single list of numbers, N"
+        " per sample [default: table].",
     ),
-    click.option("--period", type=DURATION, help="Period of a log without a time column [default: 5ms]."),
-    click.option("--skip-bad", is_flag=True, help="Leave out rows that cannot be read, up to 1 %."),
+    option(Heading.READING, "--skip-bad", is_flag=True, help="Skip unreadable rows, at most 1 %."),
 )
 JOINTS = (
-    click.option(
+    option(
+        Heading.READING,
+        "--poses",
+        is_flag=True,
+        default=None,
+        help="The rows are static poses without time.",
+    ),
+    option(
+        Heading.READING,
+        "--measured",
+        type=NamesType(),
+        help="Columns of the tool position measured by an external device: x, y, z[, orientation].",
+    ),
+    option(
+        Heading.PROCESSING,
         "--interval",
         multiple=True,
         callback=_intervals,
         metavar="[JOINT=]LOW:HIGH",
-        help="What the joints are limited to, in their own unit [default: by the wraps].",
+        help="Interval to which the program wraps the joint values, in their own unit [default: found from"
+        " the wraps].",
     ),
-    click.option(
-        "--repair", is_flag=True, help="Put samples that were left on a wrap on the line of their neighbours."
+    option(
+        Heading.PROCESSING,
+        "--repair",
+        is_flag=True,
+        help="Replace samples recorded in the middle of a wrap by interpolation.",
     ),
-    click.option("--poses", is_flag=True, default=None, help="The rows are still poses: they have no time."),
-    click.option(
-        "--measured",
-        type=NamesType(),
-        help="Columns of the tool measured from outside: x, y, z[, orientation].",
+    option(
+        Heading.PROCESSING,
+        "--tsp",
+        type=DURATION,
+        help="Sample period of the time grid [default: the log's own].",
     ),
-    click.option("--tsp", type=DURATION, help="Period of the grid [default: the log's own]."),
-    click.option(
+    option(
+        Heading.PROCESSING,
         "--derivative",
         type=OneOf(["central", "savgol"]),
-        help="How joints are differentiated [default: by the digits].",
+        help="Method of differentiation: central differences or a Savitzky-Golay filter [default: by the"
+        " resolution of the log].",
     ),
 )
 
