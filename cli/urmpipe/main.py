@@ -7,6 +7,7 @@ checks), 2 bad input or usage.
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
 import warnings
@@ -156,6 +157,10 @@ def _stop_again(dropped: sys.UnraisableHookArgs) -> None:
 def run(arguments: Sequence[str]) -> int:
     """Run the command line and return the exit code."""
     as_json = "--json" in arguments
+    if "_URMPIPE_COMPLETE" in os.environ:
+        from urmpipe.options.bash import add_bash
+
+        add_bash()
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings(

@@ -3,32 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 
 import click
 import pytest
 
+from command_contexts import EVERY, NAMES
 from urmpipe.headings import FLAT, HeadedOption, Heading
-from urmpipe.main import COMMANDS, cli
 
 HEADINGS = re.compile(r"^([A-Z][^\n]*):\n", re.MULTILINE)
 NOT_OF_OPTIONS = {"Usage", "Commands"}
 
 
-def contexts() -> Iterator[click.Context]:
-    """The context of each command, those in groups, too, as `main` makes it."""
-    top = click.Context(cli, info_name="urmpipe", **cli.context_settings)
-    for name in COMMANDS:
-        command = cli.get_command(top, name)
-        assert command is not None
-        context = click.Context(command, top, name)
-        yield context
-        if isinstance(command, click.Group):
-            yield from (click.Context(one, context, sub) for sub, one in command.commands.items())
-
-
-EVERY = list(contexts())
-ALL = pytest.mark.parametrize("context", EVERY, ids=[one.command_path for one in EVERY])
+ALL = pytest.mark.parametrize("context", EVERY, ids=NAMES)
 
 
 def headings_of(context: click.Context) -> list[str]:

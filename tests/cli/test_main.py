@@ -169,7 +169,7 @@ def test_a_group_alone_answers_with_its_help(urmpipe: RunCommand, words: tuple[s
     ("line", "offered"),
     [
         ("urmpipe in", "plain,ingest\n"),
-        ("urmpipe ingest log.csv --robot ur5", "plain,ur5\nplain,ur5e\nfile,ur5\n"),
+        ("urmpipe ingest log.csv --robot ur5", "file,ur5\nplain,ur5\nplain,ur5e\n"),
         ("urmpipe simulate log-to-delta --set l", "plain,log=\n"),
     ],
 )

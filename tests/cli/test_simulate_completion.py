@@ -13,9 +13,9 @@ from urmpipe.options.types import UNIT
 
 def test_names_complete_in_the_shell() -> None:
     context, argument = click.Context(command), command.params[0]
-    assert argument.type.shell_complete(context, argument, "six")[0].value == "six-drives"
+    assert argument.type.shell_complete(context, argument, "six")[1].value == "six-drives"
     units = UNIT.shell_complete(context, argument, "dc")
-    assert [(one.value, one.type) for one in units] == [("dc_drive", "plain"), ("dc", "file")]
+    assert [(one.value, one.type) for one in units] == [("dc", "file"), ("dc_drive", "plain")]
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import click
 import urmpipe
 from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.planning import law_options, start_option
+from urmpipe.options.planning import law_options, path_completion, start_option
 from urmpipe.options.reading import path_options
 from urmpipe.options.types import LENGTH, NumbersType, OneOf
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     "--path",
     required=True,
     metavar="PATH.csv|cube:...",
+    shell_complete=path_completion,
     help="Path of lines and arcs, or a test cube, as for plan.",
 )
 @option(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +10,11 @@ import click
 import urmpipe
 from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.comparing import comparing_options
+from urmpipe.options.completion import tolerances
 from urmpipe.options.given import for_logs, options_given
-from urmpipe.options.grouped import Command
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import log_options
-from urmpipe.options.types import LENGTH, OneOf, ParsedType
+from urmpipe.options.types import ANY_FILE, LENGTH, RECORDING, FileType, OneOf, ParsedType
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.comparison.comparison import Comparison
@@ -38,14 +37,9 @@ def _cycles(text: str) -> tuple[tuple[int, int], ...]:
     return parse_cycles(text)
 
 
-def _file(heading: Heading, name: str, *, metavar: str, help: str) -> Callable[[Command], Command]:
-    """Return an option that names a file to write or to read."""
-    return option(heading, name, metavar=metavar, type=click.Path(path_type=Path), help=help)
-
-
 @click.command(cls=HeadedCommand, short_help="Compare logs with a reference and give a verdict.")
-@click.argument("reference", type=click.Path(path_type=Path))
-@click.argument("logs", metavar="[LOG...]", nargs=-1, type=click.Path(path_type=Path))
+@click.argument("reference", type=ANY_FILE)
+@click.argument("logs", metavar="[LOG...]", nargs=-1, type=ANY_FILE)
 @output_option("RUN.rrd", "Recording to write [default: LOG-against-REFERENCE.rrd].")
 @comparing_options
 @option(
@@ -97,32 +91,36 @@ def _file(heading: Heading, name: str, *, metavar: str, help: str) -> Callable[[
     Heading.ISO,
     "--targets",
     metavar="FILE.csv",
-    type=click.Path(path_type=Path),
+    type=ANY_FILE,
     help="With --iso: poses to judge, one per row: x, y, z and optionally an orientation [default: the poses"
     " at which REFERENCE rests].",
 )
-@_file(
+@option(
     Heading.OUTPUT,
     "--junit",
     metavar="FILE.xml",
+    type=FileType(".xml"),
     help="Write the verdicts as JUnit XML for GitLab, Jenkins and GitHub.",
 )
-@_file(
+@option(
     Heading.OUTPUT,
     "--csv",
     metavar="FILE.csv",
+    type=FileType(".csv"),
     help="Write the statistics as a table, one row per log and quantity.",
 )
-@_file(
+@option(
     Heading.BASELINE,
     "--baseline",
     metavar="RUN.rrd",
+    type=RECORDING,
     help="Report changes since an earlier comparison (.rrd); exit code 1 if worse.",
 )
 @option(
     Heading.BASELINE,
     "--noise",
     type=ParsedType("M|KIND=VALUE,...", _noise),
+    shell_complete=tolerances,
     help="Ignore smaller changes since the baseline; written like --tolerance [default: 1um, 1e-6 rad].",
 )
 @log_options

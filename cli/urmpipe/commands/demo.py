@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 import urmpipe
+from urmpipe.options.completion import folders
 from urmpipe.options.output import Terminal, output_options
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ counter-rotating module does not. Why each log deviates:"""
     "--output",
     metavar="DIR",
     type=click.Path(path_type=Path),
+    shell_complete=folders,
     default=Path("urmpipe-demo"),
     show_default=True,
     help="Folder for recordings and report.",

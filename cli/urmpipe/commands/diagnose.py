@@ -13,7 +13,7 @@ from urmpipe.options.comparing import comparing_options
 from urmpipe.options.given import for_logs
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import log_options
-from urmpipe.options.types import ParsedType
+from urmpipe.options.types import ANY_FILE, ParsedType
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.diagnosis.result import Diagnosis
@@ -34,8 +34,8 @@ def _not_aligned(text: str) -> str:
 
 
 @click.command(cls=HeadedCommand, short_help="Find out why a log deviates from its reference.")
-@click.argument("reference", type=click.Path(path_type=Path))
-@click.argument("log", required=False, type=click.Path(path_type=Path))
+@click.argument("reference", type=ANY_FILE)
+@click.argument("log", required=False, type=ANY_FILE)
 @output_option("RUN.rrd", "Recording to write [default: LOG-diagnosed.rrd].")
 @comparing_options
 @option(

@@ -9,14 +9,14 @@ import click
 
 import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.types import OneOf
+from urmpipe.options.types import RECORDING, OneOf
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.tables import Exported
 
 
 @click.command(short_help="Write a recording as CSV, Parquet, MAT or TUM.")
-@click.argument("recording", metavar="RUN.rrd", type=click.Path(path_type=Path))
+@click.argument("recording", metavar="RUN.rrd", type=RECORDING)
 @click.option(
     "--to",
     type=OneOf(["csv", "parquet", "mat", "tum"]),

@@ -8,10 +8,11 @@ from typing import Literal
 import click
 
 import urmpipe
+from urmpipe.options.completion import one_of_each
 from urmpipe.options.named import NamedType, named_values, option_names, option_value
 from urmpipe.options.output import Terminal, output_options
 from urmpipe.options.reading import MAP_OPTION
-from urmpipe.options.types import DURATION, ROBOT, UNIT, NamesType, OneOf
+from urmpipe.options.types import ANY_FILE, DURATION, ROBOT, UNIT, FileType, NamesType, OneOf
 from urmpipe.usage import Group
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.messages import Hint
@@ -67,7 +68,7 @@ def list_(unit: str | None, terminal: Terminal) -> int:
 @click.option(
     "--log",
     metavar="LOG",
-    type=click.Path(path_type=Path),
+    type=ANY_FILE,
     help="Log, for units that play one back.",
 )
 @MAP_OPTION
@@ -90,6 +91,7 @@ def list_(unit: str | None, terminal: Terminal) -> int:
 @click.option(
     "--platforms",
     type=NamesType(),
+    shell_complete=one_of_each(*PLATFORMS),
     multiple=True,
     callback=_platforms,
     metavar="A,B",
@@ -98,7 +100,7 @@ def list_(unit: str | None, terminal: Terminal) -> int:
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=FileType(".fmu"),
     default=".",
     metavar="DIR|FILE.fmu",
     help="Folder for UNIT.fmu, or the file to write [default: the working folder].",
@@ -160,7 +162,7 @@ def build(
 
 
 @fmu.command(short_help="Validate an FMU, run it and list its variables.")
-@click.argument("file", metavar="FILE.fmu", type=click.Path(path_type=Path))
+@click.argument("file", metavar="FILE.fmu", type=FileType(".fmu"))
 @click.option(
     "--timeout",
     type=DURATION,

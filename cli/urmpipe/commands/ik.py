@@ -12,7 +12,7 @@ import urmpipe
 from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import table_options
-from urmpipe.options.types import DURATION, JOINT_VALUES, OneOf, WholeType
+from urmpipe.options.types import ANY_FILE, DURATION, JOINT_VALUES, OneOf, WholeType
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.solved_targets.result import SolvedTargets
@@ -39,7 +39,7 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 
 
 @click.command(cls=HeadedCommand, short_help="Find joint values for poses of the tool.")
-@click.argument("targets", metavar="TARGETS|PATH", type=click.Path(path_type=Path))
+@click.argument("targets", metavar="TARGETS|PATH", type=ANY_FILE)
 @output_option("LOG.csv|RUN.rrd", "Write a joint log for ingest, or a recording.")
 @option(
     Heading.SOLVING,

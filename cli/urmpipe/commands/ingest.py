@@ -13,6 +13,7 @@ from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.given import for_logs
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import log_options
+from urmpipe.options.types import ANY_FILE, FileType
 from urmpipe_models.errors import Finding, OptionError
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=HeadedCommand, short_help="Turn one log into a recording.")
-@click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=ANY_FILE)
 @output_option("RUN.rrd", "Recording to write [default: LOG.rrd].")
 @option(
     Heading.OUTPUT,
@@ -32,14 +33,14 @@ if TYPE_CHECKING:
     Heading.OUTPUT,
     "--write-map",
     metavar="FILE.toml",
-    type=click.Path(path_type=Path),
+    type=FileType(".toml"),
     help="Save the inferred columns and units as a map for --map.",
 )
 @option(
     Heading.OUTPUT,
     "--audit",
     metavar="FILE.csv",
-    type=click.Path(path_type=Path),
+    type=FileType(".csv"),
     help="Write every wrap, repair and open question, one per row.",
 )
 @log_options

@@ -12,7 +12,7 @@ from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.named import NamedType, control_names, named_numbers
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import STRICT_OPTION
-from urmpipe.options.types import NETWORK, WholeType
+from urmpipe.options.types import DRAWING, NETWORK, WholeType
 from urmpipe.usage import Group
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def _search_options(command: Command) -> Command:
         click.option(
             "--draw",
             metavar="FILE.svg",
-            type=click.Path(path_type=Path),
+            type=DRAWING,
             help="Draw the graph and the mechanism.",
         ),
         output_option("RUN.rrd", "Recording to write."),

@@ -11,7 +11,7 @@ import click
 import urmpipe
 from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.planning import law_options, start_option
+from urmpipe.options.planning import law_options, path_completion, start_option
 from urmpipe.options.reading import path_options
 from urmpipe.options.types import DURATION, NumberType
 
@@ -23,7 +23,7 @@ PLACED = ("base", "tool", "base_link", "tip_link")
 
 
 @click.command(cls=HeadedCommand, short_help="Plan a path of lines and arcs, and its timing.")
-@click.argument("path", metavar="PATH.csv|cube:...")
+@click.argument("path", metavar="PATH.csv|cube:...", shell_complete=path_completion)
 @output_option("PLAN.csv|PLAN.rrd", "Write a log for the other commands, or a recording.")
 @option(
     Heading.PLANNING,

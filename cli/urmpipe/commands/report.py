@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
+from urmpipe.options.completion import folders
 from urmpipe.options.given import options_given
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.types import NamesType, NumberType, WholeType
+from urmpipe.options.types import RECORDING, NamesType, NumberType, OneOf, WholeType
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.messages import Hint
 
@@ -22,12 +23,13 @@ OF_FIGURES = ("formats", "figure_names", "figure_width", "figure_font", "figure_
 
 
 @click.command(short_help="Write the HTML report of recordings.")
-@click.argument("recordings", metavar="RUN.rrd...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("recordings", metavar="RUN.rrd...", nargs=-1, required=True, type=RECORDING)
 @output_option("FILE.html", "Report to write [default: RUN.html].")
 @click.option(
     "--figures",
     metavar="DIR",
     type=click.Path(path_type=Path),
+    shell_complete=folders,
     help="Write the figures as files into this folder, too.",
 )
 @click.option(

@@ -10,7 +10,7 @@ import click
 
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import placing_options
-from urmpipe.options.types import JOINT_VALUES, ROBOT, OneOf
+from urmpipe.options.types import DRAWING, JOINT_VALUES, ROBOT, OneOf
 from urmpipe.usage import Group
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def list_(terminal: Terminal) -> int:
     type=JOINT_VALUES,
     help="Joint values in rad and m [default: the start pose].",
 )
-@click.option("--picture", metavar="FILE.svg", type=click.Path(path_type=Path), help="Draw the robot.")
+@click.option("--picture", metavar="FILE.svg", type=DRAWING, help="Draw the robot.")
 @placing_options
 @output_options
 def show(

@@ -12,7 +12,7 @@ from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.named import NamedType, argument_names, named_values
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import STRICT_OPTION, row_options
-from urmpipe.options.types import DURATION, SYSTEM, OneOf
+from urmpipe.options.types import DRAWING, DURATION, SYSTEM, FileType, OneOf
 from urmpipe_models.errors import Finding, OptionError
 
 if TYPE_CHECKING:
@@ -44,14 +44,14 @@ if TYPE_CHECKING:
     Heading.OUTPUT,
     "--write-system",
     metavar="FILE.toml",
-    type=click.Path(path_type=Path),
+    type=FileType(".toml"),
     help="Write the file of a built-in system for you to change, and do not run it.",
 )
 @option(
     Heading.OUTPUT,
     "--draw",
     metavar="FILE.svg",
-    type=click.Path(path_type=Path),
+    type=DRAWING,
     help="Also draw the system.",
 )
 @option(

@@ -8,10 +8,11 @@ import click
 
 import urmpipe
 from urmpipe.options.output import debug_option, version_option
+from urmpipe.options.types import RECORDING
 
 
 @click.command(short_help="Open recordings in the viewer.")
-@click.argument("recordings", metavar="RUN.rrd...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("recordings", metavar="RUN.rrd...", nargs=-1, required=True, type=RECORDING)
 @debug_option
 @version_option
 def view(recordings: tuple[Path, ...]) -> int:

@@ -8,6 +8,7 @@ from functools import partial
 import click
 
 from urmpipe.headings import Heading, option
+from urmpipe.options.completion import tolerances, words
 from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.types import OneOf, ParsedType, parsed
 from urmpipe_models.measure_units import TIMES, quantity
@@ -62,6 +63,7 @@ TOLERANCE_OPTION = option(
     show_default=True,
     multiple=True,
     callback=_tolerance,
+    shell_complete=tolerances,
     metavar="M|KIND=VALUE,...",
     help="Largest allowed deviation on each axis in m, or per kind, such as axis=3.5mm,norm=5mm,angle=0.5deg."
     " Kinds: axis, x, y, z, norm, path (m, mm, um), angle, joint (rad, mrad, deg; m for sliding joints). It"
@@ -81,6 +83,7 @@ SYNC_OPTION = option(
     default="start",
     show_default=True,
     type=SYNC,
+    shell_complete=words("start", "auto"),
     metavar="start|auto|SECONDS",
     help="Align the clocks: at the first samples (start), by the motion (auto), or by an offset: t_reference"
     " = t_log + SECONDS, negative if the log is late.",
@@ -89,6 +92,7 @@ SIDES_OPTION = option(
     Heading.COMPARED,
     "--sides",
     type=SIDES,
+    shell_complete=words("target,actual", "desired,actual", "commanded,measured"),
     help="Compare two sets of columns of one log, selected by words in their names: target,actual;"
     " desired,actual; commanded,measured. rest: all columns without the other word.",
 )

@@ -8,12 +8,14 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
+from urmpipe.options.completion import items, operands
+from urmpipe.options.types import robots
 from urmpipe_models.errors import shown
 from urmpipe_models.files.toml_text import TomlError, toml_values
 
 
 class NamedType(click.ParamType[str]):
-    """NAME=VALUE; the names complete in the shell.
+    """NAME=VALUE; the names complete in the shell, and those of robots as values.
 
     Args:
         names: Gives the names, from what stands on the line already.
@@ -30,8 +32,11 @@ class NamedType(click.ParamType[str]):
         """Offer the names with their sign; nothing where the line is wrong."""
         from urmpipe_models.errors import UrmpipeError
 
+        name, _, begun = incomplete.partition("=")
+        if name == "robot":
+            return items(robots(), begun, "robot=")
         try:
-            return [CompletionItem(f"{name}=") for name in self._names(ctx) if name.startswith(incomplete)]
+            return items([f"{name}=" for name in self._names(ctx)], incomplete)
         except UrmpipeError:
             return []
 
@@ -40,33 +45,26 @@ def argument_names(ctx: click.Context) -> Iterable[str]:
     """Return the arguments of the system on the line."""
     from urmpipe_fmus.cosim import load_system
 
-    system = _operand(ctx, "system")
-    return load_system(system, {}).arguments if system else ()
+    return [name for system in operands(ctx) for name in load_system(system, {}).arguments]
 
 
 def option_names(ctx: click.Context) -> Iterable[str]:
     """Return the options of the unit on the line that -s gives: not its robot or log."""
-    from urmpipe.printing.fmu import options_of
+    from urmpipe_fmus.units import unit_options
 
-    unit = _operand(ctx, "unit")
-    return [name for name in options_of(unit) if name not in ("robot", "log")] if unit else ()
+    return [name for unit in operands(ctx) for name in unit_options(unit) if name not in ("robot", "table")]
 
 
 def control_names(ctx: click.Context) -> Iterable[str]:
     """Return the controls of the network on the line that can be set."""
     from urmpipe_models.networks.network_file import load_network
 
-    network = _operand(ctx, "name")
-    return [one.name for one in load_network(network).controls if one.value is None] if network else ()
-
-
-def _operand(ctx: click.Context, name: str) -> str | None:
-    """Return an argument of a line that is not finished: click leaves it unnamed then."""
-    return ctx.params.get(name) or next(iter(ctx.args), None)
+    networks = [load_network(network) for network in operands(ctx)]
+    return [one.name for network in networks for one in network.controls if one.value is None]
 
 
 def option_value(text: str) -> Any:
-    """Return the value of NAME=VALUE: as TOML has it, else some words parted by commas, or a word."""
+    """Return the value of NAME=VALUE: as TOML has it, else words separated by commas, or a word."""
     try:
         return toml_values(f"value = {text}\n")["value"]
     except (TomlError, KeyError):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,6 +13,7 @@ import click
 from urmpipe import __version__
 from urmpipe.headings import HeadedOption, Heading, option
 from urmpipe.options.grouped import Command, grouped, with_options
+from urmpipe.options.types import FileType
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.joint_log import LogWarning
@@ -88,16 +89,15 @@ class Terminal:
         return clock(title, quiet=self.quiet)
 
 
-def output_option(metavar: str, told: str) -> Callable[[Command], Command]:
+def output_option(metavar: str, help: str) -> Callable[[Command], Command]:
     """Return the option -o, which names the file that a command writes.
 
     Args:
-        metavar: What the file is called in the help.
-        told: The help.
+        metavar: What the file is called in the help; the shell completes the suffixes in it.
+        help: The help.
     """
-    return option(
-        Heading.OUTPUT, "-o", "--output", metavar=metavar, type=click.Path(path_type=Path), help=told
-    )
+    suffixes = re.findall(r"\.[a-z]+", metavar)
+    return option(Heading.OUTPUT, "-o", "--output", metavar=metavar, type=FileType(*suffixes), help=help)
 
 
 def debug_option(command: Command) -> Command:

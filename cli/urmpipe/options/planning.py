@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from urmpipe.headings import Heading, option
+from urmpipe.options.completion import files
 from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.types import JOINT_VALUES, NumberType, OneOf
 
@@ -37,6 +38,9 @@ LAW = (
         help="Acceleration that is limited on arcs: tangential, or total with v^2 / r.",
     ),
 )
+
+path_completion = files(names=lambda: ("cube:wall,", "cube:diagonal,"))
+"""A table of lines and arcs, or a test cube."""
 
 start_option = option(
     Heading.PLANNING,

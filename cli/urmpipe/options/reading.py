@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 import click
 
 from urmpipe.headings import Heading, option
+from urmpipe.options.completion import columns, units, words
 from urmpipe.options.grouped import Command, with_options
-from urmpipe.options.types import DURATION, ROBOT, NamesType, OffsetType, OneOf
+from urmpipe.options.types import DURATION, ROBOT, FileType, NamesType, OffsetType, OneOf
 from urmpipe_models.errors import shown
 
 FORMS = ["vector", "rpy", "zyx", "xyz", "zyz", "zxz", "quat_xyzw", "quat_wxyz", "matrix"]
-"""Forms of a recorded orientation (a test holds them against those of the models)."""
+"""Forms of a recorded orientation (a test compares them with those of the models)."""
+
+SOURCES = (
+    "coppeliasim", "urmpipe", "ur-rtde", "libfranka", "ros", "ros2", "fri", "kuka-rsi", "abb", "plotjuggler",
+    "solidworks", "matlab", "path", "table",
+)  # fmt: skip
+"""Names of sources (a test compares them with those of the pipeline, which is slow to import)."""
+
+DELIMITERS = ("comma", "semicolon", "tab", "spaces", "bar")
+"""Names of column separators."""
 
 
 def _units(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str] | None:
@@ -54,7 +63,7 @@ MAP_OPTION = option(
     "--log-map",
     "--map",
     metavar="FILE.toml",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FileType(".toml", dir_okay=False),
     help="Map of the log, written by ingest; other options override it.",
 )
 STRICT_OPTION = option(
@@ -83,7 +92,13 @@ PLACING = (
 def _unit_option(help: str) -> Callable[[Command], Command]:
     """Return the option --unit."""
     return option(
-        Heading.READING, "--unit", multiple=True, callback=_units, metavar="[COLUMN=]UNIT", help=help
+        Heading.READING,
+        "--unit",
+        shell_complete=units,
+        multiple=True,
+        callback=_units,
+        metavar="[COLUMN=]UNIT",
+        help=help,
     )
 
 
@@ -91,7 +106,8 @@ UNTIMED = (
     option(
         Heading.READING,
         "--delimiter",
-        metavar="comma|semicolon|tab|spaces|bar",
+        metavar="|".join(DELIMITERS),
+        shell_complete=words(*DELIMITERS),
         help="Column separator, by name or as the character itself in quotes.",
     ),
     option(Heading.READING, "--decimal", type=OneOf(["point", "comma", ".", ","]), help="Decimal separator."),
@@ -108,7 +124,13 @@ UNTIMED = (
 def _of_table(time: str) -> tuple[Callable[[Command], Command], ...]:
     """Return the options of a table; `time` is what --time takes."""
     return (
-        option(Heading.READING, "--time", metavar=time, help="Time column; none if the log has none."),
+        option(
+            Heading.READING,
+            "--time",
+            metavar=time,
+            shell_complete=columns("none"),
+            help="Time column; none if the log has none.",
+        ),
         _unit_option("Unit of angles (rad, deg) where the names give none, or unit of one column."),
         *UNTIMED,
     )
@@ -120,6 +142,7 @@ ROWS = (
         Heading.READING,
         "--joints",
         type=NamesType(),
+        shell_complete=columns(several=True),
         help="Joint columns in the robot's order: names, or column numbers such as 2-7.",
     ),
     *_of_table("[FILE:]COLUMN"),
@@ -127,6 +150,7 @@ ROWS = (
         Heading.READING,
         "--source",
         metavar="NAME",
+        shell_complete=words(*SOURCES),
         help="Program that wrote the log: coppeliasim, solidworks, ...",
     ),
     option(
@@ -139,6 +163,7 @@ ROWS = (
         Heading.READING,
         "--layout",
         metavar="table|transposed|flat:N|flat-by-joint:N",
+        shell_complete=words("table", "transposed", "flat:", "flat-by-joint:"),
         help="table: one sample per row; transposed: one joint per row; flat: a single list of numbers, N"
         " per sample [default: table].",
     ),
@@ -156,6 +181,7 @@ JOINTS = (
         Heading.READING,
         "--measured",
         type=NamesType(),
+        shell_complete=columns(several=True),
         help="Columns of the tool position measured by an external device: x, y, z[, orientation].",
     ),
     option(
@@ -164,6 +190,7 @@ JOINTS = (
         multiple=True,
         callback=_intervals,
         metavar="[JOINT=]LOW:HIGH",
+        shell_complete=columns(sign="="),
         help="Interval to which the program wraps the joint values, in their own unit [default: found from"
         " the wraps].",
     ),

@@ -5,36 +5,62 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable
+from pathlib import Path
 from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
+from urmpipe.options.completion import files
 from urmpipe_models.errors import shown
 from urmpipe_models.measure_units import ANGLES, LENGTHS, TIMES, quantity
 
 
 class CatalogueType(click.ParamType[str]):
-    """A name of a catalogue, or a file; names complete in the shell.
+    """A name of a catalogue, or a file; both complete in the shell.
 
     Args:
         name: What the value is called in the help.
         names: Gives the names; called when they are to be completed.
+        suffixes: What the names of files end in.
     """
 
-    def __init__(self, name: str, names: Callable[[], Iterable[str]]) -> None:
+    def __init__(self, name: str, names: Callable[[], Iterable[str]], *suffixes: str) -> None:
         self.name = name
-        self._names = names
+        self._complete = files(*suffixes, names=names)
 
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        """Offer the catalogue's names and then files."""
-        names = [CompletionItem(name) for name in self._names() if name.startswith(incomplete)]
-        return [*names, CompletionItem(incomplete, type="file")]
+        """Offer files, and the names of the catalogue."""
+        return self._complete(ctx, param, incomplete)
 
 
-def _robots() -> Iterable[str]:
+class FileType(click.Path):
+    """A file whose name ends in one of some suffixes; those complete in the shell.
+
+    Args:
+        suffixes: The suffixes, each with its point.
+        settings: What `click.Path` takes besides.
+    """
+
+    def __init__(self, *suffixes: str, **settings: Any) -> None:
+        super().__init__(path_type=Path, **settings)
+        self._complete = files(*suffixes)
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Offer files of the kind."""
+        return self._complete(ctx, param, incomplete)
+
+
+ANY_FILE = FileType()
+RECORDING = FileType(".rrd")
+DRAWING = FileType(".svg")
+
+
+def robots() -> Iterable[str]:
     """Return the names of the robots."""
     from urmpipe_models.robots.catalogue import robot_names
 
@@ -62,16 +88,16 @@ def _networks() -> Iterable[str]:
     return network_names()
 
 
-ROBOT = CatalogueType("NAME|FILE", _robots)
+ROBOT = CatalogueType("NAME|FILE", robots, ".toml", ".urdf")
 """A robot's name, or a TOML or URDF file."""
 
-UNIT = CatalogueType("UNIT|FILE", _units)
+UNIT = CatalogueType("UNIT|FILE", _units, ".py")
 """A unit's name, or a Python file with one in it."""
 
-SYSTEM = CatalogueType("SYSTEM|FILE", _systems)
+SYSTEM = CatalogueType("SYSTEM|FILE", _systems, ".toml")
 """A shipped system's name, or a system file."""
 
-NETWORK = CatalogueType("NAME|FILE", _networks)
+NETWORK = CatalogueType("NAME|FILE", _networks, ".toml")
 """A shipped network's name, or a network file."""
 
 
@@ -174,7 +200,7 @@ class WholeType(click.ParamType[int]):
 
 
 class NamesType(click.ParamType[Any]):
-    """Some names, parted by commas."""
+    """Some names, separated by commas."""
 
     name = "A,B,C"
 
