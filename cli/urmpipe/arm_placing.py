@@ -26,7 +26,7 @@ FRAME_ALLOWED = "x, y, z in m and rx, ry, rz in rad (3 or 6 numbers), a 4 x 4 ma
 GIANT = 10
 """A tool that is more times as long as its arm was written in mm: 13 of them would be 13 m on a UR5e."""
 
-NO_ROBOT = (Hint("robot", None, "gives one"),)
+NO_ROBOT = (Hint("robot", None, "sets one"),)
 
 
 def place_robot(
@@ -63,7 +63,7 @@ def place_robot(
     if isinstance(robot, Chain):
         cut = [name for name, link in links.items() if link is not None]
         if cut:
-            allowed = "with the file of a URDF; a Chain is cut already"
+            allowed = "with a URDF file; the links of a Chain are fixed"
             raise OptionError(*(Finding(parameter=name, found="a Chain", allowed=allowed) for name in cut))
     chain = robot if isinstance(robot, Chain) else load_robot(robot, **links)
     _refuse_giant_tool(chain, frames[1])
@@ -108,7 +108,7 @@ def frame_of(name: str, given: Frame | None) -> Transform | None:
     turn = values[:3, :3]
     proper = np.abs(turn @ turn.T - np.eye(3)).max() < ROTATION_TOLERANCE and np.linalg.det(turn) > 0.0
     if not proper or np.abs(values[3] - (0.0, 0.0, 0.0, 1.0)).max() > ROTATION_TOLERANCE:
-        found, allowed = "a matrix that is no rigid motion", "a rotation and a translation"
+        found, allowed = "a matrix that is not a rigid motion", "a rotation and a translation"
         raise OptionError(Finding(parameter=name, found=found, allowed=allowed))
     rows, place = tuple(map(tuple, turn.tolist())), tuple(values[:3, 3].tolist())
     return Transform(cast("Any", rows), cast("Any", place))

@@ -94,7 +94,7 @@ def _fault(name: str, value: Any, allowed: Mapping[str, click.Option]) -> str | 
     from urmpipe_models.names import did_you_mean, listed
 
     if f"--{name}" in EACH_TIME:
-        return f"{name}: found what one call is to give, allowed: --{name} on the command line"
+        return f"{name}: found an option of a single call, allowed: --{name} on the command line"
     if name not in allowed:
         return f"{name}: unknown{did_you_mean(name, allowed)}; allowed: {listed(name, sorted(allowed))}"
     if isinstance(value, Mapping) and name not in TABLES:

@@ -65,13 +65,13 @@ def findings_of(error: BaseException) -> Sequence[Finding]:
         case click.ClickException():
             said = error.format_message()
         case click.Abort() | KeyboardInterrupt():
-            said = "stopped before it was done; no file is left half written"
+            said = "stopped; no file is left incomplete"
         case MemoryError():
             said = "out of memory"
         case ValueError() if str(error).startswith("embedded null "):  # what a path cannot hold
             said = "found a null character, allowed: none in the name of a file"
         case _:
-            said = f"{type(error).__name__}: {error} (a fault of urmpipe itself; --debug shows where)"
+            said = f"{type(error).__name__}: {error} (an error in urmpipe; --debug shows the traceback)"
     return [Finding(said)]
 
 

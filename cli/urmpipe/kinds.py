@@ -155,7 +155,7 @@ KIND_OF_TOLERANCE = Kind(
     'a number in m, a text such as "axis=3.5mm,angle=0.5deg", or a mapping of kinds to m or rad, such as'
     ' {"axis": 0.0035, "angle": 0.01}',
 )
-PROGRESS = Kind(callable, "a function of the share that is done, 0 to 1, such as print")
+PROGRESS = Kind(callable, "a function of the completed share, 0 to 1, such as print")
 PLANNED = Kind(_is_planned, 'a file, a test cube ("cube:..."), or PathRows')
 NUMBERS = Kind(_are_numbers, "a list of numbers")
 LINK = Kind(_is_text, "the name of a link of the URDF")
@@ -197,7 +197,7 @@ KINDS = {
         lambda value: _is_text(value) or _is_number(value),
         'column, page, a text such as "85mm", or a number in m',
     ),
-    "ingest.name": Kind(_is_text, "a text, not empty"),
+    "ingest.name": Kind(_is_text, "a non-empty text"),
     "ik.tolerance": Kind(_is_number, "a number, in m"),
     "inputs": PATHS,
     "iso": FLAG,

@@ -102,7 +102,7 @@ def usage_finding(error: click.UsageError) -> Finding:
             return place_of(ctx, param, Finding(error.message))
         case click.UsageError() if ctx and "unexpected extra" in error.message:  # told by its words alone
             found = error.message.partition("(")[2].rstrip(")")
-            robot = "; a robot is named with --robot" if _takes(ctx, "--robot") else ""
+            robot = "; --robot sets a robot" if _takes(ctx, "--robot") else ""
             said = f"found {found} besides the rest, allowed: {_usage(ctx)}{robot}"
         case _:
             said = error.format_message()

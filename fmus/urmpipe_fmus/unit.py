@@ -164,14 +164,19 @@ class Unit:
             yield from one.faults()
             if one.name == INTERNAL_STEP and not _is_internal_step(one):
                 yield f"{one.name}: found as a variable, allowed: one Real parameter with a min above 0"
-        for variables, function, said in (
-            (self.computed, self.outputs, "outputs"),
-            (self.states, self.derivatives, "derivatives"),
-            (self.memories, self.update, "update"),
+        yield from self._missing()
+
+    def _missing(self) -> Iterator[str]:
+        """Yield the functions that lack variables, and the variables that lack a function."""
+        for kind, variables, function, name in (
+            ("output", self.computed, self.outputs, "outputs"),
+            ("state", self.states, self.derivatives, "derivatives"),
+            ("memory", self.memories, self.update, "update"),
         ):
-            if bool(variables) != (function is not None):
-                found = "without variables for it" if function else f"missing, of {variables[0].name}"
-                yield f"{said}: found {found}, allowed: a function where there are variables, else none"
+            if variables and function is None:
+                yield f"{kind} {variables[0].name} is declared, but `{name}` is not set"
+            elif function is not None and not variables:
+                yield f"`{name}` is set, but no {kind} is declared"
 
 
 def _is_internal_step(one: Variable) -> bool:

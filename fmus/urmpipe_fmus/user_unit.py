@@ -82,7 +82,7 @@ def _read(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        fault = f"byte {error.start} is no UTF-8; allowed: Python in UTF-8"
+        fault = f"byte {error.start} is not UTF-8; allowed: Python in UTF-8"
         raise UnitError(Finding(fault, str(path))) from error
     except OSError as error:
         raise UnitError(Finding(f"cannot be read: {error.strerror}", str(path))) from error

@@ -3,10 +3,10 @@
 A message keeps its sentence, written where the fault is seen. What that is about, and the parameters that
 would change it, are fields. Who prints chooses the voice, so that a stored message reads right for everybody:
 
-    warning = Finding("no unit is given", hints=(Hint("unit", {"q1": "deg"}, "reads it so"),))
-    warning.words("command line")   no unit is given; --unit q1=deg reads it so
-    warning.words("python")         no unit is given; unit={"q1": "deg"} reads it so
-    warning.words("system file")    no unit is given; units.q1 = "deg" in the map of the log reads it so
+    warning = Finding("no unit is given", hints=(Hint("unit", {"q1": "deg"}, "applies this"),))
+    warning.words("command line")   no unit is given; --unit q1=deg applies this
+    warning.words("python")         no unit is given; unit={"q1": "deg"} applies this
+    warning.words("system file")    no unit is given; units.q1 = "deg" in the map of the log applies this
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Hint:
     Attributes:
         parameter: Its keyword, such as "skip_bad"; empty for advice that is no parameter.
         value: What to give it; None where that is the reader's own.
-        does: What it does, as the end of a sentence that the parameter begins: "reads it so".
+        does: What it does, as the end of a sentence that the parameter begins: "applies this".
         call: The command and public function that takes it, where it is another than the one that ran.
         robot: The robot to give with it, which it is refused without, where its name says which.
     """

@@ -219,8 +219,8 @@ def refuse_reading(reading: Mapping[str, object]) -> None:
     """Raise an `OptionError` with all keywords that say how a log is read, as there is none to be read."""
     unused = [name for name, value in reading.items() if value is not None and value is not False]
     if unused:
-        found = "found with what was ingested before"
-        allowed = "with a log; a run or a recording stands as `ingest` made it"
+        found = "found with an ingested log"
+        allowed = "with a log; a run or a recording is used as ingested"
         raise OptionError(*(Finding(found, parameter=name, allowed=allowed) for name in unused))
 
 

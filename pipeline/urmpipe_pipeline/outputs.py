@@ -153,7 +153,7 @@ def refuse_output(path: Path, inputs: Sequence[Path], kind: OutputKind) -> None:
     """Raise an `OutputError` if an output may not be written there: for who works long before it writes."""
     name = os.fspath(path.absolute())
     if kind == "recording" and encodable(name) != name:  # on Linux a name may hold any bytes
-        said = "found a name that is no UTF-8 text, which Rerun cannot open, allowed: one that is"
+        said = "found a name that is not UTF-8 text, which Rerun cannot open, allowed: one that is"
         raise OutputError(Finding(said, str(path)))
     try:
         trouble = _trouble(path, inputs, kind)
@@ -173,7 +173,7 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
     if _is_of_another_kind(path, kind):
         tables = kind == "recording" and path.suffix.lower() in TABLES
         hint = "; urmpipe export writes tables" if tables else ""
-        return f"found a name that is none of a {noun}, allowed: {_own_name(path, kind)}{hint}"
+        return f"found a name that does not fit a {noun}, allowed: {_own_name(path, kind)}{hint}"
     if not path.parent.is_dir():
         return f"found no folder {path.parent}, allowed: a folder that exists"
     return _taken(path, kind, noun) if path.exists() else None
@@ -186,7 +186,7 @@ def _taken(path: Path, kind: OutputKind, noun: str) -> str | None:
     if path.is_file() and _is_ours(path, kind):
         return None
     such = f"such {'an' if kind in ('audit', 'export', 'fmu') else 'a'} {noun}"
-    return f"found a file that is no {noun} of urmpipe's, allowed: a new name, or {such} to replace"
+    return f"found a file that is not a {noun} of urmpipe, allowed: a new name, or {such} to replace"
 
 
 def _is_of_another_kind(path: Path, kind: OutputKind) -> bool:

@@ -198,7 +198,7 @@ def test_each_joint_needs_a_drive_or_a_spring_and_one_a_drive(folder: Path, caps
     assert capsys.readouterr().err.splitlines() == [
         "error: robot flat: key drives.b: not found, allowed: the drive of the joint, or { k, l } of a spring"
         " that holds it",
-        "error: robot flat: key drives: found no joint with a drive, allowed: one at least",
+        "error: robot flat: key drives: found no joint with a drive, allowed: at least one",
     ]
 
 

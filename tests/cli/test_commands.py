@@ -256,7 +256,7 @@ def test_a_path_alone_is_nothing_to_judge(urmpipe: RunCommand) -> None:
     ran = urmpipe("compare", PATH, "--robot", "urm6")
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.splitlines()[-1] == (
-        "error: path.csv: a path alone, which has no joints; allowed: a log to hold against it"
+        "error: path.csv: a path alone, which has no joints; allowed: a log to compare with it"
     )
 
 

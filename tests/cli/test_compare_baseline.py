@@ -138,7 +138,7 @@ def test_a_baseline_is_the_recording_of_a_comparison(capsys: Captured) -> None:
         assert said(capsys) == f"error: {baseline}: {found}"
     assert compare("good.csv", "--noise", "1um", "-q") == 2
     assert said(capsys) == (
-        "error: --noise: found no baseline, allowed: with an earlier comparison; --baseline RUN.rrd names one"
+        "error: --noise: found no baseline, allowed: with an earlier comparison; --baseline RUN.rrd sets one"
     )
     assert compare("good.csv", "--baseline", "good.rrd", "--noise", "-1", "-q") == 2
     assert said(capsys) == f"error: --noise: found '-1', {ALLOWED}"

@@ -175,8 +175,8 @@ def test_bad_cycles_are_exit_code_2(cycles: str, said: str, capsys: Captured) ->
 def test_a_tolerance_for_what_has_no_value_is_exit_code_2(capsys: Captured) -> None:
     assert iso("cycle1.csv", "--tolerance", "RP=1mm,vAP=1mm") == 2
     told = capsys.readouterr().err
-    assert "--tolerance: found RP, which 1 cycle of this motion cannot tell" in told
-    assert "--tolerance: found vAP, which 1 cycle of this motion cannot tell" in told
+    assert "--tolerance: found RP, which 1 cycle of this motion cannot determine" in told
+    assert "--tolerance: found vAP, which 1 cycle of this motion cannot determine" in told
     assert not Path("run.rrd").exists()
 
 
@@ -396,7 +396,7 @@ def test_noise_that_is_most_of_fv_is_told(capsys: Captured) -> None:
     assert isinstance(told, list)
     said = [one["message"] for one in told if one["kind"] == "noisy-speed"]
     assert len(said) == 1
-    assert said[0].startswith("FV is what noise makes of it: 0.0")
+    assert said[0].startswith("FV is determined by noise: 0.0")
 
 
 @pytest.mark.parametrize("tolerance", ["FOO=1mm", "AV=5mm", "AP=-1mm"])

@@ -225,7 +225,7 @@ def test_results_are_operands_of_the_function() -> None:
     assert str(error.value) == wanted
     with pytest.raises(OptionError) as error:
         urmpipe.compare(before, baseline=before, output="a.rrd")
-    assert str(error.value) == "output: found a.rrd with a comparison that stands already, allowed: without"
+    assert str(error.value) == "output: found a.rrd with an existing comparison, allowed: without"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only there may a file name hold any bytes")
@@ -277,5 +277,5 @@ def test_strict_names_the_log_of_each_warning(capsys: Captured) -> None:
     said = "no unit is given for q1, q2, q3, q4, q5, q6: the joints are taken as rad; --unit deg"
     assert capsys.readouterr().err.splitlines() == [
         "error: --strict: found 2 warnings, allowed: none",
-        *(f"error: {name}: {said} reads them otherwise" for name in ("good", "slack")),
+        *(f"error: {name}: {said} overrides this" for name in ("good", "slack")),
     ]

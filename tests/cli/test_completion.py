@@ -119,7 +119,7 @@ def test_every_option_completes_unless_its_value_is_free(folder: Path, context: 
 
 def test_words_are_those_of_the_pipeline(folder: Path, urmpipe: RunCommand) -> None:
     assert source_names() == SOURCES
-    allowed = f"{', '.join(DELIMITERS)}, or the sign itself"
+    allowed = f"{', '.join(DELIMITERS)}, or the character itself"
     assert urmpipe("ingest", "log.csv", "--delimiter", "foo").err == (
         f"error: --delimiter: found 'foo', allowed: {allowed}\n"
     )

@@ -169,7 +169,7 @@ def test_a_quiet_command_tells_no_defaults(lab: Path, capsys: Captured) -> None:
 def test_what_one_call_is_to_give_is_no_default(lab: Path, capsys: Captured, name: str) -> None:
     (lab / "urmpipe.toml").write_text(f"{name} = 'x'\n")
     assert run([*INGEST]) == 2
-    said = f"key {name}: found what one call is to give, allowed: --{name} on the command line"
+    said = f"key {name}: found an option of a single call, allowed: --{name} on the command line"
     assert capsys.readouterr().err == f"error: {lab}/urmpipe.toml: {said}\n"
 
 
@@ -211,7 +211,7 @@ def test_options_of_logs_are_refused_with_recordings_alone(lab: Path, capsys: Ca
     both = ["compare", "log.rrd", "log.rrd", "--unit", "rad", "--repair"]
     assert run(both) == 2
     assert (
-        "--unit, --repair: found with recordings alone (log.rrd, log.rrd), allowed: "
+        "--unit, --repair: found with recordings only (log.rrd, log.rrd), allowed: "
         in capsys.readouterr().err
     )
     mixed = ["compare", "log.rrd", "log.csv", "--robot", "ur5e", "--unit", "deg", "--joints", "a,b,c,d,e,f"]

@@ -109,8 +109,8 @@ def test_junit_has_the_answer_as_a_property() -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ([PATH, RIGHT], "matlab.csv: no robot, so no forward kinematics; --robot NAME|FILE gives one"),
-        ([PATH], "path.csv: a path alone, which has no joints; allowed: a log to hold against it"),
+        ([PATH, RIGHT], "matlab.csv: no robot, so no forward kinematics; --robot NAME|FILE sets one"),
+        ([PATH], "path.csv: a path alone, which has no joints; allowed: a log to compare with it"),
         (
             [RIGHT, *ARM],
             "matlab.csv: one log, which recorded no tool centre point; allowed: a reference before the log",
@@ -122,7 +122,7 @@ def test_junit_has_the_answer_as_a_property() -> None:
         ),
         (
             [PATH, RIGHT, *ARM, "--align", "rigid"],
-            "--align: found rigid, allowed: none with a diagnosis, which names base and tool as causes",
+            "--align: found rigid, allowed: none with a diagnosis: base and tool are possible causes",
         ),
     ],
 )
@@ -135,7 +135,7 @@ def test_what_cannot_be_diagnosed_is_refused(arguments: list[str], said: str, ca
 def test_an_alignment_is_refused_with_a_diagnosis(capsys: Captured) -> None:
     assert run(["compare", PATH, RIGHT, *ARM, "--diagnose", "--align", "tool"]) == 2
     assert capsys.readouterr().err == (
-        "error: --align: found tool, allowed: none with a diagnosis, which names base and tool as causes\n"
+        "error: --align: found tool, allowed: none with a diagnosis: base and tool are possible causes\n"
     )
 
 

@@ -37,7 +37,9 @@ def comparison(tmp_path: Path, recording: Path) -> Path:
 def test_the_log_leaves_as_it_came(urmpipe: RunCommand, recording: Path, tmp_path: Path) -> None:
     ran = urmpipe("export", "log.rrd", "--to", "csv", "--rows", "file")
     assert (ran.code, ran.out) == (0, "Export: log-file.csv  (5 rows, 7 columns)\n")
-    assert ran.err == "warning: load [%]: not ingested (no role is known for them), so they cannot leave\n"
+    assert (
+        ran.err == "warning: load [%]: not ingested (no role is known for them), so they cannot be exported\n"
+    )
     found = [line.split(",") for line in (tmp_path / "log-file.csv").read_text().splitlines()]
     wanted = [line.split(",")[:-1] for line in LOG.splitlines()]
     assert found[0] == wanted[0]

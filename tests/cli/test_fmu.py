@@ -260,8 +260,8 @@ def test_what_a_unit_does_not_have_is_told_before_it_is_read(urmpipe: RunCommand
     ran = urmpipe("fmu", "build", "dc-drive", "--robot", "urm7", "--log", "missing.csv")
     assert (ran.code, ran.out) == (2, "")
     assert ran.err.splitlines() == [
-        "error: unit dc_drive: found a robot (urm7), allowed: none, it has no such option",
-        "error: unit dc_drive: found a log (missing.csv), allowed: none, it has no such option",
+        "error: unit dc_drive: found a robot (urm7), allowed: none, the unit has no such option",
+        "error: unit dc_drive: found a log (missing.csv), allowed: none, the unit has no such option",
     ]
 
 

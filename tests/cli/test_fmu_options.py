@@ -100,10 +100,10 @@ def test_a_row_without_a_value_is_an_error(tmp_path: Path) -> None:
 
 def test_a_unit_says_what_it_lacks() -> None:
     assert refusal("kinematic_chain") == [
-        "unit kinematic_chain: found no robot; robot=NAME|FILE gives one, in a system file robot = ..."
+        "unit kinematic_chain: found no robot; robot=NAME|FILE sets one, in a system file robot = ..."
     ]
     assert refusal("log_source") == [
-        "unit log_source: found no log; log=LOG gives one, in a system file log = ..."
+        "unit log_source: found no log; log=LOG sets one, in a system file log = ..."
     ]
     assert refusal("repolarizer") == [
         "unit repolarizer: option joints: not found, it needs the number of joints, such as 6"
@@ -112,8 +112,8 @@ def test_a_unit_says_what_it_lacks() -> None:
 
 def test_a_unit_refuses_what_it_does_not_take() -> None:
     assert refusal("delta_meter", robot="urm6", log="log.csv") == [
-        "unit delta_meter: found a robot (urm6), allowed: none, it has no such option",
-        "unit delta_meter: found a log (log.csv), allowed: none, it has no such option",
+        "unit delta_meter: found a robot (urm6), allowed: none, the unit has no such option",
+        "unit delta_meter: found a log (log.csv), allowed: none, the unit has no such option",
     ]
     assert refusal("repolarizer", options={"joints": 6, "turns": 2}) == [
         "unit repolarizer: option turns: found, allowed: joints; a parameter is set where the unit runs, in a"
@@ -148,7 +148,7 @@ def test_a_chain_is_taken_as_a_robot() -> None:
         (("delta_meter", "--platforms", "linux64,amiga"), "found amiga, allowed: linux64, win64"),
         (("log_source", "--log", "missing.csv"), "missing.csv: found no such file"),
         (("missing.py",), "missing.py"),
-        (("delta_meter", "--map", "lab.toml"), "--log-map: found without a log; --log LOG names one"),
+        (("delta_meter", "--map", "lab.toml"), "--log-map: found without a log; --log LOG sets one"),
     ],
 )
 def test_what_is_wrong_is_one_line_and_nothing_is_written(
@@ -166,11 +166,11 @@ def test_a_unit_is_told_what_a_map_says_of_its_log(tmp_path: Path) -> None:
     path.write_text("t,q1,q2\n0,1,2\n1,1.1,2.1\n", encoding="utf-8")
     *_, warning = (one for one in read_mapped_table(path).warnings if one.kind == "assumed-unit")
     assert warning.words("command line").endswith(
-        '; --log-map FILE.toml with units."" = "deg" reads them otherwise'
+        '; --log-map FILE.toml with units."" = "deg" overrides this'
     )
     path.write_text("time,q1,q2\n0,1,2\n1000,1,2\n2000,1,2\n", encoding="utf-8")
     (said,) = refusal("log_source", log=path)
-    assert '; log_map=FILE.toml with units.time = "ms" says which' in said
+    assert '; log_map=FILE.toml with units.time = "ms" specifies it' in said
     (tmp_path / "lab.toml").write_text('[units]\ntime = "ms"\n', encoding="utf-8")
     table = read_mapped_table(path, log_map=tmp_path / "lab.toml").table
     assert table.t_ns.tolist() == [0, 10**9, 2 * 10**9]

@@ -302,4 +302,4 @@ def test_a_labs_defaults(capsys: Captured, folder: Path) -> None:
     )
     (folder / "urmpipe.toml").write_text('robot = "arm6"\n[ik]\nall = true\noutput = "x.csv"\n')
     assert run(["ik", "default.csv"]) == 2
-    assert "key ik.output: found what one call is to give, allowed: --output" in capsys.readouterr().err
+    assert "key ik.output: found an option of a single call, allowed: --output" in capsys.readouterr().err

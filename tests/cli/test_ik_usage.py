@@ -37,12 +37,15 @@ def refused(capsys: Captured, *arguments: str) -> list[str]:
     [
         (
             ["mm", "deg"],
-            "found mm and deg without a column, allowed: one; that of another column as COLUMN=UNIT",
+            "found mm and deg without a column, allowed: one unit, or that of a column as COLUMN=UNIT",
         ),
-        (["x=mm", "x=m"], "found mm and m for x, allowed: one; that of another column as COLUMN=UNIT"),
+        (
+            ["x=mm", "x=m"],
+            "found mm and m for x, allowed: one unit, or that of a column as COLUMN=UNIT",
+        ),
         (
             ["rz=deg, ry=deg"],
-            "found 'rz=deg, ry=deg', allowed: one COLUMN=UNIT an option: --unit rz=deg --unit ry=deg",
+            "found 'rz=deg, ry=deg', allowed: one COLUMN=UNIT per option: --unit rz=deg --unit ry=deg",
         ),
     ],
 )
@@ -67,7 +70,7 @@ def test_without_a_robot(capsys: Captured) -> None:
 
 def test_a_tool_without_a_robot(capsys: Captured) -> None:
     (said,) = refused(capsys, "targets.csv", "--tool", "0,0,0.1")
-    assert said == ("error: --tool: found without a robot; --robot NAME|FILE gives one")
+    assert said == ("error: --tool: found without a robot; --robot NAME|FILE sets one")
 
 
 def test_all_that_is_wrong_is_told_at_once(capsys: Captured) -> None:
@@ -125,12 +128,12 @@ def test_a_robot_that_is_no_arm(capsys: Captured, folder: Path, joints: str, sai
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "targets.csv: found an empty file, allowed: a table with a row a sample"),
-        ("x,y,z\n", "targets.csv:1: found a header and no rows, allowed: a row a sample"),
+        ("", "targets.csv: found an empty file, allowed: a table with one row per sample"),
+        ("x,y,z\n", "targets.csv:1: found a header and no rows, allowed: one row per sample"),
         (
             "t,q1,q2\n0,1,2\n1,2,3\n",
             "targets.csv: found no position in q1, q2, allowed: x, y, z; name them so in the header;"
-            ' --log-map FILE.toml says which they are: [tcp] position = ["A", "B", "C"]',
+            ' --log-map FILE.toml names them: [tcp] position = ["A", "B", "C"]',
         ),
     ],
 )
@@ -151,7 +154,7 @@ def test_targets_in_mm_that_are_read_as_m(capsys: Captured, folder: Path) -> Non
     assert run(["ik", "mm.csv", "--robot", "arm6", "--restarts", "0"]) == 1
     assert capsys.readouterr().err == (
         "warning: no unit is given for x, y, z: they are taken as m, though every row is beyond any arm;"
-        " --unit mm reads them otherwise\n"
+        " --unit mm overrides this\n"
     )
     for units in (["mm"], ["x=mm"], ["m", "x=mm", "y=mm", "z=mm"]):
         given = [word for unit in units for word in ("--unit", unit)]

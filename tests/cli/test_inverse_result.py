@@ -202,15 +202,15 @@ def test_joints_without_limits_can_be_written_within_pi() -> None:
         ({"t": [0.0]}, "t: found shape (1,), allowed: (2,), one time for each target, in s"),
         (
             {"targets": [[0.0, 0.1], [0.0]]},
-            "targets: found a list that is no array of numbers, allowed: (n, 3),",
+            "targets: found a list that is not an array of numbers, allowed: (n, 3),",
         ),
-        ({"targets": {"x": 0.1}}, "targets: found a dict that is no array of numbers, allowed: (n, 3),"),
+        ({"targets": {"x": 0.1}}, "targets: found a dict that is not an array of numbers, allowed: (n, 3),"),
         (
             {"targets": pd.DataFrame({"z": [0.2], "y": [0.0], "x": [0.1]})},
             "targets: found a table, allowed: an array of shape (n, 3), positions in m, or (n, 4, 4), poses,"
             ' such as table[["x", "y", "z"]].to_numpy()',
         ),
-        ({"t": "ab"}, "t: found a str that is no array of numbers, allowed: numbers"),
+        ({"t": "ab"}, "t: found a str that is not an array of numbers, allowed: numbers"),
         (
             {"t": [0.0, 1e-12]},
             "t: found times that do not increase, allowed: strictly increasing, by 1 ns or",
@@ -220,7 +220,7 @@ def test_joints_without_limits_can_be_written_within_pi() -> None:
         ({"tsp": 0.0}, "tsp: found 0.0, allowed: a positive time in s"),
         ({"tsp": np.nan}, "tsp: found nan, allowed: a positive time in s"),
         ({"t": [1.0, 1.0]}, "t: found times that do not increase, allowed: strictly increasing, by 1 ns or"),
-        ({"t": [0.0, 1.0], "tsp": 1.0}, "found t and tsp, allowed: one of both"),
+        ({"t": [0.0, 1.0], "tsp": 1.0}, "found t and tsp, allowed: one of the two"),
         ({"start": [0.0]}, "start: found 1 values, allowed: 6, one for each of theta1, "),
         ({"start": "zero"}, "start: found 'zero', allowed: 6, one for each of theta1, "),
         ({"start": [np.nan] * 6}, "start: found a value that is not finite, allowed: 6, one for each of "),

@@ -260,4 +260,4 @@ def test_an_error_that_a_stop_caused_is_a_stop(
     monkeypatch.setattr("urmpipe.main._stopped", [signal.SIGINT])
     monkeypatch.setattr(cli, "main", fail)
     assert run(["ingest", "log.csv"]) == 2
-    assert capsys.readouterr().err == "error: stopped before it was done; no file is left half written\n"
+    assert capsys.readouterr().err == "error: stopped; no file is left incomplete\n"

@@ -222,7 +222,7 @@ def test_an_input_and_a_foreign_file_are_not_replaced(urmpipe: Run, tmp_path: Pa
     for arguments, said in (
         (("--draw", "mine.svg"), "mine.svg: found a file that is no drawing of urmpipe's"),
         (("-o", "mine.toml"), "mine.toml: found an input of this command"),
-        (("-o", "mine.csv"), "mine.csv: found a name that is none of a recording"),
+        (("-o", "mine.csv"), "mine.csv: found a name that does not fit a recording"),
     ):
         ran = urmpipe("network", "check", "mine.toml", *arguments)
         assert ran.code == 2

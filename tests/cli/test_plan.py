@@ -260,7 +260,7 @@ def test_a_csv_is_replaced_by_another_plan_alone(urmpipe: RunCommand, folder: Pa
 def test_a_plan_that_fails_writes_no_csv_but_a_recording(urmpipe: RunCommand, folder: Path) -> None:
     ran = urmpipe("plan", "singular.csv", "--robot", "irb60", "-o", "plan.csv")
     assert (ran.code, ran.err) == (
-        1, "warning: plan.csv is not written: the arm cannot move as planned\n",
+        1, "warning: plan.csv is not written: the arm cannot follow the plan\n",
     )  # fmt: skip
     assert not (folder / "plan.csv").exists()
     found = answer(urmpipe, 1, "singular.csv", "--robot", "irb60", "-o", "plan.csv")
@@ -324,7 +324,7 @@ def test_what_is_wrong_is_raised_at_once() -> None:
         f"{line.format(first, first + 1)}, allowed: its length, 0.1 m" for first in (1, 2)
     )
     assert refusal(OptionError, package.plan, PathRows(points, -0.01), velocity=0.0, start=[0.0]) == (
-        "start: found without a robot; robot=NAME|FILE gives one\n"
+        "start: found without a robot; robot=NAME|FILE sets one\n"
         "row 2, column radius: path: found -0.01 m, allowed: finite, 0 or more\n"
         "velocity: found 0.0, allowed: a finite number of m/s above 0"
     )

@@ -67,7 +67,7 @@ def test_a_law_that_the_arm_does_not_suit_is_told_beside_wrong_rows(capsys: Capt
         "--robot: found irb60 without the largest acceleration of theta1, theta2, theta3, allowed: a robot"
         " file with the key acceleration in limits, in rad/s2 or m/s2",
         "--law: found limits without a robot, allowed: with a robot",
-        "--start: found without a robot; --robot NAME|FILE gives one",
+        "--start: found without a robot; --robot NAME|FILE sets one",
     )
     for options, said in ((["--robot", "irb60"], [lacks]), (["--start", "1"], [start, no_robot])):
         assert refused(capsys, "path.csv", "--law", "limits", *options) == [*said, row]
@@ -143,8 +143,8 @@ def test_rows_that_make_no_path(
          "--robot: found irb60 without the largest acceleration of theta1, theta2, theta3, allowed: a robot"
          " file with the key acceleration in limits, in rad/s2 or m/s2\n"
          "--arcs: found total with the law limits, allowed: with the laws trapezoid and jerk"),
-        (["--start", "0,0,0,0"], "--start: found without a robot; --robot NAME|FILE gives one"),
-        (["--tool", "0,0,0.1"], "--tool: found without a robot; --robot NAME|FILE gives one"),
+        (["--start", "0,0,0,0"], "--start: found without a robot; --robot NAME|FILE sets one"),
+        (["--tool", "0,0,0.1"], "--tool: found without a robot; --robot NAME|FILE sets one"),
     ],
 )  # fmt: skip
 def test_values_that_are_refused(capsys: Captured, options: list[str], said: str) -> None:

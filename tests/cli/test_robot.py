@@ -156,7 +156,7 @@ def test_show_draws_a_picture_and_replaces_only_its_own(urmpipe: Any, tmp_path: 
     ran = urmpipe("robot", "show", "urm6", "--picture", picture.name)
     assert ran.code == 2
     assert ran.err == (
-        "error: urm6.svg: found a file that is no robot export of urmpipe, allowed: a new name, or such an"
+        "error: urm6.svg: found a file that is not a robot export of urmpipe, allowed: a new name, or such an"
         " export to replace\n"
     )
     assert picture.read_text(encoding="utf-8") == "mine"
@@ -231,7 +231,9 @@ def test_export_replaces_an_export_and_nothing_else(urmpipe: Any, tmp_path: Path
     (tmp_path / "mine.urdf").write_text("<robot/>", encoding="utf-8")
     ran = urmpipe("robot", "export", "urm6", "-o", "mine.urdf")
     assert ran.code == 2
-    assert ran.err.startswith("error: mine.urdf: found a file that is no robot export of urmpipe, allowed:")
+    assert ran.err.startswith(
+        "error: mine.urdf: found a file that is not a robot export of urmpipe, allowed:"
+    )
     assert (tmp_path / "mine.urdf").read_text(encoding="utf-8") == "<robot/>"
     assert (tmp_path / "arm.urdf").read_bytes() == before
     (tmp_path / "folder.urdf").mkdir()

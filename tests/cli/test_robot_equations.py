@@ -73,7 +73,7 @@ def test_c_is_written_and_replaces_only_an_export(urmpipe: Any, pendulum: str, t
     ran = urmpipe("robot", "equations", pendulum, "-o", "mine.c")
     assert (ran.code, ran.err) == (
         2,
-        "error: mine.c: found a file that is no robot export of urmpipe, allowed: a new name, or such an"
+        "error: mine.c: found a file that is not a robot export of urmpipe, allowed: a new name, or such an"
         " export to replace\n",
     )
 

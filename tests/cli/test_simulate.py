@@ -232,7 +232,7 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ((), "error: found neither a system nor --list, allowed: one of both"),
+        ((), "error: found neither a system nor --list, allowed: one of the two"),
         (("nosuch",), "system: found 'nosuch', allowed: a TOML file, or one of driven-arm, log-to-delta"),
         (("log-to-delta", "--set", "lgo=1"), "argument lgo: found 'lgo' (did you mean log?), allowed: log"),
         (("log-to-delta", "--set", "log"), "found 'log', allowed: NAME=VALUE, each name once"),
@@ -242,13 +242,13 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
         ),
         (
             ("log-to-delta", "--set", "log=mine.csv"),
-            "error: argument reference: found nothing where log is mine.csv, allowed: a file of the same"
-            " motion (log-to-delta's own path.csv is of another one)",
+            "error: argument reference: not set, but log is mine.csv; allowed: a file of the same motion"
+            " (log-to-delta's own path.csv has another motion)",
         ),
         (
             ("one-drive", "--write-system", "mine.toml", "--step", "1ms", "--set", "C=2", "-o", "run.rrd"),
-            "error: --step: found beside a system that is written, allowed: with a system that is run; change"
-            " the file",
+            "error: --step: found for a system that is only written, allowed: when the system runs; edit the"
+            " file instead",
         ),
         (("log-to-delta", "--step", "nan"), "found 'nan', allowed: a positive time in s"),
         (("log-to-delta", "-o", "missing/run.rrd"), "found no folder missing, allowed: a folder that exists"),

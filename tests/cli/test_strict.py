@@ -114,7 +114,7 @@ def test_a_part_of_the_reference_that_an_offset_leaves_out_is_a_doubt(
     )
 
 
-LARGE = "a tolerance of 500 mm (axis) lets anything pass: 0.5 is in m"
+LARGE = "a tolerance of 500 mm (axis) accepts any deviation: 0.5 is in m"
 
 
 def test_a_large_tolerance_is_a_doubt_unless_its_unit_says_that_it_is_meant(

@@ -149,14 +149,14 @@ def test_a_place_is_asked_for_where_it_is_judged(tmp_path: Path) -> None:
     for name, q in (("asked", asked), ("done", done)):
         written(tmp_path / f"{name}.csv", ["t", *six("q{} [rad]")], T, q)
     said = refusal(LogError, urmpipe.compare, tmp_path / "asked.csv", tmp_path / "done.csv")
-    lacks = "no robot, so no forward kinematics; robot=NAME|FILE gives one;"
-    lacks += ' tolerance="joint=0.1deg" judges the joints alone'
+    lacks = "no robot, so no forward kinematics; robot=NAME|FILE sets one;"
+    lacks += ' tolerance="joint=0.1deg" compares the joints only'
     assert said == f"asked.csv: {lacks}\ndone.csv: {lacks}"
     log = written(tmp_path / "log.csv", ["t", *six("target_q_{}"), *six("actual_q_{}")], T, asked, done)
     said = refusal(  # no tolerance of joints is a way out where the log is to be moved
         LogError, urmpipe.compare, log, sides=("target", "actual"), tolerance="joint=1deg", align="start"
     )
-    assert said == "log.csv: no robot, so no forward kinematics; robot=NAME|FILE gives one"
+    assert said == "log.csv: no robot, so no forward kinematics; robot=NAME|FILE sets one"
 
 
 def test_sides_that_are_not_there_are_refused(tmp_path: Path) -> None:

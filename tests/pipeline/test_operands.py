@@ -90,5 +90,5 @@ def test_a_log_that_cannot_be_read_is_told_with_the_others(load: Load, tmp_path:
         load(LOG.replace("0.01,", "0,"), "", joints=("b", "a"))
     assert str(caught.value).replace(f"{tmp_path}/", "").split("\n") == [
         f"log0.csv:3, column t [s]: found 0 s again, {INCREASE}",
-        "log1.csv: found an empty file, allowed: a table with a row a sample",
+        "log1.csv: found an empty file, allowed: a table with one row per sample",
     ]

@@ -118,7 +118,7 @@ def test_an_output_that_is_no_export_of_ours_is_not_replaced(tmp_path: Path) -> 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
 def test_a_recording_has_a_name_that_rerun_can_open(tmp_path: Path) -> None:
-    wanted = "found a name that is no UTF-8 text, which Rerun cannot open, allowed: one that is"
+    wanted = "found a name that is not UTF-8 text, which Rerun cannot open, allowed: one that is"
     for path in (tmp_path / "bad\udcff.rrd", tmp_path / "bad\udcff" / "run.rrd"):
         path.parent.mkdir(exist_ok=True)
         assert refusal(path, kind="recording") == wanted
@@ -139,7 +139,7 @@ def test_a_name_that_ends_as_those_of_another_kind_is_refused(
     tmp_path: Path, name: str, kind: OutputKind, meant: str
 ) -> None:
     tables = "; urmpipe export writes tables" if name == "run.csv" else ""
-    said = f"found a name that is none of a {kind}, allowed: {meant}{tables}"
+    said = f"found a name that does not fit a {kind}, allowed: {meant}{tables}"
     assert refusal(tmp_path / name, kind=kind) == said
     assert list(tmp_path.iterdir()) == []
 

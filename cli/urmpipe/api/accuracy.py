@@ -170,7 +170,7 @@ def _refuse_undriven(arm: Chain) -> None:
         if name not in driven
     ]
     if not faults and not any(isinstance(one, DrivenJoint) for one in arm.drives):
-        faults.append(f"robot {arm.name}: key drives: found no joint with a drive, allowed: one at least")
+        faults.append(f"robot {arm.name}: key drives: found no joint with a drive, allowed: at least one")
     if faults:
         raise RobotError(*faults)
 
@@ -310,10 +310,10 @@ def _warnings(motions: Sequence[DrivenMotion], radius: float, speed: float | Non
     slow = [one.errors for one in motions if one.errors.reached < REACHED * one.velocity]
     if slow:
         told = ", ".join(f"{one.velocity:g} m/s ({one.reached:.4g})" for one in slow)
-        yield LogWarning("not-reached", f"the path or the joints' limits keep the speed below {told}")
+        yield LogWarning("not-reached", f"the path or the joint limits keep the speed below {told}")
     if speed == FASTEST:
         yield LogWarning("fastest", f"all velocities up to {FASTEST:g} m/s are within the limit")
     for one in motions:
         if one.diverged is not None:
-            said = f"at {one.velocity:g} m/s {one.diverged.joint} left its set points by more than a turn"
-            yield LogWarning("diverged", f"{said} at t = {one.diverged.t:.4g} s: the run ends there")
+            said = f"at {one.velocity:g} m/s {one.diverged.joint} deviates from its set points by more than"
+            yield LogWarning("diverged", f"{said} a turn at t = {one.diverged.t:.4g} s: the run ends there")

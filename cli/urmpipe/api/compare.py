@@ -54,7 +54,7 @@ from urmpipe_pipeline.tables.table_csv import write_table
 
 Operand = PathLike | TableLike | MadeRun | Simulation
 
-EARLIER = Hint("baseline", None, "names one")
+EARLIER = Hint("baseline", None, "sets one")
 
 OPERANDS = (
     "a log, a path, a recording, a DataFrame or Arrow table, a Run, SolvedTargets, PlannedPath or Simulation;"
@@ -272,7 +272,7 @@ def _made_before(reference: Operand | Comparison, output: PathLike | None) -> Co
         return None
     made = reference if isinstance(reference, Comparison) else load_comparison(Path(reference))
     if made is not None and output is not None:
-        found = f"{output} with a comparison that stands already"
+        found = f"{output} with an existing comparison"
         raise OptionError(Finding(parameter="output", found=found, allowed="without"))
     return made
 

@@ -124,7 +124,7 @@ def plan(
         write_recording(result, written, kept, writing)
         return replace(result, recording=written)
     if result.obstacles:
-        said = f"{written} is not written: the arm cannot move as planned"
+        said = f"{written} is not written: the arm cannot follow the plan"
         return replace(result, warnings=(*result.warnings, LogWarning("not-written", said)))
     _write_log(result, written, kept)
     return replace(result, log=written)

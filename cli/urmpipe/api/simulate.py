@@ -102,8 +102,8 @@ def _bundled(system: PathLike, arguments: Mapping[str, str]) -> set[str]:
         return set(own.values())
     others = " and ".join(f"{name} is {value}" for name, value in given.items())
     missing = [
-        f"argument {name}: found nothing where {others}, allowed: a file of the same motion"
-        f" ({system}'s own {value} is of another one)"
+        f"argument {name}: not set, but {others}; allowed: a file of the same motion"
+        f" ({system}'s own {value} has another motion)"
         for name, value in own.items()
         if name not in given
     ]

@@ -136,7 +136,7 @@ def build(
     from urmpipe.systems.units import column_names, refuse_operands
 
     if log_map and not log:
-        hint = Hint("log", None, "names one")
+        hint = Hint("log", None, "sets one")
         raise OptionError(Finding("found without a log", parameter="log_map", hints=(hint,)))
     given = {name: option_value(text) for name, text in options.items()}
     if Path(unit).suffix != ".py":

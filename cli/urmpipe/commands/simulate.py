@@ -100,7 +100,7 @@ def simulate(
     """
     if listed == (system is not None):
         found = f"{system} and --list" if listed else "neither a system nor --list"
-        raise click.UsageError(f"found {found}, allowed: one of both")
+        raise click.UsageError(f"found {found}, allowed: one of the two")
     if listed or system is None:
         return _list(terminal)
     given = {"arguments": arguments, "step": step, "duration": duration, **options}
@@ -129,7 +129,7 @@ def _run(system: str, target: Path, draw: Path | None, terminal: Terminal, asked
     terminal.warn([one for one in result.warnings if one.kind != ON_PYTHON])  # that is told already
     terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, wall, replaces, draw))
     if result.failed is not None:
-        say(f"error: {result.failed}; what was recorded until then is in {result.recording}", err=True)
+        say(f"error: {result.failed}; the samples until then are in {result.recording}", err=True)
     return 2 if result.failed is not None else 1 if result.verdict == "fail" else 0
 
 
@@ -162,10 +162,10 @@ def _list(terminal: Terminal) -> int:
 
 def _refuse_run_options(given: dict[str, Any]) -> None:
     """Raise a usage error if a file is to be written with options that only a run follows."""
-    allowed = "with a system that is run; change the file"
+    allowed = "when the system runs; edit the file instead"
     found = [name for name, value in given.items() if value]
     if found:
-        with_file = "found beside a system that is written"
+        with_file = "found for a system that is only written"
         raise OptionError(*(Finding(with_file, parameter=name, allowed=allowed) for name in found))
 
 

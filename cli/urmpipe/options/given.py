@@ -48,9 +48,13 @@ def for_logs(
     files = ", ".join(recordings)
     if len(recordings) == len(operands):
         if given:
-            found = f"{', '.join(given)}: found with recordings alone ({files})"
-            allowed = "with a log among them; a recording stands as it was ingested"
+            found = f"{', '.join(given)}: found with recordings only ({files})"
+            allowed = "with at least one log; recordings are used as ingested"
             raise click.UsageError(f"{found}, allowed: {allowed}")
         return {name: value for name, value in options.items() if name not in OF_LOGS}, None
-    note = f"{', '.join(given)} of the logs alone: {files} as ingested" if given and recordings else None
+    note = (
+        f"{', '.join(given)} applied to the logs only: {files} used as ingested"
+        if given and recordings
+        else None
+    )
     return dict(options), note

@@ -33,10 +33,10 @@ def _units(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
         several = value.split(",")
         if len(several) > 1 and all("=" in one for one in several):
             apart = " ".join(f"--unit {one.strip()}" for one in several)
-            raise click.BadParameter(f"found {value!r}, allowed: one COLUMN=UNIT an option: {apart}")
+            raise click.BadParameter(f"found {value!r}, allowed: one COLUMN=UNIT per option: {apart}")
         if units.setdefault(column, unit) != unit:
             found = f"found {units[column]} and {unit} {f'for {column}' if column else 'without a column'}"
-            raise click.BadParameter(f"{found}, allowed: one; that of another column as COLUMN=UNIT")
+            raise click.BadParameter(f"{found}, allowed: one unit, or that of a column as COLUMN=UNIT")
     return units or None
 
 

@@ -210,7 +210,7 @@ class NamesType(click.ParamType[Any]):
 
 
 class NumbersType(click.ParamType[tuple[float, ...]]):
-    """Finite numbers in a unit that is not written behind them, parted by commas.
+    """Finite numbers in a unit that is not written behind them, separated by commas.
 
     Args:
         name: What the value is called in the help.

@@ -48,7 +48,7 @@ def units_dict() -> dict[str, Any]:
 
 def print_units() -> None:
     """Print each unit with a line, and its options."""
-    table = new_table("Unit", "What it does", "Option", "", title="Units")
+    table = new_table("Unit", "Description", "Option", "", title="Units")
     for name in unit_names():
         options = list(options_of(name).items()) or [("", "")]
         for row, (option, said) in enumerate(options):

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 
 def print_systems(systems: Sequence[System]) -> None:
     """Print the shipped systems: a line each, and their arguments."""
-    table = new_table("System", "What it is", "--set", title="Systems")
+    table = new_table("System", "Description", "--set", title="Systems")
     for one in systems:
         table.add_row(one.name, one.description, lines_of(f"{k}={v}" for k, v in one.arguments.items()))
     new_console().print(table)
     say("Run one: urmpipe simulate SYSTEM [--set NAME=VALUE]")
-    say("Change anything else of it: urmpipe simulate SYSTEM --write-system FILE.toml")
+    say("Change anything else: urmpipe simulate SYSTEM --write-system FILE.toml")

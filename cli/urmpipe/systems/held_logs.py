@@ -45,8 +45,8 @@ def between_samples(block: str, t_ns: IntArray, step: float, count: int) -> LogW
     if not np.any(late):
         return None
     found = f"{np.count_nonzero(late)} of {len(points)} communication points lie between samples of the log"
-    held = f"where the one before is held, {late.max() / 1e6:.4g} ms at most"
-    return LogWarning("held", f"block {block}: {found}, {held}: a deviation there is none of the log's")
+    held = f"where the previous sample is held for at most {late.max() / 1e6:.4g} ms"
+    return LogWarning("held", f"block {block}: {found}, {held}: deviations there are not those of the log")
 
 
 def _points(k: FloatArray | IntArray, step: float) -> IntArray:

@@ -83,8 +83,8 @@ def _motion(path: Path, robot: Chain | None, read: ReadOptions | None) -> LogTab
     files = log_files(path)
     log = read_log(files, read, robot)
     if not log.timed:
-        said = "found still poses, allowed: a motion, which has times"
-        hint = Hint("period", None, "reads the rows as one")
+        said = "found still poses, allowed: a motion with times"
+        hint = Hint("period", None, "reads the rows as a motion")
         raise LogError(Finding(said, str(files[0]), hints=(hint,)))
     parts = list(_parts(log))
     _refuse_missing(str(files[0]), parts)

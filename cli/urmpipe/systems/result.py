@@ -81,8 +81,8 @@ def simulation_of(plan: Plan, recorded: Recorded, blocks: Blocks, svg: str) -> S
 def _unjudged(system: System) -> Iterator[str]:
     """Yield what a verdict does not see: a delta meter is judged by what is recorded of it."""
     if system.record_every > 1:
-        every = f"one communication point of {system.record_every}, as system.record_every says"
-        yield from (f"block {name}: the verdict is that of {every}" for name in _meters(system))
+        every = f"one communication point in {system.record_every} (system.record_every)"
+        yield from (f"block {name}: the verdict covers {every}" for name in _meters(system))
 
 
 def _inputs(paths: list[Path]) -> list[SourceFile]:
@@ -233,7 +233,7 @@ def _doubts(plan: Plan, recorded: Recorded, odd: Mapping[Port, NotFinite], meter
     every = plan.system.record_every
     last, end = float(recorded.t_ns[-1]) * 1e-9, plan.count // every * every * plan.step
     if end - last > NANOSECOND:
-        yield f"the run ended at t = {last:.9g} s of {end:.9g} s"
+        yield f"the run ended at t = {last:.9g} s instead of {end:.9g} s"
     before = _before(plan, meter)
     for port, one in odd.items():
         if port.block in before:

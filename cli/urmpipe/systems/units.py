@@ -129,10 +129,10 @@ def refuse_operands(name: str, robot: Robot | None, log: Any) -> None:
     faults = []
     for option, value in (("robot", robot), ("log", log)):
         if takes[option] and value is None:
-            hint = Hint(option, None, f"gives one, in a system file {option} = ...")
+            hint = Hint(option, None, f"sets one, in a system file {option} = ...")
             faults.append(Finding(f"found no {option}", about=f"unit {name}", hints=(hint,)))
         elif not takes[option] and value is not None and not (option == "robot" and takes["log"]):
-            said = f"found a {option} ({_shown(value)}), allowed: none, it has no such option"
+            said = f"found a {option} ({_shown(value)}), allowed: none, the unit has no such option"
             faults.append(Finding(said, about=f"unit {name}"))
     if faults:
         raise OptionError(*faults)

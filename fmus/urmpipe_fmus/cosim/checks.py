@@ -127,7 +127,7 @@ class Wiring:
             kinds = (_kind(output), _kind(one))
             if "String" in (one.type, output.type):
                 found = f"found {source}, {kinds[0]}, for {one.name}, {kinds[1]}"
-                allowed = "numbers: texts are not exchanged, start gives one for the whole run"
+                allowed = "numbers: texts are not exchanged, start sets one for the whole run"
                 self._fault(where, f"{found}; allowed: {allowed}")
                 return
             if kinds[0] != kinds[1]:

@@ -72,7 +72,7 @@ class Joint:
         if abs(length - 1.0) > AXIS_TOLERANCE:
             yield f"joint {self.name}: axis {list(self.axis)} has length {length:g}; allowed: 1"
         if self.kind == "fixed" and self.mimic is not None:
-            yield f"joint {self.name}: is fixed and mimics {self.mimic.joint}; allowed: one of both"
+            yield f"joint {self.name}: is fixed and mimics {self.mimic.joint}; allowed: one of the two"
         if not self.lower <= self.upper:
             yield f"joint {self.name}: lower limit {self.lower:g} above upper {self.upper:g}"
         for key in ("velocity", "acceleration", "effort"):

@@ -134,7 +134,7 @@ class Table:
             return (float(value),) * count
         if are_numbers(value, count, infinite=True):
             return tuple(float(item) for item in value)
-        self._refuse(key, value, f"a number, or {count} numbers, one a joint")
+        self._refuse(key, value, f"a number, or {count} numbers, one per joint")
         return (default,) * count
 
     def rows(self, key: str) -> Rows3:

@@ -48,7 +48,7 @@ def parse_toml(path: Path, error: type[UrmpipeError]) -> dict[str, Any]:
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as fault:
-        line, said = content.count(b"\n", 0, fault.start) + 1, f"byte {fault.start} is no UTF-8"
+        line, said = content.count(b"\n", 0, fault.start) + 1, f"byte {fault.start} is not UTF-8"
         raise error(Finding(f"{said}; allowed: TOML in UTF-8", str(path), line=line)) from fault
     try:
         table = toml_values(text)

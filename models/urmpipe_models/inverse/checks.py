@@ -66,9 +66,9 @@ def _of_rotations(rotation: FloatArray) -> list[str]:
             reasons[row] = "the orientation is not finite, allowed: finite numbers"
         elif not error[row] <= ROTATION_TOLERANCE:
             reasons[row] = (
-                f"the orientation is no rotation: R^T R differs from 1 by {error[row]:.3g},"
+                f"the orientation is not a rotation: R^T R differs from 1 by {error[row]:.3g},"
                 f" allowed: {ROTATION_TOLERANCE:g}"
             )
         else:
-            reasons[row] = "the orientation is no rotation: its determinant is -1, a mirror, allowed: 1"
+            reasons[row] = "the orientation is not a rotation: its determinant is -1, a mirror, allowed: 1"
     return reasons

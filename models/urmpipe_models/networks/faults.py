@@ -174,7 +174,7 @@ def _element_faults(where: str, element: ConstraintElement) -> Iterator[Finding]
     for n in dict.fromkeys(normals):
         off = math.sqrt(dot(n, n)) - 1.0
         if not abs(off) <= ORTHONORMAL:
-            message = f"is no unit vector: |n| - 1 = {off:.3g}; allowed: {ORTHONORMAL:g} at most"
+            message = f"is not a unit vector: |n| - 1 = {off:.3g}; allowed: {ORTHONORMAL:g} at most"
             yield Finding(message, about=f"{where}.n")
     for point in element.points[element.kind == "eg" :]:
         yield from _finite_faults(f"{where}.a", point)

@@ -105,7 +105,7 @@ def read_drives(table: Table, of: Sequence[str], units: Units) -> tuple[Expressi
         return ()
     values = [value] if len(of) == 1 and not isinstance(value, (list, tuple)) else value
     if value == "" or not isinstance(values, (list, tuple)) or len(values) != len(of):
-        many = f'a list of {len(of)}, one a variable, "" where it is free'
+        many = f'a list of {len(of)}, one per variable, "" where it is free'
         _refuse(table, key, value, "one, of its only variable" if len(of) == 1 else many)
         return ()
     return tuple(_drive(table, key, one, unit, units) for one, unit in zip(values, of, strict=True))

@@ -192,11 +192,11 @@ def _unsaid_units(data: Mapping[str, Any], chain: Chain) -> Iterator[str]:
     frames = [*(joint.origin for joint in chain.joints), chain.tip]
     length = sum(math.hypot(*frame.translation) for frame in frames)
     if "length_unit" not in data and length > LONGEST:
-        yield f'key length_unit: found none, and links of {length:.4g} m, allowed: "mm", or "m" if so meant'
+        yield f'key length_unit: found none, and links of {length:.4g} m, allowed: "mm", or "m" if intended'
     twists = [row.get(key, 0.0) for row in data.get("joints", ()) for key in ("theta", "alpha")]
     angle = max(map(abs, (*data.get("tilts", ()), *twists)), default=0.0)
     if "angle_unit" not in data and angle > 2.0 * math.pi:
-        yield f'key angle_unit: found none, and {angle:.4g} rad, allowed: "deg", or "rad" if so meant'
+        yield f'key angle_unit: found none, and {angle:.4g} rad, allowed: "deg", or "rad" if intended'
 
 
 def _read_urm(table: Table, units: Units, folder: Path) -> Build:

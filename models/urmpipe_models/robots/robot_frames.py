@@ -62,7 +62,7 @@ def _rigid(table: Table, units: Units) -> Transform:
     if table.has("rpy"):
         table.fault("rotation", "found beside rpy; allowed: one of the two")
     elif not _is_rotation(frame):
-        table.fault("rotation", "is no rotation matrix; allowed: orthonormal rows, right-handed")
+        table.fault("rotation", "is not a rotation matrix; allowed: orthonormal rows, right-handed")
     return frame
 
 

@@ -37,7 +37,7 @@ def write_export(path: Path, text: str, source: Path) -> None:
     if path.exists() and not is_export(path):
         allowed = "a new name, or such an export to replace"
         raise OutputError(
-            Finding(f"found a file that is no robot export of urmpipe, allowed: {allowed}", str(path))
+            Finding(f"found a file that is not a robot export of urmpipe, allowed: {allowed}", str(path))
         )
     replace_text(path, text)
 

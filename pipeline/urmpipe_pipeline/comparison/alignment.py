@@ -154,7 +154,7 @@ def _with_tool(matched: Matched, run: Run) -> Matched:
     turned = float(angle_between(quat, np.broadcast_to(quat[0], quat.shape)).max())
     if turned < TURNED:
         found = f"tool: found a tool that turns by {np.degrees(turned):.4f} deg in all"
-        said = "which any offset of the base explains as well, allowed: a log that turns it; start, none"
+        said = "which an offset of the base explains as well, allowed: a log that turns it; start, none"
         raise LogError(lacking(run, f"{found}, {said}", parameter="align"))
     rotation = matrices(quat)
     x, y, z = np.einsum("nji,nj->ni", rotation, posed.reference - posed.actual).mean(axis=0).tolist()

@@ -57,7 +57,7 @@ third of the default tolerance."""
 
 NO_ALIGNMENT_ISO = "none with iso: an alignment would hide AP and AT"
 
-NO_ALIGNMENT = "none with a diagnosis, which names base and tool as causes"
+NO_ALIGNMENT = "none with a diagnosis: base and tool are possible causes"
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +147,7 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     """
     chosen = options or CompareOptions()
     if not runs:
-        raise OptionError("compare: no log to hold against the reference; at least one is needed")
+        raise OptionError("compare: no log to compare with the reference; at least one is needed")
     if chosen.iso is None or len(runs) > 1:
         _refuse_poses_as_motion(reference, runs, chosen)
     chosen = _joined([(run, _goes_by_record(run, chosen.tcp)) for run in (reference, *runs)], chosen)
@@ -258,8 +258,10 @@ def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], options: Compar
 def _no_motion(run: Run) -> Finding:
     """Return that still poses are held against a motion."""
     if run.log.source == SOLVED:
-        said = "found targets without times, which are no motion, allowed: a log or a path of its own times"
-        return lacking(run, said, Hint("tsp", None, "gives the targets some", call="ik"))
+        said = (
+            "found targets without times, which are not a motion, allowed: a log or a path of its own times"
+        )
+        return lacking(run, said, Hint("tsp", None, "sets their sample period", call="ik"))
     said = "found still poses beside a motion, allowed: still poses on both sides, or motions"
     return lacking(run, said, Hint("poses", True, "takes the rows of every log as still poses"))
 
@@ -310,11 +312,11 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     """
     chosen = options or CompareOptions()
     if chosen.sync != "start":
-        allowed = "start, since its joints and its recorded tool centre point stand in the same rows"
+        allowed = "start, since its joints and its recorded tool centre point share the same rows"
         raise OptionError(Finding(parameter="sync", found=f"{chosen.sync} for one log", allowed=allowed))
     log = run.log
     if not log.joints:
-        raise LogError(lacking(run, "a path alone, which has no joints; allowed: a log to hold against it"))
+        raise LogError(lacking(run, "a path alone, which has no joints; allowed: a log to compare with it"))
     if run.robot is None:
         raise LogError(lacking(run, *NO_ROBOT))
     if log.tcp_position is None:

@@ -105,18 +105,18 @@ def alignment_words(one: Deviation) -> tuple[str, str]:
     alignment = one.alignment
     match alignment.mode:
         case "none":
-            return "none", "both sides stand where they were recorded"
+            return "none", "both sides as recorded"
         case "tool":
             moved = text.quantity(float(np.linalg.norm(alignment.tool)), "m")
             by = f"{_vector(alignment.tool)} mm in the tool's frame"
-            return f"tool centre point moved by {moved}", f"the constant offset that fits best: {by}"
+            return f"tool centre point moved by {moved}", f"the best constant offset: {by}"
         case "base+tool":
             return _base_and_tool_words(alignment)
     turned = text.quantity(alignment.angle, "rad")
     moved = text.quantity(float(alignment.moved(one.actual).max()), "m")
     first = alignment.mode == "start"
-    rule = "the first compared poses agree" if first else "the rigid motion that fits best"
-    about = f"turned about the origin, then moved by {_vector(alignment.translation)} mm"
+    rule = "the first compared poses agree" if first else "the best rigid motion"
+    about = f"rotated about the origin, then translated by {_vector(alignment.translation)} mm"
     return f"{alignment.mode}: moved by up to {moved}, turned by {turned}", f"{rule}: {about}"
 
 
@@ -132,7 +132,7 @@ def _base_and_tool_words(alignment: Alignment) -> tuple[str, str]:
     )
     base, tool = _vector(alignment.translation), _vector(alignment.tool)
     by = f"base at {base} mm, tool at {tool} mm in the tool's frame"
-    return f"moved and turned: {', '.join(moved)}", f"the base and the tool that fit best: {by}"
+    return f"moved and turned: {', '.join(moved)}", f"the best base and tool: {by}"
 
 
 def _vector(metres: tuple[float, ...]) -> str:

@@ -226,7 +226,7 @@ def _cut(whole: Trajectory, first: int, last: int, name: str) -> Trajectory:
 def _left_out(name: str, found: FoundCycles) -> Iterator[LogWarning]:
     """Yield what of a log is in no cycle."""
     for first, last in found.cut:
-        said = f"rows {first + 1} to {last + 1} are no whole cycle, and left out"
+        said = f"rows {first + 1} to {last + 1} are not a whole cycle and are left out"
         yield LogWarning(CUT, said, row=first + 1, about=name)
     if found.other:
         first, last = found.other[0]
@@ -244,7 +244,7 @@ def _followed(
     for one in candidates:
         moves = marks.path is not None
         unlike = moves and not (one.motion.timed and len(one.motion) > 1 and alike(command, one.motion))
-        found = f"its path is not like that of {reference}" if unlike else follow(marks, one.motion)
+        found = f"its path differs from that of {reference}" if unlike else follow(marks, one.motion)
         if isinstance(found, str):
             told.append(LogWarning(UNLIKE, f"left out: {found}", about=one.side.run.name))
         else:
@@ -275,8 +275,8 @@ def _refuse_unvalued(test: IsoTest, tolerance: Mapping[str, float]) -> None:
     lacks = [name for name in tolerance if values.get(name) is None]
     if lacks:
         known = ", ".join(name for name, value in values.items() if value is not None)
-        allowed = f"criteria that this test tells: {known}"
-        found = [f"{name}, which {count} of this motion cannot tell" for name in lacks]
+        allowed = f"criteria of this test: {known}"
+        found = [f"{name}, which {count} of this motion cannot determine" for name in lacks]
         raise LogError(*(Finding(parameter="tolerance", found=one, allowed=allowed) for one in found))
 
 
@@ -307,7 +307,7 @@ def _trembling(cycles: Sequence[Motion], test: IsoTest) -> Iterator[LogWarning]:
     """Yield warnings if noise of the cycles leaves the band about final poses, or is most of FV."""
     noise = float(np.median([one.noise for one in cycles]))
     if any(one.value is not None for one in test.overall if one.name == "PSt") and 3.0 * noise > test.band:
-        said = f"PSt and OV are what noise makes of them: {text.quantity(3.0 * noise, 'm')} (three standard"
+        said = f"PSt and OV are determined by noise: {text.quantity(3.0 * noise, 'm')} (three standard"
         said += f" deviations) leaves the band of {text.allowed(test.band)}"
         yield LogWarning(TREMBLING, said, parameter="band")
     steps = [np.median(np.diff(one.t)) for one in cycles if len(one) > 1]
@@ -315,5 +315,5 @@ def _trembling(cycles: Sequence[Motion], test: IsoTest) -> Iterator[LogWarning]:
     (spread,) = [one.value for one in test.overall if one.name == "FV"] or [None]
     if spread is not None and 2.0 * shaken > spread:
         makes = f"{text.quantity(noise, 'm')} from row to row make about {shaken:.2g} m/s"
-        said = f"FV is what noise makes of it: {makes}"
+        said = f"FV is determined by noise: {makes}"
         yield LogWarning(NOISY, said)

@@ -62,11 +62,11 @@ class Matched:
 ORIENTED = "joints with a robot, or a recorded orientation"
 """What tells an orientation."""
 
-NO_ROBOT = ("no robot, so no forward kinematics", Hint("robot", None, "gives one"))
+NO_ROBOT = ("no robot, so no forward kinematics", Hint("robot", None, "sets one"))
 """What a run without kinematics lacks, and what to give."""
 
-AS_RECORDED = Hint("tcp", "recorded", "goes by the recorded tool centre point")
-JOINTS_ALONE = Hint("tolerance", "joint=0.1deg", "judges the joints alone")
+AS_RECORDED = Hint("tcp", "recorded", "uses the recorded tool centre point")
+JOINTS_ALONE = Hint("tolerance", "joint=0.1deg", "compares the joints only")
 """What else to give where both sides have joints."""
 
 
@@ -93,7 +93,7 @@ def as_recorded(run: Run) -> Trajectory:
         LogError: If it recorded none.
     """
     if run.log.tcp_position is None:
-        hint = Hint("tcp", "fk", "goes by the joints of a log with a robot")
+        hint = Hint("tcp", "fk", "uses the joints of a log with a robot")
         raise LogError(lacking(run, "no recorded tool centre point", hint))
     return _trajectory(run, run.log.tcp_position, run.log.tcp_quat_xyzw)
 

@@ -44,7 +44,7 @@ ENOUGH = 0.99
 
 ALLOWED = "one motion that does not repeat itself, half of it in both"
 
-BY_HAND = (Hint("sync", "start", "starts both together"), Hint("sync", None, "says the offset"))
+BY_HAND = (Hint("sync", "start", "aligns the first samples"), Hint("sync", None, "sets the offset"))
 
 SHOWN = 5
 """Offsets that a message names, the best ones."""
@@ -118,7 +118,7 @@ def _look(view: View, reference: str) -> Estimate | _Fault:
     best, *others = sorted((refine(view, found, peak) for peak in near), key=lambda one: -one.similarity)
     at_best = f"{best.offset:.6g} s with a similarity of {best.similarity:.3f}"
     if best.similarity < LIKE:
-        said = f"no likeness of the {view.by} to {reference}: {at_best} at best, {LIKE:g} is needed"
+        said = f"low similarity of the {view.by} to {reference}: {at_best} at best, {LIKE:g} is needed"
         return _Fault(said, best.similarity)
     if not np.isfinite(best.precision):
         said = f"no clear best offset to {reference} by the {view.by}: about {at_best}"
@@ -127,7 +127,9 @@ def _look(view: View, reference: str) -> Estimate | _Fault:
     if rivals:
         alike = sorted([best, *rivals], key=lambda one: (-round(one.similarity, 3), abs(one.offset)))
         shown = ", ".join(f"{one.offset:.6g} s ({one.similarity:.3f})" for one in alike[:SHOWN])
-        said = f"a motion of the {view.by} that several offsets to {reference} explain alike (similarity)"
+        said = (
+            f"a motion of the {view.by} that several offsets to {reference} explain equally well (similarity)"
+        )
         return _Fault(f"{said}: {shown}", best.similarity)
     return best
 
@@ -158,6 +160,6 @@ def sync_doubts(name: str, sync: Sync, period: float) -> list[LogWarning]:
         said_period = f"{said} {error}; the period is {1e3 * period:.6g} ms"
         doubts.append(LogWarning("sync-uncertain", said_period, about=name))
     if sync.similarity is not None and sync.similarity < ALIKE:
-        like = f"leaves the two motions alike by {sync.similarity:.2f} only, of 1: are they one motion?"
+        like = f"gives a similarity of {sync.similarity:.2f} only, of 1: do both logs show the same motion?"
         doubts.append(LogWarning("sync-unlike", f"{said} {like}", about=name))
     return doubts

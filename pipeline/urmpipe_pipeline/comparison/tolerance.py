@@ -89,7 +89,7 @@ def parse_tolerance(
         if number is None or twice:
             angle = value == part and _number(value, ANGLES, zero) is not None and not twice
             of_what = ("angle", "joint") if angle else ()
-            hints = tuple(Hint(parameter, f"{one}={part.strip()}", "says of what") for one in of_what)
+            hints = tuple(Hint(parameter, f"{one}={part.strip()}", "specifies the kind") for one in of_what)
             said = f"{shown(part.strip())}{twice}"
             allowed = ALLOWED_CRITERIA if iso else ALLOWED
             faults.append(Finding(parameter=parameter, found=said, allowed=allowed, hints=hints))

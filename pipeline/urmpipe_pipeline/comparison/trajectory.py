@@ -88,7 +88,7 @@ class Alignment:
         translation: In [m].
         tool: In the frame of the log's tool, in [m].
         tool_rotation: In the frame of the log's tool, rotation matrix [-], row by row, 3 by 3.
-        untold: What the compared poses do not tell of base and tool, or hardly.
+        untold: What the compared poses do not determine of base and tool, or hardly.
     """
 
     mode: AlignMode = "none"

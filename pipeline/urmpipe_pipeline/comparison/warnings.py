@@ -91,9 +91,9 @@ def open_frames(one: Deviation) -> Iterator[LogWarning]:
     nothing, little = ([it for it in untold if (it.seen < OPEN) is told] for told in (True, False))
     said = []
     if nothing:
-        said.append(f"do not tell {_parts(nothing)}, of which the least is taken")
+        said.append(f"do not determine {_parts(nothing)}, so the smallest values are used")
     if little:
-        said.append(f"hardly tell {_parts(little)}, of which a small error of the log makes a large one")
+        said.append(f"hardly determine {_parts(little)}, so a small error of the log causes a large one")
     if said:
         told = f"the compared poses {', and '.join(said)}"
         yield LogWarning("frames-open", told, about=one.name, parameter="align")
@@ -147,7 +147,7 @@ def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
         unit, other, most = ("rad", "deg", LARGE_ANGLE) if "rad" in UNITS[kind] else ("m", "mm", LARGE_LENGTH)
         if value > most:
             bare = f"{value:g}"
-            said = f"a tolerance of {text.allowed(value, unit)} ({kind}) lets anything pass"
+            said = f"a tolerance of {text.allowed(value, unit)} ({kind}) accepts any deviation"
             hints = (
                 Hint("tolerance", f"{kind}={bare}{other}", f"if {other} was meant"),
                 Hint("tolerance", f"{kind}={bare}{unit}", "if not"),
@@ -192,15 +192,13 @@ def recorded_apart(runs: Sequence[Run], allowed: float) -> Iterator[LogWarning]:
         alike = [(run, most) for run, most in found if (most <= CALIBRATION) == usual]
         if len(alike) == 1:
             ((run, most),) = alike
-            far = (
-                f"by its joints it is up to {text.quantity(most, 'm')} from the tool centre point it recorded"
-            )
-            remedy = f"this verdict does not judge it, a comparison of {run.name} alone does"
+            far = f"its kinematics are up to {text.quantity(most, 'm')} from its recorded tool centre point"
+            remedy = f"this verdict does not include that; a comparison of {run.name} alone does"
             yield LogWarning("recorded-tcp-apart", f"{far}, {_cause(most)}; {remedy}", about=run.name)
         elif alike:
             far = text.enumerated([f"{run.name} is up to {text.quantity(most, 'm')}" for run, most in alike])
-            said = f"by their joints {far} from the tool centre points that they recorded"
-            remedy = "this verdict does not judge that, a comparison of each alone does"
+            said = f"by forward kinematics {far} from the recorded tool centre points"
+            remedy = "this verdict does not include that; a comparison of each alone does"
             yield LogWarning(TCP_APART, f"{said}, {_cause(alike[0][1])}; {remedy}")
 
 
@@ -217,6 +215,6 @@ def _cause(apart: float) -> str:
     """Return what usually lies behind a distance in [m] between kinematics and recorded tool centre point."""
     usual = text.allowed(CALIBRATION)
     if apart > CALIBRATION:
-        return f"more than a calibration makes ({usual}): another robot, tool or base?"
-    known = "a controller knows its arm's calibration, which the robot here lacks"
+        return f"more than a calibration explains ({usual}): another robot, tool or base?"
+    known = "a controller uses the calibration of its arm, which this robot model lacks"
     return f"usual up to {usual} where {known}"

@@ -40,9 +40,9 @@ OWN = "the arm's own geometry, as a calibration finds it"
 MANY = 5
 """So many of these at once are an arm's own geometry."""
 
-ALIKE = "the joints differ, but not so that their tool centre points do"
+ALIKE = "the joint values differ, but their tool centre points do not"
 
-ELSEWHERE = "nothing of joints and clock brings the tool centre points together"
+ELSEWHERE = "no change of joints or clock makes the tool centre points agree"
 
 LENGTHS = ("axis", "norm", "path")
 """What a tolerance of a length may be of."""

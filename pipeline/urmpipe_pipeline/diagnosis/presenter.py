@@ -20,8 +20,8 @@ from urmpipe_pipeline.diagnosis.wording import (
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, table_of
 from urmpipe_pipeline.presentation.section import Fact, Presentation, Section, Table, Value
 
-ADDED = "A value is what is added to the robot, or to how the log is read, so that both sides agree."
-ALONE = "rms without it: what stays if this cause alone is taken away. Share: of the mean square."
+ADDED = "Value: the change of the robot or of the reading of the log that makes both sides agree."
+ALONE = "rms without it: remaining deviation if only this cause is removed. Share: of the mean square."
 
 
 def present(result: Diagnosis) -> Presentation:
@@ -41,8 +41,12 @@ def diagnosis_facts(result: Diagnosis) -> tuple[Fact, ...]:
         Fact("Cause", result.sentence),
         Fact("Meaning", "; ".join(one for one in meant if one not in result.sentence), brief=False),
         Fact("Undecided", undecided_words(result.undecided) if result.undecided else "", brief=False),
-        Fact("What stays", remainder_words(result.remainder, result.unit) if stays else "", brief=False),
-        Fact("Not looked for", "; ".join(_not_looked_for(result)), brief=False),
+        Fact(
+            "Remaining deviation",
+            remainder_words(result.remainder, result.unit) if stays else "",
+            brief=False,
+        ),
+        Fact("Not tested", "; ".join(_not_looked_for(result)), brief=False),
     )
 
 

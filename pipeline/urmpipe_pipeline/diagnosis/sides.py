@@ -130,7 +130,7 @@ def _of_joints(matched: Matched, reference: Side, log: Side) -> Question:
     rounding = np.hypot(_rounding(run.on_rows.q, run), _rounding(q.T, run))
     recorded = run.log.tcp_position is not None
     alone = (
-        "diagnosed alone, the log is held against the one that it recorded"
+        "diagnosed alone, the log is compared with the one that it recorded"
         if recorded
         else "none was recorded"
     )
@@ -181,7 +181,11 @@ def _of_arm(matched: Matched, reference: Side, log: Side) -> Question:
     edits = (*sign_edits(count, most=2 if open_frames else count), *swap_edits(count), *robot_edits(robot))
     edits += () if open_frames else tuple(unit_edits("reference" if log.by_joints else "log"))
     forced = tuple(g for g, group in enumerate(groups) if open_frames and group.kind in FRAMES)
-    told = [NotLookedFor(("turns",), "whole turns move no tool centre point: joints on both sides tell them")]
+    told = [
+        NotLookedFor(
+            ("turns",), "whole turns do not move the tool centre point: only joints on both sides show them"
+        )
+    ]
     if rotation is None:
         told.append(NotLookedFor(("tool_rotation",), "a side has no orientation"))
     if open_frames:

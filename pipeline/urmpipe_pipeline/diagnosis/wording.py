@@ -56,12 +56,12 @@ def sentence(result: Diagnosis) -> str:
     causes, alternatives = result.causes, result.undecided
     if not causes and not alternatives:
         taken = f" ({result.remainder.words})" if result.remainder.words else ""
-        return f"no cause named: rms {before} stays{taken}"
+        return f"no cause found: rms {before} remains{taken}"
     several = len(causes) > 1
     said = [f"{cause_words(one)}{f' ({share_words(one.share)})' if several else ''}" for one in causes]
     if alternatives:
         said.append(f"{_either(alternatives)} ({_deciding(alternatives)})")
-    stays = f", {share_words(result.remainder.share)} of the mean square stays" if len(said) > 1 else ""
+    stays = f", {share_words(result.remainder.share)} of the mean square remains" if len(said) > 1 else ""
     return f"{text.enumerated(said)}: rms {before} -> {after}{stays}"
 
 
@@ -80,7 +80,7 @@ def _either(alternatives: Sequence[Alternative]) -> str:
 def _deciding(alternatives: Sequence[Alternative]) -> str:
     """Return what would decide between some explanations."""
     needs = list(dict.fromkeys(one.needs for one in alternatives if one.needs))
-    return f"a motion of {text.enumerated(needs)} would decide" if needs else "this log does not decide"
+    return f"a motion of {text.enumerated(needs)} would decide" if needs else "this log cannot decide"
 
 
 def explanation_words(one: Alternative) -> str:
@@ -100,7 +100,7 @@ def explained(one: Cause) -> str:
     said = [f"{cause_words(one)}{f' (95 %: {interval})' if interval else ''}"]
     said += [f"or its twin {' or '.join(one.twins)}"] if one.twins else []
     if one.kind == "joint_sign":
-        said.append("or its column counts the other way: positions cannot tell these apart")
+        said.append("or its column has the opposite sign: positions cannot distinguish these")
     return ", ".join(said)
 
 
@@ -166,7 +166,7 @@ def _needs(of: str = "") -> Callable[[Cause], str]:
 
 def _sign(one: Cause) -> str:
     module = MODULE.fullmatch(one.name)
-    return f"{joints_words(joint_names(one))} {'counter-rotates' if module else 'turns the other way'}"
+    return f"{joints_words(joint_names(one))} {'counter-rotates' if module else 'rotates in reverse'}"
 
 
 def _path_unit(one: Cause) -> str:
@@ -188,7 +188,7 @@ _CLAUSES: Mapping[str, Callable[[Cause], str]] = {
     "joint_offset": lambda one: f"{joints_words(joint_names(one))} needs an offset of {value_words(one)}",
     "joint_scale": lambda one: f"{joints_words(joint_names(one))} needs a factor of {value_words(one)}",
     "compliance": lambda one: (
-        f"{joints_words(joint_names(one))} gives way: {value_words(one)} of its acceleration"
+        f"{joints_words(joint_names(one))} is compliant: {value_words(one)} of its acceleration"
     ),
     "link_length": _needs(),
     "tilt": _needs(),

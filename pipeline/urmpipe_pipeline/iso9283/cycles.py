@@ -22,7 +22,7 @@ AWAY = 2.0
 LOOKED_AT = 8
 """Returns that are tried as the end of a cycle: a path may come by its start on the way."""
 
-ALLOWED = "rows from 1 as FIRST:LAST, both ends included, parted by commas, such as 1:1477,1478:2955"
+ALLOWED = "rows from 1 as FIRST:LAST, both ends included, separated by commas, such as 1:1477,1478:2955"
 
 
 @dataclass(frozen=True, slots=True)

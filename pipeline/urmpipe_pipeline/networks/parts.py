@@ -131,7 +131,7 @@ def mobility_table(moves: Mobility) -> Table:
         rows.append(("idle spins", Value(len(moves.idle)), ", ".join(moves.idle)))
     if moves.special:
         rows.append(("mobility nearby", Value(moves.nearby), "a special configuration: less moves nearby"))
-    return table_of("Mobility", {"quantity": "", "value": "Value", "about": "What it is"}, rows, brief=True)
+    return table_of("Mobility", {"quantity": "", "value": "Value", "about": "Description"}, rows, brief=True)
 
 
 def gaps_table(gaps: Sequence[Gap]) -> Table:

@@ -85,7 +85,7 @@ def _shape_faults(rows: PathRows) -> Iterator[Finding]:
         arrays["rotation"] = rows.rotation
     wrong = {name: array for name, array in arrays.items() if array.ndim == 0 or array.shape[1:] != ROW[name]}
     for name, array in wrong.items():
-        found = f"of shape {array.shape}" if array.ndim else "that is no array of numbers"
+        found = f"of shape {array.shape}" if array.ndim else "that is not an array of numbers"
         shape = ", ".join(("n", *map(str, ROW[name]))) + "," * (not ROW[name])
         yield Finding(found=f"{name} {found}", allowed=f"numbers of shape ({shape})")
     if not wrong and len({len(array) for array in arrays.values()}) > 1:

@@ -27,7 +27,7 @@ def verify(part: Path, path: Path, encoded: Encoded, metadata: str) -> None:
         ) from error
     found = list(_differences(store, encoded, metadata))
     if found:
-        raise OutputError(*(Finding(f"reads back otherwise than written: {one}", str(path)) for one in found))
+        raise OutputError(*(Finding(f"differs when read back: {one}", str(path)) for one in found))
 
 
 def _differences(store: Store, encoded: Encoded, metadata: str) -> Iterator[str]:

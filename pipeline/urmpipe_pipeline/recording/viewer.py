@@ -169,8 +169,8 @@ def _shown(process: subprocess.Popen[bytes], url: str, path: Path, opening: Open
         raise _ClosedError(f"the window was closed before it showed {path}")
     how = f"did not answer within {PATIENCE:.0f} s" if code is None else f"ended with exit code {code}"
     raise ViewerError(
-        f"the viewer {how}, allowed: a display and a graphics driver that it can use; what is wrong it says"
-        f" itself: {_program()} {path}"
+        f"the viewer {how}, allowed: a display and a graphics driver that it can use; to see its messages:"
+        f" {_program()} {path}"
     )
 
 

@@ -286,12 +286,10 @@ def _warn_unexplained(log: JointLog, odd: _Places, periods: FloatArray) -> Itera
     quarter = f"{np.degrees(periods[odd.joints].min() / 4.0):.0f} deg"
     if len(odd.rows) == 1:
         to = log.q[odd.rows[0], odd.joints[0]]
-        said = (
-            f"{joints} steps by more than {quarter} from the value before, to {to:.6g} rad, which is no wrap:"
-        )
-        yield LogWarning("large-step", f"{said} it stays", int(odd.rows[0]) + 1)
+        said = f"{joints} steps by more than {quarter} from the value before, to {to:.6g} rad: not a wrap,"
+        yield LogWarning("large-step", f"{said} the value is kept", int(odd.rows[0]) + 1)
         return
-    said = f"{len(odd.rows)} steps of {joints} by more than {quarter} are no wraps, and stay"
+    said = f"{len(odd.rows)} steps of {joints} by more than {quarter} are not wraps and are kept"
     by = f"of {log.joints[odd.joints[worst]]} by {np.degrees(abs(odd.figures[worst])):.4g} deg"
     said = f"{said}; the largest, {by}, is to row {odd.rows[worst] + 1}"
     yield LogWarning("large-step", said, int(odd.rows[0]) + 1, hints=ALL)

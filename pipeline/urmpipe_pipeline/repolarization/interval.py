@@ -102,7 +102,7 @@ def double_turns(
             f" {np.count_nonzero(fixed.joints == j)} of about 2 pi, allowed: wraps of one interval",
             log.files[0].name if log.files else log.name,
             column=log.joints[j],
-            hints=(Hint("interval", {log.joints[j]: None}, "says which"),),
+            hints=(Hint("interval", {log.joints[j]: None}, "specifies it"),),
         )
         for j in found
         if (fixed.joints == j).any()

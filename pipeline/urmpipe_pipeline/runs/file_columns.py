@@ -102,7 +102,7 @@ def _lost(log: JointLog, kept: Sequence[LogColumn]) -> Iterator[LogWarning]:
         yield LogWarning("not-exported", said)
     for inference in log.inferences:
         if inference.kind == "columns not used":
-            said = f"{inference.value}: not ingested ({inference.evidence}), so they cannot leave"
+            said = f"{inference.value}: not ingested ({inference.evidence}), so they cannot be exported"
             yield LogWarning("not-exported", said)
     for warning in log.warnings:
         if warning.kind == "clock-rebuilt":
@@ -112,7 +112,7 @@ def _lost(log: JointLog, kept: Sequence[LogColumn]) -> Iterator[LogWarning]:
             yield LogWarning("not-exported", warning.message, warning.row)
     form = next((one for one in log.inferences if one.kind == ZONED), None)
     if form and any(one.unit == DATE for one in kept):
-        yield LogWarning("clock-in-utc", f"{form.value} with a time zone: the dates leave in UTC")
+        yield LogWarning("clock-in-utc", f"{form.value} with a time zone: the dates are exported in UTC")
 
 
 def _unsaid_units(columns: Sequence[LogColumn]) -> list[LogWarning]:
@@ -123,7 +123,7 @@ def _unsaid_units(columns: Sequence[LogColumn]) -> list[LogWarning]:
         if column.role != "time" and column.factor != 1.0 and not told:
             unsaid.setdefault(column.unit, []).append(column.name)
     return [
-        LogWarning("unit-not-in-name", f"{', '.join(names)}: in {unit}, which their names do not tell")
+        LogWarning("unit-not-in-name", f"{', '.join(names)}: in {unit}, which their names do not give")
         for unit, names in unsaid.items()
     ]
 

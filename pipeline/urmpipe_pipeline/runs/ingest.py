@@ -182,7 +182,7 @@ def _rates(
         if unit := other_unit(on_grid, values, order):
             said += f", but would {unit.said}"
             clocks = [column.name for column in log.columns if column.role == "time"]
-            hints = [Hint("unit", {name: unit.time}, "reads the time so") for name in clocks[:1] if unit.time]
+            hints = [Hint("unit", {name: unit.time}, "applies this") for name in clocks[:1] if unit.time]
         said += "; the differences are used"
         warnings.append(LogWarning(f"recorded-{word}", said, hints=tuple(hints)))
     rates, seconds = result

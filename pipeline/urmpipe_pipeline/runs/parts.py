@@ -30,7 +30,7 @@ AUDIT_NOTES: dict[AuditKind, str] = {
     " neighbours; it is unchanged.",
     "repaired": "repaired: a linear resampling left this sample on a wrap; it was moved by Step onto the line"
     " of its neighbours.",
-    "unexplained": "unexplained: a step of more than a quarter period that is no wrap; it is unchanged.",
+    "unexplained": "unexplained: a step of more than a quarter period that is not a wrap; it is unchanged.",
     "ambiguous": "ambiguous: a gap in which the joint may have turned by more than half a period.",
 }
 """What the kinds that are no wraps mean."""

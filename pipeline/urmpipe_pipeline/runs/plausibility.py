@@ -120,7 +120,7 @@ def outlier_warnings(motion: JointMotion, outliers: NDArray[np.int64]) -> list[L
                 for j in joints
             )
             said = f"an outlier, off the motion of the other rows: {steps}"
-            said = f"{said}; it stays; take it out of the file if the arm was not there"
+            said = f"{said}; it is kept; remove it from the file if the arm was not there"
             warnings.append(LogWarning("outlier-last" if row else "outlier-first", said, row + 1))
     return warnings
 

@@ -43,7 +43,7 @@ def start_warning(robot: Chain | None, log: JointLog) -> list[LogWarning]:
     first = "the first row" if rows == 1 else f"the first {rows} rows"
     where = "as 0, 0, 0" if np.isinf(apart) else f"{text.quantity(apart, 'm')} from where the others have it"
     said = f"{first} of {log.rows} recorded the TCP {where}: no tool or pose known yet?"
-    return [LogWarning(RECORDED_START, f"{said} They stay, and are judged with the others", row=1)]
+    return [LogWarning(RECORDED_START, f"{said} They are kept and judged with the others", row=1)]
 
 
 def _by_tool(robot: Chain, log: JointLog, start: int) -> tuple[int, float]:

@@ -90,7 +90,7 @@ def lacking_tool(robot: Chain | None, log: JointLog, *, turned: bool = False) ->
         return []
     said = _stays(robot, own, turned=turned)
     if not np.isfinite(poses.fit(robot).with_tool):
-        said = f"{said}, and the log moves too little to tell why: {_asked(robot)}"
+        said = f"{said}, and the log moves too little to show why: {_asked(robot)}"
         return [LogWarning(LACKING_TOOL, said)]
     hints = tuple(_placing(robot, poses, own, turned=turned))
     return [LogWarning(LACKING_TOOL, said, hints=hints)] if hints else []
@@ -183,8 +183,8 @@ def _given(edit: Edit, log: JointLog) -> tuple[str, Hint]:
         return f"those of {edit.name} agree", Hint("robot", edit.name, "takes it")
     names = " and ".join(log.joints[j] for j in edit.joints)
     if edit.kind == "joint_sign":
-        hint = Hint("log_map", None, f"reads {names} so, with sign = -1")
-        return f"with {names} counted the other way they agree", hint
+        hint = Hint("log_map", None, f"sets sign = -1 for {names}")
+        return f"with {names} reversed in sign they agree", hint
     order, (first, second) = _called(log), edit.joints
     order[first], order[second] = order[second], order[first]
     return f"with {names} exchanged they agree", Hint("joints", order, "exchanges them")

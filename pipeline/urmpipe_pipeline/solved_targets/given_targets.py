@@ -112,7 +112,7 @@ def _numbers(name: str, given: ArrayLike) -> FloatArray:
     try:
         return np.asarray(given, dtype=float)
     except (TypeError, ValueError):
-        found = f"{type(given).__name__} that is no array of numbers"
+        found = f"{type(given).__name__} that is not an array of numbers"
         raise OptionError(Finding(parameter=name, found=f"a {found}", allowed=allowed)) from None
 
 
@@ -155,7 +155,7 @@ def _faults(count: int, t: FloatArray | None, tsp: float | None) -> Iterator[Fin
     if not count:
         yield Finding(parameter="targets", found="none", allowed="one or more")
     if t is not None and tsp is not None:
-        yield Finding(found="t and tsp", allowed="one of both")
+        yield Finding(found="t and tsp", allowed="one of the two")
     if t is None:
         return
     if t.shape != (count,):

@@ -147,7 +147,7 @@ def far_warnings(
             f"{rows_text(row[far])}: up to {away[far].max():.6g} m from the base, while {chain.name} reaches"
             f" no farther than {reach:.4g} m: in mm?"
         )
-        hints = (Hint("unit", {"": "mm"}, "reads the file so"),) if of_file else ()
+        hints = (Hint("unit", {"": "mm"}, "applies this"),) if of_file else ()
         yield LogWarning("too-far", said, allowed="m", hints=hints)
 
 

@@ -40,7 +40,7 @@ SPREAD = "clock-spread"
 """The kind of the warning about stamps that several rows share."""
 
 INCREASING = "times that increase from row to row"
-_TOO_COARSE = "found {now} again, as {rows} repeat a time: too coarse for a clock to be rebuilt"
+_TOO_COARSE = "found {now} again, as {rows} repeat a time: too coarse to rebuild a clock"
 _NO_CLOCK = "found {now} after {before}, as {rows} run backwards: no clock"
 
 SHOWN_GAPS = 10
@@ -92,9 +92,9 @@ def rebuilt(numbers: Numbers) -> Numbers:
     if clock is None:
         return numbers
     period, resolution = f"{clock.period / 1e9:.9g} s", f"{clock.resolution / 1e9:.9g} s"
-    seen = f"times in steps of {resolution} stand in {clock.resolution / clock.period:.4g} rows each"
+    seen = f"times in steps of {resolution} cover {clock.resolution / clock.period:.4g} rows each"
     found = Inference("clock", f"rebuilt with a period of {period}", seen, hints=EVEN)
-    warning = LogWarning("clock-rebuilt", f"{seen}: a regular clock of {period} is taken in their place")
+    warning = LogWarning("clock-rebuilt", f"{seen}: a regular clock of {period} is used instead")
     found_out, warned = (*numbers.inferences, found), (*numbers.warnings, warning)
     return replace(numbers, clock=clock.t_ns, inferences=found_out, warnings=warned)
 
@@ -114,12 +114,12 @@ def spread(numbers: Numbers) -> Numbers:
 def _with_spread(numbers: Numbers, found: Spread) -> Numbers:
     """Return the numbers with spread times, and what that rests on."""
     end, side = ("first", "behind") if found.first else ("last", "before")
-    why = f"the number of rows goes with the time {side} it" if found.evident else "assumed"
+    why = f"the number of rows is proportional to the time {side} it" if found.evident else "assumed"
     seen = f"up to {found.largest} rows share a time, {found.chunks} times in {len(found.t_ns)} rows"
-    told = f"each is taken as that of the {end} of its rows ({why})"
+    told = f"each is assigned to the {end} of its rows ({why})"
     done = f"spread over the rows, about {found.period / 1e9:.6g} s apart"
     inference = Inference("clock", done, f"{seen}; {told}", hints=EVEN)
-    taken = "" if found.evident else f"a time that rows share is that of the {end} one"
+    taken = "" if found.evident else f"a time that rows share belongs to the {end} one"
     warning = LogWarning(SPREAD, f"{seen}: {done}; {told}", hints=EVEN, assumption=taken, role="time")
     found_out, warned = (*numbers.inferences, inference), (*numbers.warnings, warning)
     return replace(numbers, clock=found.t_ns, inferences=found_out, warnings=warned)

@@ -135,7 +135,7 @@ def _is_layout(value: Any) -> bool:
 
 
 _LAYOUTS = r"table|transposed|flat(-by-joint)?:[1-9]\d*"
-_TEXT = (_is_word, "a text, not empty")
+_TEXT = (_is_word, "a non-empty text")
 _COLUMNS = (_are(_is_column), COLUMNS)
 _FLAG = (lambda value: isinstance(value, bool), "True or False")
 

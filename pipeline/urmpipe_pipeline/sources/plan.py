@@ -103,7 +103,7 @@ def make_plan(
         clocks = clocks_apart(tables, columns, apart, options, units)
     for i, clock in enumerate(() if options.time or apart is not None else clocks):
         own = [column for column in columns if column.table == i]
-        refuse_twins(clock.columns, own, tables.layouts, Hint("time", None, "says which: give its number"))
+        refuse_twins(clock.columns, own, tables.layouts, Hint("time", None, "selects one: give its number"))
     times = {column for clock in clocks for column in clock.columns}
     rest = [column for column in columns if column not in times and column.table != apart]
     rest = of_side(rest, options.side, tables.layouts[0].file)
@@ -201,7 +201,7 @@ def _by_names(
     layouts, written = tables.layouts, () if path else own or ()
     roles = assign(columns, layouts, options, robot, tables.whole, path=path, written=written)
     if not options.joints:
-        refuse_twins(roles.joints, columns, layouts, Hint("joints", None, "says which: give their numbers"))
+        refuse_twins(roles.joints, columns, layouts, Hint("joints", None, "selects them: give their numbers"))
     refuse_twins(
         (*roles.position, *roles.rotation), columns, layouts, Hint("", does="rename or remove the others")
     )
@@ -235,14 +235,14 @@ def _refuse_several_logs(
         shown = ", ".join(path.name for path in whole[:SHOWN_LOGS])
         more = f" and {len(whole) - SHOWN_LOGS} more" if len(whole) > SHOWN_LOGS else ""
         said = f"found {len(whole)} logs, each with joints of its own ({shown}{more})"
-        hint = "allowed: one log, or its plots with one joint a file; name the logs one by one"
+        hint = "allowed: one log, or its plots with one joint per file; name the logs one by one"
         raise LogError(Finding(f"{said}, {hint}", str(whole[0].parent))) from None
 
 
 def _plots(plots: Sequence[Column], warnings: tuple[LogWarning, ...], tables: Tables) -> Roles:
-    """Return the roles of one plot a file, named by their columns or, if these repeat, by their files."""
+    """Return the roles of one plot per file, named by their columns or, if these repeat, by their files."""
     names = [column.header for column in plots]
     if len(set(names)) < len(names) or tables.layouts[0].header is None:
         plots = [replace(column, name=tables.titles[column.table]) for column in plots]
-    said = joint_inference(plots, "one plot a file")
+    said = joint_inference(plots, "one plot per file")
     return Roles(joints=tuple(plots), inferences=(said,), warnings=warnings)

@@ -68,7 +68,7 @@ def write_joint_log(
     parts = [some for some in (q, position, quat_xyzw) if some is not None]
     columns = [np.ascontiguousarray(values) for some in parts for values in some[solved].T]
     if wrong := write_columns(part, head, [*timed, *columns, row[solved]]):
-        raise OutputError(Finding(f"reads back otherwise than written: {', '.join(wrong)}", str(path)))
+        raise OutputError(Finding(f"differs when read back: {', '.join(wrong)}", str(path)))
     return int(solved.sum())
 
 

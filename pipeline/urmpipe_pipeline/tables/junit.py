@@ -84,7 +84,7 @@ def _write(root: ET.Element, part: Path, path: Path) -> None:
     written = ET.tostring(root, encoding="unicode")
     part.write_text(f"{JUNIT_HEADER}\n{written}\n", encoding="utf-8", newline="\n")
     if ET.tostring(ET.parse(part).getroot(), encoding="unicode") != written:
-        raise OutputError(Finding("reads back otherwise than written", str(path)))
+        raise OutputError(Finding("differs when read back", str(path)))
 
 
 def _suites(

@@ -88,4 +88,4 @@ def format_of(to: Format | None, output: Path | None) -> Format:
     for known in FORMATS:
         if suffix == known:
             return known
-    raise _refused("to", f"the output {output}", f"{', '.join(FORMATS)}, or an output that ends so")
+    raise _refused("to", f"the output {output}", f"{', '.join(FORMATS)}, or an output with that suffix")

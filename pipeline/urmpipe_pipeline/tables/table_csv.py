@@ -26,7 +26,7 @@ def write_table(table: Table, part: Path, path: Path) -> None:
         csv.writer(file, lineterminator="\n").writerows(rows)
     with part.open(encoding="utf-8", errors="surrogateescape", newline="") as file:
         if list(csv.reader(file)) != rows:
-            raise OutputError(Finding("reads back otherwise than written", str(path)))
+            raise OutputError(Finding("differs when read back", str(path)))
 
 
 def _cell(cell: Cell) -> str:

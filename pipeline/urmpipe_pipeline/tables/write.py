@@ -199,7 +199,7 @@ def write_all(
         OutputError: If one may not be written there, or did not read back as it was written.
     """
     if to == "csv" and targets[0].is_file():
-        found = "found a file, allowed: a new name; nothing in a CSV tells whose it is, so none is replaced"
+        found = "found a file, allowed: a new name; an existing CSV file is never replaced"
         raise OutputError(Finding(found, str(targets[0])))
     for_each(lambda path: refuse_output(path, inputs, "export"), targets)
     with all_or_none():
@@ -207,7 +207,7 @@ def write_all(
             with guarded_output(path, inputs, "export") as part:
                 wrong = write(part)
             if wrong:
-                said = f"reads back otherwise than written: {', '.join(wrong)}"
+                said = f"differs when read back: {', '.join(wrong)}"
                 raise OutputError(Finding(said, str(path)))
 
 

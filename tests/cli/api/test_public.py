@@ -56,10 +56,10 @@ def test_what_cannot_be_applied_to_a_run_is_refused(folder: Path, run: urmpipe.R
     with pytest.raises(urmpipe.OptionError) as error:
         urmpipe.compare(run, run, time="none", tsp=0.01, derivative="savgol")
     assert str(error.value) == (
-        "time: found with what was ingested before, allowed: with a log; a run or a recording stands"
-        " as `ingest` made it\ntsp: found with what was ingested before, allowed: with a log; a run or"
-        " a recording stands as `ingest` made it\nderivative: found with what was ingested before,"
-        " allowed: with a log; a run or a recording stands as `ingest` made it"
+        "time: found with an ingested log, allowed: with a log; a run or a recording stands"
+        " as `ingest` made it\ntsp: found with an ingested log, allowed: with a log; a run or"
+        " a recording stands as `ingest` made it\nderivative: found with an ingested log,"
+        " allowed: with a log; a run or a recording is used as ingested"
     )
     with pytest.raises(urmpipe.UrmpipeError, match="allowed: 7"):
         urmpipe.compare(folder / "path.csv", run, "panda")
@@ -113,7 +113,7 @@ def test_a_frame_is_numbers_a_matrix_or_a_transform(given: Any) -> None:
     [
         ("0,0,0.15", "found '0,0,0.15'"),
         ([0.0, 0.0], "found [0.0, 0.0] of shape (2,)"),
-        (2.0 * np.eye(4), "found a matrix that is no rigid motion"),
+        (2.0 * np.eye(4), "found a matrix that is not a rigid motion"),
         ([0.0, 0.0, float("nan")], "found [0.0, 0.0, nan] of shape (3,)"),
     ],
 )
@@ -154,7 +154,7 @@ def test_all_keywords_of_a_wrong_kind_are_told_at_once() -> None:
         "tsp: found '5ms', allowed: a number, in s",
         "strict: found 1, allowed: True or False",
         "output: found '', allowed: a path: text or a Path, not empty",
-        "progress: found True, allowed: a function of the share that is done, 0 to 1, such as print",
+        "progress: found True, allowed: a function of the completed share, 0 to 1, such as print",
         "log_map: found {}, allowed: a map (TOML), or what `read_map` returned",
         "skip_bad: found 1, allowed: True or False",
     ]

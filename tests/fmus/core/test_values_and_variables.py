@@ -86,10 +86,9 @@ def test_all_that_is_wrong_with_a_unit_is_told_at_once() -> None:
         "_p: size 0, allowed: 1 or more",
         "time: start value found nan, allowed: a finite number",
         "internal_step: found as a variable, allowed: one Real parameter with a min above 0",
-        "outputs: found missing, of y, allowed: a function where there are variables, else none",
-        "derivatives: found without variables for it, allowed: a function where there are variables, else"
-        " none",
-        "update: found missing, of internal_step, allowed: a function where there are variables, else none",
+        "output y is declared, but `outputs` is not set",
+        "`derivatives` is set, but no state is declared",
+        "memory internal_step is declared, but `update` is not set",
     ]
 
 

@@ -81,7 +81,7 @@ def test_every_wrong_connection_is_told() -> None:
 
 def test_texts_are_not_exchanged() -> None:
     texts = Foreign(name="texts", scalars=(Scalar("s", 0, type="String"), Scalar("u", 1, "input", "String")))
-    said = "; allowed: numbers: texts are not exchanged, start gives one for the whole run"
+    said = "; allowed: numbers: texts are not exchanged, start sets one for the whole run"
     assert told({"a": texts, "b": texts}, {"b.u": "a.s"}, {"a": {"u": "x"}}) == [
         f"connections.b.u: found a.s, String, for u, String{said}"
     ]

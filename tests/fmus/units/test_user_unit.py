@@ -253,7 +253,7 @@ def test_a_file_that_is_nested_too_deeply_is_told(tmp_path: Path) -> None:
 def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
     assert said(tmp_path / "own.py") == ["own.py: cannot be read: No such file or directory"]
     (tmp_path / "own.py").write_bytes(b"# \xff\n")
-    assert said(tmp_path / "own.py") == ["own.py: byte 2 is no UTF-8; allowed: Python in UTF-8"]
+    assert said(tmp_path / "own.py") == ["own.py: byte 2 is not UTF-8; allowed: Python in UTF-8"]
 
 
 def test_the_play_of_the_example_is_a_twentieth_of_a_degree() -> None:

@@ -103,7 +103,7 @@ def test_numbers_that_are_not_finite_and_fixed_mimics_are_refused() -> None:
         )
     odd, zeros, ones = "found a number that is not finite in", ", ".join(["0.0"] * 9), ", ".join(["1.0"] * 6)
     assert str(error.value).splitlines() == [
-        "robot arm: joint held: is fixed and mimics j; allowed: one of both",
+        "robot arm: joint held: is fixed and mimics j; allowed: one of the two",
         f"robot arm: inertial on joint j: {odd} [inf, {zeros}]; allowed: finite",
         f"robot arm: inertial on the base: {odd} [1.0, 0.0, 0.0, nan, {ones}]; allowed: finite",
         "robot arm: gravity [0.0, nan, -9.81]; allowed: finite numbers",

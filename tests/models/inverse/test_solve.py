@@ -160,8 +160,8 @@ REASONS = [
     None,
     "the position is {}, {}, nan m, allowed: finite numbers",
     "the position is inf, {}, {} m, allowed: finite numbers",
-    "the orientation is no rotation: R^T R differs from 1 by 0.0201, allowed: 1e-06",
-    "the orientation is no rotation: its determinant is -1, a mirror, allowed: 1",
+    "the orientation is not a rotation: R^T R differs from 1 by 0.0201, allowed: 1e-06",
+    "the orientation is not a rotation: its determinant is -1, a mirror, allowed: 1",
     "the orientation is not finite, allowed: finite numbers",
     None,
 ]

@@ -186,10 +186,10 @@ def test_axes_that_are_rounded_are_orthonormal() -> None:
         ]),
         ({"kind": "eg", "length": Expression("s")}, ["elements.rod.h: control found 's', allowed: none"]),
         ({"kind": "eg", "normals": ((1.0, 1.0, 0.0), (2.0, 0.0, 0.0))}, [
-            "elements.rod.n: is no unit vector: |n| - 1 = 0.414; allowed: 1e-09 at most",
+            "elements.rod.n: is not a unit vector: |n| - 1 = 0.414; allowed: 1e-09 at most",
         ]),
         ({"kind": "crc", "normals": (X, (2.0, 0.0, 0.0))}, [
-            "elements.rod.n: is no unit vector: |n| - 1 = 1; allowed: 1e-09 at most",
+            "elements.rod.n: is not a unit vector: |n| - 1 = 1; allowed: 1e-09 at most",
         ]),
         ({"kind": "gc", "points": ((NAN, 0.0, 0.0), X)}, [
             "elements.rod.a: found nan, allowed: a finite number",

@@ -377,7 +377,7 @@ net.toml:67: joints.H.value: found ['s', 's'], allowed: one, of its only variabl
 net.toml:72: elements.s.d: found 0 m where controls start, allowed: more than 0
 net.toml:77: elements.t.n: found [[0, 1, 0], [0, 1, 0]], allowed: 3 finite numbers
 net.toml:78: elements.t.h: found [1], allowed: a finite number, or an expression as a text
-net.toml:83: elements.w.n: is no unit vector: |n| - 1 = 0.414; allowed: 1e-09 at most
+net.toml:83: elements.w.n: is not a unit vector: |n| - 1 = 0.414; allowed: 1e-09 at most
 net.toml:84: elements.w.d: found -0.1 m where controls start, allowed: 0 or more
 net.toml:86: elements.x.d: found nothing, allowed: a finite number, or an expression as a text
 net.toml:90: elements.x.a: found [0, 0, 0], allowed: two lists of 3 finite numbers, one for each body

@@ -226,7 +226,7 @@ def test_everything_wrong_is_said_at_once(robot: Any) -> None:
         "arm.toml: key base.rotation: found [[1, 0], [0, 1]], allowed: three rows of three finite numbers",
         "arm.toml: key base.rotation: found beside rpy; allowed: one of the two",
         "arm.toml: key base.turn: unknown; allowed: translation, rpy, rotation, steps",
-        "arm.toml: key tool.rotation: is no rotation matrix; allowed: orthonormal rows, right-handed",
+        "arm.toml: key tool.rotation: is not a rotation matrix; allowed: orthonormal rows, right-handed",
         "arm.toml: key lengths[1]: found 'long', allowed: a finite number",
         "arm.toml: key lengths[2]: found nan, allowed: a finite number",
         "arm.toml: key tilts: found nothing, allowed: a list of finite numbers",
@@ -328,7 +328,7 @@ def test_other_bytes_and_missing_files_are_one_line(tmp_path: Path) -> None:
     assert str(caught.value) == f"{path}: cannot be read: No such file or directory"
     path.write_bytes("name = 'Ärm'".encode("latin-1"))
     assert refusal(RobotError, read_robot_file, path) == (
-        f"{path}:1: byte 8 is no UTF-8; allowed: TOML in UTF-8"
+        f"{path}:1: byte 8 is not UTF-8; allowed: TOML in UTF-8"
     )
 
 

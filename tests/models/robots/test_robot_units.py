@@ -96,8 +96,8 @@ def test_every_value_of_a_file_is_in_the_units_of_the_file(robot: Read, kind: st
 def test_rows_that_make_no_arm_in_metres_and_radians_must_tell_their_units(robot: Read) -> None:
     rows = 'kind = "dh"\njoints = [{ d = 118, alpha = 90 }, { a = 612 }]'
     assert refusal(RobotError, robot, rows).splitlines() == [
-        'arm.toml: key length_unit: found none, and links of 730 m, allowed: "mm", or "m" if so meant',
-        'arm.toml: key angle_unit: found none, and 90 rad, allowed: "deg", or "rad" if so meant',
+        'arm.toml: key length_unit: found none, and links of 730 m, allowed: "mm", or "m" if intended',
+        'arm.toml: key angle_unit: found none, and 90 rad, allowed: "deg", or "rad" if intended',
     ]
     assert robot(f'length_unit = "mm"\nangle_unit = "deg"\n{rows}').joints[1].origin.translation[2] == 0.118
     assert robot(f'length_unit = "m"\nangle_unit = "rad"\n{rows}').tip.translation[0] == 612.0

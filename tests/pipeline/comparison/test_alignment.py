@@ -363,10 +363,10 @@ def test_poses_that_any_base_and_tool_fit_are_refused(rows: int, found: str) -> 
 @pytest.mark.parametrize(
     ("turns", "said"),
     [
-        (np.zeros((200, 3)), "do not tell the offset of the tool, of which the least is taken"),
+        (np.zeros((200, 3)), "do not tell the offset of the tool, so the smallest values are used"),
         (
             np.outer(np.linspace(-1.0, 1.0, 200), [0.0, 0.0, 1.0]),
-            "do not tell the offset of the tool along z, of which the least is taken",
+            "do not tell the offset of the tool along z, so the smallest values are used",
         ),
         (
             np.outer(np.linspace(-1.0, 1.0, 200), [0.0, 0.6, 0.8])

@@ -191,7 +191,7 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
     wanted = path_run(positions_over_log(URM6, q))
     with pytest.raises(LogError) as error:
         compare_runs(wanted, [run_of(q, robot=None)])
-    assert str(error.value) == ("log.csv: no robot, so no forward kinematics; robot=NAME|FILE gives one")
+    assert str(error.value) == ("log.csv: no robot, so no forward kinematics; robot=NAME|FILE sets one")
     with pytest.raises(LogError) as error:
         compare_recorded(run_of(q))
     assert str(error.value) == (

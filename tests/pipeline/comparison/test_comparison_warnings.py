@@ -120,10 +120,10 @@ def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones(paths: Compa
 
 def test_a_large_tolerance_without_a_unit_is_told(paths: Compared) -> None:
     assert told(paths({"log": off(50)}, tolerance={"axis": 3.5, "norm": 0.1})) == [
-        ("large-tolerance", "a tolerance of 3500 mm (axis) lets anything pass: 3.5 is in m")
+        ("large-tolerance", "a tolerance of 3500 mm (axis) accepts any deviation: 3.5 is in m")
     ]
     assert [one.message for one in large_tolerances({"angle": 0.5, "joint": 0.17})] == [
-        "a tolerance of 28.6479 deg (angle) lets anything pass: 0.5 is in rad"
+        "a tolerance of 28.6479 deg (angle) accepts any deviation: 0.5 is in rad"
     ]
 
 
@@ -143,8 +143,10 @@ def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told(ar
     for away, expected in ((0.0005, []), (0.005, ["recorded-tcp-apart"])):
         beside = replace(run, log=replace(run.log, tcp_position=run.tcp.position + np.array((0, 0, away))))
         assert [one.kind for one in recorded_apart([beside], 1e-3)] == expected
-    usual = "usual up to 5 mm where a controller knows its arm's calibration, which the robot here lacks"
-    more = "more than a calibration makes (5 mm): another robot, tool or base?"
+    usual = (
+        "usual up to 5 mm where a controller uses the calibration of its arm, which this robot model lacks"
+    )
+    more = "more than a calibration explains (5 mm): another robot, tool or base?"
     for away, shown, cause in ((0.00104, "1.0400", usual), (0.0051, "5.1000", more)):
         beside = replace(run, log=replace(run.log, tcp_position=run.tcp.position + np.array((0, 0, away))))
         assert next(recorded_apart([beside], 1e-3)).message == (
@@ -155,7 +157,7 @@ def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told(ar
     (both,) = recorded_apart([beside, replace(beside, name="worse")], 1e-3)
     assert both.message == (
         "by their joints bad is up to 5.1000 mm and worse is up to 5.1000 mm from the tool centre points that"
-        f" they recorded, {more}; this verdict does not judge that, a comparison of each alone does"
+        f" they recorded, {more}; this verdict does not include that; a comparison of each alone does"
     )
 
 

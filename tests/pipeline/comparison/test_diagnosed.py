@@ -59,7 +59,7 @@ def test_causes_and_what_is_undecided_are_tables_and_what_was_not_looked_for_is_
     (section,) = present(diagnosed(paths({"log": off(0.01)}))).body.sections
     tables = {one.title: one for one in section.tables}
     assert list(tables)[:2] == ["Causes", "Undecided between"]
-    assert facts(section)["Not looked for"] == "orientation of the tool (the reference has no orientation)"
+    assert facts(section)["Not tested"] == "orientation of the tool (the reference has no orientation)"
     assert cells(tables["Causes"]) == {
         "cause": ["module 3 (phi3) counter-rotates", "r_4 needs +1.2000 mm from row 4 on"],
         "value": ["", "+1.2000 mm"],
@@ -81,10 +81,10 @@ def test_one_cause_is_no_table_in_the_terminal(paths: Compared) -> None:
 def test_what_stays_is_said_only_beside_a_cause(paths: Compared) -> None:
     found = diagnosis_of(paths({"log": off(0.01)}).runs[0])
     said = {fact.name: fact.value for fact in diagnosis_facts(found)}
-    assert said["What stays"] == "rms 0.0574 mm, 0.01 % of the mean square: the digits of the log"
+    assert said["Remaining deviation"] == "rms 0.0574 mm, 0.01 % of the mean square: the digits of the log"
     nothing = {fact.name: fact.value for fact in diagnosis_facts(replace(found, causes=(), undecided=()))}
-    assert nothing["What stays"] == ""
-    assert str(nothing["Cause"]).startswith("no cause named: rms ")
+    assert nothing["Remaining deviation"] == ""
+    assert str(nothing["Cause"]).startswith("no cause found: rms ")
 
 
 def test_each_axis_is_drawn_mended_with_its_tolerance(paths: Compared) -> None:
@@ -151,7 +151,7 @@ def test_without_a_cause_nothing_is_mended(paths: Compared) -> None:
     assert not any(path.name == "mended" for path in scene_of(present(result)).paths)
 
 
-ALIGNED = "align: found rigid, allowed: none with a diagnosis, which names base and tool as causes"
+ALIGNED = "align: found rigid, allowed: none with a diagnosis: base and tool are possible causes"
 
 
 def test_an_alignment_is_refused_with_a_diagnosis() -> None:

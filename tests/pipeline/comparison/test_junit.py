@@ -155,7 +155,7 @@ def test_the_warnings_of_a_log_stand_behind_its_cases(paths: Compared, tmp_path:
     result = paths({"short": off(0.001, 50), "long": off(0.001)}, tolerance={"norm": 0.15})
     told = [suite.findtext("system-out") for suite in written(result, tmp_path / "verdict.xml")]
     covered = "it covers 0.245 s of the 0.495 s of path (50.0 %)"
-    for_all = "large-tolerance: a tolerance of 150 mm (norm) lets anything pass: 0.15 is in m;"
+    for_all = "large-tolerance: a tolerance of 150 mm (norm) accepts any deviation: 0.15 is in m;"
     for_all += ' tolerance="norm=0.15mm" if mm was meant; tolerance="norm=0.15m" if not'
     assert told == [f"not-covered: short: {covered}: the rest was not judged\n{for_all}", for_all]
     result = paths({"short": off(0.001, 50), "long": off(0.001)})

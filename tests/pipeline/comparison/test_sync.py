@@ -28,8 +28,8 @@ Motion = Callable[[FloatArray], FloatArray]
 
 JOINTS = tuple(f"q{k}" for k in range(1, 7))
 ALLOWED = (
-    'allowed: one motion that does not repeat itself, half of it in both; sync="start" starts both'
-    " together; sync=SECONDS says the offset"
+    'allowed: one motion that does not repeat itself, half of it in both; sync="start" aligns the'
+    " first samples; sync=SECONDS sets the offset"
 )
 CLEAN = 1e-5
 """In [s]: a fiftieth of the tenth of a period of 5 ms that is asked for. Lines between samples 5 to 10 ms
@@ -267,7 +267,7 @@ def test_no_motion_tells_no_offset() -> None:
         f"wanted.csv: sync: auto: found no motion of the joints in log, {ALLOWED}"
     )
     one, other = np.random.default_rng(1).normal(scale=1e-4, size=(2, len(t), 6))
-    assert "found no likeness of the joints" in refused(joints(one, t), joints(other, t))
+    assert "found low similarity of the joints to" in refused(joints(one, t), joints(other, t))
 
 
 def test_a_motion_that_repeats_itself_names_the_offsets() -> None:
@@ -307,7 +307,7 @@ def test_a_turn_on_a_circle_tells_an_offset_only_where_the_frames_are_known() ->
 def test_two_motions_without_likeness_are_told() -> None:
     t = times(0.0, 20.0, 0.005)
     said = refused(joints(smooth(8, 6)(t), t, "wanted"), joints(smooth(9, 6)(t), t))
-    assert said.startswith("log.csv: sync: auto: found no likeness of the joints to wanted: ")
+    assert said.startswith("log.csv: sync: auto: found low similarity of the joints to wanted: ")
     assert said.endswith(f" at best, 0.8 is needed, {ALLOWED}")
 
 
@@ -392,7 +392,7 @@ def test_the_offsets_of_the_demo_logs_are_found(demo: dict[str, Trajectory]) -> 
 
 def test_an_arm_that_counts_one_joint_backwards_makes_another_motion(demo: dict[str, Trajectory]) -> None:
     assert refused(demo["path"], demo["counter_rotating"]) == (
-        "counter_rotating.csv: sync: auto: found no likeness of the position to path: -1.36 s with a"
+        "counter_rotating.csv: sync: auto: found low similarity of the position to path: -1.36 s with a"
         f" similarity of 0.598 at best, 0.8 is needed, {ALLOWED}"
     )
     assert "counter_rotating.csv: sync: auto: found no clear best offset to coppeliasim by the joints" in (

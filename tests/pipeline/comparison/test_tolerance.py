@@ -93,7 +93,7 @@ def test_an_angle_alone_and_a_decimal_comma_are_told_how_to_be_written() -> None
         parse_tolerance("0.5deg")
     assert str(error.value) == (
         f"tolerance: found '0.5deg', {ALLOWED};"
-        ' tolerance="angle=0.5deg" or tolerance="joint=0.5deg" says of what'
+        ' tolerance="angle=0.5deg" or tolerance="joint=0.5deg" specifies the kind'
     )
     with pytest.raises(OptionError) as error:
         parse_tolerance("3,5mm")

@@ -22,7 +22,7 @@ from urmpipe_pipeline.diagnosis.wording import (
 
 SENTENCES = {
     "module 3 (phi3) counter-rotates": SIGN,
-    "joint q3 turns the other way": Cause("joint_sign", "q3", ("q3",)),
+    "joint q3 rotates in reverse": Cause("joint_sign", "q3", ("q3",)),
     "modules 2 (phi2) and 4 (phi4) are exchanged": Cause("joints_swapped", "phi2 and phi4", ("a", "b")),
     "joints q1 and q2 are exchanged": Cause("joints_swapped", "q1 and q2", ("q1", "q2")),
     "joint q1 needs half a turn from row 13 on": Cause("half_turn", "q1", ("q1",), from_sample=12),
@@ -35,7 +35,7 @@ SENTENCES = {
         "joint_offset", "slide", ("slide",), value=(-0.0025,), unit="m"
     ),
     "joint q1 needs a factor of 1.0125": Cause("joint_scale", "q1", ("q1",), value=(1.0125,)),
-    "joint q1 gives way: +0.00013 s2 of its acceleration": Cause(
+    "joint q1 is compliant: +0.00013 s2 of its acceleration": Cause(
         "compliance", "q1", ("q1",), value=(1.3e-4,), unit="s2"
     ),
     "r_4 needs +1.2000 mm from row 4 on": LENGTH,
@@ -122,7 +122,7 @@ def test_of_several_causes_each_has_its_share_and_what_stays_is_told() -> None:
 
 def test_nothing_named_is_said_with_what_it_is_taken_for() -> None:
     nothing = diagnosis(remainder=Remainder(0.41657, 1.0, "no motion of the arm explains it"))
-    assert sentence(nothing) == "no cause named: rms 416.57 mm stays (no motion of the arm explains it)"
+    assert sentence(nothing) == "no cause found: rms 416.57 mm stays (no motion of the arm explains it)"
 
 
 def test_what_is_undecided_names_both_and_what_would_decide() -> None:
@@ -145,7 +145,7 @@ def test_what_is_undecided_names_both_and_what_would_decide() -> None:
 def test_one_explanation_may_be_nothing_and_the_log_may_not_decide() -> None:
     said = undecided_words((Alternative((OFFSET,)), Alternative(())))
     assert said == (
-        "either module 1 (phi1) needs an offset of +0.1146 deg or none of these: this log does not decide"
+        "either module 1 (phi1) needs an offset of +0.1146 deg or none of these: this log cannot decide"
     )
 
 

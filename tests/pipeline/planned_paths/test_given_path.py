@@ -156,16 +156,16 @@ def with_(**changed: Any) -> PathRows:
         (
             {"radius": None, "variant": [[1], [2, 3]], "rotation": np.eye(2)},
             [
-                "found radius that is no array of numbers, allowed: numbers of shape (n,)",
-                "found variant that is no array of numbers, allowed: numbers of shape (n,)",
+                "found radius that is not an array of numbers, allowed: numbers of shape (n,)",
+                "found variant that is not an array of numbers, allowed: numbers of shape (n,)",
                 "found rotation of shape (2, 2), allowed: numbers of shape (n, 3, 3)",
             ],
         ),
         (
             {"position": None, "radius": [0], "variant": 1, "rotation": "z"},
             [
-                "found position that is no array of numbers, allowed: numbers of shape (n, 3)",
-                "found rotation that is no array of numbers, allowed: numbers of shape (n, 3, 3)",
+                "found position that is not an array of numbers, allowed: numbers of shape (n, 3)",
+                "found rotation that is not an array of numbers, allowed: numbers of shape (n, 3, 3)",
             ],
         ),
         (
@@ -190,8 +190,8 @@ def test_all_that_is_wrong_with_rows_is_said() -> None:
     )
     assert refused(rows) == [
         "row 2: path: the position is 1, 0, nan m, allowed: finite numbers",
-        "row 1: path: the orientation is no rotation: its determinant is -1, a mirror, allowed: 1",
-        "row 3: path: the orientation is no rotation: R^T R differs from 1 by 3, allowed: 1e-06",
+        "row 1: path: the orientation is not a rotation: its determinant is -1, a mirror, allowed: 1",
+        "row 3: path: the orientation is not a rotation: R^T R differs from 1 by 3, allowed: 1e-06",
         "row 2, column radius: path: found -1 m, allowed: finite, 0 or more",
         "row 3, column radius: path: found inf m, allowed: finite, 0 or more",
         "row 2, column variant: path: found 3, allowed: 1 or 2",

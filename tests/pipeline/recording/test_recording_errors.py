@@ -263,7 +263,7 @@ def test_what_reads_back_otherwise_is_named(make_comparison: MakeComparison, tmp
     with pytest.raises(OutputError) as caught:
         verify(path, Path("name.rrd"), replace(found, columns=tuple(altered)), "{}")
     assert str(caught.value).splitlines() == [
-        f"name.rrd: reads back otherwise than written: {one}"
+        f"name.rrd: differs when read back: {one}"
         for one in (
             "the metadata",
             "/runs/coppeliasim/run/log/q has 40000 rows of 39999",

@@ -129,7 +129,7 @@ def test_steps_of_one_kind_are_one_warning_and_all_in_the_audit() -> None:
     (warning,) = found.warnings
     assert (warning.kind, warning.row) == ("large-step", 2)
     assert warning.words("command line") == (
-        "row 2: 384 steps of q1 and q3 by more than 90 deg are no wraps, and stay; the largest, of q1 by"
+        "row 2: 384 steps of q1 and q3 by more than 90 deg are not wraps and are kept; the largest, of q1 by"
         " 126.1 deg, is to row 122; urmpipe ingest --audit FILE.csv lists all"
     )
 
@@ -192,7 +192,7 @@ def test_jumps_of_one_and_of_two_turns_in_one_joint_are_asked_for() -> None:
         audit_log(log_of(q))
     assert str(error.value) == (
         "log, column q1: found 2 steps of about 4 pi and 2 of about 2 pi, allowed: wraps of one"
-        ' interval; interval={"q1": (LOW, HIGH)} says which'
+        ' interval; interval={"q1": (LOW, HIGH)} specifies it'
     )
     assert len(audit_log(log_of(q), interval={"q1": (-FULL_TURN, FULL_TURN)}).entries) == 4
 

@@ -129,7 +129,7 @@ def test_rates_that_agree_in_another_unit_of_time_name_it(
         "the recorded rates do not agree with the differences of the joint values, but would with the time in"
         f" {hint}; the differences are used"
     )
-    assert warning.hints == (Hint("unit", {"t 1": wanted}, "reads the time so"),)
+    assert warning.hints == (Hint("unit", {"t 1": wanted}, "applies this"),)
     assert ingest_log([path], read=ReadOptions(unit={"t 1": wanted})).warnings == ()
 
 

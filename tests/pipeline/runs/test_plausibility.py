@@ -31,7 +31,7 @@ def test_a_first_row_off_the_motion_is_an_outlier() -> None:
         LogWarning(
             "outlier-first",
             f"an outlier, off the motion of the other rows: q2 by {step:.4g} rad (other steps: at most"
-            f" {usual:.4g}); it stays; take it out of the file if the arm was not there",
+            f" {usual:.4g}); it is kept; remove it from the file if the arm was not there",
             1,
         )
     ]

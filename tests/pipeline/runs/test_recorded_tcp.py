@@ -78,7 +78,7 @@ def test_exchanged_joints_are_named_as_the_file_names_its_columns() -> None:
 
 def test_a_joint_that_is_counted_the_other_way_is_found() -> None:
     message = said(Q * np.array([1, 1, -1, 1, 1, 1]), positions_over_log(UR5E, Q))
-    assert message.endswith(": with q3 counted the other way they agree within 0.00 mm")
+    assert message.endswith(": with q3 reversed in sign they agree within 0.00 mm")
 
 
 def test_another_base_is_found_and_its_option_helps() -> None:
@@ -186,14 +186,14 @@ def test_a_sign_shows_in_a_small_motion_too(joint: int) -> None:
         UR5E, log(q * np.where(np.arange(6) == joint, -1, 1), positions_over_log(UR5E, q))
     )
     assert float(warning.message.partition("TCP (")[2].partition(" mm")[0]) < 20.0
-    assert warning.message.endswith(f"with q{joint + 1} counted the other way they agree within 0.00 mm")
+    assert warning.message.endswith(f"with q{joint + 1} reversed in sign they agree within 0.00 mm")
 
 
 def test_the_orientation_tells_of_a_joint_that_moves_no_point() -> None:
     recorded = positions_over_log(UR5E, Q)
     backwards = replace(log(Q * [1, 1, 1, 1, 1, -1], recorded), **turning(UR5E, Q))
     (warning,) = far_from_recorded(UR5E, backwards)
-    assert "with q6 counted the other way they agree within 0.00 mm and" in warning.message
+    assert "with q6 reversed in sign they agree within 0.00 mm and" in warning.message
     assert far_from_recorded(UR5E, replace(log(Q, recorded), **turning(UR5E, Q))) == []
 
 
@@ -279,7 +279,7 @@ def test_first_rows_without_a_tool_are_told_and_count_nowhere_else(rows: int) ->
         "recorded-tcp-start",
         1,
         f"{first} of 60 recorded the TCP 151.3275 mm from where the others have it: no tool or pose known"
-        " yet? They stay, and are judged with the others",
+        " yet? They are kept and judged with the others",
     )
     assert lacking_tool(TOOLED, log(Q, recorded)) == []
     (lacking,) = lacking_tool(UR5E, log(Q, recorded))

@@ -193,11 +193,11 @@ def test_rx_ry_rz_may_be_a_rotation_vector_and_the_option_is_named(read: Read) -
     assert said(vector) == []
 
 
-MAP = 'log_map=FILE.toml says which: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+MAP = 'log_map=FILE.toml names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
 
 
 def _forms(*forms: str) -> str:
-    return " or ".join(f'rotation="{form}"' for form in forms) + " says which"
+    return " or ".join(f'rotation="{form}"' for form in forms) + " specifies it"
 
 
 @pytest.mark.parametrize("names", ["W,P,R", "alpha,beta,gamma", "r11,r12,r13,r21", "j1,j2,j3,j4,j5,j6"])
@@ -282,5 +282,5 @@ def test_of_columns_without_names_the_form_tells_the_time_by_their_number(read: 
     assert_turned(targets, [np.eye(3)] * 3)
     assert wrong("".join(row[:15] + "\n" for row in rows)) == [
         "targets.csv:1: found a first column that increases from row to row, which may be the time or"
-        ' a counter; time="1" or time="none" says which'
+        ' a counter; time="1" or time="none" specifies it'
     ]

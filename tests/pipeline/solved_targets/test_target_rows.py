@@ -18,7 +18,7 @@ Read = Callable[..., TargetFile]
 Wrong = Callable[..., list[str]]
 
 
-MAP = 'log_map=FILE.toml says which: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+MAP = 'log_map=FILE.toml names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
 
 
 def said(targets: TargetFile) -> list[tuple[str, str]]:
@@ -177,7 +177,7 @@ def test_numbered_quaternions_of_which_some_are_none_are_asked_for_their_form(
     text = "x,y,z,q1,q2,q3,q4\n0.3,0.1,0.5,0.5,0,0,0\n0.3,0.1,0.5,1,0,0,0\n"
     assert wrong(text) == [
         "targets.csv: found q1, q2, q3, q4, which may be quat_wxyz or quat_xyzw, allowed: one form;"
-        ' rotation="quat_wxyz" or rotation="quat_xyzw" says which'
+        ' rotation="quat_wxyz" or rotation="quat_xyzw" specifies it'
     ]
     targets = read(text, rotation="quat_wxyz")
     assert list(targets.faults) == [1]
@@ -340,21 +340,21 @@ def test_wrong_rows_without_names_stop_no_other(read: Read) -> None:
 @pytest.mark.parametrize(
     ("text", "lines"),
     [
-        ("", ["targets.csv: found an empty file, allowed: a table with a row a sample"]),
+        ("", ["targets.csv: found an empty file, allowed: a table with one row per sample"]),
         (b"\0\1\2" * 99, ["targets.csv: found a binary file, allowed: a text table (CSV)"]),
-        ("x,y,z\n", ["targets.csv:1: found a header and no rows, allowed: a row a sample"]),
+        ("x,y,z\n", ["targets.csv:1: found a header and no rows, allowed: one row per sample"]),
         (
             "t,q1,q2,q3\n0,1,2,3\n1,1,2,3\n",
             [
                 "targets.csv: found no position in q1, q2, q3, allowed: x, y, z; name them so in the"
-                ' header; log_map=FILE.toml says which they are: [tcp] position = ["A", "B", "C"]'
+                ' header; log_map=FILE.toml names them: [tcp] position = ["A", "B", "C"]'
             ],
         ),
         (
             "x [ft],y [ft],z [m]\n1,2,3\n",
             [
                 "targets.csv, column x [ft]: found the unit 'ft', allowed: rad, deg, m, mm, cm;"
-                ' convert the values; unit={"x": "mm"} takes the values so'
+                ' convert the values; unit={"x": "mm"} keeps the values unchanged'
             ],
         ),
         (
@@ -377,7 +377,7 @@ def test_wrong_rows_without_names_stop_no_other(read: Read) -> None:
         ),
         (
             "x,y,z\n1,2,3\nx,y,z\n1,2,3\n",
-            ["targets.csv:3: found the header again, allowed: one log a file; a second log begins here"],
+            ["targets.csv:3: found the header again, allowed: one log per file; a second log begins here"],
         ),
         (
             "x,y,x,z\n1,2,3,4\n",

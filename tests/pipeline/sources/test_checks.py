@@ -145,12 +145,12 @@ def test_a_joint_without_any_value(wrong: Wrong) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("t,q1,q2\n", "log.csv:1: found a header and no rows, allowed: a row a sample"),
-        ("\n \n", "log.csv: found no line with content, allowed: a table with a row a sample"),
+        ("t,q1,q2\n", "log.csv:1: found a header and no rows, allowed: one row per sample"),
+        ("\n \n", "log.csv: found no line with content, allowed: a table with one row per sample"),
         (
             "Once upon a time\nthere was a robot\nwith no numbers\n",
             "log.csv:1: found 'Once upon a time' and no row of numbers below it,"
-            " allowed: a table with a row a sample",
+            " allowed: a table with one row per sample",
         ),
         (
             "a letter\n1\n2 and 3\n4 or 5 and 6\n7, 8\n9 or 10 or 11 or 12\n",

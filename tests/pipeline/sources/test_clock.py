@@ -96,7 +96,7 @@ def test_steps_that_may_be_two_units_are_asked_for(wrong: Wrong, read: Read) -> 
     text = clocked("t", "0", "600", "1200")
     assert wrong(text) == [
         'log.csv:2, column t: found steps of 600, which may be ms or us; unit={"t": "ms"} or'
-        f' unit={{"t": "us"}} says which{OTHER_TIME}'
+        f' unit={{"t": "us"}} specifies it{OTHER_TIME}'
     ]
     assert read(text, unit={"t": "us"}).t_ns.tolist() == [0, 600_000, 1_200_000]
 
@@ -162,7 +162,7 @@ def test_the_time_as_the_user_says(read: Read, wrong: Wrong) -> None:
 def test_two_columns_of_one_name(wrong: Wrong, read: Read) -> None:
     text = "time,time,q1\n0,0.5,1\n1,0.6,2\n"
     assert wrong(text) == [
-        "log.csv:1, column time: found as columns 1, 2, allowed: once; time=COLUMN says which: give"
+        "log.csv:1, column time: found as columns 1, 2, allowed: once; time=COLUMN selects one: give"
         " its number"
     ]
     assert read(text, time="2").period == 0.1
@@ -201,7 +201,7 @@ def test_times_that_64_bits_cannot_hold(wrong: Wrong, read: Read) -> None:
     text = clocked("t [s]", "133500000000000000", "133500000000050000")
     assert wrong(text) == [
         'log.csv:2, column t [s]: found 1.335e+17 s, allowed: times within 146 years of 0; unit={"t":'
-        f' "ns"}} reads them so{OTHER_TIME}'
+        f' "ns"}} applies this{OTHER_TIME}'
     ]
     assert read(text, unit={"t": "ns"}).t_ns.tolist() == [0, 50_000]
     assert wrong(clocked("t [s]", "0", "1", "1e30")) == [
@@ -269,7 +269,7 @@ def test_a_counter_since_boot_is_not_taken_for_unix_time(
     text = clocked("time", *(str(start + k * step) for k in range(4)))
     found = f"found times of our years in steps of {step:g}, which may be {units[0]} or {units[1]}"
     asked = " or ".join(f'unit={{"time": "{unit}"}}' for unit in units)
-    assert wrong(text) == [f"log.csv:2, column time: {found}; {asked} says which{OTHER_TIME}"]
+    assert wrong(text) == [f"log.csv:2, column time: {found}; {asked} specifies it{OTHER_TIME}"]
     assert read(text, unit={"time": units[1]}).period == 0.005
 
 
@@ -282,7 +282,7 @@ def test_minutes_days_and_dates_in_numbers_are_not_taken_for_seconds(read: Read,
     excel = clocked("Time", *(f"{44297.5 + k * 0.005 / 86400:.12f}" for k in range(4)))
     said = "found 44297.5 in steps of 5.79e-08, as Excel's days since 1900, allowed: times in s, ms, us, ns"
     hint = "convert them: (t - 25569) * 86400 is Unix time in s"
-    as_s = 'unit={"Time": "s"} takes them as they are'
+    as_s = 'unit={"Time": "s"} keeps them unchanged'
     assert wrong(excel) == [f"log.csv:2, column Time: {said}; {hint}; {as_s}{even}"]
     hours = clocked("Time", *(f"{10.5 + k * 0.005 / 3600:.12f}" for k in range(4)))
     said = "found steps of 1.39e-06, as of days or hours, allowed: times in s, ms, us, ns; convert them"

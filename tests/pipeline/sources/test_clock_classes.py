@@ -110,7 +110,7 @@ def test_no_question_where_the_robot_or_the_user_tells_the_joints(
 @pytest.mark.parametrize("clock", [range(ROWS), range(1, ROWS + 1)])
 def test_a_counter_is_asked_about(wrong: Wrong, clock: range) -> None:
     (said,) = wrong(table([clock]))
-    assert 'which may be the time, a counter or a joint; time="1" or time="none" says which' in said
+    assert 'which may be the time, a counter or a joint; time="1" or time="none" specifies it' in said
 
 
 @pytest.mark.parametrize(
@@ -278,7 +278,7 @@ def test_a_stamp_of_a_chunk_is_spread_over_its_rows(
 def test_chunks_without_a_header_are_asked_about(wrong: Wrong, read: Read) -> None:
     text = table([seconds(chunked(COUNTS))])
     (said,) = wrong(text)
-    assert 'time="1" or time="none" says which' in said
+    assert 'time="1" or time="none" specifies it' in said
     np.testing.assert_allclose(np.diff(read(text, time="1").t_ns), 4 * MS, atol=1000)
 
 

@@ -235,7 +235,7 @@ def test_known_by_suffix_and_first_bytes(wrong: Wrong, name: str, head: bytes, w
 
 @pytest.mark.parametrize("name", ["a.xlsx", "a.bag", "a.npz", "a.mat", "a.json", "a.csv"])
 def test_an_empty_file_is_empty_whatever_it_is_called(wrong: Wrong, name: str) -> None:
-    assert wrong(b"", name=name) == [f"{name}: found an empty file, allowed: a table with a row a sample"]
+    assert wrong(b"", name=name) == [f"{name}: found an empty file, allowed: a table with one row per sample"]
 
 
 def test_numpy_files_are_read(tmp_path: Path) -> None:

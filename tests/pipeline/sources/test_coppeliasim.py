@@ -74,7 +74,7 @@ def test_joints_sampled_at_other_times_are_an_error(wrong: Wrong) -> None:
 
 def test_two_arms_are_ambiguous(wrong: Wrong, read: Read) -> None:
     text = f"{JOINTS}\n{JOINTS.replace('/urm/', '/other/')}"
-    said = "allowed: once; joints=[A, B, C] says which: give their numbers"
+    said = "allowed: once; joints=[A, B, C] selects them: give their numbers"
     assert wrong(text) == [
         f"log.csv:2, column joint 1 (deg): found as columns 2, 5, {said}",
         f"log.csv:2, column joint 2 (deg): found as columns 3, 6, {said}",

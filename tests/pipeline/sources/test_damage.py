@@ -137,7 +137,7 @@ def joined(*lines: str) -> str:
 
 @pytest.mark.parametrize("behind", [30, 100_000])
 def test_a_header_again_begins_a_second_log(wrong: Wrong, behind: int) -> None:
-    said = "found the header again, allowed: one log a file; a second log begins here"
+    said = "found the header again, allowed: one log per file; a second log begins here"
     assert wrong(joined(*rows(100), "t,q1 [rad],q2 [rad]", *rows(behind))) == [f"log.csv:102: {said}"]
 
 
@@ -145,7 +145,7 @@ def test_a_header_again_begins_a_second_log(wrong: Wrong, behind: int) -> None:
 def test_another_header_begins_a_second_log_that_is_not_skipped(wrong: Wrong, header: str) -> None:
     """Its rows may be in other units, or in another order, and go on in time."""
     text = joined(*rows(300), header, *rows(300, 3.0))
-    said = f"found another header, {header!r}, allowed: one log a file; a second log begins here"
+    said = f"found another header, {header!r}, allowed: one log per file; a second log begins here"
     assert wrong(text, skip_bad=True) == wrong(text) == [f"log.csv:302: {said}"]
 
 
@@ -201,8 +201,11 @@ def test_rows_on_end_that_are_wrong_alike_are_one_finding(wrong: Wrong) -> None:
 @pytest.mark.parametrize(
     ("header", "said"),
     [
-        ("t,q1", "found 2 names over rows of 3 cells, allowed: a name a column; add 1 name"),
-        ("t,q1,q2,q3,q4", "found 5 names over rows of 3 cells, allowed: a name a column; take out 2 names"),
+        ("t,q1", "found 2 names over rows of 3 cells, allowed: one name per column; add 1 name"),
+        (
+            "t,q1,q2,q3,q4",
+            "found 5 names over rows of 3 cells, allowed: one name per column; take out 2 names",
+        ),
     ],
 )
 def test_a_header_of_another_width(wrong: Wrong, header: str, said: str) -> None:

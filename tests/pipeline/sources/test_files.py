@@ -55,7 +55,7 @@ def test_matlab_save_ascii_may_be_called_mat(read: Read, arm: Callable[..., obje
 
 
 def test_missing_folder_empty_binary(wrong: Wrong, tmp_path: Path) -> None:
-    assert wrong(b"") == ["log.csv: found an empty file, allowed: a table with a row a sample"]
+    assert wrong(b"") == ["log.csv: found an empty file, allowed: a table with one row per sample"]
     assert wrong(bytes(range(256))) == ["log.csv: found a binary file, allowed: a text table (CSV)"]
     assert wrong(np.arange(50.0).tobytes()) == ["log.csv: found a binary file, allowed: a text table (CSV)"]
     assert (
@@ -96,10 +96,10 @@ def test_a_source_that_tells_a_unit_or_nothing_else_is_not_doubted(read: Read, s
 
 def test_signs_that_are_none(wrong: Wrong) -> None:
     assert wrong("t,q1\n0,1\n", delimiter="x") == [
-        "delimiter: found 'x', allowed: comma, semicolon, tab, spaces, bar, or the sign itself"
+        "delimiter: found 'x', allowed: comma, semicolon, tab, spaces, bar, or the character itself"
     ]
     assert wrong("t,q1\n0,1\n", decimal=";") == [
-        "decimal: found ';', allowed: point, comma, or the sign itself"
+        "decimal: found ';', allowed: point, comma, or the character itself"
     ]
 
 

@@ -20,7 +20,7 @@ Q = np.c_[0.4 * np.sin(K / 9), 1 + 0.2 * np.cos(K / 7)]
 TURNS = Rotation.from_rotvec(np.linspace(0, 1, 40)[:, np.newaxis] * [0.3, 0.4, 1.0])
 NUMBER = "a number, or an empty, Null or NaN cell where a sample is missing"
 MAY_BE = (
-    "the time, a counter or a joint; time=\"1\" or time=\"none\" says which;"
+    "the time, a counter or a joint; time=\"1\" or time=\"none\" specifies it;"
     " joints=[A, B, C] names the joint columns"
 )  # fmt: skip
 

@@ -68,7 +68,7 @@ def test_a_header_that_says_degrees_over_radians(read: Read) -> None:
     assert str(warning) == (
         "q1, q2, q3, q4, q5, q6: deg (its name) contradicts the kinematics: taken as rad: with it the arm"
         f" comes within 0.00 mm (rms) of the recorded TCP, as deg within {off:.2f} mm; unit={{{every}}}"
-        " reads them otherwise"
+        " overrides this"
     )
 
 
@@ -106,7 +106,7 @@ def test_a_unit_that_the_data_contradict_is_asked_for(
     assert re.fullmatch(
         rf"log\.csv: found q1, .*, q6 in {unit} by name or source, but \d+ steps? of about {turn} from one"
         rf" row to the next, allowed: a unit that fits the data; unit={{\"q1\": \"{other}\", .*}} or"
-        rf" unit={{\"q1\": \"{unit}\", .*}} says which",
+        rf" unit={{\"q1\": \"{unit}\", .*}} specifies it",
         said,
     )
     for name in (other, unit):

@@ -24,7 +24,7 @@ from urmpipe_pipeline.sources.tables.limits import LONGEST_LINE, MOST_COLUMNS
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
 
-A_ROW = "write a row a sample, a column a joint"
+A_ROW = "write one row per sample, one column per joint"
 WIDE = f"found more than {MOST_COLUMNS} columns, allowed: as many as that; {A_ROW}"
 PLC = "VAR\n x : ARRAY[1..{}] OF REAL := [{}];\nEND_VAR\n"
 

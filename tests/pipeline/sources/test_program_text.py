@@ -131,7 +131,7 @@ def test_plc_sample_times_that_differ(wrong: Wrong) -> None:
         (
             "q1 : ARRAY[1..3] OF REAL := [1,2,3];\nq2 : ARRAY[1..2] OF REAL := [1,2];\n",
             ": found 3 values in q1; 2 values in q2, allowed: arrays of one length; delete the arrays that"
-            " are no columns of the log",
+            " are not columns of the log",
         ),
         (
             "// two lost\nq1 : ARRAY[1..5] OF REAL := [1,2,3];\n",
@@ -274,7 +274,7 @@ def test_rapid_joints_and_poses_that_are_no_rows_of_one_table(read: Read, wrong:
     points = [f"CONST robtarget p{k}:={robtarget(XYZ[k])};" for k in range(ROWS)]
     text = module(f"CONST jointtarget home:={jointtarget(Q[0])};", *points)
     assert wrong(text) == [
-        "log.csv:3: found 1 jointtarget and 80 robtargets, which are no rows of one table, allowed: one of"
+        "log.csv:3: found 1 jointtarget and 80 robtargets, which are not rows of one table, allowed: one of"
         ' the two; source="table" takes the 1 jointtarget; source="path" takes the 80 robtargets'
     ]
     path = read(text, source="path", period=0.01)
@@ -360,7 +360,7 @@ def test_krl_part_of_a_position(wrong: Wrong) -> None:
 def test_programs_that_are_not_read(wrong: Wrong, text: str, what: str) -> None:
     assert wrong(text) == [
         f"log.csv: found {what}, allowed: a text table; write its positions as a table, such as J1 [deg],"
-        "J2 [deg],... a row a position"
+        "J2 [deg],... one row per position"
     ]
 
 

@@ -91,5 +91,5 @@ def test_a_file_that_changes_is_refused(tmp_path: Path, change: bytes | None, wr
             if wrong:
                 raise LogError("found 1 cell, allowed: 2")
 
-    said = f"{path}: changed while it was read, allowed: a file that nothing writes any more"
+    said = f"{path}: changed while it was read, allowed: a file that no program still writes"
     assert refusal(LogError, read) == said

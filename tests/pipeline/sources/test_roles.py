@@ -228,7 +228,7 @@ def test_two_groups_are_ambiguous_unless_one_fits_the_robot(wrong: Wrong, read: 
 
 def test_names_that_stand_twice(wrong: Wrong) -> None:
     assert wrong(table(["t", "q1", "q2", "q2", "note", "note"])) == [
-        "log.csv:1, column q2: found as columns 3, 4, allowed: once; joints=[A, B, C] says which: give"
+        "log.csv:1, column q2: found as columns 3, 4, allowed: once; joints=[A, B, C] selects them: give"
         " their numbers"
     ]
     assert wrong(table(["t", "q1 [deg]", "q1 [rad]"])) == [
@@ -239,7 +239,7 @@ def test_names_that_stand_twice(wrong: Wrong) -> None:
 
 def test_a_header_that_does_not_fit_its_rows(wrong: Wrong) -> None:
     assert wrong("t,q1\n0,1,2,3\n0.1,1,2,3\n") == [
-        "log.csv:1: found 2 names over rows of 4 cells, allowed: a name a column; add 2 names,"
+        "log.csv:1: found 2 names over rows of 4 cells, allowed: one name per column; add 2 names,"
         " or delete line 1: without names the columns are taken as joints in order"
     ]
 
@@ -350,7 +350,7 @@ def test_three_angles_beside_a_position_are_no_joints(read: Read) -> None:
 )
 def test_signs_between_thousands_are_told(wrong: Wrong, head: str, row: str, found: str, plain: str) -> None:
     text = "\n".join([head, *(row.format(k=k) for k in range(9)), ""])
-    said = f"allowed: {plain}; export the table without signs between thousands"
+    said = f"allowed: {plain}; export the table without thousands separators"
     assert wrong(text) == [f"log.csv: found '{found}', {said}"]
 
 

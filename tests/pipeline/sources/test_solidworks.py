@@ -87,7 +87,7 @@ def test_a_folder_of_several_logs_is_told_as_such(
     files = [write(text, f"{day}.csv") for day, text in zip(("monday", "tuesday"), texts, strict=True)]
     assert refusal(LogError, read_log, files, robot=arm(joints) if joints else None) == (
         f"{tmp_path}: found 2 logs, each with joints of its own (monday.csv, tuesday.csv),"
-        " allowed: one log, or its plots with one joint a file; name the logs one by one"
+        " allowed: one log, or its plots with one joint per file; name the logs one by one"
     )
 
 

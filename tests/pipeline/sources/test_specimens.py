@@ -206,7 +206,7 @@ WRONG = [
     # the table
     Wrong("header_only", [r"^log:1: found a header and no rows, allowed: "]),
     Wrong("no_bytes", [r"^log: found .*, allowed: "]),
-    Wrong("rows_of_one_cell", [r"^log:1: found 2 names over rows of 1 cell, allowed: a name a column"]),
+    Wrong("rows_of_one_cell", [r"^log:1: found 2 names over rows of 1 cell, allowed: one name per column"]),
     Wrong("header_with_fewer_names", [r"^log:1: found 6 names over rows of 7 cells, allowed: "]),
     Wrong("header_with_more_names", [r"^log:1: found 8 names over rows of 7 cells, allowed: "]),
     Wrong("header_with_a_name_twice", [r"^log:1, column q3: found as columns 4, 5, allowed: once"]),

@@ -216,11 +216,11 @@ def test_numbers_as_text_are_read_and_other_texts_named() -> None:
 @pytest.mark.parametrize(
     ("frame", "said"),
     [
-        (pd.DataFrame(), "log: found a table without rows, allowed: a row a sample"),
-        (pd.DataFrame({"t": [], "q1": []}), "log: found a table without rows, allowed: a row a sample"),
+        (pd.DataFrame(), "log: found a table without rows, allowed: one row per sample"),
+        (pd.DataFrame({"t": [], "q1": []}), "log: found a table without rows, allowed: one row per sample"),
         (
             pd.DataFrame({"a": ["x", "y"], "b": [{}, []]}),
-            "log: found no number in a, b, allowed: a column a joint",
+            "log: found no number in a, b, allowed: one column per joint",
         ),
         (pd.DataFrame({"t": [0.0, 0.1], "q1": [object(), object()]}), "log: found no joint columns in q1"),
     ],

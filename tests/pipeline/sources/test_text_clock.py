@@ -170,7 +170,7 @@ def test_an_order_that_nothing_tells_is_asked_for(read: Read, wrong: Wrong) -> N
     assert wrong(text) == [
         "log.csv:2, column timestamp: found '01/02/2021 23:59:59', which may be date and time, day"
         ' first or date and time, month first; unit={"timestamp": "dmy"} or unit={"timestamp": "mdy"}'
-        f" says which{OTHER_TIME}"
+        f" specifies it{OTHER_TIME}"
     ]
     assert read(text, unit={"timestamp": "dmy"}).t_ns.tolist() == [0, 2 * SECOND, DAY + 3 * SECOND]
     assert read(text, unit={"timestamp": "mdy"}).clock_start_ns == unix(2021, 1, 2, 23, 59, 59)
@@ -208,7 +208,7 @@ def test_digits_behind_a_colon_that_nothing_tells_are_asked_for(read: Read, wron
     assert wrong(text) == [
         "log.csv:2, column Time: found '10:11:32:100', which may be time of day, decimals behind the"
         ' last colon or time of day, microseconds behind the last colon; unit={"Time": "s"} or'
-        f' unit={{"Time": "us"}} says which{OTHER_TIME}'
+        f' unit={{"Time": "us"}} specifies it{OTHER_TIME}'
     ]
     assert read(text, unit={"Time": "us"}).t_ns.tolist() == [0, 5 * US, 10 * US]
     assert read(text, unit={"Time": "ms"}).t_ns.tolist() == [0, 5 * MS, 10 * MS]

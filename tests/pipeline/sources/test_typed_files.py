@@ -98,15 +98,17 @@ def test_encrypted_and_empty_files_are_one_line(tmp_path: Path) -> None:
     )
     path.write_bytes(b"")
     assert refusal(LogError, read_log, [path]) == (
-        f"{path}: found an empty file, allowed: a table with a row a sample"
+        f"{path}: found an empty file, allowed: a table with one row per sample"
     )
     pq.write_table(pa.table({"a": ["x"], "b": ["y"]}), path)
     assert (
-        refusal(LogError, read_log, [path]) == f"{path}: found no number in a, b, allowed: a column a joint"
+        refusal(LogError, read_log, [path])
+        == f"{path}: found no number in a, b, allowed: one column per joint"
     )
     pq.write_table(pa.table({"t": pa.array([], pa.float64())}), path)
     assert (
-        refusal(LogError, read_log, [path]) == f"{path}: found a table without rows, allowed: a row a sample"
+        refusal(LogError, read_log, [path])
+        == f"{path}: found a table without rows, allowed: one row per sample"
     )
 
 
@@ -141,7 +143,9 @@ def test_a_mat_file_without_samples_is_one_line(tmp_path: Path) -> None:
     path = tmp_path / "log.mat"
     savemat(path, {"name": "run", "fs": 100.0})
     said = refusal(LogError, read_log, [path])
-    assert said.startswith(f"{path}: found no numbers with a row a sample in name, fs, allowed: such as t")
+    assert said.startswith(
+        f"{path}: found no numbers with one row per sample in name, fs, allowed: such as t"
+    )
     assert "\n" not in said
 
 

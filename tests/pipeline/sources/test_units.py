@@ -58,7 +58,7 @@ def test_a_unit_that_is_not_known_is_refused(wrong: Wrong) -> None:
     ]
     assert wrong("t,q1 [gon]\n0,30\n0.1,31\n") == [
         "log.csv, column q1 [gon]: found the unit 'gon', allowed: rad, deg, m, mm, cm;"
-        ' convert the values; unit={"q1": "deg"} takes the values so'
+        ' convert the values; unit={"q1": "deg"} keeps the values unchanged'
     ]
 
 
@@ -122,7 +122,7 @@ def test_a_unit_that_is_not_known(wrong: Wrong, read: Read) -> None:
     text = "t,J1 [counts]\n0,30\n0.1,31\n"
     assert wrong(text) == [
         "log.csv, column J1 [counts]: found the unit 'counts', allowed: rad, deg, m, mm, cm;"
-        ' convert the values; unit={"J1": "deg"} takes the values so'
+        ' convert the values; unit={"J1": "deg"} keeps the values unchanged'
     ]
     assert read(text, unit={"J1": "deg"}).q[0, 0] == 30 * DEG
 
@@ -130,7 +130,7 @@ def test_a_unit_that_is_not_known(wrong: Wrong, read: Read) -> None:
 def test_a_line_of_units_that_are_not_known(read: Read, wrong: Wrong) -> None:
     text = "t,J1,J2\n[s],[counts],[counts]\n0,30,1\n0.1,31,1\n"
     said = "found the unit 'counts', allowed: rad, deg, m, mm, cm; convert the values;"
-    said += ' unit={"J1": "deg"} takes the values so'
+    said += ' unit={"J1": "deg"} keeps the values unchanged'
     assert wrong(text) == [f"log.csv, column J1: {said}"]
     assert read(text, unit={"": "deg"}).units == {"t": "s", "J1": "deg", "J2": "deg"}
     powers = read("t,J1,tau1,M,n\n[s],[rad],[Nm],[kg m2/s2],(1/min)\n0,30,1,1,1\n0.1,31,1,1,1\n")
@@ -183,7 +183,7 @@ def test_the_robots_limits_tell_degrees(read: Read, arm: Arm, wrong: Wrong) -> N
 def test_slow_large_values_may_be_either(wrong: Wrong) -> None:
     assert wrong(csv_of(np.linspace(0, 60, 1000)[:, np.newaxis])) == [
         'log.csv: found values up to 60 in q1 and no unit, allowed: rad or deg; unit="rad" or'
-        ' unit="deg" says which'
+        ' unit="deg" specifies it'
     ]
 
 
@@ -219,7 +219,7 @@ def test_positions_are_not_rescaled_because_they_look_too_far(read: Read) -> Non
     )
     assert str(warning) == (
         "no unit is given for x, y, z: the positions are taken as m, though values of 658 reach further than"
-        ' any arm; unit={"x": "mm", "y": "mm", "z": "mm"} or unit={"x": "m", "y": "m", "z": "m"} says which'
+        ' any arm; unit={"x": "mm", "y": "mm", "z": "mm"} or unit={"x": "m", "y": "m", "z": "m"} specifies it'
     )
     for hint, per_m in zip(warning.hints, (1e3, 1.0), strict=True):
         told = read(table, unit=hint.value)
@@ -268,7 +268,7 @@ def test_a_position_without_unit_is_like_the_others(read: Read) -> None:
 
 def test_a_rate_in_an_unknown_unit_is_refused_as_a_joint_is(wrong: Wrong) -> None:
     said = "found the unit 'rpm', allowed: rad, deg, m, mm, cm; convert the values;"
-    said += ' unit={"qd1": "deg"} takes the values so'
+    said += ' unit={"qd1": "deg"} keeps the values unchanged'
     assert wrong("t,q1 [rad],qd1 [rpm]\n0,1,2\n1,2,3\n") == [f"log.csv, column qd1 [rpm]: {said}"]
 
 
@@ -291,7 +291,7 @@ def test_huge_numbers_are_read_without_a_warning_of_numpy(read: Read, wrong: Wro
     assert read(f"t,q1 [rad]\n{rows}").q[0, 0] == 1e308
     assert wrong(f"t,q1\n{rows}") == [
         "log.csv: found values up to 1e+308 in q1 and no unit, allowed: rad or deg; convert ticks and counts;"
-        ' unit="rad" or unit="deg" says which'
+        ' unit="rad" or unit="deg" specifies it'
     ]
 
 

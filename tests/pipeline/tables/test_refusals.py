@@ -53,7 +53,7 @@ def test_the_suffix_tells_the_format_unless_it_is_given() -> None:
     assert [format_of(None, Path(f"a.{to.upper()}")) for to in FORMATS] == list(FORMATS)
     assert format_of("csv", Path("a.txt")) == "csv"
     assert said(OptionError, lambda: format_of(None, Path("a.txt"))) == (
-        "--to: found the output a.txt, allowed: csv, parquet, mat, tum, or an output that ends so"
+        "--to: found the output a.txt, allowed: csv, parquet, mat, tum, or an output with that suffix"
     )
     assert format_of(None, None) == "csv"
 
@@ -113,7 +113,7 @@ def test_a_csv_is_never_replaced_even_if_it_is_ours(run: Run, tmp_path: Path) ->
     export_result(run, path, ExportOptions("csv"))
     before = path.read_bytes()
     assert said(OutputError, lambda: export_result(run, path, ExportOptions("csv", "file"))) == (
-        "found a file, allowed: a new name; nothing in a CSV tells whose it is, so none is replaced"
+        "found a file, allowed: a new name; an existing CSV file is never replaced"
     )
     assert path.read_bytes() == before
 
@@ -144,7 +144,7 @@ def test_a_file_that_reads_back_otherwise_does_not_get_its_name(tmp_path: Path) 
         return ["the head", "row 2"]
 
     message = said(OutputError, lambda: write_all([tmp_path / "a.csv"], [write], "csv", ()))
-    assert message == "reads back otherwise than written: the head, row 2"
+    assert message == "differs when read back: the head, row 2"
     assert not list(tmp_path.iterdir())
 
 

@@ -188,7 +188,7 @@ def test_columns_that_were_not_used_are_named(tmp_path: Path) -> None:
     result = urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "again.csv", rows="file")
     assert [warning.message for warning in result.warnings] == [
         "qd1: not ingested, since a column of them was empty",
-        "battery: not ingested (no role is known for them), so they cannot leave",
+        "battery: not ingested (no role is known for them), so they cannot be exported",
     ]
     assert [name for name, _ in result.columns] == ["t", "q1"]
 
@@ -198,7 +198,7 @@ def test_units_that_the_names_do_not_tell_are_told(tmp_path: Path) -> None:
     run = urmpipe.ingest(tmp_path / "log.csv", unit="deg")
     result = urmpipe.export(run, tmp_path / "again.csv", rows="file")
     assert [warning.message for warning in result.warnings] == [
-        "q1, q2: in deg, which their names do not tell"
+        "q1, q2: in deg, which their names do not give"
     ]
     assert result.columns[1] == ("q1", "deg")
     assert not urmpipe.export(run, tmp_path / "again.parquet", rows="file").warnings
@@ -264,7 +264,7 @@ def test_dates_with_a_time_zone_are_said_to_leave_in_utc(tmp_path: Path) -> None
     (tmp_path / "log.csv").write_text(LOG_OF_TIMES.format(*zoned))
     result = urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "again.csv", rows="file")
     assert [warning.message for warning in result.warnings] == [
-        "date and time, year first with a time zone: the dates leave in UTC"
+        "date and time, year first with a time zone: the dates are exported in UTC"
     ]
     assert pd.read_csv(tmp_path / "again.csv")["time"][0] == "2021-04-11T21:59:50"
     (tmp_path / "plain.csv").write_text(LOG_OF_TIMES.format(*(one[:19] for one in zoned)))

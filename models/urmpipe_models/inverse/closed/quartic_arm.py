@@ -16,7 +16,7 @@ FAR = 1e-3
 def quartic_roots(equations: LoopEquations, seen: Seen) -> tuple[FloatArray, FloatArray]:
     """Return u1 and u3 of A1 u1 + b1 = A3 u3 + b3, both on their tracks.
 
-    The equations give one of both as v = G u + g of the other, which put into |v|^2 = radius^2 (or v[1] =
+    The equations give one of the two as v = G u + g of the other, which put into |v|^2 = radius^2 (or v[1] =
     v[0]^2 of a prismatic joint) leaves a quadric in the cosine and the sine of the other joint, or a quartic
     in its way. The one that is given is that with the better matrix: an arm two of whose axes almost meet or
     almost are parallel loses no digit then.

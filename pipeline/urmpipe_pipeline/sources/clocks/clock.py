@@ -208,7 +208,7 @@ def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
     """Raise if the times are beyond what integers of 64 bits hold in [ns]: they are of another unit."""
     for value in layout.numbers(time.index)[:1]:
         if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
-            hint = Hint("unit", {time.called: "ns"}, "reads them so")
+            hint = Hint("unit", {time.called: "ns"}, "applies this")
             if unit == "s" and _DATES[0] <= value < _DATES[1]:
                 hint = Hint("", does="a date is read if it is written as 2021-04-11 22:27:21.5")
             message = f"found {value:g} {unit}, allowed: times within 146 years of 0"

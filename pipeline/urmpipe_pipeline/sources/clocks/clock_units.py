@@ -112,7 +112,7 @@ def _refuse_other_epochs(time: Column, layout: Layout, start: float, step: float
     for kind, ((first, last), cure) in kinds.items():
         if first <= start <= last:
             message = f"found {start:.15g} in steps of {step:.3g}, as {kind}, allowed: times in {_UNITS}"
-            hints = unit_hints([time], "s" if in_days else "ns", "takes them as they are")
+            hints = unit_hints([time], "s" if in_days else "ns", "keeps them unchanged")
             raise layout.error(f"{message}; convert them: {cure}", time.header, *hints, *EVEN)
 
 
@@ -129,7 +129,7 @@ def _short(time: Column, layout: Layout, step: float) -> Found:
     """Return s for short steps, or for none; raise where they are too short for a log."""
     if 0 < step < _IMPOSSIBLE:
         said = f"found steps of {step:.3g}, as of days or hours, allowed: times in {_UNITS}"
-        hints = unit_hints([time], "s", "takes them as they are")
+        hints = unit_hints([time], "s", "keeps them unchanged")
         raise layout.error(f"{said}; convert them", time.header, *hints, *EVEN)
     return "s", "the usual unit", (_assumed(time, step),) if 0 < step < _UNUSUAL else ()
 
@@ -142,5 +142,5 @@ def _assumed(time: Column, step: float) -> LogWarning:
 
 def _question(time: Column, layout: Layout, found: str, units: list[str]) -> LogError:
     """Ask which of some units is meant."""
-    hints = (*(Hint("unit", {time.called: unit}, "says which") for unit in units), *OTHER_TIME)
+    hints = (*(Hint("unit", {time.called: unit}, "specifies it") for unit in units), *OTHER_TIME)
     return layout.error(f"found {found}, which may be {' or '.join(units)}", time.header, *hints)

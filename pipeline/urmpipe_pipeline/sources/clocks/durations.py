@@ -23,7 +23,7 @@ def durations(columns: Sequence[Column], layout: Layout) -> Chosen | None:
     """Return the first column that is named like a duration and holds one a row; None without one."""
     for column in columns:
         if not column.text and is_duration(column, layout):
-            return Chosen((column,), "its name: a duration a row", lasts=True)
+            return Chosen((column,), "its name: one duration per row", lasts=True)
     return None
 
 
@@ -48,6 +48,6 @@ def summed(numbers: Numbers, name: str) -> Numbers:
     times = np.cumsum(np.where(known, durations, 0))
     times = np.where(known, times - durations if ahead else times, durations)
     which = "to the row behind" if ahead else "since the row before"
-    said = f"{name} is a duration a row: the time is their sum, each taken as the time {which}"
+    said = f"{name} is one duration per row: the time is their sum, each taken as the time {which}"
     warning = LogWarning(SUMMED, said, hints=OTHER_TIME)
     return replace(numbers, clock=times, warnings=(*numbers.warnings, warning))

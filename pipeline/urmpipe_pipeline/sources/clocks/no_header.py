@@ -295,7 +295,7 @@ def _question(rising: Sequence[Column], layout: Layout, *, path: bool) -> LogErr
 def _which(columns: Sequence[Column], *, path: bool) -> list[Hint]:
     """Return what to give so that one of some columns, or none, is the time."""
     numbers = [str(column.number) for column in columns[:SHOWN]]
-    hints = [Hint("time", number, "says which") for number in (*numbers, "none")]
+    hints = [Hint("time", number, "specifies it") for number in (*numbers, "none")]
     return hints if path else [*hints, Hint("joints", None, "names the joint columns")]
 
 

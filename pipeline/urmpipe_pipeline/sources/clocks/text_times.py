@@ -201,7 +201,7 @@ def _question(layout: Layout, parts: Sequence[ClockColumn], readings: Sequence[R
     keys = dict.fromkeys(key for form in choices[place] for key in form.keys if key not in shared)
     column = layout.names[parts[place].column]
     cell = layout.cells(parts[place].column)[0]
-    hints = (Hint("unit", {column: key}, "says which") for key in keys)
+    hints = (Hint("unit", {column: key}, "specifies it") for key in keys)
     return layout.error(f"found {shown(cell)}, which may be {names}", column, *hints, *OTHER_TIME)
 
 

@@ -128,7 +128,7 @@ def clock_of_file(
     for column in columns:
         if column.table != index and _is_time(column.key):
             other = tables.layouts[column.table]
-            hints = (Hint("time", None, "says which column"), Hint("time", "none", "leaves both out"))
+            hints = (Hint("time", None, "selects the column"), Hint("time", "none", "leaves both out"))
             message, file = f"found a time here and in {title}, allowed: one clock", other.file
             raise LogError(Finding(message, file, other.header_line, column=column.header, hints=hints))
     own = tuple(column for column in columns if column.table == index)

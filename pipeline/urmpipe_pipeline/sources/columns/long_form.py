@@ -33,9 +33,9 @@ def refuse_long_form(
     names = [column for column in others if _goes_round(layout.cells(column.index))]
     if not names:
         return
-    found = f"a row a joint: {names[0].header} goes round {len(set(layout.cells(names[0].index)))} names"
+    found = f"one row per joint: {names[0].header} goes round {len(set(layout.cells(names[0].index)))} names"
     hints = () if len(clock) != 1 else (Hint("", does=_command(joints[0], names[0], clock[0], layout)),)
-    raise LogError(Finding(file=layout.file, found=found, allowed="a row a sample", hints=hints))
+    raise LogError(Finding(file=layout.file, found=found, allowed="one row per sample", hints=hints))
 
 
 def _goes_round(cells: Sequence[str]) -> bool:

@@ -222,7 +222,7 @@ def _path(
     if path:
         hints = (
             Hint("", does="name them so in the header"),
-            Hint("log_map", None, 'says which they are: [tcp] position = ["A", "B", "C"]'),
+            Hint("log_map", None, 'names them: [tcp] position = ["A", "B", "C"]'),
         )
         message = f"found no position in {listed(columns)}, allowed: x, y, z"
         raise LogError(Finding(message, file=file, hints=hints))
@@ -263,7 +263,7 @@ def _refuse_thousands(layouts: Sequence[Layout], file: str) -> None:
     found = next((one for cell in cells if (one := grouped_number(cell))), None)
     if found:
         between = min(",.", key=found.index)
-        allowed = f"{found.replace(between, '')}; export the table without signs between thousands"
+        allowed = f"{found.replace(between, '')}; export the table without thousands separators"
         raise LogError(Finding(f"found {found!r}, allowed: {allowed}", file=file))
 
 

@@ -107,7 +107,7 @@ def _about_order(rotation: Sequence[Column]) -> LogWarning:
     """Say that the order of a quaternion is that of TUM's form."""
     said = f"no header tells the order of {listed(rotation)}, a quaternion: taken as x, y, z, w, as of TUM"
     hints = (
-        Hint("rotation", "quat_wxyz", "reads it otherwise"),
+        Hint("rotation", "quat_wxyz", "overrides this"),
         Hint("rotation", "quat_xyzw", "confirms it"),
     )
     assumed = "the quaternions are x, y, z, w"

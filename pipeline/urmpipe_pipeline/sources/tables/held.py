@@ -108,11 +108,11 @@ def _refuse_empty(held: Held, table: pa.Table) -> None:
     """Raise a `LogError` if a table has no row, or none of its columns holds a number."""
     file = str(held.place)
     if not held.columns.num_rows or not held.columns.num_columns:
-        raise LogError(Finding("found a table without rows, allowed: a row a sample", file))
+        raise LogError(Finding("found a table without rows, allowed: one row per sample", file))
     first = (_texts(column.slice(0, SAMPLED_LINES)).to_pylist() for column in table.columns)
     if all(is_text(cell, ".") for cells in first for cell in cells if cell):
         names = ", ".join(map(str, held.columns.column_names[:8]))
-        raise LogError(Finding(f"found no number in {names}, allowed: a column a joint", file))
+        raise LogError(Finding(f"found no number in {names}, allowed: one column per joint", file))
 
 
 def fingerprint_of(held: Held) -> SourceFile:

@@ -62,7 +62,9 @@ def read_mat(path: Path, head: bytes) -> Held:
         hint = Hint(
             "", does=f'in MATLAB: writetable(T, "log.csv") of a table, or save("{path.name}", "t", "q")'
         )
-        said = f"found no numbers with a row a sample in {names}, allowed: such as t (n x 1), q (n x joints)"
+        said = (
+            f"found no numbers with one row per sample in {names}, allowed: such as t (n x 1), q (n x joints)"
+        )
         raise LogError(Finding(said, str(path), hints=(hint,)))
     return Held(path.stem, _table(columns), path=path)
 

@@ -157,7 +157,7 @@ def _no_table(path: Path, arrays: Mapping[str, Array | None]) -> Finding:
     """Return what is said of a file without a table; of one of Python's objects with a command."""
     shapes = (f"{name or 'an array'} {array.shape}" for name, array in arrays.items() if array is not None)
     if (shown := ", ".join(shapes)) or "" not in arrays:
-        allowed = "numbers in one or two dimensions, a row a sample"
+        allowed = "numbers in one or two dimensions, one row per sample"
         return Finding(file=str(path), found=shown or "no array of numbers", allowed=allowed)
     command = (
         f"python -c \"import numpy; numpy.savez('{_written(path)}',"

@@ -75,7 +75,7 @@ def open_tables(files: Sequence[Path | Held], options: ReadOptions, sniff_plain:
         OptionError: If there is no file, or the source is unknown.
     """
     if not files:
-        raise OptionError("found no log file, allowed: one, or several if a source writes one a plot")
+        raise OptionError("found no log file, allowed: one, or several if the program writes one per plot")
     if options.source is not None and options.source not in source_names():
         found, allowed = shown(options.source), ", ".join(source_names())
         raise OptionError(Finding(parameter="source", found=found, allowed=allowed))

@@ -110,7 +110,7 @@ def unchanged(files: Collection[object]) -> Iterator[None]:
 
 def _refuse_changed(paths: Sequence[Path], before: Sequence[State | None]) -> None:
     """Raise with each file that is another than before."""
-    found = "changed while it was read, allowed: a file that nothing writes any more"
+    found = "changed while it was read, allowed: a file that no program still writes"
     changed = [path for path, state in zip(paths, before, strict=True) if _state(path) != state]
     if changed:
         raise LogError(*(Finding(found, str(path)) for path in changed))

@@ -222,7 +222,7 @@ class RowReader:
         names = self.layout.form.names if self.layout.form else self.layout.names
         width = len(names)
         if again := self._header_again(text, values, names):
-            self._report(f"found {again}, allowed: one log a file; a second log begins here", lasting=True)
+            self._report(f"found {again}, allowed: one log per file; a second log begins here", lasting=True)
             self.ended = True
             return False
         if len(values) == width - 1 and not names[-1]:

@@ -218,7 +218,7 @@ def _choices(parameter: str, given: str | None, allowed: Sequence[str]) -> Seque
     sign = _SIGNS.get(given.lower(), given)
     if sign not in allowed:
         names = ", ".join(_NAMES[sign] for sign in allowed)
-        allowed_signs = f"{names}, or the sign itself"
+        allowed_signs = f"{names}, or the character itself"
         raise OptionError(Finding(parameter=parameter, found=shown(given), allowed=allowed_signs))
     return (sign,)
 
@@ -343,11 +343,9 @@ def _names(
         _refuse_few(segment, lines, rows, uncounted, 0, f"a count, as before what line {line} names")
         _refuse_few(segment, lines, rows, ends, -1, f"no cell behind what line {line} names")
     number = abs(len(cells) - width)
-    remedy = f"{'add' if len(cells) < width else 'take out'} {counted(number, 'name')}"
-    wrong = (
-        f"found {len(cells)} names over rows of {counted(width, 'cell')}, allowed: a name a column; {remedy}"
-    )
-    wrong += f", or delete line {line}: without names the columns are taken as joints in order"
+    remedy = f"{'add' if len(cells) < width else 'remove'} {counted(number, 'name')}"
+    wrong = f"found {len(cells)} names over rows of {counted(width, 'cell')}, allowed: one name per column;"
+    wrong += f" {remedy}, or delete line {line}: without names the columns are taken as joints in order"
     raise LogError(Finding(wrong, file=str(segment.path), line=line))
 
 
@@ -395,13 +393,15 @@ def _no_rows(segment: Segment, body: Sequence[HeadLine], given: Mapping[str, str
     file = str(segment.path)
     if segment.has_more and len(body) < FEWEST_LINES:
         found = f"no row of numbers in the first {len(segment.head)} letters"
-        return Finding(file=file, found=found, allowed="a table with a row a sample")
+        return Finding(file=file, found=found, allowed="a table with one row per sample")
     if not body:
-        return Finding("found no line with content, allowed: a table with a row a sample", file=file)
+        return Finding("found no line with content, allowed: a table with one row per sample", file=file)
     cells = [cell for line in body for cell in split_line(line.text, ",")]
     if len(body) <= 2 and all(is_text(cell, ".") for cell in cells if cell):
-        return Finding("found a header and no rows, allowed: a row a sample", file=file, line=body[0].number)
+        return Finding(
+            "found a header and no rows, allowed: one row per sample", file=file, line=body[0].number
+        )
     text = body[0].text.strip()[:60]
     named = [f"{what} {_NAMES[_SIGNS.get(sign.lower(), sign)]}" for what, sign in given.items()]
     found = f"{text!r} and no row of numbers below it" + (f" with {' and '.join(named)}" if named else "")
-    return Finding(file=file, line=body[0].number, found=found, allowed="a table with a row a sample")
+    return Finding(file=file, line=body[0].number, found=found, allowed="a table with one row per sample")

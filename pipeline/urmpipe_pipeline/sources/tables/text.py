@@ -134,7 +134,9 @@ def open_text(path: Path, *, any_suffix: bool = False) -> Segment:
     """
     size = _size(path)
     if size == 0:
-        raise LogError(Finding("found an empty file, allowed: a table with a row a sample", file=str(path)))
+        raise LogError(
+            Finding("found an empty file, allowed: a table with one row per sample", file=str(path))
+        )
     with path.open("rb") as file:
         raw = file.read(HEAD_BYTES)
     container = _container(path, raw, any_suffix)

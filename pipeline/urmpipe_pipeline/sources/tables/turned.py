@@ -126,7 +126,7 @@ def _ask(layout: Layout, rows: int, columns: int) -> None:
     verb = "goes on smoothly along it, which may be a joint as a row"
     verb = verb if rows == 1 else "go on smoothly along the rows, which may be joints as rows"
     found = f"found {row} of {columns} numbers that {verb}"
-    so = Hint("layout", TRANSPOSED, "reads it so" if rows == 1 else "reads them so")
+    so = Hint("layout", TRANSPOSED, "applies this")
     raise LogError(Finding(found, layout.file, hints=(so, _TABLE)))
 
 

@@ -190,7 +190,7 @@ def _length_units(plan: Plan, finder: UnitFinder, values: FloatArray) -> tuple[l
     if told or not LONGEST_REACH < nearest < np.inf:
         return units, []
     said = f"no unit is given for {listed(columns)}: they are taken as m, though every row is beyond any arm"
-    hints = (Hint("unit", {"": "mm"}, "reads them otherwise"),)
+    hints = (Hint("unit", {"": "mm"}, "overrides this"),)
     return units, [LogWarning("assumed-unit", said, hints=hints)]
 
 
@@ -247,7 +247,7 @@ def _refuse_unclear(plan: Plan, naming: str, *, named: bool, timed: bool) -> Non
 def _remedies(count: int, naming: str, *, timed: bool) -> Iterator[Hint]:
     """Yield remedies for so many columns without names: a header, the form of the orientation, the time."""
     yield Hint("", does=naming)
-    yield from (Hint("rotation", form, "says which") for form in FORMS if 3 + width(form) == count)
+    yield from (Hint("rotation", form, "specifies it") for form in FORMS if 3 + width(form) == count)
     if not timed and count - 1 in {3, *(3 + width(form) for form in FORMS)}:
         yield Hint("time", "1", "if the first is the time")
 

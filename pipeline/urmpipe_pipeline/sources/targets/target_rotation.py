@@ -25,7 +25,7 @@ UNIT_NORM = 1e-3
 MOST_RAD = 2 * np.pi * 1.01
 """Angles without a given unit, most of them beyond a turn in [rad], are hardly in rad."""
 
-MAP = Hint("log_map", None, 'says which: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."')
+MAP = Hint("log_map", None, 'names them: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."')
 """The remedy where the names of columns show no orientation."""
 
 _OURS = frozenset(("rx", "ry", "rz"))
@@ -58,7 +58,7 @@ def target_form(
     if len(roles.forms) == 1:
         return roles.forms[0], []
     if not all(column.words & _OURS for column in found):
-        hints = tuple(Hint("rotation", form, "says which") for form in roles.forms)
+        hints = tuple(Hint("rotation", form, "specifies it") for form in roles.forms)
         said = f"found {listed(found)}, which may be {' or '.join(roles.forms)}, allowed: one form"
         raise LogError(Finding(said, file, hints=hints))
     if found[0].index > found[1].index > found[2].index:

@@ -134,7 +134,7 @@ def settle_rotation(
         choices = [found.choice] if found else choices
     if len({one.form for one in choices}) > 1:
         said = f"{names} may be of several forms: the recorded orientation is not used"
-        hints = tuple(Hint("rotation", form, "says which") for form in sound)
+        hints = tuple(Hint("rotation", form, "specifies it") for form in sound)
         return Settled(warnings=(LogWarning("orientation", said, hints=hints),))
     if len(choices) > 1:
         return _without_unit(columns, choices, values)
@@ -223,7 +223,7 @@ def _settled_by_kinematics(columns: Sequence[Column], told: Sequence[Choice], fo
         was, now = first.units[0].name, best.units[0].name
         hints = unit_hints(columns, was)
     else:
-        was, now, hints = str(first), str(best), (Hint("rotation", first.form, "reads them otherwise"),)
+        was, now, hints = str(first), str(best), (Hint("rotation", first.form, "overrides this"),)
     names = ", ".join(column.name for column in columns)
     said = f"{names}: {was} contradicts the kinematics: taken as {now}: {found.evidence}"
     return _settled(columns, best, found.evidence, LogWarning("unit-contradiction", said, hints=hints))

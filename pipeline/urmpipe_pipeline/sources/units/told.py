@@ -95,7 +95,7 @@ class Tellers:
             return self.given[column.number]
         if column.unit_text and column.unit is None:
             message = f"found the unit {shown(column.unit_text)}, allowed: rad, deg, m, mm, cm"
-            hints = unit_hints([column], "mm" if likely == "length" else "deg", "takes the values so")
+            hints = unit_hints([column], "mm" if likely == "length" else "deg", "keeps the values unchanged")
             said = f"{message}; convert the values"
             raise LogError(Finding(said, self.file, column=column.header, hints=hints))
         return column.unit

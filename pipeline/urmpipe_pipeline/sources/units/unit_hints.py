@@ -12,7 +12,7 @@ OTHER_UNIT = {"rad": "deg", "deg": "rad", "m": "mm", "mm": "m", "cm": "m"}
 """The unit that a wrong one would most likely be."""
 
 
-def unit_hints(columns: Sequence[Column], unit: str, does: str = "reads them otherwise") -> tuple[Hint, ...]:
+def unit_hints(columns: Sequence[Column], unit: str, does: str = "overrides this") -> tuple[Hint, ...]:
     """Return the hint that gives all of some columns a unit."""
     return (Hint("unit", {column.called: unit for column in columns}, does),)
 
@@ -22,7 +22,7 @@ def which_unit(columns: Sequence[Column], unit: str, *, every: bool) -> tuple[Hi
     given = [
         {"": one} if every else {column.called: one for column in columns} for one in (OTHER_UNIT[unit], unit)
     ]
-    return tuple(Hint("unit", one, "says which") for one in given)
+    return tuple(Hint("unit", one, "specifies it") for one in given)
 
 
 def unit_inference(columns: Sequence[Column], unit: str, evidence: str, *, every: bool) -> Inference:

@@ -309,14 +309,14 @@ class UnitFinder:
             message = f"found values up to {largest:.6g} in {names} and no unit, allowed: rad or deg"
             message += "; convert ticks and counts" if largest > MOST_DEGREES else ""
             unnamed = all(column.header.isdigit() for column in columns)
-            hints = [Hint("unit", {"": name}, "says which") for name in ("rad", "deg")]
+            hints = [Hint("unit", {"": name}, "specifies it") for name in ("rad", "deg")]
             hints += (
                 [Hint("source", "path", "reads them as x, y, z")] if unnamed and len(columns) == 3 else []
             )
             hints += [NAME_JOINTS] if unnamed else []
             raise LogError(Finding(message, self.tellers.file, hints=tuple(hints)))
         unit = deg if fast else rad
-        hints = [Hint("unit", {"": OTHER_UNIT[unit.name]}, "reads them otherwise")]
+        hints = [Hint("unit", {"": OTHER_UNIT[unit.name]}, "overrides this")]
         self._assume(columns, unit, "joints", hints, f": {fast}" if fast else "")
         return unit
 

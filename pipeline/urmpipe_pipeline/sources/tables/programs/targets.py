@@ -148,7 +148,7 @@ def _chosen(program: Program, found: Sequence[_Rows]) -> _Rows:
     source = program.options.source
     if source is None:
         hints = (Hint("source", rows.kind.source, f"takes the {_words(rows)}") for rows in found)
-        message = f"{' and '.join(_words(rows) for rows in found)}, which are no rows of one table"
+        message = f"{' and '.join(_words(rows) for rows in found)}, which are not rows of one table"
         raise program.error(message, "one of the two", found[0].targets[0].offset, *hints)
     return next((rows for rows in found if rows.kind.source == source), found[0])
 
