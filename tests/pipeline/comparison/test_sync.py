@@ -274,8 +274,8 @@ def test_a_motion_that_repeats_itself_names_the_offsets() -> None:
     t = times(0.0, 10.0, 0.005)
     swing = np.column_stack([np.sin(np.pi * t), np.cos(np.pi * t)])  # every 2 s
     assert refused(joints(swing, t, "wanted"), joints(swing[100:], t[100:])) == (
-        "log.csv: sync: auto: found a motion of the joints that several offsets to wanted explain alike"
-        " (similarity): 0.5 s (1.000), -1.5 s (1.000), 2.5 s (1.000), -3.5 s (1.000), 4.5 s (1.000),"
+        "log.csv: sync: auto: found a motion of the joints that several offsets to wanted explain equally"
+        " well (similarity): 0.5 s (1.000), -1.5 s (1.000), 2.5 s (1.000), -3.5 s (1.000), 4.5 s (1.000),"
         f" {ALLOWED}"
     )
 
@@ -311,13 +311,16 @@ def test_two_motions_without_likeness_are_told() -> None:
     assert said.endswith(f" at best, 0.8 is needed, {ALLOWED}")
 
 
+LOW = "log.csv: sync: auto: found low similarity of the "
+
+
 def test_random_motions_are_not_taken_for_each_other() -> None:
     t = times(0.0, 20.0, 0.01)
     for seed in range(20):
         make = (smooth, moves)[seed % 2]
         for side, channels in ((joints, 6), (path, 3)):
             one, other = (side(make(1000 + 2 * seed + k, channels)(t), t) for k in (0, 1))
-            assert refused(one, other).startswith("log.csv: sync: auto: found no ")
+            assert refused(one, other).startswith(("log.csv: sync: auto: found no ", LOW))
 
 
 def test_logs_without_samples_to_speak_of_are_refused() -> None:
@@ -354,8 +357,8 @@ def test_what_is_not_known_well_is_told() -> None:
         ),
         LogWarning(
             "sync-unlike",
-            "the offset of 0.25 s, estimated by the joints, leaves the two motions alike by 0.85 only,"
-            " of 1: are they one motion?",
+            "the offset of 0.25 s, estimated by the joints, gives a similarity of 0.85 only,"
+            " of 1: do both logs show the same motion?",
             about="log",
         ),
     ]

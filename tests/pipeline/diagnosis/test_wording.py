@@ -76,8 +76,8 @@ def test_a_cause_is_explained_with_interval_and_twins() -> None:
 
 def test_positions_cannot_tell_a_sense_from_a_column() -> None:
     assert explained(SIGN) == (
-        "module 3 (phi3) counter-rotates, or its column counts the other way: positions cannot tell these"
-        " apart"
+        "module 3 (phi3) counter-rotates, or its column has the opposite sign: positions cannot"
+        " distinguish these"
     )
 
 
@@ -116,13 +116,13 @@ def test_of_several_causes_each_has_its_share_and_what_stays_is_told() -> None:
     assert sentence(diagnosis(SIGN, OFFSET, LENGTH, remainder=Remainder(0.001, 6e-6))) == (
         "module 3 (phi3) counter-rotates (99.80 %), module 1 (phi1) needs an offset of +0.1146 deg (0 %) and"
         " r_4 needs +1.2000 mm from row 4 on (0.2 %): rms 416.57 mm -> 1 mm, under 0.01 % of the mean square"
-        " stays"
+        " remains"
     )
 
 
 def test_nothing_named_is_said_with_what_it_is_taken_for() -> None:
     nothing = diagnosis(remainder=Remainder(0.41657, 1.0, "no motion of the arm explains it"))
-    assert sentence(nothing) == "no cause found: rms 416.57 mm stays (no motion of the arm explains it)"
+    assert sentence(nothing) == "no cause found: rms 416.57 mm remains (no motion of the arm explains it)"
 
 
 def test_what_is_undecided_names_both_and_what_would_decide() -> None:
@@ -136,7 +136,7 @@ def test_what_is_undecided_names_both_and_what_would_decide() -> None:
     found = diagnosis(SIGN, remainder=Remainder(1e-7, 6e-14), undecided=both)
     assert sentence(found) == (
         f"module 3 (phi3) counter-rotates and {either}: rms 416.57 mm -> 0.0001 mm, under 0.01 % of the mean"
-        " square stays"
+        " square remains"
     )
     alone = diagnosis(remainder=Remainder(0.2, 0.23), undecided=both)
     assert sentence(alone) == f"{either}: rms 416.57 mm -> 200 mm"

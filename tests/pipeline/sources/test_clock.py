@@ -227,9 +227,9 @@ def test_a_coarse_clock_is_rebuilt_and_that_is_said(read: Read) -> None:
     log = read(clocked("t [s]", *map(str, stamps)), unit={"": "deg"})
     assert log.period == pytest.approx(0.05, rel=1e-9)
     assert (np.abs(log.t + log.clock_start - stamps) <= 1.0).all()
-    said = "times in steps of 1 s stand in 20 rows each"
+    said = "times in steps of 1 s cover 20 rows each"
     assert [(w.kind, w.message) for w in log.warnings if w.kind == "clock-rebuilt"] == [
-        ("clock-rebuilt", f"{said}: a regular clock of 0.05 s is taken in their place")
+        ("clock-rebuilt", f"{said}: a regular clock of 0.05 s is used instead")
     ]
     assert [(i.value, i.evidence) for i in log.inferences if i.what == "clock"] == [
         ("rebuilt with a period of 0.05 s", said)
@@ -246,8 +246,8 @@ def test_a_coarse_time_of_day_goes_over_midnight(read: Read) -> None:
 def test_irregular_repeats_are_one_error(wrong: Wrong) -> None:
     rows = [0, 0, 0, 1, 1, 1, 1, 1, 1, 2, 3, 3, 3, 3]
     assert wrong(clocked("t [s]", *map(str, rows))) == [
-        "log.csv:3, column t [s]: found 0 s again, as 10 of 14 rows repeat a time: too coarse for a"
-        f" clock to be rebuilt, {INCREASE}; period=SECONDS sets the time between rows then"
+        "log.csv:3, column t [s]: found 0 s again, as 10 of 14 rows repeat a time: too coarse to"
+        f" rebuild a clock, {INCREASE}; period=SECONDS sets the time between rows then"
     ]
 
 

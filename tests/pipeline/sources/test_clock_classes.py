@@ -271,7 +271,8 @@ def test_a_stamp_of_a_chunk_is_spread_over_its_rows(
     log = read(table([seconds(chunked(COUNTS, first=first) + start)], names=names))
     np.testing.assert_allclose(np.diff(log.t_ns), 4 * MS, atol=1000)  # written in us
     (warning,) = (one for one in log.warnings if one.kind == "clock-spread")
-    assert f"that of the {'first' if first else 'last'} of its rows (the number of rows" in warning.message
+    end = "first" if first else "last"
+    assert f"assigned to the {end} of its rows (the number of rows" in warning.message
     assert [hint.parameter for hint in warning.hints] == ["time", "time", "period"]
 
 

@@ -204,7 +204,7 @@ def test_rows_on_end_that_are_wrong_alike_are_one_finding(wrong: Wrong) -> None:
         ("t,q1", "found 2 names over rows of 3 cells, allowed: one name per column; add 1 name"),
         (
             "t,q1,q2,q3,q4",
-            "found 5 names over rows of 3 cells, allowed: one name per column; take out 2 names",
+            "found 5 names over rows of 3 cells, allowed: one name per column; remove 2 names",
         ),
     ],
 )

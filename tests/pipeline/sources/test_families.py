@@ -121,7 +121,7 @@ def test_a_row_a_joint_is_told_with_the_command_that_makes_a_row_a_sample(
     names = ("shoulder", "elbow", "wrist")
     rows = [f"{t!r}{sign}{name}{sign}{t + k!r}" for t in T.tolist() for k, name in enumerate(names)]
     path = write("\n".join([f"time{sign}joint{sign}position", *rows]))
-    with pytest.raises(LogError, match="found a row a joint: joint goes round 3 names") as refused:
+    with pytest.raises(LogError, match="found one row per joint: joint goes round 3 names") as refused:
         read_log([path])
     command = refused.value.findings[0].hints[0].does
     monkeypatch.chdir(tmp_path)

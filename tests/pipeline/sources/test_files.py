@@ -105,7 +105,7 @@ def test_signs_that_are_none(wrong: Wrong) -> None:
 
 def test_signs_that_the_file_does_not_have(wrong: Wrong) -> None:
     found = "log.csv:1: found 't,q1,q2' and no row of numbers below it"
-    allowed = "a table with a row a sample"
+    allowed = "a table with one row per sample"
     text = "t,q1,q2\n0,1,2\n1,1,2\n"
     assert wrong(text, delimiter=";") == [f"{found} with delimiter semicolon, allowed: {allowed}"]
     assert wrong(text, delimiter="Tab", decimal="comma") == [

@@ -232,8 +232,8 @@ def test_names_that_stand_twice(wrong: Wrong) -> None:
         " their numbers"
     ]
     assert wrong(table(["t", "q1 [deg]", "q1 [rad]"])) == [
-        "log.csv:1, column q1 [deg]: found as columns 2, 3, allowed: once; joints=[A, B, C] says"
-        " which: give their numbers"
+        "log.csv:1, column q1 [deg]: found as columns 2, 3, allowed: once; joints=[A, B, C] selects"
+        " them: give their numbers"
     ]
 
 

@@ -279,7 +279,7 @@ def test_times_that_were_rebuilt_and_rows_that_were_left_out_are_said(tmp_path: 
     rebuilt = urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "a.csv", rows="file")
     assert [warning.message for warning in rebuilt.warnings] == [
         "the file's own times, which were not kept: times in steps of 1 s stand in 10 rows each: a regular"
-        " clock of 0.1 s is taken in their place"
+        " clock of 0.1 s is used instead"
     ]
     bad = [f"{k * 0.1:.1f},{'oops' if k == 50 else k * 0.001}" for k in range(200)]
     (tmp_path / "bad.csv").write_text("\n".join(["t [s],q1 [rad]", *bad]) + "\n")
