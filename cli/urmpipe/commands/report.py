@@ -11,7 +11,7 @@ import urmpipe
 from urmpipe.options.completion import folders
 from urmpipe.options.given import options_given
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.types import RECORDING, NamesType, NumberType, OneOf, WholeType
+from urmpipe.options.types import RECORDING, NamesType, NumberType, WholeType
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.messages import Hint
 
