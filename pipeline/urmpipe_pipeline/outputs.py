@@ -185,8 +185,8 @@ def _taken(path: Path, kind: OutputKind, noun: str) -> str | None:
         return "found a file, allowed: a new name"
     if path.is_file() and _is_ours(path, kind):
         return None
-    such = f"such {'an' if kind in ('audit', 'export', 'fmu') else 'a'} {noun}"
-    return f"found a file that is not a {noun} of urmpipe, allowed: a new name, or {such} to replace"
+    one = f"{'an' if kind in ('audit', 'export', 'fmu') else 'a'} {noun}"
+    return f"found a file that is not {one} of urmpipe, allowed: a new name, or such {one} to replace"
 
 
 def _is_of_another_kind(path: Path, kind: OutputKind) -> bool:

@@ -67,8 +67,8 @@ def test_an_audit_replaces_only_an_audit(urmpipe: RunCommand, log: Path, tmp_pat
     refused = urmpipe("ingest", log, "--audit", "audit.csv", "-q")
     assert refused.code == 2
     assert refused.err == (
-        "error: audit.csv: found a file that is no audit of urmpipe's, allowed: a new name, or such an audit"
-        " to replace\n"
+        "error: audit.csv: found a file that is not an audit of urmpipe, allowed: a new name, or such an"
+        " audit to replace\n"
     )
     assert target.read_text() == "my notes\n"
     assert not (tmp_path / "log.rrd").exists()

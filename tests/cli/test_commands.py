@@ -223,10 +223,10 @@ def test_the_demo_goes_the_whole_way(urmpipe: RunCommand, tmp_path: Path) -> Non
     assert (folder / "report.html").stat().st_size < 15e6
     again = urmpipe("demo")
     assert again.code == 0
-    assert again.out.startswith("Four logs of one motion: three should pass; the fourth, ")
+    assert again.out.startswith("Four logs of one motion. Three should pass. ")
     *_, as_expected, more, first, second, third, fourth, logs, report, recording = again.out.splitlines()
-    assert as_expected.startswith("The verdicts are as they should be: ")
-    assert more == "the counter-rotating module does not. Why each deviates:"
+    assert as_expected.startswith("All verdicts are as expected: ")
+    assert more == "counter-rotating module does not. Why each log deviates:"
     assert [one.split(":")[0].strip() for one in (first, second, third)] == [
         "coppeliasim",
         "matlab",

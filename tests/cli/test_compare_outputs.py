@@ -119,8 +119,6 @@ def test_options_complete_in_the_shell() -> None:
     shell = ShellComplete(cli, {}, "urmpipe", "_URMPIPE_COMPLETE")
     for option in ("--junit", "--csv", "--baseline", "--noise", "--tolerance"):
         assert [item.value for item in shell.get_completions(["compare"], option)] == [option]
-    for option in ("--junit", "--csv", "--baseline"):
-        assert [item.type for item in shell.get_completions(["compare", option], "")] == ["file"]
 
 
 def test_a_verdict_of_fail_writes_all_and_bad_input_nothing_but_its_error(

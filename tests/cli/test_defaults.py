@@ -148,7 +148,7 @@ def test_a_map_replaces_only_a_map(lab: Path, capsys: Captured) -> None:
     assert capsys.readouterr().err == said
     Path("notes.toml").write_text("mine = 1\n")
     assert run([*INGEST, "-q", "--write-map", "notes.toml"]) == 2
-    assert "found a file that is no map of urmpipe's" in capsys.readouterr().err
+    assert "found a file that is not a map of urmpipe" in capsys.readouterr().err
     assert Path("notes.toml").read_text() == "mine = 1\n"
     for _ in range(2):
         assert run([*INGEST, "-q", "--write-map", "m.toml"]) == 0
@@ -216,7 +216,10 @@ def test_options_of_logs_are_refused_with_recordings_alone(lab: Path, capsys: Ca
     )
     mixed = ["compare", "log.rrd", "log.csv", "--robot", "ur5e", "--unit", "deg", "--joints", "a,b,c,d,e,f"]
     assert run(mixed) == 0
-    assert "note: --joints, --unit of the logs alone: log.rrd as ingested\n" in capsys.readouterr().err
+    assert (
+        "note: --joints, --unit applied to the logs only: log.rrd used as ingested\n"
+        in capsys.readouterr().err
+    )
     (lab / "urmpipe.toml").write_text("unit = 'deg'\n")
     assert run(["compare", "log.rrd", "log.rrd", "-q"]) == 0
 

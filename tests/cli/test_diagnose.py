@@ -117,8 +117,8 @@ def test_junit_has_the_answer_as_a_property() -> None:
         ),
         (
             [PATH, RIGHT, WRONG, *ARM],
-            f"found {WRONG} besides the rest, allowed: urmpipe diagnose [OPTIONS] REFERENCE [LOG]; a robot is"
-            " named with --robot",
+            f"found {WRONG} besides the rest, allowed: urmpipe diagnose [OPTIONS] REFERENCE [LOG]; --robot"
+            " sets a robot",
         ),
         (
             [PATH, RIGHT, *ARM, "--align", "rigid"],

@@ -57,8 +57,7 @@ def test_without_a_name_the_log_beside_is_left_alone(
     again = urmpipe("export", "log.rrd", "--to", "csv")
     assert (again.code, again.out) == (2, "")
     assert again.err == (
-        "error: log-grid.csv: found a file, allowed: a new name;"
-        " nothing in a CSV tells whose it is, so none is replaced\n"
+        "error: log-grid.csv: found a file, allowed: a new name; an existing CSV file is never replaced\n"
     )
     assert urmpipe("export", "log.rrd", "-o", "log.csv").code == 2
     assert (tmp_path / "log.csv").read_text() == LOG

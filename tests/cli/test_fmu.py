@@ -86,7 +86,7 @@ def test_an_fmu_of_ours_is_replaced_and_another_never(urmpipe: RunCommand, meter
             target.writestr(name, text.replace(b'"urmpipe', b'"Dymola') if described else text)
     shutil.copy(foreign, meter)
     ran = urmpipe("fmu", "build", "delta_meter", "--backend", "python")
-    said = "found a file that is no FMU of urmpipe's, allowed: a new name, or such an FMU to replace"
+    said = "found a file that is not an FMU of urmpipe, allowed: a new name, or such an FMU to replace"
     assert (ran.code, ran.err) == (2, f"error: delta_meter.fmu: {said}\n")
     assert meter.read_bytes() == foreign.read_bytes()
 
@@ -97,7 +97,7 @@ def test_an_output_is_never_an_input(tmp_path: Path) -> None:
     with pytest.raises(UrmpipeError, match="found no folder, allowed: a folder that exists, or a name that"):
         build_fmu(unit, output=unit)
     shutil.copy(unit, tmp_path / "spring.fmu")
-    with pytest.raises(UrmpipeError, match="found a file that is no FMU of urmpipe's"):
+    with pytest.raises(UrmpipeError, match="found a file that is not an FMU of urmpipe"):
         build_fmu(unit, output=tmp_path)
     assert unit.read_text(encoding="utf-8") == example()
 

@@ -37,8 +37,8 @@ def test_samples_off_the_points_stay_where_they_are_and_are_told() -> None:
     said = between_samples("log", met, 0.005, 9)
     assert said is not None
     assert said.message == (
-        "block log: 1 of 4 communication points lie between samples of the log, where the one before is held,"
-        " 2.5 ms at most: a deviation there is none of the log's"
+        "block log: 1 of 4 communication points lie between samples of the log, where the previous"
+        " sample is held for at most 2.5 ms: deviations there are not those of the log"
     )
 
 

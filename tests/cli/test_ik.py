@@ -286,7 +286,7 @@ def test_an_output_that_is_not_ours_or_is_an_input_is_never_replaced(capsys: Cap
     (folder / "mine.csv").write_text("precious\n")
     assert run(["ik", "targets.csv", "--robot", "arm6", "-o", "mine.csv"]) == 2
     assert capsys.readouterr().err == (
-        "error: mine.csv: found a file that is no joint log of urmpipe's, allowed: a new name, or such a"
+        "error: mine.csv: found a file that is not a joint log of urmpipe, allowed: a new name, or such a"
         " joint log to replace\n"
     )
     assert (folder / "mine.csv").read_text() == "precious\n"

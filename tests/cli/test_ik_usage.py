@@ -233,6 +233,6 @@ def test_errors_as_json(capsys: Captured) -> None:
 
 def test_a_robot_among_the_operands_is_told_by_its_option(capsys: Captured) -> None:
     assert refused(capsys, "arm6", "targets.csv") == [
-        "error: found targets.csv besides the rest, allowed: urmpipe ik [OPTIONS] TARGETS|PATH; a robot is"
-        " named with --robot"
+        "error: found targets.csv besides the rest, allowed: urmpipe ik [OPTIONS] TARGETS|PATH; --robot"
+        " sets a robot"
     ]

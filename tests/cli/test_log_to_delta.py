@@ -77,8 +77,8 @@ def test_a_step_between_the_samples_of_a_log_is_told(slow_motion: dict[str, str]
     result = simulate("log-to-delta", arguments=slow_motion, step=0.005)
     assert [(one.kind, one.message) for one in result.warnings] == [(
         "held",
-        "block log: 99 of 199 communication points lie between samples of the log, where the one before is"
-        " held, 5 ms at most: a deviation there is none of the log's",
+        "block log: 99 of 199 communication points lie between samples of the log, where the previous"
+        " sample is held for at most 5 ms: deviations there are not those of the log",
     )]  # fmt: skip
 
 

@@ -220,7 +220,7 @@ def test_an_input_and_a_foreign_file_are_not_replaced(urmpipe: Run, tmp_path: Pa
     (tmp_path / "mine.toml").write_text(PARALLEL)
     (tmp_path / "mine.svg").write_text("<svg/>")
     for arguments, said in (
-        (("--draw", "mine.svg"), "mine.svg: found a file that is no drawing of urmpipe's"),
+        (("--draw", "mine.svg"), "mine.svg: found a file that is not a drawing of urmpipe"),
         (("-o", "mine.toml"), "mine.toml: found an input of this command"),
         (("-o", "mine.csv"), "mine.csv: found a name that does not fit a recording"),
     ):

@@ -245,7 +245,7 @@ def test_a_csv_is_replaced_by_another_plan_alone(urmpipe: RunCommand, folder: Pa
     for arguments, said in (
         (
             (CUBE, "-o", "path.csv"),
-            "a file that is no plan of urmpipe's, allowed: a new name, or such a plan to replace",
+            "a file that is not a plan of urmpipe, allowed: a new name, or such a plan to replace",
         ),
         (
             ("path.csv", "-o", "path.csv"),

@@ -100,9 +100,9 @@ def test_a_recording_gives_the_run_that_it_holds(run: Run, tmp_path: Path) -> No
 def test_options_of_reading_are_refused_with_a_recording(run: Run, urmpipe: Callable[..., Any]) -> None:
     import urmpipe as api
 
-    found = "found with an ingested log, allowed: with a log; a run or a recording stands as"
+    found = "found with an ingested log, allowed: with a log; a run or a recording is used"
     assert refusal(OptionError, api.ingest, run.recording, unit="deg", tsp=0.01).splitlines() == [
-        f"unit: {found} `ingest` made it", f"tsp: {found} `ingest` made it",
+        f"unit: {found} as ingested", f"tsp: {found} as ingested",
     ]  # fmt: skip
     ran = urmpipe("ingest", there(run.recording), "--unit", "deg")
     assert ran.code == 2

@@ -147,7 +147,7 @@ def test_an_fmu_that_fails_leaves_what_was_recorded(
     result = json.loads(ran.out)
     assert ran.code == 2
     assert result["failed"].startswith("block lag: fmi2DoStep at t = 0.1 s: ")
-    assert f"error: {result['failed']}; what was recorded until then is in following.rrd" in ran.err
+    assert f"error: {result['failed']}; the samples until then are in following.rrd" in ran.err
     assert (result["samples"], result["verdict"]) == (11, "fail")
     assert (tmp_path / "following.rrd").exists()
 
@@ -211,9 +211,7 @@ def test_a_verdict_of_few_samples_says_so(urmpipe: RunCommand, tmp_path: Path) -
     (tmp_path / "few.toml").write_text(f"[system]\nduration = 0.1\nrecord_every = 3\n{meter}")
     ran = urmpipe("simulate", "few.toml")
     assert ran.code == 0
-    said = (
-        "warning: block m: the verdict is that of one communication point of 3, as system.record_every says"
-    )
+    said = "warning: block m: the verdict covers one communication point in 3 (system.record_every)"
     assert said in ran.err.splitlines()
 
 

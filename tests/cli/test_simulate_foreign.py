@@ -79,7 +79,7 @@ def test_an_fmu_that_ends_the_process_fails_the_run(
     ran = urmpipe(*write(tmp_path, {"bad": ends}, {ACTUAL: "bad.y"}), "--json")
     failed = f"block bad: {where}: ended the process with the exit code 0; it logged nothing"
     assert ran.code == 2
-    assert errors(ran.err) == [f"error: {failed}; what was recorded until then is in system.rrd"]
+    assert errors(ran.err) == [f"error: {failed}; the samples until then are in system.rrd"]
     told = json.loads(ran.out)
     assert (told["failed"], told["samples"], told["verdict"]) == (failed, samples, "fail")
     assert recorded(tmp_path).failed == failed
@@ -93,7 +93,7 @@ def test_a_meter_of_a_run_that_ended_early_does_not_pass(
     ran = urmpipe(*write(tmp_path, {"bad": ends}, {ACTUAL: "bad.y"}), "--json")
     (verdict,) = json.loads(ran.out)["verdicts"]
     assert (verdict["verdict"], verdict["out_of_tolerance"]) == ("fail", 0)
-    assert verdict["doubts"] == ["the run ended at t = 0.3 s of 1 s"]
+    assert verdict["doubts"] == ["the run ended at t = 0.3 s instead of 1 s"]
     assert ran.code == (1 if stops is STOPS else 2)
 
 
@@ -102,7 +102,7 @@ def test_a_call_that_does_not_return_fails_the_run(urmpipe: RunCommand, tmp_path
     ran = urmpipe(*write(tmp_path, {"bad": hangs}, {ACTUAL: "bad.y"}), "--timeout", "2s", "--json")
     failed = "block bad: fmi2DoStep at t = 0.3 s: did not return within 2 s; it logged nothing"
     assert ran.code == 2
-    assert errors(ran.err) == [f"error: {failed}; what was recorded until then is in system.rrd"]
+    assert errors(ran.err) == [f"error: {failed}; the samples until then are in system.rrd"]
     assert json.loads(ran.out)["samples"] == 4
     assert recorded(tmp_path).failed == failed
 
@@ -157,10 +157,10 @@ def test_a_meter_that_is_given_what_is_not_finite_fails_the_run(urmpipe: RunComm
     ran = urmpipe(*write(tmp_path, {"a": GLITCH}, {ACTUAL: "a.y[2]"}, every=10))
     assert ran.code == 2
     assert errors(ran.err) == [
-        "warning: block m: the verdict is that of one communication point of 10, as system.record_every says",
+        "warning: block m: the verdict covers one communication point in 10 (system.record_every)",
         "warning: a: y: found nan at t = 0.2 s; values that are not finite: 2",
         "error: block m: fmi2SetReal at t = 0.2 s: returned fmi2Error; its last lines: fmi2Error: unit"
-        " delta_meter: actual[1]: found nan, allowed: a finite number; what was recorded until then is in"
+        " delta_meter: actual[1]: found nan, allowed: a finite number; the samples until then are in"
         " system.rrd",
     ]
 

@@ -84,7 +84,7 @@ def test_a_report_of_ours_is_replaced(tmp_path: Path) -> None:
 def test_a_file_that_is_no_report_of_ours_is_not_replaced(tmp_path: Path, text: str) -> None:
     path = tmp_path / "page.html"
     path.write_text(text)
-    wanted = "found a file that is no report of urmpipe's, allowed: a new name, or such a report to replace"
+    wanted = "found a file that is not a report of urmpipe, allowed: a new name, or such a report to replace"
     assert refusal(path) == wanted
 
 
@@ -92,7 +92,7 @@ def test_an_output_of_the_other_kind_is_not_replaced(tmp_path: Path) -> None:
     path = tmp_path / "report.rrd"
     path.write_text(REPORT)
     wanted = (
-        "found a file that is no recording of urmpipe's, allowed: a new name, or such a recording to replace"
+        "found a file that is not a recording of urmpipe, allowed: a new name, or such a recording to replace"
     )
     assert refusal(path, kind="recording") == wanted
 
@@ -101,14 +101,16 @@ def test_a_broken_recording_is_not_replaced(tmp_path: Path) -> None:
     path = tmp_path / "run.rrd"
     path.write_bytes(b"RRF2" + bytes(100))
     wanted = (
-        "found a file that is no recording of urmpipe's, allowed: a new name, or such a recording to replace"
+        "found a file that is not a recording of urmpipe, allowed: a new name, or such a recording to replace"
     )
     assert refusal(path, kind="recording") == wanted
 
 
 def test_an_output_that_is_no_export_of_ours_is_not_replaced(tmp_path: Path) -> None:
     path = tmp_path / "run.tum"
-    wanted = "found a file that is no export of urmpipe's, allowed: a new name, or such an export to replace"
+    wanted = (
+        "found a file that is not an export of urmpipe, allowed: a new name, or such an export to replace"
+    )
     path.write_text(REPORT)
     assert refusal(path, kind="export") == wanted
     path.write_text("# urmpipe export: t x y z\n")
@@ -192,7 +194,7 @@ def test_an_input_is_not_replaced_through_a_link(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not Path("/dev/null").exists(), reason="there is no /dev/null here")
 def test_a_device_is_not_replaced() -> None:
-    wanted = "found a file that is no report of urmpipe's, allowed: a new name, or such a report to replace"
+    wanted = "found a file that is not a report of urmpipe, allowed: a new name, or such a report to replace"
     assert refusal(Path("/dev/null")) == wanted
 
 
@@ -275,7 +277,7 @@ def test_an_fmu_of_another_tool_is_not_replaced(tmp_path: Path, description: str
     path = tmp_path / "chain.fmu"
     write_fmu(path, description)
     assert refusal(path, kind="fmu") == (
-        "found a file that is no FMU of urmpipe's, allowed: a new name, or such an FMU to replace"
+        "found a file that is not an FMU of urmpipe, allowed: a new name, or such an FMU to replace"
     )
 
 
@@ -285,7 +287,7 @@ def test_an_fmu_that_cannot_be_read_is_not_replaced(tmp_path: Path) -> None:
     whole = path.read_bytes()
     for broken in (b"", b"no archive", whole[: len(whole) // 2], whole.replace(b"\x08\x00", b"\x63\x00")):
         path.write_bytes(broken)
-        assert "found a file that is no FMU of urmpipe's" in refusal(path, kind="fmu")
+        assert "found a file that is not an FMU of urmpipe" in refusal(path, kind="fmu")
 
 
 def test_a_drawing_of_ours_is_replaced_and_another_is_not(tmp_path: Path) -> None:
@@ -294,5 +296,5 @@ def test_a_drawing_of_ours_is_replaced_and_another_is_not(tmp_path: Path) -> Non
     write(path, kind="drawing")
     path.write_text("<svg/>")
     assert refusal(path, kind="drawing") == (
-        "found a file that is no drawing of urmpipe's, allowed: a new name, or such a drawing to replace"
+        "found a file that is not a drawing of urmpipe, allowed: a new name, or such a drawing to replace"
     )

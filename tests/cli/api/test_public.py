@@ -56,9 +56,9 @@ def test_what_cannot_be_applied_to_a_run_is_refused(folder: Path, run: urmpipe.R
     with pytest.raises(urmpipe.OptionError) as error:
         urmpipe.compare(run, run, time="none", tsp=0.01, derivative="savgol")
     assert str(error.value) == (
-        "time: found with an ingested log, allowed: with a log; a run or a recording stands"
-        " as `ingest` made it\ntsp: found with an ingested log, allowed: with a log; a run or"
-        " a recording stands as `ingest` made it\nderivative: found with an ingested log,"
+        "time: found with an ingested log, allowed: with a log; a run or a recording is"
+        " used as ingested\ntsp: found with an ingested log, allowed: with a log; a run or"
+        " a recording is used as ingested\nderivative: found with an ingested log,"
         " allowed: with a log; a run or a recording is used as ingested"
     )
     with pytest.raises(urmpipe.UrmpipeError, match="allowed: 7"):

@@ -150,14 +150,14 @@ def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told(ar
     for away, shown, cause in ((0.00104, "1.0400", usual), (0.0051, "5.1000", more)):
         beside = replace(run, log=replace(run.log, tcp_position=run.tcp.position + np.array((0, 0, away))))
         assert next(recorded_apart([beside], 1e-3)).message == (
-            f"by its joints it is up to {shown} mm from the tool centre point it recorded, {cause};"
-            " this verdict does not judge it, a comparison of bad alone does"
+            f"its kinematics are up to {shown} mm from its recorded tool centre point, {cause};"
+            " this verdict does not include that; a comparison of bad alone does"
         )
     assert list(recorded_apart([run], 1e-3)) == []
     (both,) = recorded_apart([beside, replace(beside, name="worse")], 1e-3)
     assert both.message == (
-        "by their joints bad is up to 5.1000 mm and worse is up to 5.1000 mm from the tool centre points that"
-        f" they recorded, {more}; this verdict does not include that; a comparison of each alone does"
+        "by forward kinematics bad is up to 5.1000 mm and worse is up to 5.1000 mm from the recorded tool"
+        f" centre points, {more}; this verdict does not include that; a comparison of each alone does"
     )
 
 

@@ -220,6 +220,6 @@ def test_a_junit_file_of_ours_is_replaced_and_no_other(paths: Compared, tmp_path
         written(paths({"a": off(0.0, 5)}), path)
     path.write_text('<?xml version="1.0" encoding="UTF-8"?>\n<testsuites/>\n')
     assert refusal(OutputError, written, paths({"a": off(0.0, 5)}), path) == (
-        f"{path}: found a file that is no JUnit file of urmpipe's, allowed: a new name,"
+        f"{path}: found a file that is not a JUnit file of urmpipe, allowed: a new name,"
         " or such a JUnit file to replace"
     )

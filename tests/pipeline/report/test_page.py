@@ -271,7 +271,7 @@ def test_writing_replaces_a_report_of_ours_and_nothing_else(bare_run: Run, tmp_p
         write_report([present(bare_run)], path, [path])
     foreign = tmp_path / "mine.html"
     foreign.write_text("<html></html>")
-    with pytest.raises(OutputError, match="found a file that is no report of urmpipe's"):
+    with pytest.raises(OutputError, match="found a file that is not a report of urmpipe"):
         write_report([present(bare_run)], foreign)
     assert foreign.read_text() == "<html></html>"
     assert {file.name for file in tmp_path.iterdir()} == {"report.html", "mine.html"}

@@ -150,7 +150,7 @@ def test_only_a_joint_log_of_ours_is_replaced_and_never_an_input(tmp_path: Path)
     with pytest.raises(OutputError) as caught:
         write(path, robot, motion(5, 6), times(5))
     said = (
-        "found a file that is no joint log of urmpipe's, allowed: a new name, or such a joint log to replace"
+        "found a file that is not a joint log of urmpipe, allowed: a new name, or such a joint log to replace"
     )
     assert [finding.message for finding in caught.value.findings] == [said]
     assert path.read_text(encoding="utf-8") == "t (s),phi1 (rad)\n0,0.1\n"

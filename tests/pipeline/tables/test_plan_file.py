@@ -91,10 +91,10 @@ def test_only_a_plan_is_replaced_by_a_plan_and_a_joint_log_by_a_joint_log(tmp_pa
     with guarded_output(other, [], "joints") as part:
         write_joint_log(part, other, joints=["q1"], units=["rad"], q=np.zeros((2, 1)), row=np.array([1, 2]))
     assert other.read_text(encoding="utf-8").startswith(f"q1 (rad),{TARGET_ROW}\n")
-    with pytest.raises(OutputError, match="found a file that is no plan of urmpipe's, allowed: a new name"):
+    with pytest.raises(OutputError, match="found a file that is not a plan of urmpipe, allowed: a new name"):
         planned("sliding", other)
     with (
-        pytest.raises(OutputError, match="found a file that is no joint log of urmpipe's"),
+        pytest.raises(OutputError, match="found a file that is not a joint log of urmpipe"),
         guarded_output(path, [], "joints"),
     ):
         pass

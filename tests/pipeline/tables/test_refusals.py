@@ -103,7 +103,7 @@ def test_an_export_of_ours_is_replaced_and_nothing_else(run: Run, tmp_path: Path
         path.write_bytes(foreign)
         work = lambda: export_result(run, path, ExportOptions(to))  # noqa: E731
         assert said(OutputError, work) == (
-            "found a file that is no export of urmpipe's, allowed: a new name, or such an export to replace"
+            "found a file that is not an export of urmpipe, allowed: a new name, or such an export to replace"
         )
         assert path.read_bytes() == foreign
 
