@@ -11,6 +11,7 @@ the page complain of is printed, and the exit code is 1 then.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import subprocess
 import sys
@@ -89,6 +90,7 @@ def of_readme() -> list[str]:
             *of_page(demo / "report.html", HERE / "report.png", 1280),
             *of_recording(drives, HERE / "driven-arm.png", 0.5),
             *of_branches(Path(folder), HERE / "ik.png"),
+            *of_tutorial(Path(folder)),
         ]
 
 
@@ -99,6 +101,18 @@ def of_branches(folder: Path, target: Path, settle: float = SETTLE) -> list[str]
     solved = ["ik", str(pose), "--robot", "arm6", "--all", "-q", "-o", str(branches)]
     subprocess.run([sys.executable, "-m", "urmpipe", *solved], check=True)
     return of_recording(branches, target, 0.0, settle)
+
+
+def of_tutorial(folder: Path) -> list[str]:
+    """Do what docs/tutorial.md tells in a folder, and picture what it opens; return complaints."""
+    from write_tutorial import PAGE, steps
+
+    with contextlib.chdir(folder):
+        list(steps(PAGE.read_text(encoding="utf-8"), folder))
+    return [
+        *of_recording(folder / "counter_rotating-against-path.rrd", HERE / "tutorial-failed.png", None),
+        *of_page(folder / "report.html", HERE / "tutorial-report.png", 1280),
+    ]
 
 
 def main() -> None:

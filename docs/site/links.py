@@ -1,13 +1,12 @@
 """Hooks of mkdocs: files beside docs/ that pages link to, as files of the site.
 
-In the site, docs/ is the root. A file elsewhere in the repository keeps its path, README.md is the first page, and
-a folder is a list of its pages. So a link that leads somewhere in the repository leads there in the site.
+In the site, docs/ is the root. A file elsewhere in the repository keeps its path, README.md is the first page,
+and a folder is a list of its pages. So a link works in the repository and in the site.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from functools import cache
 from os.path import relpath
 from pathlib import Path, PurePosixPath

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 import shlex
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
 import click
 import pytest
 
-from pages import DOCS, command_lines, commands_in_text, pages, text_of
+from pages import DOCS, command_lines, commands_in_text, pages, script, text_of
 from urmpipe.defaults import EACH_TIME
 from urmpipe.main import cli
 from urmpipe_fmus.cosim import system_names
@@ -27,11 +26,7 @@ OF_OTHERS = {"--start-values", "--debug-logging", "--no-arr", "--truncate-length
 @pytest.fixture(scope="module")
 def writer() -> Any:
     """The script that writes the page."""
-    spec = spec_from_file_location("write_commands", DOCS / "write_commands.py")
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return script(DOCS / "write_commands.py")
 
 
 def test_the_page_is_what_its_script_writes(writer: Any) -> None:

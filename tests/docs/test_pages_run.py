@@ -19,8 +19,8 @@ ELSEWHERE = {
 HEAVY = ("urmpipe fmu build", "urmpipe simulate", "urmpipe accuracy")
 """What compiles, and so is slow."""
 
-WRITTEN_BY_A_SCRIPT = "docs/commands.md"
-"""Examples of --help, with files of all kinds; tests/docs/test_commands_page.py holds their options."""
+WRITTEN_BY_A_SCRIPT = ("docs/commands.md", "docs/tutorial.md")
+"""Held by test_commands_page.py (examples of --help, with files of all kinds) and test_tutorial.py."""
 
 
 def shown(page: str, *, heavy: bool) -> list[str]:
@@ -34,7 +34,7 @@ def shown(page: str, *, heavy: bool) -> list[str]:
 
 def cases() -> list[object]:
     """Return each page with its quick and with its slow commands."""
-    named = [page for page in pages() if page != WRITTEN_BY_A_SCRIPT]
+    named = [page for page in pages() if page not in WRITTEN_BY_A_SCRIPT]
     return [
         pytest.param(page, heavy, id=f"{page}{', slow' * heavy}", marks=[pytest.mark.slow] * heavy)
         for page in named

@@ -19,6 +19,8 @@ SIZES = {
     "ik.png": (1920, 1080),
     "recording.png": (1920, 1080),
     "report.png": (1280, 1000),
+    "tutorial-failed.png": (1920, 1080),
+    "tutorial-report.png": (1280, 1000),
 }
 """Width and height in [px]."""
 

@@ -8,7 +8,9 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,6 +30,15 @@ DOCS = ROOT / "docs"
 def text_of(page: str) -> str:
     """Return the text of a page, named from the root of the checkout."""
     return (ROOT / page).read_text(encoding="utf-8")
+
+
+def script(path: Path) -> Any:
+    """Return a script of docs/ as a module."""
+    spec = spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def pages() -> list[str]:
