@@ -1,7 +1,7 @@
 """Hooks of mkdocs: files beside docs/ that pages link to, as files of the site.
 
-In the site, docs/ is the root. A file elsewhere in the repository keeps its path, README.md is the first page,
-and a folder is a list of its pages. So a link works in the repository and in the site.
+In the site, docs/ is the root. A file elsewhere in the repository keeps its path, README.md is the first
+page, and a folder is a list of its pages. So a link works in the repository and in the site.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A hook of mkdocs: notebooks run when the site is built, and become pages like the others.
 
-The repository keeps them without outputs: each output comes from the code of the same build, and a change of a
-notebook reads as text. A cell that fails ends the build.
+The repository keeps them without outputs: each output comes from the code of the same build, and a change of
+a notebook reads as text. A cell that fails ends the build.
 """
 
 from __future__ import annotations
