@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import runpy
 import subprocess
 import sys
 import tempfile
@@ -105,10 +106,9 @@ def of_branches(folder: Path, target: Path, settle: float = SETTLE) -> list[str]
 
 def of_tutorial(folder: Path) -> list[str]:
     """Do what docs/tutorial.md tells in a folder, and picture what it opens; return complaints."""
-    from write_tutorial import PAGE, steps
-
+    tutorial = runpy.run_path(str(HERE.parent / "write_tutorial.py"))
     with contextlib.chdir(folder):
-        list(steps(PAGE.read_text(encoding="utf-8"), folder))
+        list(tutorial["steps"](tutorial["PAGE"].read_text(encoding="utf-8"), folder))
     return [
         *of_recording(folder / "counter_rotating-against-path.rrd", HERE / "tutorial-failed.png", None),
         *of_page(folder / "report.html", HERE / "tutorial-report.png", 1280),

@@ -19,8 +19,10 @@ FENCED = re.compile(r"^( *)```(\w*)\n(.*?)^ *```$", re.DOTALL | re.MULTILINE)
 
 
 def same_width(content: str) -> None:
-    """Refuse a CSV whose rows differ in their number of cells."""
-    assert len({len(row) for row in csv.reader(content.splitlines())}) == 1
+    """Refuse a CSV whose rows differ in their number of cells; a semicolon in its header is its delimiter."""
+    lines = content.splitlines()
+    rows = csv.reader(lines, delimiter=";" if ";" in lines[0] else ",")
+    assert len({len(row) for row in rows}) == 1
 
 
 CHECKS: dict[str, Callable[[str], object]] = {

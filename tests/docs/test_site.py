@@ -1,4 +1,4 @@
-"""The site builds without a warning, every link in it has a target, and no page loads anything from a network."""
+"""The site builds without a warning, its links have targets, and no page loads anything from a network."""
 
 from __future__ import annotations
 
