@@ -15,10 +15,12 @@ import pytest
 from numpy.typing import NDArray
 
 from made_plans import FAILED, SMALL, limited, planned
+from recorded import static
 from toys import eye_of
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.solids import solids_of
 from urmpipe_models.inverse.targets import Targets
-from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
+from urmpipe_models.kinematics.forward import frames_over_log
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import (
@@ -225,9 +227,9 @@ def test_a_log_without_a_robot_in_the_viewer(viewer: Any, make_run: MakeRun, tmp
 def missed(eye: Eye, points: FloatArray, colours: Sequence[str], picture: Picture) -> list[str]:
     """Return the colours that do not stand where the points with them are projected.
 
-    A joint's ball is 17 pixels wide, and up to half of it is hidden by the links that meet there: of the 169
+    A joint's cylinder is wider than that, and the links that meet there hide up to half of it: of the 169
     pixels at most 6 from its middle, 20 are of its colour. That leaves room for rounding, for smoothed edges
-    and for what hides it, not for a ball that stands beside the place.
+    and for what hides it, not for a joint that stands beside the place.
     """
     places = projected(eye, points, picture)
     return [
@@ -273,12 +275,16 @@ def test_the_arm_stands_where_its_kinematics_project_it(
     robot = run.robot
     assert robot is not None
 
+    solids = solids_of(robot, dict.fromkeys(robot.coordinates, (0.0, 0.0, 0.0, 1.0)))
+    middles = np.array([one.origin.translation for one in solids if one.colour is not None], float)
+
     def joints(q: FloatArray) -> FloatArray:
-        """Return the base and p1..p5, where the six joints are."""
-        result: FloatArray = points_over_log(robot, q)[0, :6]
+        """Return the middles of the cylinders of the six joints in [m]."""
+        position, rotation = frames_over_log(robot, q)
+        result: FloatArray = position[0, 1:7] + np.einsum("kij,kj->ki", rotation[0, 1:7], middles)
         return result
 
-    assert_stands(viewer, run, tmp_path, JOINT_COLOURS[:6], joints, (3.0, 17.0))
+    assert_stands(viewer, run, tmp_path, JOINT_COLOURS[:6], joints, (3.0, 8.5))
 
 
 def test_a_robot_of_shapes_stands_where_its_kinematics_project_it(
@@ -357,9 +363,16 @@ def test_a_plan_in_the_viewer(viewer: Any, tmp_path: Path) -> None:
 
 
 def test_a_plan_that_fails_opens_where_it_does(viewer: Any, tmp_path: Path) -> None:
-    """At the last sample before it: the arm is still there."""
+    """At the last sample before it: the arm is still there. It hides the place, not its words."""
     plan = FAILED["unreachable"]()
     path = write_recording(plan, tmp_path / "plan.rrd")
     opens = present(plan).opens_at_ns / 1e9
     picture = look(viewer, path, opens, JOINT_COLOURS[:6])
-    assert_drawn(picture, left=[*JOINT_COLOURS[:4], DEVIATION_COLOUR], right=JOINT_COLOURS[:6])
+    assert_drawn(picture, left=JOINT_COLOURS[:4], right=JOINT_COLOURS[:6])
+    scene = present(plan).scene
+    found = scene() if scene is not None else None
+    assert found is not None
+    (number,) = (k for k, spot in enumerate(found.spots) if spot.colour == DEVIATION_COLOUR)
+    assert all(spot.always for spot in found.spots)
+    words = static(path, f"/shown/scene/spot\\ {number}/label", "Points3D:labels")
+    assert words == [found.spots[number].words]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -91,8 +91,12 @@ class DrawnArm:
     def thickness(self, mark: ArmMark) -> float:
         """Return the largest radius of the round shapes on the link that ends at a mark in [m], 0 of none."""
         carrier = (None, *(joint.name for joint in self.chain.joints))[mark.point]
-        shapes = [one.shape for body in self.bodies if body.joint == carrier for one in body.visuals]
-        return max((one.radius for one in shapes if not isinstance(one, (Box, Mesh))), default=0.0)
+        return _largest_radius(body for body in self.bodies if body.joint == carrier)
+
+    @property
+    def radius(self) -> float:
+        """The largest radius of the round shapes on moving links in [m], 0 of none."""
+        return _largest_radius(body for body in self.bodies if body.joint is not None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -279,7 +283,9 @@ def extent(
     Targets that are missed by far are not: they would make the arm small.
     """
     points = [part for one in paths for part in (*one.strips, one.places, one.position) if len(part)]
-    points += [] if arm is None else [arm.skeleton.reshape(-1, 3)]
+    if arm is not None:
+        skeleton, radius = arm.skeleton.reshape(-1, 3), arm.radius
+        points += [skeleton - radius, skeleton + radius] if radius else [skeleton]
     points += [] if arrows is None else [arrows.start, arrows.end]
     if balls is not None:
         reach = balls.radius[:, np.newaxis]
@@ -356,6 +362,12 @@ def _moving(
         ends = np.union1d(ends[ends <= rows[-1]], [rows[-1] + 1])
         ends = ends[ends < len(there)]
     return Moving(t_ns, np.union1d(rows, begins) if t_ns is not None else rows, ends)
+
+
+def _largest_radius(bodies: Iterable[Body]) -> float:
+    """Return the largest radius of the round shapes of some links in [m], 0 of none."""
+    shapes = [visual.shape for body in bodies for visual in body.visuals]
+    return max((one.radius for one in shapes if not isinstance(one, (Box, Mesh))), default=0.0)
 
 
 def _near(points: FloatArray, missed: FloatArray) -> FloatArray:
