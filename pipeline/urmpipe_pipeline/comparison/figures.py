@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -73,10 +74,11 @@ def deviation_figures(one: Deviation) -> Iterator[Figure]:
     yield from _joints(one)
     if not one.statistics:
         yield from mended_figure(one)
-    yield from joints_figure(one.run, 1 if one.joint_delta is not None else None)
+    moves = [*joints_figure(one.run, 1 if one.joint_delta is not None else None)]
     if np.isfinite(one.speed).any():
-        yield speed_figure(one.name, one.t_ns, one.speed)
-    yield from motion_figure(one.run)
+        moves.append(speed_figure(one.name, one.t_ns, one.speed))
+    moves += motion_figure(one.run)
+    yield from (replace(figure, folded=True) for figure in moves)
 
 
 def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
@@ -128,6 +130,7 @@ def speed_cloud(one: Deviation) -> Iterator[Figure]:
         f"Each point is a sample. {said}",
         f"Norm of the deviation of {one.name} over the speed of its tool centre point. {said}",
         (View("‖Δ‖ over ‖v‖", (panel,)),),
+        folded=True,
     )
 
 

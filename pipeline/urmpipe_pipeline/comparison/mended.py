@@ -41,6 +41,7 @@ def mended_figure(one: Deviation) -> Iterator[Figure]:
         (View("delta mended", panels),),
         share=3.0,
         beside=True,
+        folded=True,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -165,8 +166,8 @@ def _page(one: Deviation) -> Iterator[Block]:
     """Yield what only a page shows of a compared log."""
     yield from path_figure(one)
     yield from speed_cloud(one)
-    yield from playback_figures(one.run)
-    yield from log_tables(one.run)
+    yield from (replace(figure, folded=True) for figure in playback_figures(one.run))
+    yield from (replace(table, folded=True) for table in log_tables(one.run))
 
 
 def _events(one: Deviation) -> Iterator[Event]:

@@ -158,6 +158,7 @@ class Figure:
         opened: Number of the view that the viewer opens; None: all of them, one below the other.
         share: Height of its row in the viewer relative to others; of each row if all views are open.
         beside: Whether the viewer shows its views as further tabs of the figure before it.
+        folded: Whether a page opens it only on request: it explains more than it decides.
     """
 
     title: str
@@ -168,11 +169,24 @@ class Figure:
     opened: int | None = 0
     share: float = 1.0
     beside: bool = False
+    folded: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SpaceFigure:
-    """Paths and solids in space on a page, with equal scale on all axes; the viewer has its scene instead."""
+    """Paths and solids in space on a page, with equal scale on all axes; the viewer has its scene instead.
+
+    Attributes:
+        title: Its heading.
+        caption: What is drawn and what to look for, one or two sentences.
+        alt: What it shows, for who does not see it.
+        paths: Lines, from the back to the front.
+        spots: Single places.
+        arrows: Arrows from places, None for none.
+        sheets: Flat pieces of planes, None for none.
+        solids: Bodies.
+        folded: Whether a page opens it only on request.
+    """
 
     title: str
     caption: str
@@ -182,6 +196,7 @@ class SpaceFigure:
     arrows: Arrows | None = None
     sheets: Sheets | None = None
     solids: tuple[Solid, ...] = ()
+    folded: bool = False
 
 
 @dataclass(frozen=True, slots=True)

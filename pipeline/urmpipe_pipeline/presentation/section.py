@@ -91,13 +91,15 @@ class Fact:
         name: What it is of.
         value: What it is; nothing is shown of None and of an empty text.
         help: What that means, for who meets it for the first time.
-        brief: Whether it is shown where there is little room: terminal, card, summary.
+        brief: Whether it is shown where there is little room: terminal, notebook.
+        page: False for what a page shows in another place: no number stands twice on it.
     """
 
     name: str
     value: Cell
     help: str = ""
     brief: bool = True
+    page: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,12 +111,14 @@ class Column:
         title: Its head, without a unit: that comes from its values; where they differ, each cell has its own.
         cells: One a row.
         brief: Whether it is shown where there is little room.
+        page: False for what a page shows in another place.
     """
 
     key: str
     title: str
     cells: Sequence[Cell]
     brief: bool = True
+    page: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,6 +132,7 @@ class Table:
         brief: Whether it is shown where there is little room.
         folded: Whether a page opens it only on request.
         worst_first: Whether it ranks verdicts from worst to best; else from best to worst, if it has some.
+        page: False for what a page shows in another place.
     """
 
     title: str
@@ -136,6 +141,7 @@ class Table:
     brief: bool = True
     folded: bool = False
     worst_first: bool = False
+    page: bool = True
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from urmpipe_models.arrays import IntArray
 from urmpipe_pipeline.presentation.curves import Span, axis_of, by_axis, panels_of, place_of, span_of
-from urmpipe_pipeline.presentation.figure import Figure, Over, Panel
+from urmpipe_pipeline.presentation.figure import Figure, Over, Panel, View
+from urmpipe_pipeline.presentation.layout import band_vanishes, small_multiples
 from urmpipe_pipeline.report import spec
 from urmpipe_pipeline.report.panels import MARKED, Names, drawn_panel
 from urmpipe_pipeline.report.spec import Spec
@@ -25,6 +27,12 @@ SMALL_PX = 400
 
 PANEL_PX = ((1, 112), (4, 150), (8, 220))
 """Height of one panel among some, by the number of lines that it has at most."""
+
+SMALL_MULTIPLE_PX = 150
+"""Height of a plot among many small ones."""
+
+BROKEN = " The axis has two scales: a larger one within the tolerance, a smaller one beyond it."
+"""Said of a figure whose tolerance would vanish on one scale."""
 
 LEGEND_Y, OVER_LEGEND_Y = 1.025, 1.06
 """Where the legend begins, in heights of the plot: above the words at the head of a line through it; in a
@@ -51,20 +59,55 @@ class Links:
         return found
 
 
-def drawn_figures(figure: Figure, times: Span) -> Iterator[spec.Figure]:
-    """Yield a figure, one for each kind of horizontal axis that its panels have.
+@dataclass(frozen=True, slots=True)
+class Multiples:
+    """Small figures side by side, each of an answer with its set point.
+
+    Attributes:
+        title: Their heading.
+        caption: What is drawn and what to look for.
+        figures: One a pair.
+        folded: Whether they are closed until someone opens them.
+    """
+
+    title: str
+    caption: str
+    figures: tuple[spec.Figure, ...]
+    folded: bool
+
+
+def drawn_figures(figure: Figure, times: Span) -> Iterator[spec.Figure | Multiples]:
+    """Yield a figure, one for each kind of horizontal axis that its panels have; many pairs of lines apart.
 
     Axes of time span the same times in all figures that stand together.
     """
+    whole = tuple(panel for panel in panels_of(figure) if len(small_multiples(panel)) == 1)
+    yield from _whole(replace(figure, views=(View("", whole),)), times)
+    for panel in panels_of(figure):
+        if len(few := small_multiples(panel)) > 1:
+            small = tuple(_small(figure, one, times) for one in few)
+            yield Multiples(figure.title, figure.caption, small, figure.folded)
+
+
+def _small(figure: Figure, panel: Panel, times: Span) -> spec.Figure:
+    """Return an answer and its set point, which is dashed."""
+    wanted, answer = (line.names[0] for line in panel.lines)
+    alt = f"{answer} and its set point {wanted}, dashed, over time."
+    return spec.Figure(panel.title, "", alt, _spec(figure, [panel], times), SMALL_MULTIPLE_PX + AROUND_PX)
+
+
+def _whole(figure: Figure, times: Span) -> Iterator[spec.Figure]:
+    """Yield panels one below the other."""
     for title, over, panels in by_axis(figure):
         span = times if over == "t" else span_of(panels)
         yield spec.Figure(
             title,
-            f"{figure.caption}{_left_out(panels)}",
+            f"{figure.caption}{_left_out(panels)}{BROKEN if any(map(band_vanishes, panels)) else ''}",
             figure.alt if isinstance(figure.alt, str) else figure.alt(),
             _spec(figure, panels, span),
             _height(panels),
             over=over,
+            folded=figure.folded,
         )
 
 

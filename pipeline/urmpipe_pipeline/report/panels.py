@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.decimate import decimate, points_for
 from urmpipe_pipeline.palette import rgb
 from urmpipe_pipeline.presentation.curves import (
@@ -23,6 +24,7 @@ from urmpipe_pipeline.presentation.curves import (
     shown_unit,
 )
 from urmpipe_pipeline.presentation.figure import Mark, Over, Panel, Shape
+from urmpipe_pipeline.presentation.layout import BAND_SHARE, TwoScales, two_scales
 from urmpipe_pipeline.report import spec
 from urmpipe_pipeline.report.spec import MUTED, Spec, typed
 from urmpipe_pipeline.report.traces import (
@@ -98,27 +100,53 @@ class Names:
 def drawn_panel(panel: Panel, number: int, names: Names, span: Span) -> spec.Panel:
     """Return a panel of a figure, the first of number 0, for `stacked`: its axis spans what it is given."""
     unit, factor = shown_unit(panel)
-    curves = list(curves_of(panel, factor))
+    curves, scales = list(curves_of(panel, factor)), two_scales(panel)
     title = f"{label(panel.title)} [{label(unit) if unit not in ('', '1') else '-'}]"
     look: Spec = {"rangemode": "normal" if panel.signed else "tozero"}
     if panel.logarithmic:
         joined = panel.over is not None and panel.over.joined
         ends = logarithmic_ends(curves, (panel.limit or 0.0) * factor, whole=joined)
         look = {"type": "log", "range": np.log10(ends).tolist()}
+    elif scales is not None:
+        look = _broken(panel, scales, factor)
     elif is_switch(curves):
         look = {"range": [-0.1, 1.1], "tickvals": [0, 1]}  # yes or no
     if panel.over is not None:
         return _over(panel, panel.over, curves, spec.Panel(title, (), (), panel.share, look), names, number)
     traces = [
         *_areas(panel, [one for one in curves if one.line.stacked], number, names, unit),
-        *_lines(panel, [one for one in curves if not one.line.stacked], number, names, unit),
-        *_peaks(panel, curves),
-        *_marks(panel, factor, names, number),
+        *_lines(panel, [one for one in curves if not one.line.stacked], number, names, unit, scales),
+        *_peaks(panel, curves, scales),
+        *_marks(panel, factor, names, number, scales),
     ]
-    return spec.Panel(title, traces, _shapes(panel, curves, span, unit, factor), panel.share, look)
+    shapes = _shapes(panel, curves, span, unit, factor, scales)
+    return spec.Panel(title, traces, shapes, panel.share, look)
 
 
-def _lines(panel: Panel, curves: Sequence[Curve], number: int, names: Names, unit: str) -> Iterator[Spec]:
+def _broken(panel: Panel, scales: TwoScales, factor: float) -> Spec:
+    """Return an axis of two scales: its ticks tell the values that stand at their heights."""
+    sizes = np.array(scales.ticks())
+    ticks = np.unique(np.concatenate((-sizes, sizes))) if panel.signed else sizes
+    return {
+        "range": [-1.05 if panel.signed else 0.0, 1.05],
+        "tickvals": scales.height(ticks).tolist(),
+        "ticktext": [f"{value:.4g}".replace("-", "−") for value in factor * ticks + 0.0],  # no -0
+    }
+
+
+def _at(curve: Curve, scales: TwoScales | None) -> FloatArray:
+    """Return where the values of a curve stand on the vertical axis, shape (n,)."""
+    return curve.values if scales is None else scales.height(curve.raw)
+
+
+def _lines(
+    panel: Panel,
+    curves: Sequence[Curve],
+    number: int,
+    names: Names,
+    unit: str,
+    scales: TwoScales | None,
+) -> Iterator[Spec]:
     """Yield each curve as a line, or as points where nothing joins the rows."""
     seen: Counter[str] = Counter()  # colours repeat, dashes do not
     for one in curves:
@@ -129,7 +157,8 @@ def _lines(panel: Panel, curves: Sequence[Curve], number: int, names: Names, uni
         if one.line.points or one.t_ns is None:
             more |= {"mode": "markers", "marker": {"color": one.colour, "size": 7}, "cliponaxis": False}
         points = points_for(one.t_ns)
-        trace = line(one.x, one.values, one.name, one.colour, unit, points=points, keep=panel.peaks, **more)
+        more |= {"points": points, "keep": panel.peaks, "at": _at(one, scales)}
+        trace = line(one.x, one.values, one.name, one.colour, unit, **more)
         trace["hovertemplate"] += names.extra(one.name, panel.title)
         yield trace
 
@@ -169,24 +198,27 @@ def _areas(panel: Panel, curves: Sequence[Curve], number: int, names: Names, uni
             }  # fmt: skip
 
 
-def _peaks(panel: Panel, curves: Sequence[Curve]) -> Iterator[Spec]:
+def _peaks(panel: Panel, curves: Sequence[Curve], scales: TwoScales | None) -> Iterator[Spec]:
     """Yield a diamond at each row that is marked as the largest, on each curve that was measured."""
     rows = np.asarray(panel.peaks, dtype=np.int64)
     for one in curves:
         if len(rows) and not one.line.dashed:
             name = label(f"largest {one.name}")
-            yield marks(one.x[rows], one.values[rows], one.colour, SYMBOLS["diamond"], name=name)
+            yield marks(one.x[rows], _at(one, scales)[rows], one.colour, SYMBOLS["diamond"], name=name)
 
 
-def _marks(panel: Panel, factor: float, names: Names, number: int) -> Iterator[Spec]:
+def _marks(
+    panel: Panel, factor: float, names: Names, number: int, scales: TwoScales | None = None
+) -> Iterator[Spec]:
     """Yield the marks, those on one line together so that the legend hides them with it."""
     some: dict[tuple[str, str], list[Mark]] = {}
     for one in panel.marks[:MARKED]:
         some.setdefault((one.name, one.colour), []).append(one)
     for (name, colour), items in some.items():
+        values = np.array([one.value for one in items])
         yield marks(
             np.array([place_of(panel, one.t_ns) for one in items]),
-            factor * np.array([one.value for one in items]),
+            factor * values if scales is None else scales.height(values),
             colour,
             [SYMBOLS[one.shape] for one in items],
             name=label(f"{name}, marked"),
@@ -197,7 +229,14 @@ def _marks(panel: Panel, factor: float, names: Names, number: int) -> Iterator[S
         )
 
 
-def _shapes(panel: Panel, curves: Sequence[Curve], span: Span, unit: str, factor: float) -> list[Spec]:
+def _shapes(
+    panel: Panel,
+    curves: Sequence[Curve],
+    span: Span,
+    unit: str,
+    factor: float,
+    scales: TwoScales | None,
+) -> list[Spec]:
     """Return the limit as a band between dashed lines, and what is tinted: out of it, or doubtful."""
     found: list[Spec] = []
     if panel.tinted is not None:
@@ -210,6 +249,7 @@ def _shapes(panel: Panel, curves: Sequence[Curve], span: Span, unit: str, factor
         return [*found, level(high, words)]
     out = out_of_limit(panel, curves)
     found += shaded(out, np.ones(len(out), dtype=np.bool_), span.length)
+    high = high if scales is None else BAND_SHARE
     if panel.signed:
         return [band(-high, high), *found, level(high, words), level(-high)]
     measured = (one for one in curves if not one.line.dashed)

@@ -20,6 +20,7 @@ from urmpipe_pipeline.figures.files import FigureFile, FigureOptions, figure_ste
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.report.page import Page, lay_out
+from urmpipe_pipeline.report.spec import DARK
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,9 +39,9 @@ class Written:
 def render_report(presentations: Sequence[Presentation]) -> str:
     """Return the report as one HTML file that needs no network, the results in their order.
 
-    The verdict stands first, then a card for each judged part, then all parts with their facts, tables and
-    figures. Everything that came from a file is escaped, and a content security policy lets only the page's
-    own two scripts run, known by their hashes.
+    The verdict stands first, then a line for each judged part, then all parts with their facts, tables and
+    figures: those that failed first and open, those that passed folded. Everything that came from a file is
+    escaped, and a content security policy lets only the page's own two scripts run, known by their hashes.
 
     Raises:
         OptionError: If there is nothing to report.
@@ -89,6 +90,7 @@ def _render(page: Page) -> str:
     return template.render(
         page=page,
         version=version("urmpipe"),
+        dark=json.dumps(DARK),
         hashes=[script_hash(plotly), script_hash(script)],
         style=asset("style.css"),
         plotly=plotly,

@@ -67,6 +67,7 @@ def drawn_space(figure: SpaceFigure) -> Figure:
         _scene([*traces, *_spots(figure.spots)], places),
         SCENE_PX,
         space=True,
+        folded=figure.folded,
     )
 
 

@@ -24,6 +24,18 @@ FAULT = "#b32d00"
 BAND = "rgba(0, 114, 178, 0.06)"
 """The inside of a tolerance."""
 
+DARK = {
+    INK: "#e3e8eb",
+    MUTED: "#a5b1b9",
+    GRID: "#2a333a",
+    FRAME: "#4a5760",
+    WASH: "#1c242a",
+    FAULT: "#ff8a65",
+    BAND: "rgba(88, 174, 230, 0.14)",
+    "#ffffff": "#12181c",
+}
+"""The same colours, on white, for who reads on a dark ground; what is drawn of data keeps its colour."""
+
 MANY_ROWS = 10
 """With fewer rows each of them has its number at the axis."""
 
@@ -42,6 +54,7 @@ class Figure:
         height: In [px].
         space: True for a scene in 3D.
         over: What its horizontal axis measures: figures of one part that share it move together.
+        folded: Whether it is closed until someone opens it.
     """
 
     title: str
@@ -51,6 +64,7 @@ class Figure:
     height: int
     space: bool = False
     over: str = "t"
+    folded: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""What a minute is enough for: the banner, a card for each judged part, results side by side."""
+"""What a minute is enough for: the banner, a line for each judged part, results side by side."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.presentation.digits import allowed_words, written
+from urmpipe_pipeline.presentation.digits import written
 from urmpipe_pipeline.presentation.section import (
     Cell,
     Column,
@@ -53,31 +53,23 @@ class Banner:
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """A judged part, or a result without a verdict.
+    """A judged part; its numbers stand where it stands.
 
     Attributes:
         name: Its heading.
         href: Where it is.
-        state: pass, fail or plain.
-        word: The same in capitals, or what stands for it.
+        state: pass or fail.
         size: What uses up most of its limit; empty where nothing has a limit.
-        amount: How much that is, with the unit.
-        allowed: What is allowed.
         share: Share of the limit that is used up, 0 to 1 at most, drawn as a bar; None without one.
         used: The same in words.
-        facts: What else there is to know.
     """
 
     name: str
     href: str
     state: str
-    word: str
     size: str
-    amount: str
-    allowed: str
     share: float | None
     used: str
-    facts: tuple[ShownFact, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,18 +106,26 @@ def worst_first(shown: Sequence[tuple[Presentation, Anchors]]) -> list[tuple[Pre
     return sorted(shown, key=lambda pair: _badness(pair[0].verdict, _most_used(pair[0])))
 
 
-def cards_of(shown: Sequence[tuple[Presentation, Anchors]], *, plain: bool) -> tuple[Card, ...]:
-    """Return a card for each judged part that has something to tell, the worst first."""
-    found = []
-    for one, anchors in shown:
-        sections = list(judged_sections(one.body)) or ([one.body] if plain or one.verdict else [])
-        for section in sections:
-            beside = len(shown) > 1 and section is not one.body
-            name = f"{section.title} ({one.name})" if beside else section.title
-            card = _card(section, name, one.word, anchors)
-            if card.size or card.facts:
-                found.append((_badness(section.verdict, _used(section)), card))
-    return tuple(card for _, card in sorted(found, key=lambda pair: pair[0]))
+def badness(section: Section) -> tuple[int, float, int]:
+    """Return what puts the worst of some sections first; those without a verdict keep their rank."""
+    return (*_badness(section.verdict, _used(section)), section.rank)
+
+
+def cards_of(shown: Sequence[tuple[Presentation, Anchors]]) -> tuple[Card, ...]:
+    """Return a card for each judged part, the worst first; none of a single one, which stands below alone."""
+    every = [(one, anchors, part) for one, anchors in shown for part in judged_parts(one.body)]
+    every.sort(key=lambda found: badness(found[2]))
+    several = len(shown) > 1
+    cards = (
+        _card(part, f"{part.title} ({one.name})" if several and part is not one.body else part.title, anchors)
+        for one, anchors, part in every
+    )
+    return tuple(cards) if len(every) > 1 else ()
+
+
+def judged_parts(body: Section) -> list[Section]:
+    """Return the judged sections of a result, or the result itself if it alone is judged."""
+    return list(judged_sections(body)) or ([body] if body.verdict else [])
 
 
 def judged_sections(section: Section) -> Iterator[Section]:
@@ -190,30 +190,19 @@ def _decisive(section: Section) -> Value | None:
     return value if isinstance(value, Value) and value.limit is not None else None
 
 
-def _card(section: Section, name: str, word: str, anchors: Anchors) -> Card:
-    value, brief = _decisive(section), [fact for fact in section.facts if fact.brief]
+def _card(section: Section, name: str, anchors: Anchors) -> Card:
+    value = _decisive(section)
     used = None if value is None else value.used
-    if count := _warnings(section):
-        brief.append(Fact("Warnings", Value(count)))
     return Card(
         name=name,
         href=f"#{anchors.ident(section)}",
         state=section.verdict or PLAIN,
-        word=word_of(section.verdict, word),
         size="" if value is None else section.facts[0].name,
-        amount="" if value is None else written(value, unit=True),
-        allowed="" if value is None else allowed_words(value),
         share=None if used is None else min(used, 1.0),
         used="" if used is None or math.isinf(used) else f"{text.portion(used)} the limit",
-        facts=tuple(_short([one for one in brief if one.value is not value], anchors)),
     )
 
 
 def _short(facts: Sequence[Fact], anchors: Anchors) -> Iterator[ShownFact]:
     """Yield facts without what they mean: that is said where there is room."""
     return (replace(fact, help="") for fact in shown_facts(facts, anchors.href))
-
-
-def _warnings(section: Section) -> int:
-    """Return how many warnings there are in a section and below."""
-    return len(section.warnings) + sum(map(_warnings, section.sections))

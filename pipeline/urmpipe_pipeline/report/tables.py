@@ -121,7 +121,7 @@ class ShownFact:
 def grid(table: Table, href: Href, *, folds: bool = True) -> Grid:
     """Return a table without its empty columns, cut where it is very long."""
     rows = max((len(column.cells) for column in table.columns), default=0)
-    drawn = [(column, list(_cells(column, href))) for column in table.columns]
+    drawn = [(column, list(_cells(column, href))) for column in table.columns if column.page]
     kept = [pair for pair in drawn if any(cell.text != text.NOTHING for cell in pair[1])]
     more = f"{rows - MOST} more; the JSON output lists them all." if rows > MOST else ""
     return Grid(
@@ -149,6 +149,8 @@ def warnings_table(warnings: Sequence[LogWarning]) -> Table:
 def shown_facts(facts: Sequence[Fact], href: Href) -> Iterator[ShownFact]:
     """Yield the facts that have a value, with what is allowed of it."""
     for fact in facts:
+        if not fact.page:
+            continue
         value = held(fact.value) if isinstance(fact.value, Value) else written(fact.value, unit=True)
         if value != text.NOTHING:
             yield ShownFact(fact.name, value, fact.help, href(fact.value))

@@ -47,6 +47,7 @@ def line(
     *,
     points: int = POINTS,
     keep: Sequence[int] = (),
+    at: FloatArray | None = None,
     **more: Any,
 ) -> Spec:
     """Return a line over time, decimated.
@@ -59,6 +60,7 @@ def line(
         unit: Unit of the values; empty without one.
         points: How many of its samples may stay.
         keep: Samples that stay in any case.
+        at: Where the values stand on an axis of two scales, shape (n,); None: where they are.
         **more: Further settings of the trace.
     """
     kept: IntArray = np.union1d(decimate(values, points, t), np.asarray(keep, dtype=np.int64))
@@ -66,13 +68,16 @@ def line(
     digits = pointer_digits(unit, shown)
     alone = np.count_nonzero(np.isfinite(shown)) == 1  # a line through one point is nothing to see
     settings = {"line": stroke(colour), "mode": "lines+markers" if alone else "lines"} | more
+    exact = typed(shown, precision(shown, digits))
+    apart = at is not None and at is not values
+    shows = "customdata" if apart else "y"
     return {
         "type": "scatter",
         "name": label(name),
         "x": typed(t[kept], "f8"),
-        "y": typed(shown, precision(shown, digits)),
-        "hovertemplate": f"%{{y:{told(shown, digits)}}} {label(unit)}".rstrip(),
+        "hovertemplate": f"%{{{shows}:{told(shown, digits)}}} {label(unit)}".rstrip(),
         "showlegend": False,
+        **({"y": typed(at[kept]), "customdata": exact} if at is not None and apart else {"y": exact}),
     } | settings
 
 
