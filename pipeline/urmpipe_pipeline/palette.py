@@ -56,6 +56,10 @@ MASS_COLOUR = "#ffe14d"
 VALUE_SCALE = ((0.0, "#8fc1e3"), (0.35, "#e69f00"), (0.7, "#d55e00"), (1.0, "#6b0f00"))
 """Small to large: darker all the way, blue to red, legible on white and to the colour-blind."""
 
+WITHIN_SCALE, BEYOND_SCALE = ("#4a98c9", "#2a73b5"), ("#cf7a00", "#c2183b")
+"""Values up to a limit, from small to large: blue; beyond it: orange to crimson. Protanopes and deuteranopes
+tell the two apart, and both are legible on a light and on a dark ground."""
+
 INK_COLOUR = "#1b2329"
 """Marks that are no data, such as where a path begins."""
 

@@ -14,6 +14,9 @@ from urmpipe_models.measure_units import factor, units_of
 NOTHING = "–"
 """Stands where there is no value."""
 
+SIGNIFICANT = 4
+"""Digits of a length or an angle that people read; JSON, CSV and the tips of a report's cells have all."""
+
 DIGITS = 4
 """Digits after the point of a length in [mm] or an angle in [deg]: 0.1 micrometres, 2 microradians."""
 
@@ -41,8 +44,8 @@ def display_unit(unit: str, wanted: str) -> tuple[str, float]:
 def number(value: float | None, unit: str, against: float | None = None) -> str:
     """Return a length in [m] as [mm], or an angle in [rad] as [deg].
 
-    Four digits after the point, or as many as tell it from what it is held against; below a thousandth
-    in exponent form.
+    Four significant digits, or as many as tell it from what it is held against; below a thousandth in
+    exponent form.
 
     Args:
         value: In [m] or [rad].
@@ -53,15 +56,23 @@ def number(value: float | None, unit: str, against: float | None = None) -> str:
         return NOTHING
     scale = SHOWN[unit][1]
     scaled = value * scale
-    digits, form = (3, "e") if 0.0 < abs(scaled) < 1e-3 else (DIGITS, "f")
+    digits, form = (3, "e") if 0.0 < abs(scaled) < 1e-3 else (decimals(scaled), "f")
     if against is not None and abs(value) != against:
         while digits < 12 and f"{abs(scaled):.{digits}{form}}" == f"{against * scale:.{digits}{form}}":
             digits += 1
     return f"{scaled:.{digits}{form}}"
 
 
+def decimals(value: float) -> int:
+    """Return how many digits after the point show `SIGNIFICANT` digits of a value; one of 0."""
+    if not value or not math.isfinite(value):
+        return 1
+    before = math.floor(math.log10(float(f"{abs(value):.{SIGNIFICANT - 1}e}")))  # 9.9996 is shown as 10.00
+    return max(SIGNIFICANT - 1 - before, 0)
+
+
 def quantity(value: float | None, unit: str, against: float | None = None) -> str:
-    """Return a number with the unit that people read: "2.5000 mm", "0.1234 deg"."""
+    """Return a number with the unit that people read: "2.500 mm", "0.1234 deg"."""
     return f"{number(value, unit, against)} {SHOWN[unit][0]}"
 
 

@@ -23,14 +23,16 @@ from urmpipe_pipeline.runs.parts import log_facts
 def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
     """Yield why a log deviates, if that is known, and what decided the verdict: how much, when and where."""
     held = one.decisive
-    yield from () if one.diagnosis is None else diagnosis_facts(one.diagnosis)[:1]
+    cause = () if one.diagnosis is None else diagnosis_facts(one.diagnosis)[:1]
+    yield from (replace(fact, page=False) for fact in cause)  # a page says it where the log stands
     yield Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", Ref(one.name, colour))
-    yield Fact("Decided by", decided_words(held))
+    yield Fact("Decided by", decided_words(held), page=False)
+    yield Fact("Decided by", ", ".join(filter(None, (size_of(held), used_words(held)))), brief=False)
     if not held.missing and one.run.timed:
-        yield Fact("Data row", Value(one.row(held)))
-    yield Fact("Position", place_of(one, held))
+        yield Fact("Data row", Value(one.row(held)), page=False)
+    yield Fact("Position", place_of(one, held), page=False)
     yield from _furthest_joint(one)
-    yield from _undiagnosed(one)
+    yield from (replace(fact, page=False) for fact in _undiagnosed(one))
 
 
 def place_of(one: Deviation, held: Statistics) -> Place | None:
@@ -49,17 +51,18 @@ def largest(one: Statistics | None, *, most: bool = False) -> Value | None:
 def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     """Yield what is to be known of a compared log, what decided first."""
     held, covered = one.decisive, result.covered(one)
-    yield Fact(size_of(held), largest(held), used_words(held), brief=False)
+    yield Fact(size_of(held), largest(held), used_words(held), brief=False, page=False)
     timed = one.run.timed
     if timed:
-        yield Fact("Time", Value(held.t_max, "s"), brief=False)
+        yield Fact("Time", Value(held.t_max, "s"), brief=False, page=False)
+    ranked = len(result.runs) > 1  # a table at the top of the page has the log's verdict
     yield Fact("Data row", Value(one.row(held)), brief=False)
     yield Fact("Position", place_of(one, held), brief=False)
     yield from (replace(fact, brief=False) for fact in _furthest_joint(one))
     compared = f"{text.counted(len(one.sample), 'sample')} over {text.seconds(one.duration)} s"
     yield Fact("Compared", compared if timed else f"{text.counted(len(one.sample), 'pose')}, row by row")
     share = "share of the reference within the log's time"
-    yield Fact("Covered", Value(covered, "%"), share, covered < WHOLE)
+    yield Fact("Covered", Value(covered, "%"), share, covered < WHOLE, page=not ranked)
     yield _left_out(one, len(result.reference.t_ns))
     yield from _out_of_tolerance(one)
     if timed:
@@ -70,7 +73,9 @@ def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     if (r := one.speed_correlation) is not None:
         yield Fact("r(‖Δ‖, speed)", Value(r, "1", signed=True), "1: they grow together; 0: no correlation")
     yield from _why(one, result)
-    yield from (replace(fact, brief=fact.name == "Robot") for fact in log_facts(one.run))
+    for fact in log_facts(one.run):
+        counted = fact.name in ("Rows", "Grid", "Duration")  # what was compared says so
+        yield replace(fact, brief=fact.name == "Robot", page=not counted)
 
 
 def _why(one: Deviation, result: Comparison) -> Iterator[Fact]:
@@ -144,14 +149,15 @@ def _furthest_joint(one: Deviation) -> Iterator[Fact]:
     """Yield the joint that deviates most, of a log that is decided by something else."""
     joint = one.furthest_joint("rad") or one.furthest_joint("m")
     if joint is not None and one.decisive.kind != "joint" and joint.max:
-        yield Fact("Joint furthest off", f"{joint.quantity}: {text.quantity(joint.max, joint.unit)}")
+        said = f"{joint.quantity}: {text.quantity(joint.max, joint.unit)}"
+        yield Fact("Joint furthest off", said, page=False)
 
 
 def _left_out(one: Deviation, reference_samples: int) -> Fact:
     own = f"{one.left_out} of {text.counted(one.left_out + len(one.sample), 'sample')}"
     theirs = f"{one.reference_left_out} of {reference_samples} of the reference"
     some = bool(one.left_out or one.reference_left_out)
-    return Fact("Left out", f"{own}, {theirs}", "no counterpart, or no value", some)
+    return Fact("Left out", f"{own}, {theirs}", "no counterpart, or no value", some, page=some)
 
 
 def _out_of_tolerance(one: Deviation) -> Iterator[Fact]:

@@ -12,7 +12,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
 from urmpipe_pipeline.comparison.mended import mended_figure, mended_path
-from urmpipe_pipeline.comparison.scene import deviation_arrows
+from urmpipe_pipeline.comparison.scene import allowed_norm, deviation_arrows
 from urmpipe_pipeline.comparison.trajectory import extent
 from urmpipe_pipeline.comparison.wording import SYMBOLS, amount_words, symbol, when
 from urmpipe_pipeline.palette import (
@@ -102,14 +102,16 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
         return
     yield SpaceFigure(
         "Path in space",
-        "Equal scale on all axes. The colour is the distance from the reference at the same time.",
+        "The colour is the distance from the reference at the same time:"
+        " blue within the tolerance, orange to crimson beyond it." if allowed_norm(one)
+        else "The colour is the distance from the reference at the same time.",
         f"Paths of the reference and of {one.name} in three dimensions. The verdict was decided at"
         f" x, y, z = {text.point(place)} m: {amount_words(one.decisive)}.",
         (
             Path("reference", one.reference, one.t_ns, REFERENCE_COLOUR, asked=True, sample=one.sample),
             Path(
                 "actual: ‖Δ‖", one.actual, one.t_ns, AXIS_COLOURS["norm"], values=column(one.delta, 3),
-                sample=one.sample, kept=(one.decided_at,),
+                limit=allowed_norm(one), sample=one.sample, kept=(one.decided_at,),
             ),
             *mended_path(one),
         ),

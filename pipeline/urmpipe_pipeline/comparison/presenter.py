@@ -90,8 +90,8 @@ def _body(result: Comparison) -> Section:
         f"Comparison {result.name}",
         result.verdict,
         (
-            *_against(result),
-            Fact("Reference samples", Value(len(result.reference.t_ns)), brief=False),
+            *(replace(fact, page=False) for fact in _against(result)),
+            Fact("Reference samples", Value(len(result.reference.t_ns)), brief=False, page=False),
             Fact("Made", minute(result.provenance), brief=False),
             recording_fact(result.recording),
         ),
@@ -115,7 +115,10 @@ def _log(one: Deviation, result: Comparison) -> Section:
         one.name,
         one.verdict,
         tuple(deviation_facts(one, result)),
-        (*(diagnosis_tables(one.diagnosis) if one.diagnosis else ()), *statistics_tables(one)),
+        (
+            *(diagnosis_tables(one.diagnosis) if one.diagnosis else ()),
+            *statistics_tables(one, ranked=len(result.runs) > 1),
+        ),
         partial(deviation_figures, one),
         partial(_page, one),
         tuple(_checks(result, one)),

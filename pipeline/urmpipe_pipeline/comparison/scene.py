@@ -10,7 +10,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_pipeline.comparison.alignment import placed
 from urmpipe_pipeline.comparison.comparison import Comparison, by_tolerance
-from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.mended import cause_marks, mended_path
 from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.comparison.wording import amount_words, when
@@ -65,7 +65,14 @@ def deviation_arrows(one: Deviation, radius: float) -> Arrows:
     start = np.asarray(one.reference)[drawn]
     end = start + factor * (np.asarray(one.actual)[drawn] - start)
     sample = np.asarray(one.sample)[drawn]
-    return Arrows(f"deviation drawn x{factor}", start, end, size[drawn], sample)
+    return Arrows(f"deviation drawn x{factor}", start, end, size[drawn], sample, limit=allowed_norm(one))
+
+
+def allowed_norm(one: Deviation) -> float | None:
+    """Return what is allowed of the norm in [m]: its tolerance, else the least of an axis; None without."""
+    norm = one.statistics["norm"].tolerance
+    axes = [found for axis in AXES[:3] if (found := one.statistics[axis].tolerance) is not None]
+    return min(axes, default=None) if norm is None else norm
 
 
 def shown_log(result: Comparison) -> Deviation:

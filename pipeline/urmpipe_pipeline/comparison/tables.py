@@ -35,13 +35,31 @@ def ranking_tables(result: Comparison) -> tuple[Table, ...]:
     left_out = "Left out: samples of the log without a counterpart or without a value."
     whole = min(map(result.covered, result.runs)) >= WHOLE
     columns = (
-        replace(one, brief=False) if one.key == "covered" and whole else one
+        replace(one, brief=not (one.key == "covered" and whole), page=_leads(result, one.key, whole=whole))
         for one in columns_of(result.ranking, far)
     )
     return (
-        Table("Largest deviations, from best to worst", tuple(columns), note),
-        Table("When, where and how compared", tuple(_conditions(result, names)), left_out),
+        Table(
+            "Largest deviations, from best to worst",
+            tuple(columns),
+            note,
+            page_title="Largest deviations, from worst to best",
+        ),
+        Table("When, where and how compared", tuple(_conditions(result, names)), left_out, page=False),
     )
+
+
+def _leads(result: Comparison, key: str, *, whole: bool) -> bool:
+    """Tell whether a page shows a column of the largest deviations here, not in the statistics of each log.
+
+    Where joints of a unit are compared, the statistics have the largest values of all in that unit.
+    """
+    joints = {held.unit for one in result.runs for held in one.joint_statistics.values()}
+    if key == "covered":
+        return not whole
+    if key in ("max_angle", "max_joint", "max_slide"):
+        return "rad" not in joints and key == "max_angle"
+    return not (key.startswith("max_") and "m" in joints)
 
 
 def reference_of(result: Comparison, one: Deviation) -> Ref:
@@ -118,8 +136,13 @@ def comparison_lines(result: Comparison) -> Iterator[dict[str, Cell]]:
         }
 
 
-def statistics_tables(one: Deviation) -> Iterator[Table]:
-    """Yield the statistics of every quantity of a log: those in m, then those in rad."""
+def statistics_tables(one: Deviation, *, ranked: bool = False) -> Iterator[Table]:
+    """Yield the statistics of every quantity of a log: those in m, then those in rad.
+
+    Args:
+        one: The log.
+        ranked: Whether a table of all logs has their largest deviations.
+    """
     starts = dict(zip(map(id, one.all_statistics), (float(values[0]) for values in one.values), strict=True))
     for unit in text.SHOWN:
         own = [held for held in one.all_statistics if held.unit == unit]
@@ -130,7 +153,13 @@ def statistics_tables(one: Deviation) -> Iterator[Table]:
                 "max, rms and p95 are of absolute values, mean and std signed. At start: the difference of"
                 f" the start poses (mutual calibration) at {start}."
             )
-            yield Table(f"Statistics of {about}", _statistics(one, own, starts), note)
+            known = {"tolerance"} | (
+                {"max"} if ranked and all(held.kind != "joint" for held in own) else set()
+            )
+            columns = (
+                replace(column, page=column.key not in known) for column in _statistics(one, own, starts)
+            )
+            yield Table(f"Statistics of {about}", tuple(columns), note)
 
 
 def _statistics(one: Deviation, own: list[Statistics], starts: Mapping[int, float]) -> tuple[Column, ...]:

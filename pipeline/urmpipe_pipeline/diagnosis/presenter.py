@@ -36,15 +36,18 @@ def diagnosis_facts(result: Diagnosis) -> tuple[Fact, ...]:
     """Return the answer, what it means, what is undecided, and what stays."""
     alone = len(result.causes) == 1  # of several the table has interval and twins
     meant = [explained(one) for one in result.causes if alone or one.kind == "joint_sign"]
+    meaning = "; ".join(one for one in meant if one not in result.sentence)
+    undecided = undecided_words(result.undecided) if result.undecided else ""
     stays = result.causes or result.undecided  # else the answer says so
     return (
-        Fact("Cause", result.sentence),
-        Fact("Meaning", "; ".join(one for one in meant if one not in result.sentence), brief=False),
-        Fact("Undecided", undecided_words(result.undecided) if result.undecided else "", brief=False),
+        Fact("Cause", result.sentence, leads=True),
+        Fact("Meaning", meaning, brief=False, leads=True),
+        Fact("Undecided", undecided, brief=False, page=False),  # the cause says it
         Fact(
             "Remaining deviation",
             remainder_words(result.remainder, result.unit) if stays else "",
             brief=False,
+            page=False,
         ),
         Fact("Not tested", "; ".join(_not_looked_for(result)), brief=False),
     )
@@ -61,11 +64,13 @@ def diagnosis_tables(result: Diagnosis) -> Iterator[Table]:
     """Yield the causes, and the explanations that are not told apart."""
     if result.causes:
         several = len(result.causes) > 1
-        yield Table("Causes", columns_of(result.causes, _heads(result.unit)), f"{ADDED} {ALONE}", several)
+        columns = columns_of(result.causes, _heads(result.unit))
+        yield Table("Causes", columns, f"{ADDED} {ALONE}", several, page=several)
     if result.undecided:
         heads = {"explanation": "Explanation", "needs": "a motion that would decide"}
         rows = [(explanation_words(one), one.needs or "none") for one in result.undecided]
-        yield table_of("Undecided between", heads, rows, brief=len(rows) > SAID)
+        many = len(rows) > SAID  # else the answer names them all
+        yield replace(table_of("Undecided between", heads, rows, brief=many), page=many)
 
 
 def _heads(unit: str) -> Heads[Cause]:

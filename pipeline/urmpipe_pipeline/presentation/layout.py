@@ -21,10 +21,7 @@ MANY = 3
 """So many set points with their answers are plotted apart, a pair a plot."""
 
 STEPS = (1.0, 2.0, 5.0)
-"""Distances between ticks, times a power of ten."""
-
-CLEAR = 0.2
-"""Share of an axis of two scales between the tick at the limit and the next one: their words do not meet."""
+"""What the largest tick may be, times a power of ten: at least two fifths of the largest value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,12 +49,9 @@ class TwoScales:
         return self._odd(heights, np.array([0.0, BAND_SHARE, 1.0]), sizes)
 
     def ticks(self) -> list[float]:
-        """Return the sizes that have a tick: 0, the limit, and round values beyond it where there is room."""
-        power = 10.0 ** np.floor(np.log10(self.top / 2.0))
-        step = max(one * power for one in STEPS if one * power <= self.top / 2.0)
-        beyond = np.arange(step, 1.001 * self.top, step)
-        clear = self.height(beyond) >= BAND_SHARE + CLEAR
-        return [0.0, self.limit, *beyond[clear].tolist()]
+        """Return the sizes that have a tick: 0, the limit, and the largest round one, the limit far below."""
+        power = 10.0 ** np.floor(np.log10(self.top))
+        return [0.0, self.limit, float(max(one * power for one in STEPS if one * power <= self.top))]
 
     @staticmethod
     def _odd(values: FloatArray, known: FloatArray, shown: FloatArray) -> FloatArray:

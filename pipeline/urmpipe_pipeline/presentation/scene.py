@@ -76,6 +76,7 @@ class Path:
         label: What is written at the moving point.
         values: What it is coloured by (small to large), in `unit`, shape (n,); None for its colour.
         unit: SI unit of `values`.
+        limit: What is allowed of `values`, in `unit`: their colours change there; None for nothing.
         sample: Row numbers, shape (n,): broken where one is missing; None: none is missing.
         kept: Rows that are drawn in any case.
         vanishes: True if there is no moving point where there is no position.
@@ -91,6 +92,7 @@ class Path:
     label: str = ""
     values: FloatArray | None = None
     unit: str = "m"
+    limit: float | None = None
     sample: IntArray | None = None
     kept: tuple[int, ...] = ()
     vanishes: bool = False
@@ -108,6 +110,7 @@ class Arrows:
         values: What they stand for (small to large), in `unit`, shape (n,).
         sample: Row numbers, from 0, shape (n,).
         unit: SI unit of `values`.
+        limit: What is allowed of `values`, in `unit`; None for nothing.
     """
 
     name: str
@@ -116,6 +119,7 @@ class Arrows:
     values: FloatArray
     sample: IntArray
     unit: str = "m"
+    limit: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -93,6 +93,7 @@ class Fact:
         help: What that means, for who meets it for the first time.
         brief: Whether it is shown where there is little room: terminal, notebook.
         page: False for what a page shows in another place: no number stands twice on it.
+        leads: Whether a page shows it before the others.
     """
 
     name: str
@@ -100,6 +101,7 @@ class Fact:
     help: str = ""
     brief: bool = True
     page: bool = True
+    leads: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +135,7 @@ class Table:
         folded: Whether a page opens it only on request.
         worst_first: Whether it ranks verdicts from worst to best; else from best to worst, if it has some.
         page: False for what a page shows in another place.
+        page_title: Its heading on a page that shows its rows from the worst; empty where that is `title`.
     """
 
     title: str
@@ -142,6 +145,7 @@ class Table:
     folded: bool = False
     worst_first: bool = False
     page: bool = True
+    page_title: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,7 +26,15 @@ from urmpipe_pipeline.report.summary import (
     side_by_side,
     worst_first,
 )
-from urmpipe_pipeline.report.tables import Anchors, Grid, ShownFact, grid, shown_facts, warnings_table
+from urmpipe_pipeline.report.tables import (
+    Anchors,
+    Grid,
+    ShownFact,
+    from_worst,
+    grid,
+    shown_facts,
+    warnings_table,
+)
 
 FEW = 3
 """With fewer parts that no table leads to, a page needs no list of contents."""
@@ -163,7 +171,7 @@ def _summaries(shown: Sequence[tuple[Presentation, Anchors]]) -> Iterator[Summar
         for group in [[pair] for pair in some] if ranked else [list(some)]:
             cards = () if ranked else cards_of(group)
             ranked_by = ((table, anchors) for one, anchors in group for table in _ranking(one.body))
-            tables = tuple(grid(table, anchors.href, folds=False) for table, anchors in ranked_by)
+            tables = tuple(grid(from_worst(table), anchors.href, folds=False) for table, anchors in ranked_by)
             if cards or tables:
                 which = f": {group[0][0].body.title}" if ranked and len(shown) > 1 else ""
                 yield Summary(f"Verdicts, the worst first{which}", cards, tables)

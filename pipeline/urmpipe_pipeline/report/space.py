@@ -10,16 +10,15 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.decimate import decimate, points_for
 from urmpipe_pipeline.joint_log import seconds
-from urmpipe_pipeline.palette import VALUE_SCALE
+from urmpipe_pipeline.palette import BEYOND_SCALE, VALUE_SCALE, WITHIN_SCALE
 from urmpipe_pipeline.presentation.figure import SpaceFigure
+from urmpipe_pipeline.presentation.layout import BAND_SHARE, TwoScales
 from urmpipe_pipeline.presentation.scene import Arrows, Path, Sheets, Solid, Spot
 from urmpipe_pipeline.report.spec import Figure, Spec, base_layout, space_axis, typed
 from urmpipe_pipeline.report.traces import label
 
 CAMERA = {"eye": {"x": 1.5, "y": -1.5, "z": 0.86}, "center": {"x": 0.0, "y": 0.0, "z": -0.2}}
 """Looked at from the front right, a little from above; in lengths of the scene."""
-
-HANDLING = "Drag to turn; pinch to zoom, with a mouse by the bar at the top right."
 
 AROUND, CLOSEST = 0.05, 1e-3
 """Space around a slim path as a share of its extent, and half of the shortest axis in [m]."""
@@ -39,6 +38,9 @@ TINT = 0.12
 
 LIGHT = {"ambient": 0.6, "diffuse": 0.6, "specular": 0.1}
 """How solids are lit: their colours stay those of the legend."""
+
+ENDS = (0.0, BAND_SHARE, BAND_SHARE, 1.0)
+"""Where the colours of values within a limit and beyond it begin and end, on an axis of two scales."""
 
 BACK_PX, FRONT_PX, VALUES_PX = 2, 5, 6
 """Width of a path: of those in the back, of the one in front, and of one that its values colour."""
@@ -62,7 +64,7 @@ def drawn_space(figure: SpaceFigure) -> Figure:
     places += [one.points for one in figure.solids if not one.hidden]
     return Figure(
         figure.title,
-        f"{figure.caption} {HANDLING}",
+        figure.caption,
         figure.alt,
         _scene([*traces, *_spots(figure.spots)], places),
         SCENE_PX,
@@ -94,7 +96,9 @@ def _path(path: Path, width: int, dot: int) -> Spec:
         "showlegend": path.values is None,  # a line of many colours is told by its colour scale
         "customdata": typed(t if path.values is None else np.column_stack([t, shown]), "f8"),
         "hovertemplate": f"{said}<extra>{label(path.name)}</extra>",
-        "line": style if path.values is None else _by_value(path.name, shown, unit),
+        "line": style
+        if path.values is None
+        else _by_value(path.name, shown, unit, path.limit and factor * path.limit),
     }
 
 
@@ -106,16 +110,25 @@ def _picked(values: FloatArray, kept: IntArray, sample: IntArray | None) -> Floa
     return np.insert(values[kept].astype(np.float64), np.flatnonzero(np.diff(gaps) > 0) + 1, np.nan, axis=0)
 
 
-def _by_value(name: str, values: FloatArray, unit: str) -> Spec:
-    """Return a line's style that colours it by its values, with their scale."""
+def _by_value(name: str, values: FloatArray, unit: str, limit: float | None) -> Spec:
+    """Return a line's style that colours it by its values, all in one unit, with their scale."""
+    largest = float(np.nanmax(values, initial=0.0))
+    scales = _scales(values, limit)
+    ticks: Spec = {}
+    if scales is not None:
+        places = scales.height(np.array(scales.ticks())).tolist()
+        words = ["0", f"{limit:.4g} allowed", f"{scales.ticks()[2]:.4g}"]
+        ticks = {"tickvals": places, "ticktext": words}
+    colours = VALUE_SCALE if scales is None else tuple(zip(ENDS, WITHIN_SCALE + BEYOND_SCALE, strict=True))
     return {
-        "color": typed(values),
-        "colorscale": [list(stop) for stop in VALUE_SCALE],
+        "color": typed(values if scales is None else scales.height(values)),
+        "colorscale": [list(stop) for stop in colours],
         "cmin": 0.0,
-        "cmax": float(np.nanmax(values, initial=0.0)) or 1.0,
+        "cmax": largest or 1.0 if scales is None else 1.0,
         "width": VALUES_PX,
         "showscale": True,
-        "colorbar": {
+        "colorbar": ticks
+        | {
             "title": {"text": f"{label(name)} [{label(unit) or '-'}]", "side": "top"},
             "orientation": "h",
             "thickness": 10,
@@ -124,6 +137,12 @@ def _by_value(name: str, values: FloatArray, unit: str) -> Spec:
             "yanchor": "top",
         },
     }
+
+
+def _scales(values: FloatArray, limit: float | None) -> TwoScales | None:
+    """Return where the colours of values stand that have a limit in their unit."""
+    largest = float(np.nanmax(values, initial=0.0))
+    return TwoScales(limit, max(largest, 2.0 * limit)) if limit else None
 
 
 def _sheets(sheets: Sheets) -> Iterator[Spec]:
@@ -169,14 +188,16 @@ def _arrows(arrows: Arrows) -> Iterator[Spec]:
     """Yield arrows as lines, a dot where each starts; both in the colour of what it stands for."""
     unit, factor = text.SHOWN.get(arrows.unit, (arrows.unit, 1.0))
     values, row = factor * arrows.values, arrows.sample + 1
-    style = _by_value(arrows.name, values, unit)
+    limit = arrows.limit and factor * arrows.limit
+    style, scales = _by_value(arrows.name, values, unit, limit), _scales(values, limit)
+    heights = values if scales is None else scales.height(values)
     apart = np.full_like(arrows.start, np.nan)
     yield _in_space(np.stack((arrows.start, arrows.end, apart), axis=1).reshape(-1, 3)) | {
         "mode": "lines",
         "name": label(arrows.name),
         "showlegend": False,
         "hoverinfo": "skip",
-        "line": style | {"color": typed(np.repeat(values, 3)), "width": FRONT_PX, "showscale": False},
+        "line": style | {"color": typed(np.repeat(heights, 3)), "width": FRONT_PX, "showscale": False},
     }
     said = "row %{customdata[0]}<br>x %{x:.4f} m<br>y %{y:.4f} m<br>z %{z:.4f} m"
     said += f"<br>%{{customdata[1]:.{text.DIGITS}f}} {label(unit)}"

@@ -110,12 +110,22 @@ class ShownFact:
         value: What it is.
         help: What that means; empty where it explains itself.
         href: Where the value leads.
+        leads: Whether it stands on a line of its own, before the others.
     """
 
     name: str
     value: str
     help: str = ""
     href: str = ""
+    leads: bool = False
+
+
+def from_worst(table: Table) -> Table:
+    """Return a table whose rows are ranked from best to worst with the worst first; else the table."""
+    if not table.page_title:
+        return table
+    columns = tuple(replace(one, cells=list(one.cells)[::-1]) for one in table.columns)
+    return replace(table, title=table.page_title, columns=columns)
 
 
 def grid(table: Table, href: Href, *, folds: bool = True) -> Grid:
@@ -147,13 +157,13 @@ def warnings_table(warnings: Sequence[LogWarning]) -> Table:
 
 
 def shown_facts(facts: Sequence[Fact], href: Href) -> Iterator[ShownFact]:
-    """Yield the facts that have a value, with what is allowed of it."""
-    for fact in facts:
+    """Yield the facts that have a value, with what is allowed of it: first those that lead."""
+    for fact in sorted(facts, key=lambda one: not one.leads):
         if not fact.page:
             continue
         value = held(fact.value) if isinstance(fact.value, Value) else written(fact.value, unit=True)
         if value != text.NOTHING:
-            yield ShownFact(fact.name, value, fact.help, href(fact.value))
+            yield ShownFact(fact.name, value, fact.help, href(fact.value), fact.leads)
 
 
 def _is_number(column: Column) -> bool:

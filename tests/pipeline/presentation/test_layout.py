@@ -57,8 +57,8 @@ def test_the_band_takes_its_share_and_the_ticks_are_round() -> None:
     scales = TwoScales(3.5, 807.0)
     found = scales.height(np.array([0.0, 3.5, -3.5, 807.0, np.nan]))
     np.testing.assert_array_equal(found, [0.0, BAND_SHARE, -BAND_SHARE, 1.0, np.nan])
-    assert scales.ticks() == [0.0, 3.5, 400.0, 600.0, 800.0]
-    assert TwoScales(3.5, 271.0).ticks() == [0.0, 3.5, 100.0, 200.0]
+    assert scales.ticks() == [0.0, 3.5, 500.0]
+    assert TwoScales(3.5, 271.0).ticks() == [0.0, 3.5, 200.0]
 
 
 def pairs(joints: int, wanted: int) -> Panel:

@@ -3,7 +3,8 @@
 "use strict";
 (() => {
   const PRINT_WIDTH = 686; // px; what an A4 page holds between its margins
-  const PRINT_HEIGHT = { plot: 330, scene: 260 }; // px at most, so that a log stands on a page
+  const PRINT_FONT = 9; // px; what fits between the panels of a figure on paper
+  const PRINT_HEIGHT = { plot: 320, scene: 230 }; // px at most, so that a log stands on a page
   const SCENES = { seen: 8, printed: 16 }; // drawn at once; browsers drop the oldest WebGL context beyond 16
   const REST = 1500; // ms after which a page that nobody scrolls draws what is further down
   const touch = matchMedia("(pointer: coarse)").matches;
@@ -41,7 +42,10 @@
   function specOf(plot) {
     const dark = darkly.matches && !printing;
     const text = plot.nextElementSibling.textContent;
-    const spec = JSON.parse(text, (_, value) => (dark && typeof value === "string" && DARK[value]) || value);
+    const spec = JSON.parse(text, (key, value) => {
+      if (printing && (key === "font" || key === "tickfont")) value.size = Math.min(value.size, PRINT_FONT);
+      return (dark && typeof value === "string" && DARK[value]) || value;
+    });
     spec.layout.uirevision = "kept"; // zoom and hidden lines stay when the colours change
     if (isScene(plot)) {
       if (plot.camera) spec.layout.scene.camera = plot.camera;
