@@ -72,6 +72,7 @@ class ShownCell:
         used: Share of the limit that is used up, 0..1, shown as a bar under the number.
         most: True for what stands out of its column: shown bold.
         colour: As #rrggbb, in which its subject is drawn in figures; empty if it has none.
+        exact: The number with all its digits in SI, for who points at it; empty for what has no more.
     """
 
     text: str
@@ -80,6 +81,7 @@ class ShownCell:
     used: float | None = None
     most: bool = False
     colour: str = ""
+    exact: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,9 +182,10 @@ def _cells(column: Column, href: Href) -> Iterator[ShownCell]:
                 yield replace(shown, colour=cell.colour)
             case Judged(verdict=str(verdict)):
                 yield replace(shown, state=verdict)
-            case Value(number=int() | float()):
+            case Value(number=int() | float() as number):
+                exact = f"{number!r} {cell.unit}" if isinstance(number, float) else ""
                 state = "fail" if cell.verdict == "fail" else ""
                 used = None if cell.used is None else min(cell.used, 1.0)
-                yield replace(shown, state=state, used=used, most=cell.most)
+                yield replace(shown, state=state, used=used, most=cell.most, exact=exact)
             case _:
                 yield shown

@@ -41,7 +41,7 @@ def test_a_quantity_with_a_tolerance_is_a_check(paths: Compared) -> None:
     shown = present(result)
     assert [one.title for one in shown.body.sections] == ["good", "bad"]
     said = (
-        "|Δx| = 4.0000 mm of 3.5 mm allowed (1.14 times the tolerance) at t = 0.495 s (row 100); out of"
+        "|Δx| = 4.000 mm of 3.5 mm allowed (1.14 times the tolerance) at t = 0.495 s (row 100); out of"
         " tolerance: 13 of 100 samples (13.0 %)"
     )
     assert shown.body.sections[1].checks == (

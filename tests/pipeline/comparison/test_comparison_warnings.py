@@ -147,7 +147,7 @@ def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told(ar
         "usual up to 5 mm where a controller uses the calibration of its arm, which this robot model lacks"
     )
     more = "more than a calibration explains (5 mm): another robot, tool or base?"
-    for away, shown, cause in ((0.00104, "1.0400", usual), (0.0051, "5.1000", more)):
+    for away, shown, cause in ((0.00104, "1.040", usual), (0.0051, "5.100", more)):
         beside = replace(run, log=replace(run.log, tcp_position=run.tcp.position + np.array((0, 0, away))))
         assert next(recorded_apart([beside], 1e-3)).message == (
             f"its kinematics are up to {shown} mm from its recorded tool centre point, {cause};"
@@ -156,7 +156,7 @@ def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told(ar
     assert list(recorded_apart([run], 1e-3)) == []
     (both,) = recorded_apart([beside, replace(beside, name="worse")], 1e-3)
     assert both.message == (
-        "by forward kinematics bad is up to 5.1000 mm and worse is up to 5.1000 mm from the recorded tool"
+        "by forward kinematics bad is up to 5.100 mm and worse is up to 5.100 mm from the recorded tool"
         f" centre points, {more}; this verdict does not include that; a comparison of each alone does"
     )
 

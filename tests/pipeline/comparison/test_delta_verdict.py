@@ -28,7 +28,7 @@ def test_the_component_that_uses_up_most_is_the_worst() -> None:
     assert (found.samples, found.out_of_tolerance, found.verdict) == (3, 1, "fail")  # what is allowed passes
     assert (found.used, found.share_out) == (4e-3 / 0.0035, 1 / 3)
     assert meter_words(found) == (
-        "|Δy| = 4.0000 mm of 3.5 mm allowed (1.14 times the tolerance) at t = 0.005 s; out of tolerance: 1"
+        "|Δy| = 4.000 mm of 3.5 mm allowed (1.14 times the tolerance) at t = 0.005 s; out of tolerance: 1"
         " of 3 samples (33.3 %)"
     )
 
@@ -59,7 +59,7 @@ def test_a_doubt_keeps_it_from_passing_and_is_told() -> None:
     assert (found.out_of_tolerance, found.verdict, found.used) == (0, "fail", 4e-3)
     assert found.to_dict()["doubts"] == ["a.y was nan", "it ended early"]
     assert meter_words(found) == (
-        "|Δy| = 4.0000 mm of 1000 mm allowed (0.4 % of the tolerance) at t = 0.005 s; out of tolerance: 0 of"
+        "|Δy| = 4.000 mm of 1000 mm allowed (0.4 % of the tolerance) at t = 0.005 s; out of tolerance: 0 of"
         " 3 samples (0 %); a.y was nan; it ended early"
     )
 
@@ -67,7 +67,7 @@ def test_a_doubt_keeps_it_from_passing_and_is_told() -> None:
 def test_of_nothing_allowed_no_share_is_told() -> None:
     found = there(delta_verdict("meter", T_NS, DELTA, {"axis": 0.0}))
     assert meter_words(found) == (
-        "|Δy| = 4.0000 mm of 0 mm allowed at t = 0.005 s; out of tolerance: 3 of 3 samples (100 %)"
+        "|Δy| = 4.000 mm of 0 mm allowed at t = 0.005 s; out of tolerance: 3 of 3 samples (100 %)"
     )
 
 

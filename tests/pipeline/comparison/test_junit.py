@@ -78,7 +78,7 @@ def test_a_log_is_a_suite_and_a_judged_quantity_a_case(paths: Compared, tmp_path
     failure = root[1].findall("testcase/failure")[0]
     assert (failure.get("type"), failure.text) == (
         "out-of-tolerance",
-        "|Δx| = 4.0000 mm of 3.5 mm allowed (1.14 times the tolerance) at t = 0.495 s (row 100); out of"
+        "|Δx| = 4.000 mm of 3.5 mm allowed (1.14 times the tolerance) at t = 0.495 s (row 100); out of"
         " tolerance: 13 of 100 samples (13.0 %)",
     )
     assert root[0].get("timestamp") == result.provenance.created[:19]
@@ -127,7 +127,7 @@ def test_what_is_worse_than_the_baseline_fails(paths: Compared, arms: Compared, 
         ("old against baseline", "log is there"),
     ]  # fmt: skip
     assert failures["a against baseline", "x"].text == (
-        "|Δx|: max 1.0000 → 1.5000 mm, rms 0.5788 → 0.8682 mm (noise 0.001 mm)"
+        "|Δx|: max 1.000 → 1.500 mm, rms 0.5788 → 0.8682 mm (noise 0.001 mm)"
     )
     assert failures["old against baseline", "log is there"].text == (
         "old: a log of the baseline, not compared any more"

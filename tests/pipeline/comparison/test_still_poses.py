@@ -191,7 +191,7 @@ def test_nothing_that_is_shown_speaks_of_times(run: Run, found: Comparison) -> N
         assert all(path.t_ns is None and not path.line for path in scene.paths)
         assert all(arm.t_ns is None for arm in scene.arms)
     assert present(found).facts[1].value == (
-        "|Δx| = 2.0000 mm of 1 mm allowed (2 times the tolerance) in row 8"
+        "|Δx| = 2.000 mm of 1 mm allowed (2 times the tolerance) in row 8"
     )
     assert present(found).opens_at_row == WORST
 

@@ -68,7 +68,7 @@ class Page(HTMLParser):
         row: list[str] = []
         for tag, attrs, parts in self.elements:
             said = "".join(parts).strip().replace("\u00a0", " ").removeprefix("out of tolerance: ")
-            if tag in ("h2", "h3", "h4"):
+            if tag in ("h2", "h3", "h4", "h5"):
                 heading = said
             elif heading.startswith(title) and tag == "table":
                 heads, row = [], []
@@ -115,7 +115,8 @@ def test_numbers_are_those_of_the_json_and_the_recording(everything: Comparison,
     by_unit = zip(
         page.tables("Statistics of position"), page.tables("Statistics of orientation"), strict=True
     )
-    ranked = [next(run for run in as_json if run["name"] == one.name) for one in everything.ranking]
+    worst = reversed(everything.ranking)
+    ranked = [next(run for run in as_json if run["name"] == one.name) for one in worst]
     for run, tables in zip(ranked, by_unit, strict=True):
         lengths = [*run["delta"].values(), run["path"]]
         angles = [run["angle"], *run["joints"].values()]
@@ -125,10 +126,9 @@ def test_numbers_are_those_of_the_json_and_the_recording(everything: Comparison,
         ):
             assert len(rows) == len(statistics)
             for row, one in zip(rows, statistics, strict=True):
-                for key in ("max", "rms", "p95", "mean", "std"):
+                for key in (*(("max",) if unit == "deg" else ()), "rms", "p95", "mean", "std"):
                     cell = row[f"{key} [{unit}]"]
                     assert cell == printed_again(cell, one[key], factor)
-                assert float(row[f"tolerance [{unit}]"]) == pytest.approx(one["tolerance"] * factor, rel=1e-5)
                 assert row["at t [s]"] == text.seconds(one["t_max"])
                 assert row["samples out"] == str(one["out_of_tolerance"])
                 assert row["out"] == text.percent(one["share_out"])
@@ -136,10 +136,10 @@ def test_numbers_are_those_of_the_json_and_the_recording(everything: Comparison,
 
 
 def test_the_audit_is_told(page: Page, comparison: Comparison, bare_run: Run) -> None:
-    runs = [*(one.run for one in comparison.ranking), bare_run]
+    runs = [*(one.run for one in reversed(comparison.ranking)), bare_run]  # from the worst
     for rows, run in zip(page.tables("Audit"), runs, strict=True):
         for row, item in zip(rows, run.audit, strict=True):
-            assert row["Step [deg]"] == f"{np.degrees(item.step):+.4f}"
+            assert row["Step [deg]"] == f"{np.degrees(item.step):+.1f}"  # four digits of some 350
             assert row["Instant t_r [s]"] == text.seconds(item.t)
             assert row["Row"] == str(item.row)
 
@@ -151,12 +151,23 @@ def test_where_it_comes_from_is_told(page: Page) -> None:
     assert "every line has 7 fields with it" in said
 
 
-def test_the_contents_lead_to_every_part_and_block(page: Page, comparison: Comparison) -> None:
-    (contents,) = [text for attrs, text in page.all("nav") if attrs["aria-label"] == "Contents"]
-    for name in ("Comparison against-path", "Log bare", *(run.name for run in comparison.runs)):
-        assert name in contents
-    for title in ("Deviation over time", "Path in space", "How it was made"):
-        assert title in contents
+def test_the_contents_stand_once(page: Page, comparison: Comparison) -> None:
+    """The table at the top leads to each log: with few other parts there is no list beside it."""
+    assert not [attrs for attrs, _ in page.all("nav") if attrs["aria-label"] == "Contents"]
+    leads = [attrs["href"] for attrs, said in page.all("a") if said in {run.name for run in comparison.runs}]
+    assert {"#r1-1", "#r1-2"} <= set(leads)
+
+
+def test_no_number_of_the_results_stands_twice_on_a_page(comparison: Comparison) -> None:
+    """The largest deviations: those of a round 0 are no numbers that anybody looks for."""
+    page = Page(render_report([present(comparison)]))
+    words = [said for _, said in page.all("td", "dd")]
+    for one in comparison.runs:
+        for held in (found for found in one.statistics.values() if found.max):
+            number = text.number(held.max, held.unit)
+            assert len([said for said in words if said.removeprefix("out of tolerance: ") == number]) <= 1, (
+                number
+            )
 
 
 def test_a_keyboard_can_skip_to_the_details(page: Page) -> None:
@@ -171,11 +182,13 @@ def luminance(colour: str) -> float:
     return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
+@pytest.mark.parametrize("setting", ["light", "dark"])
 @pytest.mark.parametrize("ink", ["ink", "muted", "pass", "fail", "plain"])
-def test_every_ink_is_legible_on_every_ground(ink: str) -> None:
-    variables = dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6});", asset("style.css")))
-    grounds = [value for name, value in variables.items() if name.endswith("wash")]
-    for ground in (*grounds, "#ffffff"):
+def test_every_ink_is_legible_on_every_ground(ink: str, setting: str) -> None:
+    both = asset("style.css").split("@media screen and (prefers-color-scheme: dark)")
+    style = both[setting == "dark"]
+    variables = dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6});", style.partition("@media")[0]))
+    for ground in (value for name, value in variables.items() if name.endswith(("wash", "ground"))):
         dark, light = sorted((luminance(variables[ink]), luminance(ground)))
         assert (light + 0.05) / (dark + 0.05) >= 4.5, (ink, ground)  # WCAG 2.2 AA
 

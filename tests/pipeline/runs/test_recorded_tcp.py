@@ -251,8 +251,8 @@ def test_only_a_turned_tool_is_found_where_orientations_are_judged() -> None:
     assert lacking_tool(UR5E, recorded) == []
     (warning,) = lacking_tool(UR5E, recorded, turned=True)
     assert warning.words("command line") == (
-        "the kinematics of ur5e stay 0.0 mm and 28.6479 deg (rms) from the recorded TCP;"
-        " --robot ur5e --tool 0,0,0,0,0,0.5 brings them within 0.00 mm and 0.0000 deg"
+        "the kinematics of ur5e stay 0.0 mm and 28.65 deg (rms) from the recorded TCP;"
+        " --robot ur5e --tool 0,0,0,0,0,0.5 brings them within 0.00 mm and 0.0 deg"
     )
 
 
@@ -278,7 +278,7 @@ def test_first_rows_without_a_tool_are_told_and_count_nowhere_else(rows: int) ->
     assert (told.kind, told.row, told.message) == (
         "recorded-tcp-start",
         1,
-        f"{first} of 60 recorded the TCP 151.3275 mm from where the others have it: no tool or pose known"
+        f"{first} of 60 recorded the TCP 151.3 mm from where the others have it: no tool or pose known"
         " yet? They are kept and judged with the others",
     )
     assert lacking_tool(TOOLED, log(Q, recorded)) == []
