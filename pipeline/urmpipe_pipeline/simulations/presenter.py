@@ -93,7 +93,8 @@ def _decisive(simulation: Simulation) -> Iterator[Fact]:
         yield Fact("Recorded until", end)
     elif (worst := simulation.judged_worst) is not None:
         yield Fact("Furthest out" if worst.out_of_tolerance else "Closest to the limit", Ref(worst.block))
-        yield Fact("Decided by", meter_words(worst))
+        yield Fact("Decided by", meter_words(worst), page=False)
+        yield Fact("Decided by", ", ".join(filter(None, (size_of(worst), used_words(worst)))), brief=False)
 
 
 def _opening_time(simulation: Simulation) -> int:
@@ -123,10 +124,14 @@ def _body(simulation: Simulation) -> Section:
 
 
 def _meter_facts(one: DeltaVerdict) -> Iterator[Fact]:
-    """Yield what a delta meter found: how much, when, how often it was too much; what is to be doubted."""
-    yield Fact(size_of(one), Value(one.worst, "m", one.allowed, one.verdict, one.used), used_words(one))
-    yield Fact("Time", Value(one.t, "s"))
-    yield Fact("Out of tolerance", out_words(one.out_of_tolerance, one.samples))
+    """Yield what a delta meter found: how much, when, how often it was too much; what is to be doubted.
+
+    A page has the numbers in its table of the delta meters.
+    """
+    value = Value(one.worst, "m", one.allowed, one.verdict, one.used)
+    yield Fact(size_of(one), value, used_words(one), page=False)
+    yield Fact("Time", Value(one.t, "s"), page=False)
+    yield Fact("Out of tolerance", out_words(one.out_of_tolerance, one.samples), page=False)
     yield Fact("In doubt", "; ".join(one.doubts))
 
 

@@ -32,4 +32,4 @@ def test_its_parts_stand_where_they_are_read_first(comparison: Comparison) -> No
         "d_5, tool shift z", "399.0", "0.2 %",
     ]  # fmt: skip
     figures = [block.title for block in part.blocks if isinstance(block, Figure)]
-    assert figures[:2] == ["Deviation over time", "Deviation over time without the causes"]
+    assert figures[:2] == ["Deviation over time", "Deviation of joints"]
