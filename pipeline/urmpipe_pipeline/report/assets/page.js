@@ -35,7 +35,7 @@
 
   // In a part that is closed there is no room to draw.
   function isHidden(plot) {
-    return plot.offsetParent === null;
+    return !plot.checkVisibility();
   }
 
   // Returns the figure in the colours of the reader's setting; paper is light.
