@@ -166,8 +166,8 @@ def test_a_report_has_its_section_beside_those_of_other_results() -> None:
 def test_the_terminal_and_a_notebook_show_it(capsys: pytest.CaptureFixture[str]) -> None:
     print_presentation(present(swing()))
     said = capsys.readouterr().out
-    assert said.startswith("FAIL  it swings too far\n      Limit: 14.3239 deg\n")
-    assert "Largest angle: 17.18" in said
+    assert said.startswith("FAIL  it swings too far\n      Limit: 14.32 deg\n")
+    assert "Largest angle: 17.19 deg" in said
     html = swing()._repr_html_()
     assert html.startswith("<p><b>Swing</b> FAIL it swings too far</p>")
     assert "it comes to rest" in html

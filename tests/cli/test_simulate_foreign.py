@@ -147,7 +147,7 @@ def test_a_meter_that_depends_on_what_is_not_finite_does_not_pass(
     samples = 10 // every + 1
     assert lines[0] == "FAIL  m of system within tolerance, but in doubt"
     assert lines[2].strip() == (
-        "Decided by: |Δx| = 0.0000 mm of 3.5 mm allowed (0 % of the tolerance) at t = 0.000 s; out of"
+        "Decided by: |Δx| = 0.0 mm of 3.5 mm allowed (0 % of the tolerance) at t = 0.000 s; out of"
         f" tolerance: 0 of {samples} samples (0 %); a.y was nan at t = 0.2 s, and m depends on a"
     )
     assert recorded(tmp_path).verdict == "fail"

@@ -64,7 +64,7 @@ def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     share = "share of the reference within the log's time"
     yield Fact("Covered", Value(covered, "%"), share, covered < WHOLE, page=not ranked)
     yield _left_out(one, len(result.reference.t_ns))
-    yield from _out_of_tolerance(one)
+    yield from _out_of_tolerance(one, ranked=ranked)
     if timed:
         yield Fact("Clocks", *sync_words(one.sync))
     yield Fact("Turns removed", _turns(one), "whole turns counted differently at the start")
@@ -160,9 +160,9 @@ def _left_out(one: Deviation, reference_samples: int) -> Fact:
     return Fact("Left out", f"{own}, {theirs}", "no counterpart, or no value", some, page=some)
 
 
-def _out_of_tolerance(one: Deviation) -> Iterator[Fact]:
+def _out_of_tolerance(one: Deviation, *, ranked: bool) -> Iterator[Fact]:
     out = int(np.count_nonzero(one.outside))
-    yield Fact("Out of tolerance", out_words(out, len(one.sample)), brief=out > 0)
+    yield Fact("Out of tolerance", out_words(out, len(one.sample)), brief=out > 0, page=not ranked)
     if longest := one.longest_out:
         yield Fact("Longest stretch out", stretch_words(longest))
 

@@ -54,7 +54,7 @@ def test_the_verdict_comes_first_then_what_explains_it() -> None:
     assert lines(one)[:7] == [
         "### FAIL: a\\_b\\|c is out",
         "",
-        "Decided by: **1.2000 mm**; At: **2.500 s**",
+        "Decided by: **1.200 mm**; At: **2.500 s**",
         "",
         "Samples: 7",
         "",
@@ -70,8 +70,8 @@ def test_verdicts_stand_above_warnings_and_other_tables_below_all() -> None:
     assert told[2:] == [
         "| Log | max [mm] | Verdict |".replace("[", "\\[").replace("]", "\\]"),
         "| --- | --- | --- |",
-        "| Log 0 | 1.0000 | PASS |",
-        "| Log 1 | 2.0000 | FAIL |",
+        "| Log 0 | 1.000 | PASS |",
+        "| Log 1 | 2.000 | FAIL |",
         "",
         "Warnings: 1",
         "",
@@ -81,7 +81,7 @@ def test_verdicts_stand_above_warnings_and_other_tables_below_all() -> None:
         "",
         "| Signal | max \\[mm\\] |",
         "| --- | --- |",
-        *(f"| Signal {k} | {k + 1}.0000 |" for k in range(3)),
+        *(f"| Signal {k} | {k + 1}.000 |" for k in range(3)),
     ]
 
 

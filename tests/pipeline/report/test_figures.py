@@ -22,10 +22,11 @@ from urmpipe_pipeline.presentation.figure import (
     Text,
     View,
 )
+from urmpipe_pipeline.presentation.layout import BAND_SHARE
 from urmpipe_pipeline.presentation.scene import Arrows, Path, Sheets, Spot
 from urmpipe_pipeline.presentation.section import Block, Fact, Presentation, Section
 from urmpipe_pipeline.report import spec
-from urmpipe_pipeline.report.figures import drawn_figures, time_span
+from urmpipe_pipeline.report.figures import Multiples, drawn_figures, time_span
 from urmpipe_pipeline.report.page import Page, lay_out
 from urmpipe_pipeline.report.render import data_address
 from urmpipe_pipeline.report.space import drawn_space
@@ -56,8 +57,15 @@ def figure(*panels: Panel, **more: Any) -> Figure:
     return Figure("Title", "Caption.", "Alt.", (View("view", panels),), **more)
 
 
+def whole(one: Figure) -> list[spec.Figure]:
+    """The figures of a figure none of whose panels becomes small multiples."""
+    found = list(drawn_figures(one, time_span([one])))
+    assert not [each for each in found if isinstance(each, Multiples)]
+    return [each for each in found if isinstance(each, spec.Figure)]
+
+
 def drawn(one: Figure) -> spec.Figure:
-    (found,) = drawn_figures(one, time_span([one]))
+    (found,) = whole(one)
     go.Figure(found.spec)  # raises on an unknown word or a wrong value
     return found
 
@@ -269,7 +277,7 @@ def test_rows_without_times_are_points_that_nothing_joins() -> None:
 
 def test_panels_of_other_axes_become_figures_of_their_own() -> None:
     both = figure(panel(WAVE), panel(WAVE, over=Over(T, "‖v‖", "m/s")))
-    first, second = drawn_figures(both, time_span([both]))
+    first, second = whole(both)
     assert (first.title, first.over) == ("Title", "t")
     assert (second.title, second.over) == ("Title over ‖v‖", "‖v‖")
 
@@ -466,3 +474,36 @@ def test_a_line_over_a_quantity_is_parted_dashed_and_pointed() -> None:
     x = numbers(trace(made, "runs")["x"])
     assert np.flatnonzero(np.isnan(x)).tolist() == [150, 301]
     assert made.spec["layout"]["legend"]["y"] > 1.0  # above the word of the corner
+
+
+def test_a_tolerance_that_would_vanish_has_a_scale_of_its_own() -> None:
+    """The pointer tells the value, not the height; the band takes its share of the axis."""
+    values = np.array([0.0, 0.807, -0.2, 0.001, 0.0035])
+    found = drawn(figure(panel(values, "Δx", "m", limit=0.0035, small=True, peaks=(1,), t_ns=T_NS[:5])))
+    (line, peak) = found.spec["data"]
+    np.testing.assert_allclose(
+        numbers(line["customdata"]), 1e3 * values, rtol=1e-6
+    )  # in mm, single precision
+    assert line["hovertemplate"].startswith("%{customdata:")
+    heights = numbers(line["y"])
+    assert heights[1] == 1.0
+    assert heights[4] == pytest.approx(BAND_SHARE)
+    assert numbers(peak["y"])[0] == 1.0
+    axis = found.spec["layout"]["yaxis"]
+    assert axis["ticktext"] == ["−500", "−3.5", "0", "3.5", "500"]
+    (band,) = [one for one in found.spec["layout"]["shapes"] if one.get("fillcolor") == spec.BAND]
+    assert (band["y0"], band["y1"]) == (-BAND_SHARE, BAND_SHARE)
+    assert found.caption.endswith("a larger one within the tolerance, a smaller one beyond it.")
+
+
+def test_many_answers_with_their_set_points_are_small_multiples() -> None:
+    grey = tuple(Line(WAVE, (f"set {k}",), ("#8f9ba0",), dashed=True) for k in range(3))
+    answers = Line(np.column_stack([WAVE] * 3), ("q1", "q2", "q3"), (RED, BLUE, RED))
+    one = figure(Panel("theta", "rad", (*grey, answers), T_NS))
+    (found,) = drawn_figures(one, time_span([one]))
+    assert isinstance(found, Multiples)
+    assert [small.title for small in found.figures] == ["q1", "q2", "q3"]
+    for k, small in enumerate(found.figures):
+        assert [trace["name"] for trace in small.spec["data"]] == [f"set {k}", f"q{k + 1}"]
+        assert [trace["line"]["dash"] for trace in small.spec["data"]] == ["dash", "solid"]
+        assert small.alt == f"q{k + 1} and its set point set {k}, dashed, over time."
