@@ -43,6 +43,12 @@ NOT_CHECKED = {
 """Languages that nothing here reads, and why."""
 
 
+WRONG_ON_PURPOSE = {
+    ("docs/targets.md", "x,y,z,qx,qy,qz,qw"): "each wrong row has its error: test_targets_page.py"
+}
+"""Page and first line of blocks that show what is refused, and where that is tested."""
+
+
 def blocks(page: str) -> list[tuple[str, str]]:
     """Return the language and the content of each fenced block, without its indent."""
     return [
@@ -55,5 +61,5 @@ def blocks(page: str) -> list[tuple[str, str]]:
 def test_each_fenced_block_is_of_its_language(page: str) -> None:
     for language, content in blocks(page):
         assert language in CHECKS or language in NOT_CHECKED, f"{page}: {language!r}: {content}"
-        if language in CHECKS:
+        if language in CHECKS and (page, content.partition("\n")[0]) not in WRONG_ON_PURPOSE:
             CHECKS[language](content)
