@@ -230,7 +230,7 @@ def test_a_tool_that_hardly_turns_is_refused_since_a_base_explains_as_much() -> 
     with pytest.raises(LogError) as error:
         aligned(path_run(position + SHIFT), path_run(position, turned.as_quat(), name="log"), "tool")
     assert str(error.value) == (
-        "log.csv: align: tool: found a tool that turns by 0.9000 deg in all, which any offset of the"
+        "log.csv: align: tool: found a tool that turns by 0.9000 deg in all, which an offset of the"
         " base explains as well, allowed: a log that turns it; start, none"
     )
 
@@ -363,16 +363,16 @@ def test_poses_that_any_base_and_tool_fit_are_refused(rows: int, found: str) -> 
 @pytest.mark.parametrize(
     ("turns", "said"),
     [
-        (np.zeros((200, 3)), "do not tell the offset of the tool, so the smallest values are used"),
+        (np.zeros((200, 3)), "do not determine the offset of the tool, so the smallest values are used"),
         (
             np.outer(np.linspace(-1.0, 1.0, 200), [0.0, 0.0, 1.0]),
-            "do not tell the offset of the tool along z, so the smallest values are used",
+            "do not determine the offset of the tool along z, so the smallest values are used",
         ),
         (
             np.outer(np.linspace(-1.0, 1.0, 200), [0.0, 0.6, 0.8])
             + np.outer(np.cos(np.arange(200)), [0.0, -0.008, 0.006]),
-            "hardly tell the offset of the tool along (0.00, 0.60, 0.80), of which a small error of the log"
-            " makes a large one",
+            "hardly determine the offset of the tool along (0.00, 0.60, 0.80), so a small error of the log"
+            " causes a large one",
         ),
     ],
 )

@@ -132,7 +132,7 @@ def test_one_log_alone_has_one_clock(q: FloatArray) -> None:
     for sync in ("auto", 0.25):
         assert refusal(OptionError, compare_recorded, log, CompareOptions(sync=sync)) == (
             f"sync: found {sync} for one log, allowed: start, since its joints and its recorded tool centre"
-            " point stand in the same rows"
+            " point share the same rows"
         )
 
 

@@ -68,8 +68,8 @@ def test_a_wrap_an_unexplained_step_and_an_in_between_sample_stand_in_the_audit(
     assert odd.step == pytest.approx(0.05 + 2.5, abs=1e-14)
     assert (odd.before, odd.after) == (1, 1)
     assert [(w.kind, w.row, w.message) for w in found.warnings] == [
-        ("large-step", 31, f"q1 steps by more than 90 deg from the value before, to {q[30]:.6g} rad, which"
-         " is no wrap: it stays"),
+        ("large-step", 31, f"q1 steps by more than 90 deg from the value before, to {q[30]:.6g} rad: not a"
+         " wrap, the value is kept"),
         ("in-between", 21, f"q1 lies between the ends of a wrap, {abs(between.step):.4g} rad off the line of"
          " its neighbours, where a linear resampling left it"),
     ]  # fmt: skip

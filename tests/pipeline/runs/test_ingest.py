@@ -167,8 +167,8 @@ def test_real_jumps_that_are_no_wraps_stay() -> None:
     (told,) = [one for one in run.warnings if one.kind == "large-step"]
     assert (told.row, told.message) == (
         2,
-        "3 steps of field.position.joint_0 and field.position.joint_3 by more than 90 deg are no wraps, and"
-        " stay; the largest, of field.position.joint_3 by 682.7 deg, is to row 1412",
+        "3 steps of field.position.joint_0 and field.position.joint_3 by more than 90 deg are not wraps and"
+        " are kept; the largest, of field.position.joint_3 by 682.7 deg, is to row 1412",
     )
     assert "recorded-rates" in [w.kind for w in run.warnings]  # its velocity columns are all 0
 

@@ -258,7 +258,7 @@ def test_the_real_log_with_an_outlier_says_so() -> None:
     assert warning == LogWarning(
         "outlier-first",
         "an outlier, off the motion of the other rows: joint1 by 0.6856 rad (other steps: at most 0.09092);"
-        " it stays; take it out of the file if the arm was not there",
+        " it is kept; remove it from the file if the arm was not there",
         1,
     )
     assert run.log.q[0, 0] == 0.7116998434066772

@@ -133,13 +133,13 @@ def test_no_tool_is_found_for_a_log_that_hardly_moves_or_needs_more_than_a_tool(
     (warning,) = lacking_tool(UR5E, log(still, positions_over_log(UR5E, still) + np.array([0.0, 0.0, 0.15])))
     assert warning.message == (
         "the kinematics of ur5e stay 150.0 mm (rms) from the recorded TCP, and the log moves too"
-        " little to tell why: is a tool or a base missing?"
+        " little to show why: is a tool or a base missing?"
     )
     tooled = UR5E.placed(tool=translation(0.0, 0.0, 0.1))
     (warning,) = lacking_tool(tooled, log(still, positions_over_log(UR5E, still)))
     assert warning.message == (
         "the kinematics of ur5e stay 100.0 mm (rms) from the recorded TCP, and the log moves too"
-        " little to tell why: is the tool, 100.0 mm long, the right one, or a base missing?"
+        " little to show why: is the tool, 100.0 mm long, the right one, or a base missing?"
     )
     assert lacking_tool(UR5E, log(Q, 1.3 * positions_over_log(UR5E, Q) + np.sin(9 * T))) == []
 

@@ -111,7 +111,7 @@ def test_single_poses_are_no_motion_to_be_compared_with() -> None:
     poses = solved("poses", UR5E, way(50)).as_run()
     motion = solved("motion", UR5E, way(50), np.arange(50) * STEP_NS).as_run()
     for reference, runs in ((motion, [poses]), (poses, [motion]), (poses, [poses, motion])):
-        with pytest.raises(LogError, match="targets without times, which are no motion") as error:
+        with pytest.raises(LogError, match="targets without times, which are not a motion") as error:
             compare_runs(reference, runs)
         assert {one.file for one in error.value.findings} == {FILE.name}
     with pytest.raises(OptionError, match="sync"):

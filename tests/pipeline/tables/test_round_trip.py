@@ -278,7 +278,7 @@ def test_times_that_were_rebuilt_and_rows_that_were_left_out_are_said(tmp_path: 
     (tmp_path / "log.csv").write_text("\n".join(["t [s],q1 [rad]", *lines]) + "\n")
     rebuilt = urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "a.csv", rows="file")
     assert [warning.message for warning in rebuilt.warnings] == [
-        "the file's own times, which were not kept: times in steps of 1 s stand in 10 rows each: a regular"
+        "the file's own times, which were not kept: times in steps of 1 s cover 10 rows each: a regular"
         " clock of 0.1 s is used instead"
     ]
     bad = [f"{k * 0.1:.1f},{'oops' if k == 50 else k * 0.001}" for k in range(200)]
