@@ -24,7 +24,8 @@ RunCommand = Callable[..., Any]
 FREE = {
     "--planes", "--band", "--cycles", "--base", "--tool", "--base-link", "--tip-link", "--period", "--tsp",
     "--start", "--restarts", "--seed", "--velocity", "--velocities", "--acceleration", "--jerk", "--limit",
-    "--force", "--step", "--duration", "--timeout", "--q", "--block",
+    "--force", "--step", "--duration", "--timeout", "--q", "--block", "--figure-names",
+    "--figure-font", "--figure-dpi",
 }  # fmt: skip
 """Options whose values are numbers, or names in a file that is slow to read."""
 
@@ -87,6 +88,7 @@ def completions(line: str, begun: str) -> list[str]:
         ("plan", "cube", ["<file>", "cube:wall,", "cube:diagonal,"]),
         ("fmu build dc_drive --platforms", "win64,", ["win64,linux64"]),
         ("report a.rrd --figures", "", ["<dir>"]),
+        ("report a.rrd --formats", "pdf,", ["pdf,svg", "pdf,png"]),
         ("demo -o", "", ["<dir>"]),
     ],
 )

@@ -106,7 +106,7 @@ def test_options_of_reading_are_refused_with_a_recording(run: Run, urmpipe: Call
     ]  # fmt: skip
     ran = urmpipe("ingest", there(run.recording), "--unit", "deg")
     assert ran.code == 2
-    assert "--unit: found with recordings alone" in ran.err
+    assert "--unit: found with recordings only" in ran.err
     ran = urmpipe("ingest", there(run.recording), "-q")
     assert (ran.code, ran.err) == (0, "")
 

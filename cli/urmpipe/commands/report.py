@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
-from urmpipe.options.completion import folders
+from urmpipe.options.completion import folders, one_of_each, words
 from urmpipe.options.given import options_given
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.types import RECORDING, NamesType, NumberType, WholeType
@@ -37,6 +37,7 @@ OF_FIGURES = ("formats", "figure_names", "figure_width", "figure_font", "figure_
     "--format",
     metavar="FORMATS",
     type=NamesType(),
+    shell_complete=one_of_each("pdf", "svg", "png"),
     default="pdf,png",
     show_default=True,
     help="Formats of figures: pdf, svg, png.",
@@ -50,6 +51,7 @@ OF_FIGURES = ("formats", "figure_names", "figure_width", "figure_font", "figure_
 @click.option(
     "--figure-width",
     metavar="WIDTH",
+    shell_complete=words("column", "page"),
     default="page",
     show_default=True,
     help="column (88 mm), page (180 mm), or a length such as 85mm or 3.5in.",
@@ -61,7 +63,13 @@ OF_FIGURES = ("formats", "figure_names", "figure_width", "figure_font", "figure_
     show_default=True,
     help="Size of the text in figures in pt.",
 )
-@click.option("--figure-dpi", type=WholeType(), default=300, show_default=True, help="Dots an inch of a PNG.")
+@click.option(
+    "--figure-dpi",
+    type=WholeType(),
+    default=300,
+    show_default=True,
+    help="Resolution of PNG files in dots per inch.",
+)
 @output_options
 @click.pass_context
 def report(
