@@ -35,6 +35,8 @@ _STEP_2 = (_STEP & (1 << _COARSE) - 1) / (1 << _BITS)
 _PER_STEP = (1 << _BITS) / _STEP
 _TURN = 2 * _PI / (1 << _BITS)
 _TURN_REST = (2 * _PI - int(_TURN * 2**51) * (1 << _BITS - 51)) / (1 << _BITS)
+WORK = 4
+"""Arrays that `cosine_sine_into` needs in between."""
 _SHIFT = 1.5 * 2.0**52
 """A number added to it is rounded to a whole one, half to even, which stands in the low bits."""
 
@@ -63,37 +65,57 @@ def cosine_sine(angle: Element) -> tuple[Element, Element]:
 
 
 def _of_array(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return cos and sin of each element, with few arrays of its own: they cost more than the products."""
+    """Return cos and sin of each element."""
+    cosine, sine, *work = (np.empty(x.shape) for _ in range(2 + WORK))
+    cosine_sine_into(x, cosine, sine, *work)
+    return cosine, sine
+
+
+def cosine_sine_into(x: FloatArray, c: FloatArray, s: FloatArray, *work: FloatArray) -> None:
+    """Write cos and sin of each angle x [rad] into c and s: no array is made, which would cost more than it holds.
+
+    Args:
+        x: Any shape and strides.
+        c: An array of the same shape, apart from x.
+        s: Another one.
+        work: `WORK` more.
+    """
     if not (x.min(initial=0.0) >= -_MOST and x.max(initial=0.0) <= _MOST):
         x = _less_turns(x)
-    steps = np.asarray(x * _PER_STEP)
+    steps, r, sine, other = work
+    np.multiply(x, _PER_STEP, steps)
     steps += _SHIFT
-    at = steps.view(np.int64) & (_STEPS - 1)
+    at = np.bitwise_and(steps.view(np.int64), _STEPS - 1, r.view(np.int64))
     steps -= _SHIFT
-    rest = np.asarray(x - steps * _STEP_1)
-    steps *= _STEP_2
-    rest -= steps
     cosines, sines = table()
-    return _turned(cosines.take(at, mode="clip"), sines.take(at, mode="clip"), rest)
-
-
-def _turned(c: Element, s: Element, r: Element) -> tuple[Element, Element]:
-    """Return cos and sin of an angle from those of the nearest step and the rest in [rad]."""
-    z = r * r
-    sine = z * (-1.0 / 6.0)
+    cosines.take(at, out=c, mode="clip")
+    sines.take(at, out=s, mode="clip")
+    np.multiply(steps, _STEP_1, r)
+    np.subtract(x, r, r)
+    steps *= _STEP_2
+    r -= steps
+    z = np.multiply(r, r, steps)
+    np.multiply(z, -1.0 / 6.0, sine)
     sine *= r
     sine += r
-    versine = z * (1.0 / 24.0)
+    versine = np.multiply(z, 1.0 / 24.0, r)
     versine -= 0.5
     versine *= z
-    z = s * versine
-    z += c * sine
-    z += s
-    versine *= c
+    np.multiply(s, versine, other)
+    other += np.multiply(c, sine, z)
     sine *= s
+    versine *= c
     versine -= sine
-    versine += c
-    return versine, z
+    s += other
+    c += versine
+
+
+def _turned(c: float, s: float, r: float) -> tuple[float, float]:
+    """Return cos and sin of an angle from those of the nearest step and the rest in [rad], as the array's."""
+    z = r * r
+    sine = z * (-1.0 / 6.0) * r + r
+    versine = (z * (1.0 / 24.0) - 0.5) * z
+    return c + (c * versine - s * sine), s + (s * versine + c * sine)
 
 
 def _less_turns(x: FloatArray) -> FloatArray:

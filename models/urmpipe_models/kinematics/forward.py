@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -19,6 +20,7 @@ from urmpipe_models.elementwise import ZERO, Element, Vector, cross, plus, subtr
 from urmpipe_models.kinematics.frames import frames, joint_values, moved, tip_position
 from urmpipe_models.kinematics.motion import each_motion
 from urmpipe_models.row_blocks import row_blocks, side_by_side
+from urmpipe_models.tape import aligned, fill_over_log
 from urmpipe_models.transform import Transform, euler_zyx
 
 
@@ -126,9 +128,8 @@ def positions_over_log(chain: Chain, q: FloatArray) -> FloatArray:
         chain: The arm.
         q: Joint values in [rad] or [m], shape (n, joints).
     """
-    position = np.empty((3, len(q)))
-    for block in row_blocks(len(q)):  # one after the other: two threads are no faster at products this short
-        _fill(position[:, block], tip_position(chain, _columns(q[block])))
+    position = aligned(3, len(q))
+    fill_over_log(partial(tip_position, chain), q, position)
     return position.T
 
 
@@ -142,13 +143,15 @@ def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]
     Returns:
         Both in the world: x_world = R x_tool + p.
     """
-    position, rotation = np.empty((3, len(q))), np.empty((3, 3, len(q)))
-    for block in row_blocks(len(q)):  # see `positions_over_log`
-        pose = tip_pose(chain, _columns(q[block]))
-        _fill(position[:, block], pose.translation)
-        for row in range(3):
-            _fill(rotation[row, :, block], pose.rotation[row])
-    return position.T, rotation.transpose(2, 0, 1)
+
+    def entries(q: Sequence[Element]) -> list[Element]:
+        """Return p and the rows of R."""
+        pose = tip_pose(chain, q)
+        return [element for row in (pose.translation, *pose.rotation) for element in row]
+
+    position, rotation = aligned(3, len(q)), aligned(9, len(q))
+    fill_over_log(entries, q, [*position, *rotation])
+    return position.T, rotation.reshape(3, 3, len(q)).transpose(2, 0, 1)
 
 
 def point_over_log(
