@@ -28,6 +28,7 @@ def test_each_command_stands_in_both_shells() -> None:
     assert windows == as_windows
 
 
+@pytest.mark.slow
 def test_the_python_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     lay_files(tmp_path, monkeypatch)
     names: dict[str, object] = {}

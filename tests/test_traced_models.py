@@ -5,9 +5,12 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 
 
+@pytest.mark.slow
 def test_each_model_is_traced() -> None:
     """What is called in a test of traces, or by what is called there, is."""
     tests = [file.read_text(encoding="utf-8") for file in (ROOT / "tests" / "models").rglob("*.py")]

@@ -153,6 +153,7 @@ def test_a_path_without_time_goes_by_sample_index(urmpipe: RunCommand, tmp_path:
     assert json.loads(ran.out)["runs"][0]["samples"] == 7383
 
 
+@pytest.mark.slow
 def test_report_is_written_beside_and_named_after_the_recording(urmpipe: RunCommand, tmp_path: Path) -> None:
     assert urmpipe("compare", PATH, MATLAB, "--robot", "urm6", "-q", "-o", "run.rrd").code == 0
     ran = urmpipe("report", "run.rrd")
@@ -204,6 +205,7 @@ def test_bad_input_is_named_by_line_and_column_and_outputs_stay(
     assert (tmp_path / "run.rrd").read_bytes() == before
 
 
+@pytest.mark.slow
 def test_the_demo_goes_the_whole_way(urmpipe: RunCommand, tmp_path: Path) -> None:
     ran = urmpipe("demo", "--json")
     assert ran.code == 0, ran.err
@@ -260,6 +262,7 @@ def test_a_path_alone_is_nothing_to_judge(urmpipe: RunCommand) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no closed pipes of this kind")
 def test_a_reader_that_leaves_does_not_turn_a_pass_into_a_fail(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "urmpipe", "compare", str(PATH), str(MATLAB), "--robot", "urm6"]

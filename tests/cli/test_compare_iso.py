@@ -293,6 +293,7 @@ def joints_of(arm: Chain) -> FloatArray:
     return np.array(arm.start) + share[:, np.newaxis] * np.linspace(0.2, 0.4, len(arm.start))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur5e", "panda (URDF)", "rail arm (URDF)"])
 def test_joints_and_their_tool_tell_the_same(name: str, shared: Path) -> None:
     arm = {"ur5e": lambda: load_robot("ur5e"), "panda (URDF)": lambda: panda(shared)}.get(name, rail_arm)()

@@ -238,6 +238,7 @@ def test_a_log_whose_name_is_no_text_is_compared_recorded_and_reported(capsys: C
     assert Path("gut\ufffd.rrd").is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="only there may a file name hold any bytes")
 @pytest.mark.parametrize("encoding", ["utf-8:strict", "ascii:strict"])
 def test_no_output_is_too_narrow_for_a_name_or_a_sign(encoding: str) -> None:

@@ -42,6 +42,7 @@ def assert_agrees(found: Comparison, simulation: Simulation) -> None:
     assert found.verdict == meter.verdict
 
 
+@pytest.mark.slow
 def test_the_tip_that_a_block_computed_is_judged_as_its_delta_meter_does(recorded: Simulation) -> None:
     for one in operands(recorded):
         assert_agrees(urmpipe.compare(PATH, one, block="chain", tcp="recorded"), recorded)
@@ -61,6 +62,7 @@ def test_a_simulated_arm_compares_as_its_log_does(recorded: Simulation) -> None:
             assert_agrees(found, recorded)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("block", ["chain", "repolarizer", "log"])
 def test_a_simulated_arm_does_not_deviate_from_its_log(recorded: Simulation, block: str) -> None:
     for one in operands(recorded):
@@ -78,6 +80,7 @@ def test_its_own_tip_agrees_with_its_joints(recorded: Simulation) -> None:
     assert there(run.angle).max() < 1e-7  # of quaternions whose entries are a rounding apart: its root
 
 
+@pytest.mark.slow
 def test_the_block_is_asked_for_and_its_answers_work(
     recorded: Simulation, urmpipe: Callable[..., Any]
 ) -> None:
@@ -103,6 +106,7 @@ def test_a_block_without_a_simulation_is_refused(urmpipe: Callable[..., Any]) ->
     assert ran.code == 2
 
 
+@pytest.mark.slow
 def test_such_a_comparison_is_reported_and_diagnosed(
     recorded: Simulation, urmpipe: Callable[..., Any], tmp_path: Path
 ) -> None:

@@ -60,6 +60,7 @@ def test_the_first_line_is_verdict_and_answer(capsys: Captured) -> None:
     assert lines[-1].startswith("Recording: counter_rotating-diagnosed.rrd  (open it: ")
 
 
+@pytest.mark.slow
 def test_what_is_written_is_the_comparison_with_its_diagnosis() -> None:
     run(["diagnose", PATH, WRONG, *ARM, "-q"])
     run(["compare", PATH, WRONG, *ARM, "--diagnose", "-q", "-o", "compared.rrd"])
@@ -71,6 +72,7 @@ def test_what_is_written_is_the_comparison_with_its_diagnosis() -> None:
     assert "module 3 (phi3) counter-rotates" in Path("counter_rotating-diagnosed.html").read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_json_has_the_keys_that_are_promised(capsys: Captured) -> None:
     assert run(["diagnose", PATH, WRONG, *ARM, "--json"]) == 1
     found = told(capsys)
@@ -90,16 +92,19 @@ def test_json_has_the_keys_that_are_promised(capsys: Captured) -> None:
     assert told(capsys)["runs"][0]["diagnosis"] is None
 
 
+@pytest.mark.slow
 def test_a_log_that_passes_is_diagnosed_too(capsys: Captured) -> None:
     assert run(["diagnose", PATH, RIGHT, *ARM]) == 0
     assert capsys.readouterr().out.startswith("PASS  ")
 
 
+@pytest.mark.slow
 def test_a_quiet_failure_says_why_and_nothing_else(capsys: Captured) -> None:
     assert run(["diagnose", PATH, WRONG, *ARM, "-q"]) == 1
     assert capsys.readouterr() == ("", f"FAIL  {ANSWER}\n")
 
 
+@pytest.mark.slow
 def test_junit_has_the_answer_as_a_property() -> None:
     run(["compare", PATH, WRONG, *ARM, "--diagnose", "-q", "--junit", "verdict.xml"])
     suite = there(ET.parse("verdict.xml").getroot().find("testsuite"))
@@ -157,6 +162,7 @@ def test_the_recording_of_a_comparison_is_no_log(operands: list[str], capsys: Ca
     )
 
 
+@pytest.mark.slow
 def test_in_python_it_stands_in_its_comparison() -> None:
     with pytest.warns(urmpipe.UrmpipeWarning) as shown:
         found = urmpipe.diagnose(PATH, WRONG, robot="urm6")
@@ -181,6 +187,7 @@ def test_in_python_operands_are_refused_by_their_names() -> None:
     assert refusal(LogError, urmpipe.diagnose, PATH, RIGHT).startswith("matlab.csv: no robot")
 
 
+@pytest.mark.slow
 def test_poses_measured_from_outside_are_put_into_their_base_and_tool_first() -> None:
     arm = load_robot("ur5e")
     q = np.array([0.3, -1.2, 1.1, -0.7, -1.5, 0.4]) + np.random.default_rng(1).uniform(-1.0, 1.0, (40, 6))

@@ -17,6 +17,7 @@ def diagnosed(name: str) -> Diagnosis:
     return urmpipe.diagnose(LOGS / "path.csv", LOGS / name, robot="urm6")
 
 
+@pytest.mark.slow
 def test_a_module_that_turns_the_other_way() -> None:
     found = diagnosed("counter_rotating.csv")
     (cause,) = found.causes
@@ -26,6 +27,7 @@ def test_a_module_that_turns_the_other_way() -> None:
     assert found.remainder.rms < 1e-6
 
 
+@pytest.mark.slow
 def test_a_log_that_starts_4_ms_late() -> None:
     found = diagnosed("matlab.csv")
     (cause,) = found.causes
@@ -36,6 +38,7 @@ def test_a_log_that_starts_4_ms_late() -> None:
     assert found.remainder.rms < 2e-5
 
 
+@pytest.mark.slow
 def test_a_base_that_stands_elsewhere_and_its_twin() -> None:
     found = diagnosed("solidworks")
     (cause,) = found.causes
@@ -45,6 +48,7 @@ def test_a_base_that_stands_elsewhere_and_its_twin() -> None:
     assert found.remainder.rms < 1e-6
 
 
+@pytest.mark.slow
 def test_what_a_damped_inverse_leaves_has_no_cause_that_explains_much() -> None:
     found = diagnosed("coppeliasim.csv")
     told = [*found.causes, *(cause for one in found.undecided for cause in one.causes)]

@@ -50,6 +50,7 @@ def test_the_poses_of_a_library_that_rounds_a_ur10() -> None:
     assert found.undecided == ()
 
 
+@pytest.mark.slow
 def test_poses_that_a_laser_tracker_measured_have_the_arms_own_geometry_and_no_cause() -> None:
     found = urmpipe.diagnose(LOGS / "ur10-laser-tracker" / "measurements_grid.csv", robot="ur10")
     assert (found.verdict, found.causes, found.undecided) == ("pass", (), ())

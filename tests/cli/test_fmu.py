@@ -43,6 +43,7 @@ def meter(tmp_path: Path) -> Path:
     return build_fmu("delta_meter", backend="python", output=tmp_path).path
 
 
+@pytest.mark.slow
 def test_build_writes_the_fmu_and_says_what_is_inside(urmpipe: RunCommand, tmp_path: Path) -> None:
     needs_native()
     ran = urmpipe("fmu", "build", "kinematic_chain", "--robot", "urm6", "--json")
@@ -64,6 +65,7 @@ def test_build_writes_the_fmu_and_says_what_is_inside(urmpipe: RunCommand, tmp_p
     np.testing.assert_allclose(found, tip, rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_the_same_unit_is_the_same_file(tmp_path: Path) -> None:
     first = build_fmu("repolarizer", options={"joints": 2}, backend="python", output=tmp_path / "a.fmu")
     second = build_fmu("repolarizer", options={"joints": 2}, backend="python", output=tmp_path / "b.fmu")
@@ -102,6 +104,7 @@ def test_an_output_is_never_an_input(tmp_path: Path) -> None:
     assert unit.read_text(encoding="utf-8") == example()
 
 
+@pytest.mark.slow
 def test_a_log_is_inside_its_fmu(tmp_path: Path) -> None:
     built = build_fmu("log_source", log=LOGS / "matlab.csv", output=tmp_path)
     values = {one.name: one.before for one in check_fmu(built.path).variables}
@@ -121,6 +124,7 @@ def example() -> str:
     return PAGE.split("```python\n")[1].split("```")[0]
 
 
+@pytest.mark.slow
 def test_the_unit_of_the_page_is_built_and_runs(urmpipe: RunCommand, tmp_path: Path) -> None:
     (tmp_path / "my_unit.py").write_text(example(), encoding="utf-8")
     ran = urmpipe("fmu", "build", "my_unit.py", "-q")
@@ -143,6 +147,7 @@ def test_what_a_unit_prints_is_no_part_of_the_json(urmpipe: RunCommand, tmp_path
     assert (ran.code, json.loads(ran.out)["name"]) == (0, "system")
 
 
+@pytest.mark.slow
 def test_check_of_a_sound_fmu_is_0(urmpipe: RunCommand, meter: Path) -> None:
     ran = urmpipe("fmu", "check", meter.name)
     assert (ran.code, ran.err) == (0, "")
@@ -157,6 +162,7 @@ def test_check_of_a_sound_fmu_is_0(urmpipe: RunCommand, meter: Path) -> None:
     }  # fmt: skip
 
 
+@pytest.mark.slow
 def test_check_of_a_broken_fmu_is_1(urmpipe: RunCommand, meter: Path) -> None:
     broken = meter.with_name("broken.fmu")
     with zipfile.ZipFile(meter) as source, zipfile.ZipFile(broken, "w") as target:
@@ -207,6 +213,7 @@ def test_without_casadi_it_is_python_and_says_why(
     assert capsys.readouterr().err == f"error: {said}\n"
 
 
+@pytest.mark.slow
 def test_units_on_python_are_a_warning_of_the_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("urmpipe_fmus.native.native_missing", lambda platforms=(): "casadi is not installed")
     told: list[str] = []
@@ -303,6 +310,7 @@ def test_check_tells_warnings_of_an_fmu_and_is_0_all_the_same(urmpipe: RunComman
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "said"),
     [("exit(0);", "ended the process with the exit code 0"), (HANGS, "did not return within 1 s")],

@@ -82,6 +82,7 @@ def test_the_specimens_provoke_hints_of_many_kinds(specimen: str, parameter: str
     assert parameter in {hint.parameter for robot in ROBOTS for _, hint in offers(specimen, robot)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ROBOTS)
 @pytest.mark.parametrize("name", SPECIMENS)
 def test_hints_that_are_followed_help(
@@ -138,6 +139,7 @@ SHIFTED = UR5E.placed(base=from_offset((0.0, 0.02, -0.005)))
 BEHIND = UR5E.placed(base=from_offset((0.5, -0.3, 0.8, 0.0, 0.0, 1.2)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("order", "held", "robot", "kind", "parameter"),
     [

@@ -16,6 +16,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.sources.tables.text import fingerprint
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log", ["coppeliasim.csv", "matlab.csv", "solidworks", "counter_rotating.csv"])
 def test_log_to_delta_is_what_compare_says(log: str) -> None:
     result = simulate(
@@ -56,12 +57,14 @@ def write_motion(tmp_path: Path, t: FloatArray, digits: str) -> dict[str, str]:
     return {name: str(path) for name, path in files.items()}
 
 
+@pytest.mark.slow
 def test_a_log_of_another_period_is_judged_at_its_samples(slow_motion: dict[str, str]) -> None:
     result = simulate("log-to-delta", arguments=slow_motion)
     assert (result.step, result.verdict, result.warnings) == (0.01, "pass", ())
     assert result.verdicts[0].worst < 1e-12  # the path is the log's own, but for rounding
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("digits", ["%.9f", "%.3f"])
 def test_a_log_whose_period_no_clock_writes_exactly_is_judged_at_its_samples(
     tmp_path: Path, digits: str

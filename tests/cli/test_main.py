@@ -65,6 +65,7 @@ def test_every_command_has_help_with_examples_and_every_option_says_what_it_does
     assert [line for line in narrow.splitlines() if len(line) > 80] == []
 
 
+@pytest.mark.slow
 def test_importing_urmpipe_leaves_the_garbage_collection_alone() -> None:
     code = (
         "import gc; before = gc.get_threshold();"
@@ -188,6 +189,7 @@ def test_a_shell_completes_whatever_the_lab_says(
     assert capsys.readouterr() == (offered, "")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is full")
 @pytest.mark.parametrize("arguments", [(), ("--json",)])
 def test_an_output_that_is_full_is_one_line(arguments: tuple[str, ...]) -> None:
@@ -197,6 +199,7 @@ def test_an_output_that_is_full_is_one_line(arguments: tuple[str, ...]) -> None:
     assert (done.returncode, done.stderr) == (2, "error: No space left on device\n")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is full")
 def test_a_standard_error_that_is_full_is_no_verdict() -> None:
     with Path("/dev/full").open("w") as full:
@@ -204,6 +207,7 @@ def test_a_standard_error_that_is_full_is_no_verdict() -> None:
         assert subprocess.run(command, stderr=full, check=False).returncode == 2
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="closes an output as a shell of Unix does")
 def test_outputs_that_are_closed_are_no_fault() -> None:
     command = [sys.executable, "-m", "urmpipe", "robot", "list"]

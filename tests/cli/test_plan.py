@@ -130,6 +130,7 @@ def test_options_of_the_law(urmpipe: RunCommand, options: tuple[str, ...], durat
     assert answer(urmpipe, 0, CUBE, *options)["duration"] == pytest.approx(duration, abs=5e-6)
 
 
+@pytest.mark.slow
 def test_a_plan_that_fails_is_exit_1(urmpipe: RunCommand) -> None:
     found = answer(urmpipe, 1, "singular.csv", "--robot", "irb60")
     assert found["verdict"] == "fail"
@@ -213,6 +214,7 @@ def test_a_recording_is_the_plan(urmpipe: RunCommand, folder: Path) -> None:
     assert [one.name for one in back.provenance.inputs] == ["path.csv"]
 
 
+@pytest.mark.slow
 def test_how_to_read_a_plan_names_what_is_not_in_the_file(urmpipe: RunCommand, folder: Path) -> None:
     (folder / "arm.toml").write_text(robot_toml(load_robot("irb60")), encoding="utf-8")
     for options, read in (
@@ -257,6 +259,7 @@ def test_a_csv_is_replaced_by_another_plan_alone(urmpipe: RunCommand, folder: Pa
         assert (folder / "path.csv").read_text() == CONTOUR
 
 
+@pytest.mark.slow
 def test_a_plan_that_fails_writes_no_csv_but_a_recording(urmpipe: RunCommand, folder: Path) -> None:
     ran = urmpipe("plan", "singular.csv", "--robot", "irb60", "-o", "plan.csv")
     assert (ran.code, ran.err) == (

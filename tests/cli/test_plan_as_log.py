@@ -37,6 +37,7 @@ robot = "arm.toml"
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_ingest_finds_an_arm_of_the_catalogue_by_the_recorded_tool(name: str, tmp_path: Path) -> None:
     plan = planned(name, tmp_path / "plan.csv")
@@ -52,6 +53,7 @@ def compared(reference: Path, log: Path, arm: Chain | None) -> tuple[str | None,
     return found.verdict, run["delta"]["norm"]["max"], [warning.kind for warning in found.warnings]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "given"), [*((name, False) for name in CATALOGUE), *((name, True) for name in PATHS)]
 )
@@ -65,6 +67,7 @@ def test_compare_takes_it_on_either_side(name: str, given: bool, tmp_path: Path)
         assert largest <= CLOSE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OWN)
 def test_compare_asks_for_an_arm_that_the_log_cannot_tell_or_takes_what_was_recorded(
     name: str, tmp_path: Path
@@ -80,6 +83,7 @@ def test_compare_asks_for_an_arm_that_the_log_cannot_tell_or_takes_what_was_reco
     assert (found.verdict, list(found.warnings)) == ("pass", [])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PATHS)
 def test_ik_comes_back_to_it(name: str, tmp_path: Path) -> None:
     plan = planned(name, tmp_path / "plan.csv")
@@ -91,6 +95,7 @@ def test_ik_comes_back_to_it(name: str, tmp_path: Path) -> None:
     assert solved.reached.all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PATHS)
 def test_simulate_plays_it_into_an_arm(name: str, tmp_path: Path) -> None:
     plan = planned(name, tmp_path / "plan.csv")

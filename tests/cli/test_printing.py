@@ -161,6 +161,7 @@ def test_no_name_breaks_a_line_of_what_robot_prints_and_writes(
     assert read_back.coordinates == (f"j{read_back.name}", "second")
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows allows no such names")
 def test_no_name_breaks_a_line_of_a_verdict(urmpipe: Callable[..., Any], tmp_path: Path) -> None:
     """Of a robot, a file or a column: in the terminal, JSON, JUnit, CSV, the report, exports and maps."""

@@ -111,6 +111,7 @@ def test_options_of_reading_are_refused_with_a_recording(run: Run, urmpipe: Call
     assert (ran.code, ran.err) == (0, "")
 
 
+@pytest.mark.slow
 def test_a_recording_among_files_or_without_a_run_is_refused(run: Run, tmp_path: Path) -> None:
     path, log = there(run.recording), there(run.recording).with_suffix(".csv")
     assert refusal(RecordingError, urmpipe.ingest, [path, log]) == (
@@ -145,6 +146,7 @@ def test_solved_targets_come_back(timed: bool, tmp_path: Path) -> None:
     assert_path(tmp_path / "a.tum", *written(tmp_path / "a.tum"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", [None, "urm6"])
 def test_a_plan_comes_back(robot: str | None, tmp_path: Path) -> None:
     made = {"velocity": 0.2, "acceleration": 1.0}
@@ -176,6 +178,7 @@ SYSTEMS = {
 """The signals of each system that may be the joints of an arm; none where it has only one such array."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", ["csv", "parquet", "mat"])
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_the_signals_of_a_simulation_come_back_or_are_asked_for(system: str, to: str, tmp_path: Path) -> None:

@@ -111,6 +111,7 @@ def test_a_unit_of_ones_own_follows_a_column_of_a_table(following: Path) -> None
     assert (result.duration, result.verdict, result.failed) == (1.0, None, None)
 
 
+@pytest.mark.slow
 def test_a_unit_of_ones_own_shows_its_energies_and_its_limit(urmpipe: RunCommand, tmp_path: Path) -> None:
     (tmp_path / "swing.py").write_text(SWING, encoding="utf-8")
     system = '[system]\nstep = 0.01\nduration = 10.0\n[blocks.swing]\nfile = "swing.py"\n'
@@ -382,6 +383,7 @@ def test_a_step_and_a_duration_are_positive(following: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_cold_build_is_told(following: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("URMPIPE_CACHE", str(tmp_path / "cache"))
     lines: list[str] = []

@@ -61,6 +61,7 @@ def recorded(folder: Path) -> Simulation:
     return result
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("place", "code", "samples", "where"),
     [
@@ -129,6 +130,7 @@ def test_an_fmu_that_ends_the_run_with_its_last_step_is_judged_as_a_whole(
 TOLD = "a: y: found nan at t = 0.2 s; values that are not finite: 4"  # y[1] and y[2] at two points
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("connections", "every"),
     [

@@ -255,6 +255,7 @@ def test_files_are_small() -> None:
     assert sum(sizes) < 3_500_000
 
 
+@pytest.mark.slow
 def test_generator_makes_what_is_shipped(monkeypatch: pytest.MonkeyPatch) -> None:
     """The whole path and each environment's first 0.25 s; `make_samples.py --check` makes it all."""
     monkeypatch.syspath_prepend(ROOT / "benchmarks")

@@ -78,6 +78,7 @@ def run_script(folder: Path, script: str) -> int:
     return subprocess.run(["sh", "-e", "-c", script], cwd=folder, env=environment, check=False).returncode
 
 
+@pytest.mark.slow
 def test_the_worst_exit_code_of_several_logs_is_kept(folder: Path) -> None:
     (folder / "logs").mkdir()
     log = (folder / "robot_data.csv").read_text(encoding="utf-8")
@@ -91,6 +92,7 @@ def test_the_worst_exit_code_of_several_logs_is_kept(folder: Path) -> None:
     assert errors == {"verdict-a.xml": "1", "verdict-b.xml": "0"}
 
 
+@pytest.mark.slow
 def test_a_first_run_needs_no_baseline_and_a_later_one_is_held_against_it(folder: Path) -> None:
     _, script = snippets(PAGE, "sh")
     assert run_script(folder, script) == 0

@@ -7,6 +7,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 FILES = [path for area in ("models", "fmus", "pipeline", "cli") for path in (ROOT / area).rglob("[!_]*.py")]
 
@@ -65,6 +67,7 @@ def stated(node: Definition) -> dict[str, str]:
     return said
 
 
+@pytest.mark.slow
 def test_public_docstrings_give_unit_and_shape_of_each_array() -> None:
     missing, seen = [], 0
     for path in FILES:

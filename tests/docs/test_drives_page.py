@@ -27,6 +27,7 @@ def test_the_table_of_stability_is_what_the_script_computes(figures: Mapping[str
     assert lines == figures["table"]()
 
 
+@pytest.mark.slow
 def test_the_picture_is_what_the_script_draws(figures: Mapping[str, Any]) -> None:
     texts = figures["picture"](), figures["PICTURE"].read_text(encoding="utf-8")
     number = re.compile(r"\d+(?:\.\d+)?")

@@ -22,6 +22,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 NAMED = set(re.findall(r"`(\w+)`", (DOCS / "json.md").read_text(encoding="utf-8")))
 
 
+@pytest.mark.slow
 def test_the_page_of_fmpy_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     missing = native_missing()
     if missing:
@@ -55,6 +56,7 @@ def test_the_system_of_the_page_runs(tmp_path: Path) -> None:
     assert (result.name, result.verdict, len(result.t_ns)) == ("my-arm", "pass", 21)
 
 
+@pytest.mark.slow
 def test_the_system_of_the_page_goes_straight_between_the_points_of_a_coarse_path(tmp_path: Path) -> None:
     system = next(one for one in snippets("docs/simulate.md", "toml") if one.startswith("[system]"))
     (tmp_path / "my-arm.toml").write_text(system, encoding="utf-8")

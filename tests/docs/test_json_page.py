@@ -130,6 +130,7 @@ CALLS = {
 """A call of each command that has --json; demo prints what compare prints."""
 
 
+@pytest.mark.slow
 def test_each_key_of_each_command_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

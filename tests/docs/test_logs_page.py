@@ -90,6 +90,7 @@ def made() -> set[str]:
     return {kind for path in MAKERS for kind in kinds(path)}
 
 
+@pytest.mark.slow
 def test_each_kind_of_warning_has_its_row(made: set[str]) -> None:
     assert [kind for kind in sorted(made) if not any(fnmatch(row, kind) for row in WARNINGS)] == []
 

@@ -80,6 +80,7 @@ def test_every_kind_is_on_the_page() -> None:
     assert set(rows) >= {*FREEDOMS, *get_args(ElementKind)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "count"), [("boom", 2), ("five-bar", 2), ("door", 8)])
 def test_an_example_moves_by_its_control(name: str, count: int) -> None:
     found = urmpipe.network_solve(f"{name}.toml", every=True)

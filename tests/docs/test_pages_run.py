@@ -43,6 +43,7 @@ def cases() -> list[object]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("page", "heavy"), cases())
 def test_the_commands_of_a_page_run(
     page: str, heavy: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -35,6 +35,7 @@ def rows_of(folder: Path, text: str) -> GivenPath:
     return read_path(folder / "path.csv")
 
 
+@pytest.mark.slow
 def test_commands_and_code_of_the_page_run_with_its_contour(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -66,6 +66,7 @@ def test_there_are_ten_lines_of_each() -> None:
     assert [one and one[1] for one in called] == ["build_fmu" if one == "fmu" else one for one in asked]
 
 
+@pytest.mark.slow
 def test_both_sides_write_the_same_files(sides: dict[str, Path]) -> None:
     ours = {"log-against-path.rrd", "log.rrd"}  # recordings that a command writes by default
     files = {name: {one.name for one in folder.iterdir()} for name, folder in sides.items()}

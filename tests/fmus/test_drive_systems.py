@@ -67,6 +67,7 @@ def coupled(figures: Mapping[str, Any], parts: int, **starts: float) -> FloatArr
     return np.asarray(found[::parts])
 
 
+@pytest.mark.slow
 def test_the_coupled_blocks_near_the_monolithic_solution_with_the_communication_step(
     figures: Mapping[str, Any],
 ) -> None:
@@ -78,6 +79,7 @@ def test_the_coupled_blocks_near_the_monolithic_solution_with_the_communication_
     assert errors[-1] < 2e-3  # rad of a move of 1 rad
 
 
+@pytest.mark.slow
 def test_eq_20_with_a_plus_tracks_and_settles(figures: Mapping[str, Any]) -> None:
     system = figures["OneDrive"]()
     wanted, real = figures["simulated"](system, 1e-3, 2.0, "set_point.theta", "load.theta").T
@@ -187,6 +189,7 @@ def run_system(name: str | Path, step: float | None = None, **changes: Any) -> R
     return recorded
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_one_drive_of_native_fmus_is_the_loop_over_units(figures: Mapping[str, Any]) -> None:
     recorded = run_system("one-drive", duration=1.0)
@@ -198,6 +201,7 @@ def test_one_drive_of_native_fmus_is_the_loop_over_units(figures: Mapping[str, A
         np.testing.assert_allclose(found, column, rtol=0.0, atol=1e-10)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_one_drive_nears_the_monolithic_solution_with_the_first_order_of_the_communication_step() -> None:
     expected = monolithic()
@@ -223,6 +227,7 @@ def test_six_drives_start_at_the_calibration_pose_and_arrive_where_their_set_poi
     np.testing.assert_allclose(tip[-1], forward(chain, targets)[-1].translation, rtol=0.0, atol=1e-4)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_six_drives_with_5_ms_shake_at_the_wrist_and_with_their_own_step_they_do_not() -> None:
     def shaking(recorded: Recorded, i: int) -> float:
@@ -237,6 +242,7 @@ def test_six_drives_with_5_ms_shake_at_the_wrist_and_with_their_own_step_they_do
     assert max(shaking(coarse, i) for i in range(1, 6)) < 0.01
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_native_drives_error_falls_with_the_fourth_power_of_the_internal_step(tmp_path: Path) -> None:
     errors = []

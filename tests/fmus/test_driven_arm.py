@@ -206,6 +206,7 @@ def test_it_starts_in_equilibrium_with_shafts_twisted_and_currents_and_voltages_
     np.testing.assert_allclose(read(unit, "phidd"), 0.0, rtol=0.0, atol=1e-10)
 
 
+@pytest.mark.slow
 @needs_native
 def test_an_arm_at_rest_stays_for_ten_seconds() -> None:
     for chain in (urm6(), with_drives(with_masses(load_robot("urm6")), held=["phi2", "phi4"])):
@@ -237,6 +238,7 @@ def test_a_held_pendulum_swings_with_the_root_of_k_over_j() -> None:
     assert read(unit, "phi")[0] == pytest.approx(1e-6 * np.cos(rate * 0.1), abs=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     (
         "inertia",
@@ -455,6 +457,7 @@ def without_springs(chain: Chain) -> Chain:
 PUSH = Wrench((20.0, -15.0, 25.0), (1.0, -2.0, 1.5))
 
 
+@pytest.mark.slow
 def test_a_spring_beside_a_drive_takes_its_torque_from_the_drive_and_the_arm_stays_at_rest() -> None:
     chain = sprung()
     relieved, plain = at_rest(chain), at_rest(without_springs(chain))
@@ -507,6 +510,7 @@ def test_the_torque_of_a_spring_is_what_its_energy_changes_by() -> None:
         assert added[0] == pytest.approx(300.0 * (0.7 - q), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_with_springs_no_energy_is_lost_and_the_unit_is_what_dop853_makes_of_the_equations() -> None:
     chain = sprung()
     chain = replace(chain, drives=tuple(
@@ -539,6 +543,7 @@ def test_with_springs_no_energy_is_lost_and_the_unit_is_what_dop853_makes_of_the
     assert abs(given - (stored - before) - heat) <= 1e-6 * abs(given)
 
 
+@pytest.mark.slow
 @needs_native
 def test_a_native_fmu_has_the_springs_of_the_instance() -> None:
     unit, count = make_unit("driven_arm", robot=sprung()), 10
@@ -565,6 +570,7 @@ def test_a_native_fmu_has_the_springs_of_the_instance() -> None:
     assert (np.abs(found - expected) / size).max() <= 1e-12
 
 
+@pytest.mark.slow
 def test_a_stiff_spring_beside_a_drive_shortens_the_internal_step() -> None:
     stiff = replace(driven("q"), spring=ReliefSpring(1e7, 0.0))
     inertia = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
@@ -677,6 +683,7 @@ def radius_of_the_unit(chain: Chain, round_: float) -> float:
     return float(size ** (shortest / round_))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period", [5e-3, 7.5e-3])
 def test_the_spectral_radius_is_that_of_the_unit_from_sample_to_sample(period: float) -> None:
     turn, slide, wrist = sprung().drives
@@ -688,6 +695,7 @@ def test_the_spectral_radius_is_that_of_the_unit_from_sample_to_sample(period: f
     assert abs(found - spectral_radius(without_springs(chain), np.array(chain.start))) > 1e-4
 
 
+@pytest.mark.slow
 def test_above_a_spectral_radius_of_1_the_simulation_grows_by_it_and_below_it_dies_away() -> None:
     def with_gain(velocity: float) -> Chain:
         own = replace(driven("q"), gains=Gains(7.5, velocity, 0.01), spring=ReliefSpring(200.0, 0.1))

@@ -159,6 +159,7 @@ def assert_fmu_gives(unit: Unit, path: Path, case: tuple[Any, Any], t: FloatArra
         assert_same(fmu.over(t, columns), shown(unit, run(unit, t, columns, start)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", UNITS)
 def test_a_run_gives_what_steps_give(what: str) -> None:
     unit, t = unit_of(what), times_of(unit_of(what))
@@ -235,6 +236,7 @@ CASES = random_units().flatmap(
 T = np.array([0.0, 0.01, 0.02, 0.05, 0.2])
 
 
+@pytest.mark.slow
 @settings(max_examples=40, **PATIENT)  # most of the time goes into drawing a unit; those of core/ draw more
 @given(CASES)
 def test_a_random_unit_gives_stepped_what_a_run_gives(case: tuple[Unit, tuple[Any, Any]]) -> None:

@@ -73,6 +73,7 @@ def test_every_changed_file_is_read_or_refused_in_words(tmp_path: Path) -> None:
     assert refused <= {"defaults", "recording"}, "nothing is behind what only is refused"
 
 
+@pytest.mark.slow
 def test_what_is_planted_is_found_and_kept_once(tmp_path: Path) -> None:
     done = run("-c", PLANTED, str(tmp_path))
     found = json.loads(done.stdout)

@@ -79,6 +79,7 @@ def assert_found(found: HandEye, truth: Truth, *, turned: bool) -> None:
     np.testing.assert_allclose(found.tool_rotation, truth.tool if turned else np.eye(3), atol=ROUNDING)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turned", [True, False])
 @pytest.mark.parametrize("robot", ["ur10", "ur5e", "urm6", "arm6"])
 def test_any_frames_are_found_from_exact_poses(robot: str, turned: bool) -> None:
@@ -229,6 +230,7 @@ def test_a_tool_that_hardly_turns_is_found_and_said_to_be_hardly_told() -> None:
         assert one.seen < HARDLY
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", FORMS)
 def test_the_form_of_orientations_is_the_one_that_leaves_no_angle(form: RotationForm) -> None:
     truth = random_truth(7, 40)

@@ -267,6 +267,7 @@ def second_order(arm: Chain, turned: float) -> float:
     return float(weight) + turned**2  # the lever shortens by a half of the square, and the arc rises by less
 
 
+@pytest.mark.slow
 @needs_native
 def test_a_force_on_the_tool_shifts_it_by_the_wrist_alone(tmp_path: Path) -> None:
     arm, path = irb60(), short_path(tmp_path)

@@ -6,6 +6,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -81,6 +82,7 @@ def test_what_is_no_array_in_a_row_is_decimated_alike() -> None:
     np.testing.assert_array_equal(values, before)
 
 
+@pytest.mark.slow
 def test_the_library_is_loaded_by_a_drawing_and_not_by_the_reader() -> None:
     code = (
         "import sys\nfrom urmpipe_datasets import LOGS\nfrom urmpipe_pipeline.runs.ingest import ingest_log\n"

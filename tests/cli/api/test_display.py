@@ -60,6 +60,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     return {type(one).__name__: one for one in made}
 
 
+@pytest.mark.slow
 def test_each_public_class_is_a_result_or_named_as_another(results: dict[str, Any]) -> None:
     public = {name for name in urmpipe.__all__ if isinstance(getattr(urmpipe, name), type)}
     errors = {name for name in public if issubclass(getattr(urmpipe, name), Exception)}

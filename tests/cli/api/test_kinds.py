@@ -155,6 +155,7 @@ def test_a_keyword_may_take_something_else_in_one_function() -> None:
     assert kind_of("compare", "reference") is None
 
 
+@pytest.mark.slow
 def test_arguments_of_a_system_may_be_paths_and_numbers() -> None:
     kind = KINDS["arguments"]
     assert kind.fits({"log": Path("log.csv"), "gain": 3, "name": "text"})

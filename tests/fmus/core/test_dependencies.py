@@ -149,6 +149,7 @@ def test_the_functions_that_are_allowed_are_those_that_become_c() -> None:
     assert sorted(FUNCTIONS) == sorted(traceable())
 
 
+@pytest.mark.slow
 @settings(**PATIENT)
 @given(random_units())
 def test_what_an_expression_of_casadi_depends_on_is_remembered_and_nothing_else(unit: Unit) -> None:

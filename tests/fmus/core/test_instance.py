@@ -252,6 +252,7 @@ def test_a_step_is_divided_into_equal_internal_steps() -> None:
         ]
 
 
+@pytest.mark.slow
 @settings(**PATIENT)
 @given(
     random_units().flatmap(

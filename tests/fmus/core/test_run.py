@@ -96,6 +96,7 @@ def test_a_memory_makes_each_sample_wait_for_the_one_before() -> None:
     assert found["m"].tolist() == [10.0, 11.0, 13.0, 17.0]
 
 
+@pytest.mark.slow
 @settings(**PATIENT)
 @given(
     random_units(remembers=False).flatmap(

@@ -50,6 +50,7 @@ def sampled(points: list[tuple[float, float]]) -> FloatArray:
     return np.concatenate(curves)
 
 
+@pytest.mark.slow
 @settings(deadline=None)  # a slow computer is no fault
 @given(diagrams())
 def test_boxes_stand_apart_and_wires_go_from_port_to_port_around_them(shown: Diagram) -> None:

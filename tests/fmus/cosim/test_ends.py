@@ -55,6 +55,7 @@ def own_processes() -> set[str]:
     return {one for each in lists for one in each.read_text().split()}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "timeout", "how"),
     [
@@ -74,6 +75,7 @@ def test_any_call_may_hang_or_end_the_process(code: str, timeout: float, how: st
     assert own_processes() <= before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "how"),
     [

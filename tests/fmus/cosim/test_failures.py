@@ -33,6 +33,7 @@ FAILURES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", sorted(FAILURES))
 def test_a_failing_block_is_told_and_what_was_recorded_stays(kind: int) -> None:
     recorded = ran({"good": gain(), "bad": TROUBLE}, {"good.u": "bad.y"}, {"bad": {"kind": kind}}, step=0.01)
@@ -187,6 +188,7 @@ def ends(pid: int) -> bool:
     return not runs.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for the child in /proc")
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_an_fmu_that_hangs_ends_with_who_started_it(how: signal.Signals, tmp_path: Path) -> None:
@@ -261,6 +263,7 @@ ENDS_AT_ONCE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("when", "rows", "said"),
     [

@@ -18,6 +18,7 @@ def solved(*arguments: object, **options: object) -> Recorded:
     return recorded
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("k", [(0.5, 0.5), (-3.0, 4.0), (10.0, 10.0), (1.0, 0.0), (-1.0, 1.0)])
 def test_a_linear_ring_is_solved_even_where_plain_iteration_runs_away(k: tuple[float, float]) -> None:
     """a = k1 b + 1, b = k2 a + 2: a = (2 k1 + 1) / (1 - k1 k2)."""
@@ -225,6 +226,7 @@ def test_outputs_that_may_be_a_step_late_are_told() -> None:
     assert ran({"a": gain()}, {"a.u": "a.y"}, {"a": {"k": 0.5}}, iterate=True).notes == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fresh", [True, False])
 def test_inputs_at_the_end_of_their_range_are_not_moved_out_of_it(fresh: bool) -> None:
     """y = u / 2 + 1 / 2 with u in 0..1: u = 1, where a larger u is refused."""

@@ -57,6 +57,7 @@ def test_a_ring_with_an_integrator_is_eulers_method() -> None:
     assert np.array_equal(recorded.column("decay", "y"), -2.0 * recorded.column("x", "y"))
 
 
+@pytest.mark.slow
 @settings(max_examples=5, deadline=None)  # each starts a process
 @given(st.floats(1e-6, 10.0), st.integers(1, 300))
 def test_time_is_k_steps_and_an_fmus_own_time_meets_it(step: float, count: int) -> None:
@@ -81,6 +82,7 @@ def test_an_fmu_of_one_step_size_is_always_given_the_same() -> None:
     assert recorded.column("a", "y").tolist() == list(range(11))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("every", [1, 3, 10, 11])
 def test_every_so_many_points_are_recorded(every: int) -> None:
     recorded = ran({"ramp": RAMP}, record_every=every)
@@ -88,6 +90,7 @@ def test_every_so_many_points_are_recorded(every: int) -> None:
     assert recorded.column("ramp", "y[3]").tolist() == [3 * (k * 0.1) for k in range(0, 11, every)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [(1, 2, 3), (3, 1, 2), (2, 2, 1)])
 def test_arrays_and_elements_are_connected_one_by_one(order: tuple[int, int, int]) -> None:
     connections = {f"sum.u[{i}]": f"ramp.y[{k}]" for i, k in enumerate(order, 1)}

@@ -90,6 +90,7 @@ def test_texts_are_not_exchanged() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_units_must_be_the_same_by_what_they_are_not_by_how_they_are_spelled() -> None:
     degrees = '<Unit name="Grad"><BaseUnit rad="1" factor="0.017453292519943295"/></Unit>'
     in_degrees = gain("in_degrees", unit="Grad", units=degrees)

@@ -27,6 +27,7 @@ needs_compiler = pytest.mark.skipif(native_missing() is not None, reason=f"needs
 needs_zig = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang")
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_the_same_unit_gives_the_same_bytes(
     oscillator: Unit, monkeypatch: pytest.MonkeyPatch, tmp_path: Path

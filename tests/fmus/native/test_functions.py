@@ -70,6 +70,7 @@ def test_what_is_traced_is_what_a_unit_may_use() -> None:
     assert set(traceable()) == set(FUNCTIONS)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of what is not finite, which is meant here
 def test_each_function_gives_what_numpy_gives(native: Callable[..., Any], all_functions: Unit) -> None:
     fmu = native(all_functions)

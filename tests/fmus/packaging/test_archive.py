@@ -56,6 +56,7 @@ def test_a_guid_stays_the_same_from_version_to_version() -> None:
     assert content_guid(FILES) == "{ab89020f-ef2c-b77b-13d8-c877f8ada7a7}"
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(
     st.dictionaries(st.text(st.characters(codec="utf-8"), max_size=3), st.binary(max_size=3), max_size=3),

@@ -41,6 +41,7 @@ def guid_in(path: Path) -> str:
     return ET.fromstring(contents(path)["modelDescription.xml"]).get("guid", "")
 
 
+@pytest.mark.slow
 @needs_native
 def test_a_native_fmu_is_valid_and_the_same_bytes_again(unit: Unit, tmp_path: Path) -> None:
     made = build_fmu(unit, tmp_path, backend="native")
@@ -56,6 +57,7 @@ def test_a_native_fmu_is_valid_and_the_same_bytes_again(unit: Unit, tmp_path: Pa
     assert build_fmu(unit, tmp_path, backend="native").path.read_bytes() == first
 
 
+@pytest.mark.slow
 @needs_native
 def test_a_native_fmu_holds_description_binary_sources_and_documentation(make: Make, tmp_path: Path) -> None:
     found = contents(build_fmu(make("playback"), tmp_path, backend="native").path)
@@ -82,6 +84,7 @@ def test_other_descriptions_tables_and_backends_have_other_guids(make: Make, tmp
     assert len(guids) == len(units)
 
 
+@pytest.mark.slow
 @needs_native
 def test_native_is_the_default_where_it_can_be_built(make: Make, tmp_path: Path) -> None:
     made = build_fmu(make("arm"), tmp_path / "any.fmu")
@@ -123,6 +126,7 @@ OPTIONS: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in unit_names() if name != "log_source"])
 def test_every_shipped_unit_is_a_valid_python_fmu_that_starts_as_it_says(name: str, tmp_path: Path) -> None:
     unit = make_unit(name, **OPTIONS.get(name, {}))

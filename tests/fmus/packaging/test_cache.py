@@ -44,6 +44,7 @@ def test_a_unit_is_built_once(make: Make, folder: Path) -> None:
     assert marked(path) == built
 
 
+@pytest.mark.slow
 def test_other_tables_arguments_sources_variables_and_backends_are_other_fmus(make: Make) -> None:
     unit = make("playback")
     assert unit.table is not None
@@ -73,6 +74,7 @@ def test_an_entry_without_its_hash_is_built_again(make: Make) -> None:
     assert sorted(one.name for one in path.parent.iterdir()) == ["arm.fmu", "arm.sha256"]
 
 
+@pytest.mark.slow
 def test_a_unit_without_a_recipe_is_never_taken_for_another(make: Make, folder: Path) -> None:
     spring = make("spring")
     one = replace(spring, recipe=Recipe())
@@ -91,6 +93,7 @@ unit = Unit(name="reading", description="", outputs=lambda v: {"y": gain * v.u},
 """
 
 
+@pytest.mark.slow
 def test_a_file_that_reads_another_is_built_again_when_that_one_changed(tmp_path: Path) -> None:
     (tmp_path / "reading.py").write_text(READING, encoding="utf-8")
     starts = []
@@ -104,6 +107,7 @@ def test_a_file_that_reads_another_is_built_again_when_that_one_changed(tmp_path
     assert starts[0] == starts[2]
 
 
+@pytest.mark.slow
 def test_a_recipe_of_somebody_elses_module_is_never_taken_for_another(make: Make) -> None:
     spring = make("spring")
     one = replace(spring, recipe=Recipe("somebody.elses", "spring"))
@@ -124,6 +128,7 @@ def test_another_file_behind_the_command_of_the_compiler_is_another_fmu(
     assert keys[0] != keys[1]
 
 
+@pytest.mark.slow
 def test_a_hit_imports_nothing_that_traces_and_runs_no_function() -> None:
     cached_fmu(make_unit("inertia"))
     code = (

@@ -47,6 +47,7 @@ def changed(path: Path, old: str, new: str) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_good_fmu_has_no_problems_and_its_values_are_those_of_an_instance(
     unit: Unit, tmp_path: Path, backend: str
@@ -147,6 +148,7 @@ def test_a_step_that_fails_is_told_with_the_last_lines_of_the_log(tmp_path: Path
     assert found.variables[0].before == 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 def test_an_fmu_that_ends_its_process_does_not_end_ours(tmp_path: Path) -> None:
     found = check_fmu(built(failing("os.abort()"), tmp_path))
@@ -175,6 +177,7 @@ def test_an_fmu_that_ends_well_but_early_is_no_good_one(tmp_path: Path) -> None:
     assert found.problems == ("fmi2DoStep at 0.015 s ended the process with the exit code 0",)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("place", "when"),
     [("start", "fmi2Instantiate"), ("terminate", "fmi2Terminate"), ("free", "fmi2FreeInstance")],
@@ -203,6 +206,7 @@ def test_outputs_that_are_not_finite_are_a_problem_with_their_time() -> None:
     assert [(one.before, one.after) for one in found.variables] == [(None, None), (1.0, None), (None, None)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", ["Jürgen", "100% sure", "a#b", "a%20b"])
 def test_a_python_fmu_is_not_run_where_its_binary_would_crash(
     make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str
@@ -231,6 +235,7 @@ def test_a_python_fmu_runs_in_a_folder_with_spaces(
     assert check_fmu(build_fmu(make("arm"), tmp_path, backend="python").path).problems == ()
 
 
+@pytest.mark.slow
 def test_a_wrong_guid_is_told_with_what_the_fmu_logged(make: Make, tmp_path: Path) -> None:
     path = built(make("arm"), tmp_path, "native")
     found = check_fmu(changed(path, 'guid="{', 'guid="{0'))
@@ -238,6 +243,7 @@ def test_a_wrong_guid_is_told_with_what_the_fmu_logged(make: Make, tmp_path: Pat
     assert found.problems[1].startswith("its log: unit arm: GUID: found {0")
 
 
+@pytest.mark.slow
 def test_problems_of_the_description_are_told_and_it_runs_all_the_same(make: Make, tmp_path: Path) -> None:
     path = built(make("spring"), tmp_path)
     found = check_fmu(changed(path, '<Unit name="kg">', '<Unit name="kilo">'))

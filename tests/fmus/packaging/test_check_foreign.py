@@ -53,12 +53,14 @@ def checked(paths: list[Path], *, timeout: float = 60.0) -> list[Checked]:
         return list(pool.map(partial(check_fmu, timeout=timeout), paths))
 
 
+@pytest.mark.slow
 def test_an_fmu_that_ends_its_process_in_any_call_is_told_with_the_call() -> None:
     for call, found in zip(CALLS, checked([breaking(call, "exit(0);") for call in CALLS]), strict=True):
         assert of_run(found) == (f"{CALLS[call]} ended the process with the exit code 0",)
         assert not found.ran
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("code", "ending"),
     [
@@ -74,12 +76,14 @@ def test_each_way_to_end_a_process_is_told(code: str, ending: str) -> None:
     assert (found.variables[0].before, found.variables[0].after) == (0.0, None)
 
 
+@pytest.mark.slow
 def test_an_fmu_that_hangs_in_any_call_is_ended_and_told_with_the_call() -> None:
     paths = [breaking(call, HANGS) for call in CALLS]
     for call, found in zip(CALLS, checked(paths, timeout=2.0), strict=True):
         assert (of_run(found), found.ran) == ((f"{CALLS[call]} did not return within 2 s",), False)
 
 
+@pytest.mark.slow
 def test_neither_logging_without_end_nor_a_stopped_process_is_waited_for() -> None:
     ways = ('for (;;) LOG(m, fmi2OK, "round and round");', "raise(SIGSTOP);")
     spins, stops = checked([breaking("step", way) for way in ways], timeout=2.0)
@@ -100,6 +104,7 @@ def test_a_value_that_becomes_nan_is_a_problem_with_its_name_and_first_time() ->
     assert (found.ran, found.variables[0].before, found.variables[0].after) == (True, 0.0, None)
 
 
+@pytest.mark.slow
 def test_a_run_that_the_fmu_ends_early_is_no_pass_and_its_values_are_those_of_its_last_time() -> None:
     early = replace(STAIR, start="m->v.r[0] = 0.0275;", variable_step=False)
     found = check_fmu(fmu(early))

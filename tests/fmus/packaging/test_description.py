@@ -133,6 +133,7 @@ def test_bounds_are_told_where_they_are_some(tmp_path: Path) -> None:
     assert [(one.min, one.max) for one in found] == [("-0.5", None), ("-1", None), (None, None)]
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(text=st.text(st.characters(exclude_categories=[])))
 def test_any_description_is_valid_and_what_xml_can_hold_of_it_comes_back(text: str) -> None:

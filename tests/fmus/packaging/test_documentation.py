@@ -73,6 +73,7 @@ NOT_MARKUP = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What XML 1.0 cannot hold."""
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(text=st.text(st.characters(exclude_categories=[], exclude_characters="\r")))  # \r is read as \n
 @example(text='<script>alert(1)</script> & "it\'s"')

@@ -201,6 +201,7 @@ def sound() -> bytes:
         return packed(Path(folder, "m.fmu"), ("a", b"text " * 30), ("b/c", b"more " * 30)).read_bytes()
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=300)
 @given(
     changes=st.lists(

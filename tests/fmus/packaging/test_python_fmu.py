@@ -42,6 +42,7 @@ def test_fmpy_finds_nothing_wrong(unit: Unit, tmp_path: Path) -> None:
     assert validate_fmu(str(built(unit, tmp_path))) == []
 
 
+@pytest.mark.slow
 def test_the_same_unit_is_the_same_bytes(unit: Unit, tmp_path: Path) -> None:
     first = built(unit, tmp_path).read_bytes()
     assert built(unit, tmp_path).read_bytes() == first
@@ -74,6 +75,7 @@ def test_outputs_are_fresh_after_set_without_a_step(make: Make, tmp_path: Path) 
     fmu.free()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("serialized", [False, True])
 def test_a_state_that_is_restored_goes_on_bit_by_bit(unit: Unit, tmp_path: Path, serialized: bool) -> None:
     names = [name for name, _ in unit.scalars]
@@ -162,6 +164,7 @@ REFUSALS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("function", "references", "values", "said"), REFUSALS)
 def test_what_is_refused_is_told_and_changes_nothing(
     make: Make, tmp_path: Path, function: str, references: list[int], values: Any, said: str

@@ -99,6 +99,7 @@ def assert_runs_alone(unit: Unit, tmp_path: Path) -> None:
     assert [float(one) for one in eval(said.stdout)] == values
 
 
+@pytest.mark.slow
 def test_it_runs_where_there_is_no_urmpipe(unit: Unit, tmp_path: Path) -> None:
     assert_runs_alone(unit, tmp_path)
 
@@ -132,6 +133,7 @@ os._exit(0)  # as above
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs Linux's /proc")
 def test_a_thousand_instances_leave_no_memory_behind_but_what_pythonfmu_loses(
     make: Make, tmp_path: Path

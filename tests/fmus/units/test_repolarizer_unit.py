@@ -45,6 +45,7 @@ def test_it_gives_what_the_repolarizer_gives_over_a_regular_log_bit_by_bit(
     assert over(raw, period=period, max_step=max_step)["q"].tobytes() == expected.q.tobytes()
 
 
+@pytest.mark.slow
 @settings(max_examples=20, **PATIENT)
 @given(st.integers(0, 10_000), st.floats(0.001, 1.5), st.floats(-3.0, 3.0))
 def test_a_joint_that_goes_round_and_round_goes_on_where_it_was(

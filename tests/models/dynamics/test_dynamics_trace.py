@@ -56,6 +56,7 @@ def assert_traced(function: Callable[..., Any], sizes: Sequence[int], seed: int 
         np.testing.assert_allclose(got, expected, rtol=0.0, atol=SAME * (1.0 + np.abs(expected).max()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("arm", [load_robot("urm6"), load_robot("ur5e"), sliding_arm()])
 def test_equations_of_motion_trace(arm: Chain) -> None:
     chain, n = with_masses(arm), len(arm.coordinates)

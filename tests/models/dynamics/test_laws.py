@@ -180,6 +180,7 @@ def test_long_logs_are_as_each_row() -> None:
         assert potential[k] == potential_energy(chain, q[k])
 
 
+@pytest.mark.slow
 def test_energy_is_kept_over_ten_seconds() -> None:
     """urm6 swings from its side without friction: 1e-8 of the energy it swings with."""
     chain = with_masses(load_robot("urm6"))

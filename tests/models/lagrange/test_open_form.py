@@ -57,6 +57,7 @@ def test_the_arms_turn_slide_follow_and_have_parallel_axes_and_others() -> None:
     assert len(parallel) - parallel.count(0) >= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "seed"), CASES)
 def test_each_term_is_that_of_the_numeric_dynamics_in_text_and_in_c(
     count: int, seed: int, tmp_path: Path
@@ -83,6 +84,7 @@ def test_each_term_is_that_of_the_numeric_dynamics_in_text_and_in_c(
         np.testing.assert_allclose(np.transpose(unit), mass_matrix(chain, q), rtol=0.0, atol=1e-10 * largest)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "seed"), [(1, 2), (1, 11), (2, 8), (3, 19), (4, 3)])
 def test_the_work_of_the_drives_is_the_change_of_energy(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -115,6 +117,7 @@ def test_the_work_of_the_drives_is_the_change_of_energy(count: int, seed: int) -
     assert weights @ powers == pytest.approx(energy(2.0) - energy(0.0), abs=1e-11 * scale)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "seed"), CASES)
 def test_the_reduction_adds_no_operation(count: int, seed: int) -> None:
     for one in open_form(seeded_arm(count, seed)).costs:

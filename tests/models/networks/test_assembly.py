@@ -226,6 +226,7 @@ def orientations(of: Plane) -> list[float]:
     return [root for sign in (1.0, -1.0) for root in roots_of(partial(third_leg, sign=sign))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("of", "count"),
     [
@@ -289,6 +290,7 @@ def test_sarrus_has_both_sides_of_each_leg() -> None:
 # --- seeds
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("build", [four_bar, rssr, rccc, coupled_loops, nine_revolutes, sarrus])
 def test_one_seed_gives_the_same_bits_another_the_same_set(build: Callable[..., Network]) -> None:
     network = build(drive="s")

@@ -67,6 +67,7 @@ def test_a_robot_of_the_catalogue_moves_as_its_chain(robot: str) -> None:
     assert all(one.start == (start[one.name[4:]],) for one in network.joints if one.name[4:] in start)
 
 
+@pytest.mark.slow
 @given(st.data())
 def test_any_chain_moves_as_its_frames(chains: SearchStrategy[Chain], data: DataObject) -> None:
     chain = data.draw(chains)

@@ -161,6 +161,7 @@ def both(kind: ElementKind, others: int, seed: int) -> tuple[Network, Network, C
     return first, second, built
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ELEMENTS)
 @pytest.mark.parametrize("others", range(5))
 def test_an_element_equals_its_joints_on_a_hundred_networks(kind: ElementKind, others: int) -> None:

@@ -82,6 +82,7 @@ def assert_right(mechanism: Mechanism, x: FloatArray) -> int:
     return int(held.sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(40))
 def test_random_networks_far_from_closing(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -92,6 +93,7 @@ def test_random_networks_far_from_closing(seed: int) -> None:
     assert sum(held) > len(residual_of(mechanism, x))  # of four times as many
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_random_networks_where_they_close(seed: int) -> None:
     rng = np.random.default_rng(seed)
@@ -100,6 +102,7 @@ def test_random_networks_where_they_close(seed: int) -> None:
     assert assert_right(mechanism, mechanism.start) == mechanism.rows
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_clusters_of_bodies_of_their_own(seed: int) -> None:
     """Parts that only elements tie: the freedoms of their first bodies are variables, near 0 turns, too."""

@@ -59,6 +59,7 @@ def test_joints_move_as_matrix_exponentials_of_their_twists(kind: JointKind, see
     np.testing.assert_allclose(matrix(joint_frame(joint, list(q))), moved(joint, q), rtol=0.0, atol=ROUNDING)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_twists_are_derivatives_of_matrix_exponentials(kind: JointKind) -> None:
     rng = np.random.default_rng(8)
@@ -98,6 +99,7 @@ def user_motion() -> tuple[Expression, ...]:
     )
 
 
+@pytest.mark.slow
 def test_a_user_joint_moves_as_its_formulas_say() -> None:
     """Its pose, and its derivatives by both controls, against the rotations typed in as exponentials."""
     joint = Joint("U", "user", ("ground", "b"), motion=user_motion())
@@ -191,6 +193,7 @@ def apart(network: Network, rng: np.random.Generator) -> Network:
     return Network(network.name, network.bodies, joints, network.elements)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_poses_and_gaps_of_random_networks_are_those_of_matrices(seed: int) -> None:
     """Trees in either direction, loops cut at any joint, closed at the start and open elsewhere."""

@@ -193,6 +193,7 @@ def test_known_mechanisms_move_as_is_known(name: str) -> None:
     assert facts_of(MECHANISMS[name](drive="s")) == EXPECTED[name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MECHANISMS)
 @examined
 @given(seed=seeds, power=st.integers(-4, 4))
@@ -218,6 +219,7 @@ def test_which_constraints_are_redundant_does_not_depend_on_the_unit_of_length()
         assert found[0] == found[1] == found[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(10))
 def test_random_networks_do_not_depend_on_how_they_are_written(seed: int) -> None:
     """Joints of all kinds and elements of all kinds."""
@@ -241,6 +243,7 @@ def poses_in(network: Network, held: dict[str, float]) -> dict[str, FloatArray]:
     return dict(zip(network.body_names, poses, strict=True))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MECHANISMS)
 @examined
 @given(seed=seeds, power=st.integers(-3, 3), value=st.floats(-0.05, 0.05))
@@ -311,6 +314,7 @@ def test_the_formula_of_kutzbach_by_hand(network: Network, figure: int) -> None:
     assert mobility_of(mechanism, mechanism.start).kutzbach == figure
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_the_formula_of_kutzbach_on_random_networks(seed: int) -> None:
     network = random_network(np.random.default_rng(seed), bodies=5, extra=3, elements=2)

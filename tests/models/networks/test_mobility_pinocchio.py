@@ -157,6 +157,7 @@ def test_known_mechanisms_move_as_in_pinocchio(name: str, seed: int | None) -> N
     assert assert_as_pinocchio(network) == mobility
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_random_loops_move_as_in_pinocchio(seed: int) -> None:
     """Revolute, prismatic and cylindrical joints at random, up to three loops, either direction."""

@@ -48,6 +48,7 @@ def rotations(q: FloatArray) -> FloatArray:
     return np.array(rows).transpose(2, 0, 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angle", ANGLES)
 def test_rotations_are_orthogonal_and_equal_the_matrix_exponential(angle: float) -> None:
     q = vectors(angle)

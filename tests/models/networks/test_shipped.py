@@ -247,6 +247,7 @@ def test_no_two_axes_of_the_nine_are_parallel() -> None:
     assert sines[~np.eye(9, dtype=bool)].min() > 0.05  # about 3 degrees
 
 
+@pytest.mark.slow
 def test_dietmaiers_platform_has_forty_assemblies_with_legs_of_the_given_lengths() -> None:
     tables = tables_of("stewart-gough")
     mechanism, assembled = every_assembly(tables, {}, restarts=2000)
@@ -368,6 +369,7 @@ PERTURBATIONS: dict[str, Perturb] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PERTURBATIONS)
 def test_five_perturbed_mechanisms_have_the_answers_of_the_closed_form(name: str) -> None:
     assert_perturbed(name, 5, seed=3)

@@ -142,6 +142,7 @@ def by_toppra(chain: Chain, path: LineArcPath, s: FloatArray, scheme: Discretiza
     return float((2.0 * np.diff(s) / (speeds[1:] + speeds[:-1])).sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("way", ["line", "contour"])
 @pytest.mark.parametrize(("velocity", "acceleration"), [(2.0, 5.0), (0.4, 20.0), (5.0, 1.0)])
@@ -231,6 +232,7 @@ def test_a_joint_without_room_gives_no_freedom() -> None:
     assert (np.abs(found.dq[:, :3]).max(axis=0) > 0.1).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_the_largest_usage_is_that_of_many_places(case: str) -> None:
     """Also where s'' steps, in the middle of an interval: by ten times as many places as the grid has."""
@@ -247,6 +249,7 @@ def test_the_largest_usage_is_that_of_many_places(case: str) -> None:
     )  # in proportion
 
 
+@pytest.mark.slow
 def test_a_joint_that_comes_to_its_limit_makes_the_others_step() -> None:
     """Of panda at positions; while its third joint rests on a limit the others move otherwise."""
     chain = load_robot("panda")
@@ -267,6 +270,7 @@ def test_a_joint_that_comes_to_its_limit_makes_the_others_step() -> None:
     assert not len(joints_along(chain, path).rate_steps)
 
 
+@pytest.mark.slow
 def test_the_contact_with_a_limit_is_found() -> None:
     """The law of limits rests there: by differences no joint accelerates more than it may."""
     chain = load_robot("panda")

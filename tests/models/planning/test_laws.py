@@ -88,6 +88,7 @@ def test_the_contour_by_ruckig_without_a_limit_of_jerk() -> None:
     assert 0.0 < late < 20 * 6.0 / 6e6
 
 
+@pytest.mark.slow
 @given(corner_rows(), speeds, rises, st.none() | jerks, arcs)
 def test_a_law_runs_the_whole_path_from_rest_to_rest(
     rows: PathRows, v: float, a: float, j: float | None, held: Arcs

@@ -144,6 +144,7 @@ def test_a_rigid_motion_of_the_rows_moves_the_curve(rows: PathRows, motion: list
     )  # radii are sharpened by up to 20 of a corner
 
 
+@pytest.mark.slow
 @given(corner_rows())
 def test_rows_stand_where_they_say(rows: PathRows) -> None:
     """Stops at their own points, corners at the middle of their arcs, first points where these begin."""

@@ -57,6 +57,7 @@ def test_a_sample_that_moved_alone_leaves_largest_and_rms(paths: Compared) -> No
     assert (x.changed, x.worse, worse_words(x)) == (True, (), "")
 
 
+@pytest.mark.slow
 def test_shares_differ_by_a_digit_where_they_count_as_changed(paths: Compared) -> None:
     out = off(0.0, 100_000)
     out[:99_000, 0] = 0.005

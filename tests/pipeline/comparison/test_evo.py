@@ -79,6 +79,7 @@ def test_errors_of_random_trajectories_are_those_of_evo(align: AlignMode, seed: 
     assert_agree(deviation, runs[0], runs[1], align)
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_errors_of_irregular_logs_are_those_of_evo_at_their_rows(seed: int) -> None:
@@ -141,6 +142,7 @@ def exported(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Run], list[
     return runs, files
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("align", ["none", "start", "rigid"])
 def test_what_is_exported_gives_evo_the_same_errors(
     align: AlignMode, exported: tuple[list[Run], list[Path]]

@@ -50,6 +50,7 @@ def path(t: FloatArray, position: FloatArray) -> Run:
     return run_of(log, None, ReadOptions(), made=provenance("ingest", {}, ()))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(
     st.integers(0, 10**6), st.integers(1, 198), st.floats(0.004, 0.5), st.sampled_from([None, 0.002, 0.02])

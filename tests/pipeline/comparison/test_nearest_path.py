@@ -45,6 +45,7 @@ def assert_near(found: FloatArray, expected: FloatArray) -> None:
 coordinates = st.integers(-3, 3).map(float) | st.floats(-10, 10).map(lambda value: round(value, 6))
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(st.data())
 def test_the_distance_is_that_of_the_nearest_piece(data: st.DataObject) -> None:
@@ -55,6 +56,7 @@ def test_the_distance_is_that_of_the_nearest_piece(data: st.DataObject) -> None:
     assert_distances(data.draw(arrays(np.float64, (6, 3), elements=coordinates)), path, joined)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("far", [0.0, 0.01, 1.0])
 def test_a_long_path_with_loops_corners_and_dwells(far: float) -> None:
     rng = np.random.default_rng(1)
@@ -162,6 +164,7 @@ def test_ten_times_the_noisy_repetitions_make_far_less_than_a_hundred_times_the_
     assert pairs_of(30, noise, white) <= 36 * pairs_of(3, noise, white)
 
 
+@pytest.mark.slow
 @noisy
 def test_repetitions_are_met_exactly(noise: float, white: bool) -> None:
     points, path = (repeated(30, noise, seed, white) for seed in (3, 4))

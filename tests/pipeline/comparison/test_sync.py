@@ -123,6 +123,7 @@ def test_any_offset_between_two_logs_of_the_joints_is_found_or_too_little_is_in_
     assert there(sync.similarity) > 0.999  # lines between samples leave less than 1e-3 unlike
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None)
 @given(SEEDS, STARTS, STARTS, RATES, st.sampled_from([smooth, moves]), st.booleans())
 def test_any_offset_between_two_paths_is_found_wherever_they_stand(
@@ -235,6 +236,7 @@ def test_joints_are_put_together_by_name() -> None:
     assert synchronise(joints(q, t), log, "auto").offset == 1.0
 
 
+@pytest.mark.slow
 def test_a_million_samples_are_looked_at_in_less() -> None:
     t = times(0.0, 5000.0, 0.005)
     q = smooth(5, 6)(t)
@@ -314,6 +316,7 @@ def test_two_motions_without_likeness_are_told() -> None:
 LOW = "log.csv: sync: auto: found low similarity of the "
 
 
+@pytest.mark.slow
 def test_random_motions_are_not_taken_for_each_other() -> None:
     t = times(0.0, 20.0, 0.01)
     for seed in range(20):
@@ -380,6 +383,7 @@ def demo() -> dict[str, Trajectory]:
     return {run.name: trajectory(run) for run in runs}
 
 
+@pytest.mark.slow
 def test_the_offsets_of_the_demo_logs_are_found(demo: dict[str, Trajectory]) -> None:
     def offset(name: str, align: AlignMode = "none") -> float:
         return synchronise(demo["path"], demo[name], "auto", align).offset

@@ -46,6 +46,7 @@ def test_joints_that_agree_have_no_cause() -> None:
     assert answer(against_joints(joints())) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("j", [0, 3, 5])
 def test_a_joint_that_counts_the_other_way_is_named_and_not_by_a_factor(j: int, seed: int) -> None:
@@ -54,6 +55,7 @@ def test_a_joint_that_counts_the_other_way_is_named_and_not_by_a_factor(j: int, 
     assert answer(against_joints(q, seed=seed)) == [("joint_sign", (f"q{j + 1}",), None)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("j", [1, 4])
 def test_a_whole_turn_is_named_though_the_tool_centre_point_lacks_nothing(j: int, seed: int) -> None:
@@ -76,6 +78,7 @@ def test_an_offset_of_a_joint_is_named_with_its_size() -> None:
     assert cause.low[0] < -np.radians(0.1) < cause.high[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", ["demo", "rich"])
 @pytest.mark.parametrize("j", [0, 3, 5])
 def test_half_a_turn_is_found_at_the_tool_centre_point_to_the_sample(motion: str, j: int) -> None:
@@ -84,6 +87,7 @@ def test_half_a_turn_is_found_at_the_tool_centre_point_to_the_sample(motion: str
     assert answer(against_path(q, motion)) == [("half_turn", (f"q{j + 1}",), 400)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", ["demo", "rich"])
 @pytest.mark.parametrize("j", [1, 2, 4])
 def test_a_mirrored_angle_is_found_there_within_seven_samples(motion: str, j: int) -> None:

@@ -87,6 +87,7 @@ def at_data(chain: Chain, numbers: float, edits: tuple[Edit, ...] = ()) -> tuple
     return replace(model, position=position, rotation=rotation), state
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", ARMS, ids=lambda chain: chain.name)
 @pytest.mark.parametrize("size", [0.0, 0.3])
 def test_the_jacobian_of_an_arm_is_its_slope(chain: Chain, size: float) -> None:

@@ -69,6 +69,7 @@ def signs(joints: Sequence[int]) -> Edits:
     return tuple(Edit("joint_sign", (j,)) for j in joints)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("motion", ["demo", "rich"])
 @pytest.mark.parametrize("joints", [(0,), (2,), (5,), (0, 5), (1, 3)])
 def test_signs_of_one_joint_or_two_are_named_from_50_samples(motion: str, joints: tuple[int, ...]) -> None:
@@ -85,6 +86,7 @@ def test_so_are_all_of_them(motion: str) -> None:
             assert wanted <= answer.sure, joints
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["urm6", "ur5e", "panda", "rail_arm"])
 def test_a_sign_and_an_exchange_of_any_arm_are_named(robot: str) -> None:
     chain = rail_arm() if robot == "rail_arm" else load_robot(robot)
@@ -106,6 +108,7 @@ CAUSES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cause", CAUSES)
 def test_a_clear_cause_is_named(cause: str) -> None:
     answer, wanted = said(CAUSES[cause])
@@ -120,22 +123,26 @@ def test_so_it_is_in_other_noise(cause: str, noise: Noise, oriented: bool) -> No
     assert answer.outcome(wanted) == "named"
 
 
+@pytest.mark.slow
 def test_an_outlier_in_a_hundred_samples_changes_no_answer() -> None:
     answer, wanted = said(CAUSES["r3"], noise=spoilt)
     assert answer.outcome(wanted) == "named"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pair", [("r3", "phi4"), ("theta4", "lag"), ("base", "scale of phi2")])
 def test_two_clear_causes_are_named(pair: tuple[str, str]) -> None:
     answer, wanted = said({**CAUSES[pair[0]], **CAUSES[pair[1]]}, motion="demo")
     assert answer.outcome(wanted) == "named"
 
 
+@pytest.mark.slow
 def test_a_sign_and_a_length_are_named_together() -> None:
     answer, wanted = said(CAUSES["r3"], (Edit("joint_sign", (2,)),))
     assert answer.outcome(wanted) == "named"
 
 
+@pytest.mark.slow
 def test_twins_are_named_by_the_first_of_them() -> None:
     search, result, _ = found(numbers_of(joint_offset__phi1=RIGHT))
     groups = search.model.groups
@@ -147,6 +154,7 @@ def test_twins_are_named_by_the_first_of_them() -> None:
     assert not {"r1", "phi1"} & set(twins)
 
 
+@pytest.mark.slow
 def test_a_joint_that_stands_still_has_an_offset_and_no_scale_of_its_own() -> None:
     moved = rich_motion(URM6)
     t = times(LONG)
@@ -174,12 +182,14 @@ def test_correlated_noise_is_no_cause(lasting: float) -> None:
     assert sum(silent) >= 7  # 5 % are allowed to alarm
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("samples", "trials"), [(SHORT, 12), (LONG, 4)])
 def test_white_noise_is_no_cause(samples: int, trials: int) -> None:
     silent = [not said({}, samples=samples, seed=seed)[0].best for seed in range(trials)]
     assert sum(silent) >= trials - 1
 
 
+@pytest.mark.slow
 def test_noise_that_lasts_a_second_is_no_cause() -> None:
     def noise(rng: np.random.Generator, position: FloatArray) -> FloatArray:
         return drifting(rng, position, 1.0)
@@ -198,6 +208,7 @@ def test_sizes_lie_in_their_intervals() -> None:
     assert sum(inside) >= 34  # 95 % of 40 are 38, with a standard deviation of 1.4
 
 
+@pytest.mark.slow
 def test_shares_and_the_remainder_make_up_the_whole() -> None:
     search, result, _ = found({**CAUSES["r3"], **CAUSES["lag"]}, (Edit("joint_sign", (2,)),))
     names = tuple(URM6.coordinates)
@@ -212,6 +223,7 @@ def test_shares_and_the_remainder_make_up_the_whole() -> None:
     assert sum(cause.share for cause in causes) + after / before == pytest.approx(1.0, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_the_same_log_gives_the_same_answer_to_the_last_bit() -> None:
     (_, first, _), (_, second, _) = (found(CAUSES["phi3"], samples=6000) for _ in range(2))
     np.testing.assert_array_equal(first.best.state.values, second.best.state.values)

@@ -70,6 +70,7 @@ def rows(result: Comparison) -> list[tuple[int, int]]:
     return [(one.row, one.last_row) for one in judged(result).cycles]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("way", list(WAYS))
 def test_29_of_30_are_found_with_noise_and_a_cut_one(way: str, seed: int, tmp_path: Path) -> None:

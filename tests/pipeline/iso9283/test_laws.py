@@ -116,6 +116,7 @@ def test_the_set_tells_every_criterion_but_vap(unmoved: IsoTest) -> None:
     assert min(abs(one) for one in values.values() if one is not None) > 0.0
 
 
+@pytest.mark.slow
 @SOME
 @given(SHIFTS, st.tuples(*[st.floats(-1.0, 1.0)] * 2, st.floats(0.1, 1.0)), st.floats(-3.1, 3.1))
 def test_rigid_motion_of_both_sides_changes_no_position(
@@ -126,6 +127,7 @@ def test_rigid_motion_of_both_sides_changes_no_position(
     same(unmoved, other, set(UNITS) - ANGLES)
 
 
+@pytest.mark.slow
 @SOME
 @given(st.tuples(*[st.floats(-1.0, 1.0)] * 3), st.floats(-3.1, 3.1))
 def test_shifts_and_turns_about_the_base_change_no_angle(
@@ -148,6 +150,7 @@ def test_identical_cycles_have_no_spread(tmp_path: Path) -> None:
     assert values["dAP"] == 0.0
 
 
+@pytest.mark.slow
 @SOME
 @given(SHIFTS)
 def test_a_constant_shift_is_the_accuracy(shift: tuple[float, ...]) -> None:
@@ -166,6 +169,7 @@ def test_a_constant_shift_is_the_accuracy(shift: tuple[float, ...]) -> None:
     assert value(iso, "AV") == pytest.approx(0.0, abs=SPEED_ROUNDING)
 
 
+@pytest.mark.slow
 def test_a_shift_across_both_legs_of_a_corner_is_no_overshoot(tmp_path: Path) -> None:
     # The mean path runs above the line of the second leg, on neither side of it: rounding must not decide.
     found = []
@@ -194,6 +198,7 @@ def test_a_gaussian_cloud_has_the_repeatability_of_chi(seed: int) -> None:
     assert spread[0] == pytest.approx(FACTOR * SIGMA, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_gaussian_cloud_of_visits_has_it_too(tmp_path: Path) -> None:
     rng = np.random.default_rng(4)
     reference = still(tmp_path / "command.csv", np.array([[0.5, 0.2, 0.1]]))
@@ -204,6 +209,7 @@ def test_a_gaussian_cloud_of_visits_has_it_too(tmp_path: Path) -> None:
     assert value(iso, "AP") < 6.0 * SIGMA / np.sqrt(2000.0)  # chance: chi with 3 degrees, 1e-7 beyond 6
 
 
+@pytest.mark.slow
 @SOME
 @given(st.permutations(range(4)))
 def test_the_order_of_cycles_does_not_matter(order: list[int]) -> None:

@@ -144,6 +144,7 @@ def rounded(duration: float, tick: float) -> FloatArray:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("duration", "count"), [(0.002, 1), (0.004, 1), (0.02, 0), (0.05, 0)])
 def test_a_turn_within_4_ms_is_one_corner_over_20_ms_none(
     duration: float, count: int, tmp_path: Path
@@ -217,6 +218,7 @@ def test_a_cycle_that_comes_back_a_little_is_taken_where_it_is_nearest(tmp_path:
 SQUARE = ((0, 0, 0.4), (0.2, 0, 0.4), (0.2, 0.2, 0.4), (0, 0.2, 0.4), (0, 0, 0.4))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("noise", [1e-6, 1e-5, 5e-5])
 def test_a_reference_with_noise_keeps_its_corners_legs_and_poses(

@@ -250,6 +250,7 @@ def test_one_cycle_has_no_repeatability(tmp_path: Path) -> None:
     assert shown.headline.startswith("1 cycle of cycle0 within tolerance")
 
 
+@pytest.mark.slow
 def test_still_poses_have_no_path(tmp_path: Path) -> None:
     poses = np.random.default_rng(1).uniform(-0.3, 0.3, (5, 3))
     visits = np.tile(poses, (30, 1)) + np.random.default_rng(2).normal(0.0, 1e-4, (150, 3))
@@ -274,6 +275,7 @@ def test_a_curve_without_rests_has_no_poses_corners_or_legs(tmp_path: Path) -> N
     ]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("poses", "count"), [(1, 5), (50, 3), (2, 200)])
 def test_few_and_many_poses_and_cycles(poses: int, count: int, tmp_path: Path) -> None:
     nodes = np.random.default_rng(3).uniform(-0.2, 0.2, (poses + 1, 3))

@@ -36,6 +36,7 @@ def words(svg: str, kind: str) -> list[str]:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_every_name_is_in_it(name: str) -> None:
     result = found(name)
@@ -48,6 +49,7 @@ def test_every_name_is_in_it(name: str) -> None:
     assert len([one for one in ET.fromstring(svg).iter() if one.get("class") == "hatch"]) == 1  # the ground's
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_what_controls_drive_is_in_their_colour(name: str) -> None:
     result = found(name)
@@ -56,6 +58,7 @@ def test_what_controls_drive_is_in_their_colour(name: str) -> None:
     assert ["".join(one.itertext()) for one in texts if one.get("fill") == CONTROL_COLOUR] == driven
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_elements_are_dashed_and_loops_and_clusters_stand_behind(name: str) -> None:
     result = found(name)
@@ -67,6 +70,7 @@ def test_elements_are_dashed_and_loops_and_clusters_stand_behind(name: str) -> N
     assert polygons == ["cluster"] * clusters + ["loop"] * len(result.loops)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_words_hide_neither_bodies_nor_words(name: str) -> None:
     layout = layout_of(found(name))
@@ -81,6 +85,7 @@ def test_edges_between_the_same_bodies_bow_apart() -> None:
     assert apart.min() > 15.0  # a line of text and more
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_a_loop_goes_round_its_bodies(name: str) -> None:
     result = found(name)
@@ -123,6 +128,7 @@ def graphs(draw: st.DrawFn) -> tuple[Sequence[str], list[Edge]]:
     return names, [Edge(f"e{k}", f"e{k} R", (names[a], names[b])) for k, (a, b) in enumerate(pairs)]
 
 
+@pytest.mark.slow
 @given(graphs())
 @settings(deadline=None, max_examples=25)
 def test_bodies_of_any_graph_are_apart(graph: tuple[Sequence[str], list[Edge]]) -> None:

@@ -51,6 +51,7 @@ def test_a_revolute_joint_is_a_circle_along_its_axis_and_a_rectangle_across() ->
     assert corners.count(20) == 3  # three joints, in one of three views
 
 
+@pytest.mark.slow
 def test_every_assembly_has_a_picture() -> None:
     result = found("stewart-gough", every=True)
     assert len(result.assemblies) > 5

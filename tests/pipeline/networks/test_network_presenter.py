@@ -103,6 +103,7 @@ def test_assemblies_have_a_row_each_and_a_single_one_a_row_a_variable() -> None:
     assert single["name"] == list(found("bars").assemblies[0].values)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", NAMES)
 def test_every_network_has_a_page_with_its_drawings(name: str) -> None:

@@ -161,6 +161,7 @@ def test_what_does_not_close_is_shown_where_it_comes_nearest() -> None:
     assert np.linalg.norm(gap[1] - gap[0]) == pytest.approx(result.gaps[0].metres, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["zoo", "stewart-gough"])
 def test_a_recording_has_an_entity_a_part(name: str, tmp_path: Path) -> None:
     result = found(name, every=True)
@@ -188,6 +189,7 @@ def test_of_many_ghosts_only_some_are_seen_at_first(tmp_path: Path) -> None:
     assert len(names) == ghosts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_it_comes_back_as_it_was(name: str, tmp_path: Path) -> None:
     """Of the recording, too: with controls without an end, and in all configurations."""

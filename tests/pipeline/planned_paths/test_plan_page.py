@@ -63,6 +63,7 @@ def test_a_page_has_all_of_a_plan(slowed: PlannedPath) -> None:
     assert names == ["planes", "tangent points", "stops"]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", PLANS)
 def test_every_plan_has_a_page(name: str) -> None:

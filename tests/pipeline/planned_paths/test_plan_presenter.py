@@ -139,6 +139,7 @@ def test_the_law_of_limits_tells_what_was_asked_beside_them() -> None:
         assert brief(planned(arm, SMALL, law="limits", **timing))["Law"] == said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FAILED)
 def test_what_is_in_the_way_is_headline_fact_check_and_event(kind: ObstacleKind, tmp_path: Path) -> None:
     plan = FAILED[kind]()
@@ -179,6 +180,7 @@ def test_of_many_things_in_the_way_the_rest_is_counted() -> None:
     assert (len(told), told[-1]) == (MANY + 1, "and 3 more")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FAILED)
 def test_the_viewer_opens_before_what_is_in_the_way(kind: ObstacleKind) -> None:
     """At the last sample before it: from then on there may be no arm."""

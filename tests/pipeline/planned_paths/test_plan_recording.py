@@ -31,6 +31,7 @@ PLANS: Mapping[str, Callable[[], PlannedPath]] = {
 """Plans by their law, with and without an arm, and those that fail."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PLANS)
 def test_it_comes_back_as_it_was(name: str, tmp_path: Path) -> None:
     """Every array bit for bit, and all that is derived from them."""
@@ -69,6 +70,7 @@ def test_it_is_an_operand_of_compare(tmp_path: Path) -> None:
         assert run["samples"] == len(plan)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PLANS)
 def test_its_run_has_the_rates_that_were_planned(name: str) -> None:
     plan = PLANS[name]()

@@ -204,6 +204,7 @@ def test_of_many_rows_the_stops_are_named(ring: PlannedPath) -> None:
     assert scene_of(present(stops)).spots == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FAILED)
 def test_what_is_in_the_way_is_marked(kind: ObstacleKind) -> None:
     plan = FAILED[kind]()

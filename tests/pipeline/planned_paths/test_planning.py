@@ -59,6 +59,7 @@ def test_the_papers_contour_by_its_arm() -> None:
     np.testing.assert_allclose(plan.corners[1], [2.0, -0.3, 1.0], atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [{}, {"arcs": "total"}, {"law": "jerk", "jerk": 40.0}])
 def test_rates_are_the_derivatives_of_the_joints(law: dict[str, Any]) -> None:
     """At a fine period, away from the times at which the law's acceleration steps."""
@@ -85,6 +86,7 @@ def test_it_is_at_rest_at_its_ends_and_holds_the_last_point() -> None:
     np.testing.assert_array_equal(joints_of(plan).qd[-1], 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [{}, {"arcs": "total"}, {"law": "jerk", "jerk": 40.0}])
 def test_a_joint_that_is_twice_too_fast_halves_the_speed(law: dict[str, Any]) -> None:
     free = planned(limited("ur5e", velocity=math.inf), SMALL, tsp=0.0005, **law)
@@ -99,6 +101,7 @@ def test_a_joint_that_is_twice_too_fast_halves_the_speed(law: dict[str, Any]) ->
     assert joints_of(plan).velocity_share.max() <= KEPT
 
 
+@pytest.mark.slow
 def test_a_joint_that_accelerates_four_times_too_much_halves_the_speed() -> None:
     free = planned(limited("ur5e", velocity=math.inf), SMALL, tsp=0.0001)
     most = largest(joints_of(free).qdd)
@@ -109,6 +112,7 @@ def test_a_joint_that_accelerates_four_times_too_much_halves_the_speed() -> None
     assert joints_of(plan).acceleration_share.max() <= KEPT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tsp", [0.0007, 0.02, 0.5])
 @pytest.mark.parametrize(
     ("limits", "law"),
@@ -126,6 +130,7 @@ def test_the_period_changes_no_speed(limits: dict[str, float], law: dict[str, An
     assert other.duration == pytest.approx(plan.duration, rel=2e-4)
 
 
+@pytest.mark.slow
 def test_arcs_shorter_than_a_period_count() -> None:
     """An arc of 0.5 mm is passed between two samples, and its acceleration is 20 times what is allowed."""
     rows = cube_rows("wall", 0.3, 0.0005, np.array([0.45, 0.0, 0.3]), rotation=DOWN)
@@ -136,6 +141,7 @@ def test_arcs_shorter_than_a_period_count() -> None:
     assert joints_of(fine).acceleration_share.max() == pytest.approx(1.0, abs=0.01)  # 30 samples an arc
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tsp", [0.005, 7.0])
 def test_the_period_hides_no_obstacle(tsp: float) -> None:
     singular = np.array([[0.6, 0.0, 1.6], [0.3, 0.0, 1.6], [-0.3, 0.0, 1.6]])
@@ -163,6 +169,7 @@ def test_less_than_a_hundredth_of_the_speed_is_no_plan() -> None:
     assert plan.path.row[obstacle.segment] + 1 == obstacle.row
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("y", [1e-3, 1.6e-3, 2e-3])
 def test_past_the_axis_the_first_joint_takes_the_speed(y: float) -> None:
     """At a distance y from it the joint turns at v / y: with v = 0.5 m/s, and 6 rad/s allowed."""
@@ -178,6 +185,7 @@ def test_past_the_axis_the_first_joint_takes_the_speed(y: float) -> None:
         assert plan.obstacles[0].t == pytest.approx(0.5 * plan.duration, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("y", [1e-2, 1e-3, 1e-4])
 def test_the_law_of_limits_turns_the_arm_near_its_axis(y: float) -> None:
     """However near it passes, half a turn of the first joint takes what its limits allow, and hardly more."""
@@ -232,6 +240,7 @@ def test_rows_out_of_reach_are_all_told_by_their_distance() -> None:
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "rows"),
     [("ur5e", SMALL), ("urm6", cube_rows("wall", 0.3, 0.03, np.array([0.45, 0.0, 0.9])))],
@@ -277,6 +286,7 @@ def test_the_law_of_limits_stops_where_the_turn_changes_and_does_not_warn() -> N
     assert plan.motion.v[np.abs(plan.t - plan.row_times[1]).argmin()] < 10.0 * plan.tsp
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("digits", [6, 15])
 def test_an_even_turn_that_was_rounded_is_no_step(digits: int) -> None:
     points = np.array([[0.4, -0.2, 0.3], [0.5, -0.1, 0.3], [0.5, 0.0, 0.3], [0.4, 0.2, 0.3]])
@@ -298,6 +308,7 @@ def test_half_a_turn_is_as_short_either_way() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_joint_that_comes_to_a_limit_is_warned_of() -> None:
     """The third joint of panda may hardly turn, so that it rests on its limits for most of the way."""
     chain = load_robot("panda")

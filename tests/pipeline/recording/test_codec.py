@@ -152,6 +152,7 @@ def round_trip(value: Any) -> Any:
     return decode(type(value), json.loads(json.dumps(found.tree)), array_of)
 
 
+@pytest.mark.slow
 @given(TOY)
 def test_whatever_its_fields_hold_comes_back(toy: Toy) -> None:
     assert_same(round_trip(toy), toy)

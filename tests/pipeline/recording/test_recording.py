@@ -70,6 +70,7 @@ def test_a_run_with_every_array_comes_back_as_it_was(make_run: MakeRun, tmp_path
     assert_same(round_trip(run, tmp_path), run)
 
 
+@pytest.mark.slow
 def test_a_long_run_comes_back_in_the_order_of_time(make_run: MakeRun, tmp_path: Path) -> None:
     run = full(make_run(rows=140_000))  # three slices: the first and the last are sent before the other
     assert_same(round_trip(run, tmp_path), run)
@@ -167,6 +168,7 @@ def test_a_log_against_itself_comes_back_as_it_was(make_run: MakeRun, tmp_path: 
     assert_same(round_trip(comparison, tmp_path), comparison)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("align", get_args(AlignMode))
 def test_a_comparison_of_poses_and_joints_comes_back_as_it_was(
     align: AlignMode, make_run: MakeRun, tmp_path: Path
@@ -219,6 +221,7 @@ NAMES = (
 )
 
 
+@pytest.mark.slow
 def test_runs_may_have_any_names(make_run: MakeRun, tmp_path: Path) -> None:
     wanted = compare_runs(make_run("reference", 40), [make_run(f"run {i}", 40) for i in range(len(NAMES))])
     named = tuple(
@@ -238,6 +241,7 @@ OPTIONS = st.recursive(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     texts=st.lists(ODD, min_size=10, max_size=10),
@@ -285,6 +289,7 @@ def test_options_come_back_as_json_has_them(make_run: MakeRun, tmp_path: Path) -
     }
 
 
+@pytest.mark.slow
 def test_a_mended_recording_is_the_same(make_comparison: MakeComparison, tmp_path: Path) -> None:
     """Rerun's own tool cuts and orders the chunks anew."""
     comparison = make_comparison(("coppeliasim",), rows=70_000)
@@ -293,6 +298,7 @@ def test_a_mended_recording_is_the_same(make_comparison: MakeComparison, tmp_pat
     assert_same(read_recording(tmp_path / "mended.rrd"), comparison)
 
 
+@pytest.mark.slow
 def test_rerun_finds_nothing_wrong(make_comparison: MakeComparison, tmp_path: Path) -> None:
     path = write_recording(make_comparison(NAMES[:3]), tmp_path / "odd.rrd")
     assert "1 file verified without error" in rerun_tool("rrd", "verify", str(path))

@@ -31,6 +31,7 @@ def changed(path: Path, at: int, copy: Path) -> Path:
     return copy
 
 
+@pytest.mark.slow
 def test_a_byte_that_aborts_the_reader_is_one_line(make_run: MakeRun, tmp_path: Path) -> None:
     """About one byte in twenty, changed, aborts the process that reads it: many are tried until one does."""
     path = write_recording(make_run(rows=5), tmp_path / "whole.rrd")

@@ -68,6 +68,7 @@ def test_no_recording(tmp_path: Path, content: bytes) -> None:
     assert trouble(path) == "found no Rerun recording, allowed: a recording (.rrd) that urmpipe wrote"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0001, 0.3, 0.9, 0.99999])
 def test_a_recording_that_was_cut_off(make_run: MakeRun, tmp_path: Path, share: float) -> None:
     whole = write_recording(make_run(), tmp_path / "whole.rrd").read_bytes()
@@ -133,6 +134,7 @@ def test_a_recording_of_another_layout_says_how_to_make_it_again(
     assert trouble(path) == f"found layout version {version}, allowed: {LAYOUT_VERSION}; {again}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("metadata", "reason"),
     [
@@ -219,6 +221,7 @@ except OutputError as error:
 """
 
 
+@pytest.mark.slow
 def test_rerun_switched_off_is_one_line(tmp_path: Path) -> None:
     here = Path(__file__).parent
     folders = [str(here), str(here.parents[1] / "shared")]
@@ -245,6 +248,7 @@ def test_rerun_is_not_imported_before_it_is_needed(tmp_path: Path) -> None:
     assert done.stdout == "False False False\n"
 
 
+@pytest.mark.slow
 def test_what_reads_back_otherwise_is_named(make_comparison: MakeComparison, tmp_path: Path) -> None:
     """The first, the middle and the last row of each array, the number of rows, and the metadata."""
     comparison = make_comparison(("coppeliasim",), rows=40_000)

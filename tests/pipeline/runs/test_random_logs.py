@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
@@ -157,6 +158,7 @@ def clear_of_wraps(motion: FloatArray) -> NDArray[np.bool_]:
     return np.asarray((np.abs(sums - FULL_TURN) > FULL_TURN / 4.0).all(axis=0))
 
 
+@pytest.mark.slow
 def test_no_turn_of_a_thousand_random_logs_goes_wrong_in_silence() -> None:
     """Every other log with a robot that tells how fast its joint is."""
     cases = [random_case(seed) for seed in range(1000)]

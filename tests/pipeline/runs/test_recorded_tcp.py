@@ -154,6 +154,7 @@ SIX = [name for name in robot_names() if len(load_robot(name).moving) == 6]
 TWINS = {"ur3": "ur3e", "ur3e": "ur3"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("true", SIX)
 def test_another_robot_of_the_catalogue_is_found_behind_a_tool_and_a_calibration(true: str) -> None:
     rng = np.random.default_rng(SIX.index(true))
@@ -216,6 +217,7 @@ def any_motion(rng: np.random.Generator) -> FloatArray:
     return np.asarray(about + wide * np.sin(t * rng.uniform(0.5, 6, 6) + rng.uniform(0, 6, 6)))
 
 
+@pytest.mark.slow
 def test_nothing_is_said_of_logs_that_are_right() -> None:
     """With the calibration of a real arm, noise and rounding, a tool that was given or not."""
     for seed in range(200):
@@ -330,6 +332,7 @@ def test_real_logs_are_of_their_robot(file: str) -> None:
     assert [one for one in run.warnings if one.kind.startswith("recorded-tcp")] == []
 
 
+@pytest.mark.slow
 @needs_shared
 @pytest.mark.parametrize(
     ("file", "given"),

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -115,6 +116,7 @@ def assert_poses(targets: TargetFile, written: Written, kept: Sequence[int]) -> 
         np.testing.assert_allclose(targets.rotation[kept], written.rotation[kept], rtol=0, atol=1e-14)
 
 
+@pytest.mark.slow
 @given(written=poses())
 def test_poses_come_back_whatever_the_spelling(written: Written) -> None:
     targets = written.read(written.rows())
@@ -149,6 +151,7 @@ def damaged(draw: st.DrawFn) -> tuple[Written, list[list[str]], dict[int, str]]:
     return written, rows, dict(sorted(reasons.items()))
 
 
+@pytest.mark.slow
 @given(case=damaged())
 def test_damage_to_a_row_is_its_fault_alone(case: tuple[Written, list[list[str]], dict[int, str]]) -> None:
     written, rows, reasons = case
@@ -161,6 +164,7 @@ def test_damage_to_a_row_is_its_fault_alone(case: tuple[Written, list[list[str]]
     assert targets.rotation is None or bool(np.isnan(targets.rotation[lost]).all())
 
 
+@pytest.mark.slow
 @given(written=poses(least=6), rows=st.permutations(range(6)))
 def test_the_order_of_the_rows_is_that_of_the_file(written: Written, rows: list[int]) -> None:
     """Each row stands for itself: no row's pose depends on the others'."""

@@ -61,6 +61,7 @@ ROWS = {
 """Rows, and what is wrong with each."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_a_good_row_is_read_whatever_stands_around_it(read: Read, count: int) -> None:
     """Each order of rows of each kind, one of them good: most may be wrong, the first one too."""

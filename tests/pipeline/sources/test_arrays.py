@@ -203,6 +203,7 @@ def test_torn_and_swapped_labels_are_errors(wrong: Wrong) -> None:
     assert wrong("".join(lines))[1:] == [f"log.csv:4: found {shown[3]!r}, {allowed}"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "row",
     [
@@ -242,6 +243,7 @@ def test_words_before_numbers_are_no_labels(read: Read) -> None:
     assert log.q.shape == (3, 4)
 
 
+@pytest.mark.slow
 def test_many_blocks_of_arrays_and_of_labels(tmp_path: Path) -> None:
     """60,000 rows are several megabytes: rows over two lines and rows of labels are cut between blocks."""
     q = np.round(np.sin(np.arange(360_000.0)).reshape(-1, 6), 5)

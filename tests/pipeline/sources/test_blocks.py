@@ -57,6 +57,7 @@ def columns_of(log: JointLog, role: str) -> list[int]:
     return [column.number for column in log.columns if column.role == role]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [",", ";", " "])
 @pytest.mark.parametrize(
     ("blocks", "first"), [("q qd", 1), ("q qd tau", 1), ("tau q qd", 7), ("q qd qdd", 1), ("qd q", 7)]

@@ -133,6 +133,7 @@ def dense(form: str, t_ns: IntArray) -> list[str]:
     return [(start + timedelta(microseconds=t // 1000)).strftime(form) for t in t_ns.tolist()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [(), ("stamp_of_row",), ("Date",)])
 @pytest.mark.parametrize("form", ["%Y%m%d%H%M%S.%f", "%Y%m%d_%H%M%S.%f", "%Y%m%d%H%M%S%f"])
 @pytest.mark.parametrize("delimiter", [",", ";"])
@@ -162,6 +163,7 @@ def test_a_date_in_whole_seconds_is_rebuilt(read: Read) -> None:
     assert "clock-rebuilt" in [warning.kind for warning in log.warnings]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("names", "unit"),
     [

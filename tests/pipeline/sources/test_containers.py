@@ -172,6 +172,7 @@ WRITERS: Mapping[str, Write] = {
 COMMAND = re.compile(r"(?:python -|ulog2csv ).*?(?= \(with a password|$)")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRITERS)
 def test_the_command_for_a_format_writes_a_table_that_is_read(name: str, tmp_path: Path) -> None:
     path = tmp_path / name

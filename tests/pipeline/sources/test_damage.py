@@ -77,6 +77,7 @@ def damaged(draw: st.DrawFn) -> bytes:
     return text
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 @settings(max_examples=200, deadline=None)
 @given(damaged(), st.sampled_from(OPTIONS), st.sampled_from(ROBOTS))
@@ -113,6 +114,7 @@ def outcome(path: Path, options: ReadOptions) -> tuple[object, ...]:
     return log.t_ns.tobytes(), log.q.tobytes(), log.q.shape, log.inferences, log.warnings
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(damaged(), st.sampled_from(OPTIONS), st.sampled_from([8, 30, 200]))
 def test_a_file_reads_the_same_in_blocks_of_any_size(content: bytes, options: ReadOptions, size: int) -> None:
@@ -266,6 +268,7 @@ def test_many_rows_left_out_are_counted(read: Read) -> None:
     assert warnings[0].row == 51
 
 
+@pytest.mark.slow
 @settings(max_examples=8, deadline=None, phases=[Phase.generate])
 @given(
     st.sets(st.integers(0, 79_999), min_size=1, max_size=12), st.sampled_from(["torn", "x,1,2", "1,2", "# a"])

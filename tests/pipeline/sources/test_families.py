@@ -114,6 +114,7 @@ def test_a_position_by_numbers_beside_a_quaternion_is_no_arm_of_four_joints(read
     assert log.tcp_rotation.tolist() == quaternion.tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sign", [",", ";"])
 def test_a_row_a_joint_is_told_with_the_command_that_makes_a_row_a_sample(
     sign: str, write: Callable[..., Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch

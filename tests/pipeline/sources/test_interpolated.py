@@ -75,6 +75,7 @@ def kinds(log: JointLog) -> list[str]:
     return [warning.kind for warning in log.warnings]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", COLUMNS)
 @pytest.mark.parametrize("ratio", [1.25, 2.0, 8.0])
 def test_rows_between_the_ends_of_a_jump_are_not_used(form: RotationForm, ratio: float, read: Read) -> None:

@@ -38,6 +38,7 @@ def _table(columns: int, rows: int = 5) -> str:
     return "\n".join(map(",".join, (names, *cells))) + "\n"
 
 
+@pytest.mark.slow
 def test_a_header_longer_than_the_first_look_is_read(read: Read) -> None:
     """9000 columns: names and rows of 60 kB and more each."""
     log = read(_table(9000, 3))
@@ -49,6 +50,7 @@ def test_rows_below_many_comments_are_read(read: Read) -> None:
     assert (log.joints, log.rows) == (("q1", "q2", "q3", "q4", "q5", "q6"), 5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", ["1 " * 200_000, "1," * 200_000], ids=["spaces", "commas"])
 def test_a_line_of_too_many_columns(wrong: Wrong, text: str) -> None:
     assert wrong(text) == [f"log.csv: {WIDE}"]
@@ -221,6 +223,7 @@ def test_programs_of_too_much(wrong: Wrong, text: str, said: str) -> None:
     assert found.startswith(said), found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     [

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -80,6 +81,7 @@ def tables(draw: st.DrawFn) -> Written:
     )
 
 
+@pytest.mark.slow
 @settings(max_examples=200, deadline=None)
 @given(tables())
 def test_tables_come_back_as_they_were(table: Written) -> None:
@@ -111,6 +113,7 @@ def test_decimal_times_are_rounded_once(times: list[object]) -> None:
     assert log.t_ns.tolist() == [time - nanoseconds[0] for time in nanoseconds]
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(tables())
 def test_rows_are_read_alone_as_they_are_parsed_together(table: Written) -> None:

@@ -265,6 +265,7 @@ def truth_of(case: Good) -> Truth:
     return truth
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", GOOD, ids=_name)
 def test_a_specimen_gives_the_motion_that_it_holds(case: Good) -> None:
     truth, log = truth_of(case), read(case)

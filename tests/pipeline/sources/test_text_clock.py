@@ -281,6 +281,7 @@ WRITERS: dict[str, Callable[[datetime], str]] = {
 }
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(
     st.datetimes(datetime(1900, 1, 1), datetime(2100, 1, 1)),

@@ -154,6 +154,7 @@ def test_joints_that_the_user_names_come_first(read: Read) -> None:
     np.testing.assert_array_equal(log.q, quat)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.integers(2, 60), st.integers(0, 2**31), st.sampled_from([7, 8, 12, 13, 16]))
 def test_random_joints_are_no_trajectory(

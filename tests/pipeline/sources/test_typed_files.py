@@ -77,6 +77,7 @@ def damaged(path: Path, write: Callable[[Path], Any], kept: int | float) -> str:
     return refusal(LogError, read_log, [path])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kept", [4, 20, 0.5, 0.99])
 @pytest.mark.parametrize("name", ["log.parquet", "log.mat"])
 def test_truncated_files_are_one_line(tmp_path: Path, name: str, kept: float) -> None:
@@ -123,6 +124,7 @@ MATS: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compressed", [False, True])
 @pytest.mark.parametrize("what", MATS)
 def test_mat_files_of_others(tmp_path: Path, what: str, compressed: bool) -> None:
@@ -132,6 +134,7 @@ def test_mat_files_of_others(tmp_path: Path, what: str, compressed: bool) -> Non
     assert log.warnings == ()
 
 
+@pytest.mark.slow
 def test_a_matrix_alone_has_its_samples_along_its_longer_side(tmp_path: Path) -> None:
     for q in (Q, Q.T):
         savemat(tmp_path / "log.mat", {"q": q})

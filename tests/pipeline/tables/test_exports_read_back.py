@@ -113,6 +113,7 @@ def same(found: Any, wanted: Any) -> None:
         np.testing.assert_array_equal(found, wanted, strict=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", FORMATS)
 @pytest.mark.parametrize("case", CASES)
 def test_the_rows_of_the_file_come_back(tmp_path: Path, case: str, to: Format) -> None:
@@ -128,6 +129,7 @@ def test_the_rows_of_the_file_come_back(tmp_path: Path, case: str, to: Format) -
     assert {w.kind for w in found.warnings} <= {w.kind for w in run.warnings}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", FORMATS)
 @pytest.mark.parametrize("case", CASES)
 def test_the_grid_comes_back(tmp_path: Path, case: str, to: Format) -> None:
@@ -145,6 +147,7 @@ def test_the_grid_comes_back(tmp_path: Path, case: str, to: Format) -> None:
     assert not found.repolarizations
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_tables_of_results_come_back(tmp_path: Path, case: str) -> None:
     run = made(tmp_path, case)
@@ -164,6 +167,7 @@ def test_tables_of_results_come_back(tmp_path: Path, case: str) -> None:
                 same(getattr(found, name), getattr(run, name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", FORMATS)
 def test_still_poses_come_back(tmp_path: Path, to: Format) -> None:
     q = np.random.default_rng(3).uniform(-2, 2, (40, 6))
@@ -175,6 +179,7 @@ def test_still_poses_come_back(tmp_path: Path, to: Format) -> None:
         assert not found.log.timed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", FORMATS)
 @pytest.mark.parametrize("name", ["coppeliasim.csv", "matlab.csv", "path.csv"])
 def test_logs_of_other_programs_come_back(tmp_path: Path, name: str, to: Format) -> None:

@@ -42,6 +42,7 @@ def test_joints_called_as_the_tool_keep_their_names(tmp_path: Path) -> None:
     assert found == f"t (s),x (m),y (m),z (m),t (rad),{tool},{PATH_ROW}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PATHS)
 @pytest.mark.parametrize("robot", [True, False])
 def test_ingest_reads_it_bit_by_bit_without_a_warning(name: str, robot: bool, tmp_path: Path) -> None:

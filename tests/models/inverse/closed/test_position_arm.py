@@ -80,6 +80,7 @@ def _grazes(values: FloatArray) -> bool:
     return bool((np.abs(inner[extremal]) < 1e-3 * np.abs(values).max()).any())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parameter", NEARLY.values(), ids=list(NEARLY))
 @pytest.mark.parametrize("off", [1e-2, 1e-4, 1e-6, 1e-7, 1e-8, 1e-10, 1e-12, 1e-14])
 def test_an_arm_that_is_almost_special_loses_no_digit(parameter: str, off: float) -> None:

@@ -69,6 +69,7 @@ def test_ten_thousand_poses_are_reached_by_every_solution_the_given_one_among_th
     assert np.nanmin(solutions.q) > -math.pi
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("special", SPECIAL)
 def test_random_arms_are_reached_by_every_solution_the_given_one_among_them(special: str) -> None:
     generator = np.random.default_rng(len(special))
@@ -82,6 +83,7 @@ def test_random_arms_are_reached_by_every_solution_the_given_one_among_them(spec
         assert away_from(chain, solutions, q).min(axis=1).max() < FOUND
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kinds", sorted({"".join(kinds) for kinds in product("RP", repeat=3)} - {"RRR"}))
 @pytest.mark.parametrize("special", ["plain", "axes 1 and 2 meet", "axes 1 and 2 parallel"])
 def test_prismatic_joints_among_the_first_three(kinds: str, special: str) -> None:

@@ -55,6 +55,7 @@ def assert_agreement(chain: Chain, q: FloatArray) -> None:
         assert distance.min(axis=1).max() < AGREEMENT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("special", [name for name in SPECIAL if name != "plain"])
 def test_arms_with_axes_that_meet_or_are_parallel(special: str) -> None:
     generator = np.random.default_rng(21)

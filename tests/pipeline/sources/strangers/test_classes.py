@@ -26,6 +26,7 @@ from urmpipe_pipeline.sources import ReadOptions
 ORDINARY: Mapping[str, Stranger] = {f"ordinary-{k + 1}": one for k, one in enumerate(well_written())}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STRANGERS)
 def test_a_strangers_file_is_read_right_or_asked_about(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -41,6 +42,7 @@ def test_a_strangers_file_is_read_right_or_asked_about(
         assert code != 2, capsys.readouterr().err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ORDINARY)
 def test_a_well_written_file_gets_no_question(name: str, tmp_path: Path) -> None:
     verdict = judged(ORDINARY[name], tmp_path)

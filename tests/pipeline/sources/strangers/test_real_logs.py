@@ -177,6 +177,7 @@ NO_LOGS = (
 OTHERS = ("youbot-vrep-scene8/configurations.csv", "plotjuggler/simple_parse_timestamp.csv")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LOGS_READ)
 def test_a_real_log_is_read_right_or_asked_about(name: str) -> None:
     oracle, robot = LOGS_READ[name]
