@@ -21,11 +21,11 @@ from urmpipe_models.elementwise import Element
 from urmpipe_models.row_blocks import row_blocks
 from urmpipe_models.sine_cosine import WORK, cosine_sine_into
 
-BLOCK = 8192
-"""Rows in a block: some 25 arrays of 64 kB stay in a core's cache, and a call of NumPy costs a tenth."""
+BLOCK = 12288
+"""Rows in a block: some 20 arrays of 96 kB stay in a core's cache, and a call of NumPy costs a tenth."""
 
-LONG = 4 * BLOCK
-"""From here on recording, about a millisecond, is little."""
+LONG = 2 * BLOCK
+"""Fewer rows take less time than recording, which takes a millisecond or two."""
 
 _LINE = 8
 """Doubles in a line of the cache, 64 bytes: NumPy is half as fast again on arrays that start with one."""

@@ -121,26 +121,29 @@ class Transform:
         return Transform(Transform((columns[0], columns[1], columns[2])).columns, self.translation)
 
 
-def turned_vector(vector: Vector, axis: Sequence[float], angle: Element) -> Vector:
-    """Return a vector after a rotation about an axis, in its own unit.
+def turned_vectors(vectors: Sequence[Vector], axis: Sequence[float], angle: Element) -> list[Vector]:
+    """Return vectors after a rotation about an axis, each in its own unit.
 
     About x, y or z the other two coordinates a, b become c a - s b, c b + s a: 4 products instead of 9.
 
     Args:
-        vector: Any elements.
+        vectors: Of any elements.
         axis: Unit vector [-].
         angle: In [rad], any element.
     """
     along = _along(axis)
     if along is None:
-        return rotation_about(axis, angle).rotate(vector)
+        return [*map(rotation_about(axis, angle).rotate, vectors)]
     c, s = _cosine_sine(angle)
     s = times(axis[along], s)
-    turned = list(vector)
-    first, second = vector[along - 2], vector[along - 1]
-    turned[along - 2] = minus(times(c, first), times(s, second))
-    turned[along - 1] = plus(times(c, second), times(s, first))
-    return turned[0], turned[1], turned[2]
+    turned = []
+    for vector in vectors:
+        first, second = vector[along - 2], vector[along - 1]
+        new = list(vector)
+        new[along - 2] = minus(times(c, first), times(s, second))
+        new[along - 1] = plus(times(c, second), times(s, first))
+        turned.append((new[0], new[1], new[2]))
+    return turned
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.elementwise import ZERO, Element, Vector, cross, plus, subtract, times
-from urmpipe_models.kinematics.frames import frames, joint_values, moved, tip_position
+from urmpipe_models.kinematics.frames import frames, from_tip, joint_values, moved, tip_position
 from urmpipe_models.kinematics.motion import each_motion
 from urmpipe_models.row_blocks import row_blocks, side_by_side
 from urmpipe_models.tape import aligned, fill_over_log
@@ -50,13 +50,15 @@ def forward(chain: Chain, q: Sequence[Element]) -> tuple[Transform, ...]:
 def tip_pose(chain: Chain, q: Sequence[Element]) -> Transform:
     """Return the pose of the tool centre point alone, in the world: the last of `forward`, at less cost.
 
+    Its axes x and y come with the point from the tool to the base; z = x cross y.
+
     Args:
         chain: The arm.
         q: One element per coordinate, in [rad] or [m].
     """
-    for frame in frames(chain, q):
-        last = frame
-    return last @ chain.tip @ chain.tool
+    tip = chain.tip @ chain.tool
+    point, x, y = from_tip(chain, q, tip.translation, *tip.columns[:2])
+    return Transform(Transform((x, y, cross(x, y))).columns, point)
 
 
 def jacobian(chain: Chain, q: Sequence[Element], point: int = -1) -> tuple[tuple[Element, ...], ...]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.elementwise import Element, Vector, add, plus, scale, times
-from urmpipe_models.transform import Transform, turned_vector
+from urmpipe_models.transform import Transform, turned_vectors
 
 
 def joint_values(chain: Chain, q: Sequence[Element]) -> list[Element]:
@@ -48,23 +48,30 @@ def moved(at_joint: Transform, joint: Joint, value: Element) -> Transform:
 
 
 def tip_position(chain: Chain, q: Sequence[Element]) -> Vector:
-    """Return the tool centre point in the world [m], without its orientation.
-
-    Inward recursion: the point in a link's frame becomes the same point in the frame before,
-    p' = o + R Rot(axis, q) p, from the tool to the base. It turns a vector where `frames` turns three.
+    """Return the tool centre point in the world [m], without its orientation: that of `tip_pose`.
 
     Args:
         chain: The arm.
         q: One element per coordinate, in [rad] or [m].
     """
-    point = chain.tip.point(chain.tool.translation)
+    return from_tip(chain, q, chain.tip.point(chain.tool.translation))[0]
+
+
+def from_tip(chain: Chain, q: Sequence[Element], point: Vector, *directions: Vector) -> list[Vector]:
+    """Return a point [m] and directions that are given in the frame of the last joint, in the world.
+
+    Inward recursion: what is known in a link's frame becomes the same in the frame before,
+    p' = o + R Rot(axis, q) p and v' = R Rot(axis, q) v, from the tool to the base. It turns one vector for
+    each of them where `frames` turns three.
+    """
+    vectors = [point, *directions]
     for joint, value in zip(reversed(chain.joints), reversed(joint_values(chain, q)), strict=True):
         if joint.kind == "revolute":
-            point = turned_vector(point, joint.axis, value)
+            vectors = turned_vectors(vectors, joint.axis, value)
         elif joint.kind == "prismatic":
-            point = add(point, scale(value, joint.axis))
-        point = joint.origin.point(point)
-    return chain.base.point(point)
+            vectors[0] = add(vectors[0], scale(value, joint.axis))
+        vectors = [joint.origin.point(vectors[0]), *map(joint.origin.rotate, vectors[1:])]
+    return [chain.base.point(vectors[0]), *map(chain.base.rotate, vectors[1:])]
 
 
 def _value(joint: Joint, of: dict[str, Element]) -> Element:
