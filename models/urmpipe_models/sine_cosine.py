@@ -72,7 +72,7 @@ def _of_array(x: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def cosine_sine_into(x: FloatArray, c: FloatArray, s: FloatArray, *work: FloatArray) -> None:
-    """Write cos and sin of each angle x [rad] into c and s: no array is made, which would cost more than it holds.
+    """Write cos and sin of each angle x [rad] into c and s, without an array of its own: those cost more.
 
     Args:
         x: Any shape and strides.

@@ -3,7 +3,7 @@
 A model is written once, for one element per coordinate (see `elementwise`). Over an array, each of its
 operations would make an array of its own, and memory would cost more than arithmetic. So the function runs
 once on elements that record its operations; these then run block by block, in a few arrays that all blocks
-share. They are the same operations in the same order on the same numbers: the results are the same bits.
+share. They are the same operations on the same numbers, so the results are the same bits.
 """
 
 from __future__ import annotations
@@ -34,12 +34,12 @@ Function: TypeAlias = Callable[[Sequence[Element]], Iterable[Element]]
 Operation: TypeAlias = tuple[Callable[..., object], Callable[[Sequence[FloatArray]], Sequence[FloatArray]]]
 
 
-def aligned(rows: int, count: int) -> FloatArray:
-    """Return an array of shape (rows, count), not filled, each row of which starts a line of the cache."""
-    width = -(-count // _LINE) * _LINE
+def aligned(rows: int, length: int) -> FloatArray:
+    """Return an array of shape (rows, length), not filled, each row of which starts a line of the cache."""
+    width = -(-length // _LINE) * _LINE
     memory = np.empty(rows * width + _LINE)
     start = -memory.ctypes.data // memory.itemsize % _LINE
-    return memory[start : start + rows * width].reshape(rows, width)[:, :count]
+    return memory[start : start + rows * width].reshape(rows, width)[:, :length]
 
 
 def fill_over_log(function: Function, q: FloatArray, targets: Sequence[FloatArray]) -> None:
@@ -51,7 +51,8 @@ def fill_over_log(function: Function, q: FloatArray, targets: Sequence[FloatArra
         targets: An array of shape (n,) for each element that the function returns.
     """
     if len(q) < LONG:
-        for target, element in zip(targets, function([*np.ascontiguousarray(q.T)]), strict=True):
+        columns = np.ascontiguousarray(q.T, dtype=np.float64)
+        for target, element in zip(targets, function([*columns]), strict=True):
             target[:] = element
         return
     tape = Tape(function, q.shape[1], len(targets))
@@ -82,11 +83,10 @@ class Tape:
         self._count = inputs
         self._turns: dict[int, tuple[_Value, _Value]] = {}
         targets: dict[int, int] = {}
-        for place, element in enumerate(function([_Value(self, k) for k in range(inputs)]), start=inputs):
+        elements = function([_Value(self, k) for k in range(inputs)])
+        for place, element in zip(range(inputs, inputs + outputs), elements, strict=True):
             copy = not isinstance(element, _Value) or element.at < inputs or element.at in targets
             targets[self.add(np.positive, [element])[0].at if copy else element.at] = place
-        if len(targets) != outputs:
-            raise ValueError(f"{len(targets)} elements for {outputs} targets")
         places = {**{k: k for k in range(inputs)}, **targets}
         self.operations, self.arrays = self._placed(places, inputs + outputs)
         self.constants = [np.array(number) for number in reversed(self._numbers)]
@@ -146,11 +146,11 @@ class _Value(NDArrayOperatorsMixin):
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *operands: Any, **options: Any) -> _Value:
         """Record an operation; cos and sin are those of `cosine_sine`, by which models take them."""
         if method != "__call__" or options or ufunc.nout != 1:
-            raise TypeError(f"np.{ufunc.__name__}: allowed over a log are operations with one result")
+            raise TypeError(f"np.{ufunc.__name__} is not recorded; allowed: one result, no options")
         if ufunc in (np.cos, np.sin):
             return self.tape.turn(self)[ufunc is np.sin]
         return self.tape.add(ufunc, operands)[0]
 
     def __bool__(self) -> bool:
         """Refuse: what a function does may not depend on a value."""
-        raise TypeError("no choice by a value is allowed over a log")
+        raise TypeError("a choice by a value is not recorded; allowed: operations on every value")
