@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import argparse
 import statistics
+import time
 from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
-from pairs import Bound, machine, timed, write_results
+from pairs import Bound, machine, write_results
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import poses_over_log, positions_over_log
@@ -37,6 +38,13 @@ def peer_model(chain: Chain) -> tuple[pin.Model, int]:
             frame = pin.SE3.Identity()
     tip = pin.Frame("tip", parent, 0, frame * placement(chain.tip), pin.FrameType.OP_FRAME)
     return model, model.addFrame(tip)
+
+
+def cpu_seconds(job: Callable[[], object]) -> float:
+    """Return the time in [s] that all threads of this process compute for a job."""
+    start = time.process_time()
+    job()
+    return time.process_time() - start
 
 
 def main() -> None:
@@ -70,18 +78,19 @@ def main() -> None:
     taken: dict[str, list[float]] = {name: [] for name in jobs}
     for _ in range(options.rounds):
         for name, job in jobs.items():
-            taken[name].append(min(timed(job) for _ in range(TRIES)))
+            taken[name].append(min(cpu_seconds(job) for _ in range(TRIES)))
     pairs = zip(poses_over_log(chain, q), (position, rotation), strict=True)
     error = max(np.abs(mine - peers).max() for mine, peers in pairs)
     lines = [
         f"# Forward kinematics of {options.poses} urm6 poses: {options.rounds} rounds in turn, one thread",
         "",
         *machine("pin"),
+        "Seconds are CPU time, all threads of the process together: other programs use the machine as well.",
         f"Of each job the shortest of {TRIES} runs in a row counts in a round: memory that was not in use",
         "for a while is slow at first here, and not every job needs much of it.",
         f"Largest difference between the two, position [m] and rotation: {error:.1e}.",
         "",
-        "| job | s, median (min-max) | thousand poses a second | times urmpipe's, median of pairs |",
+        "| job | CPU s, median (min-max) | thousand poses a second | times urmpipe's, median of pairs |",
         "|---|---|---|---|",
     ]
     ratios: dict[str, float] = {}

@@ -76,7 +76,7 @@ def test_angles_of_many_turns_and_missing_ones_are_as_in_whole_arrays() -> None:
         got = over_log(lambda values: entries(chain, values), q, 12)
         expected = entries(chain, [*np.ascontiguousarray(q.T)])
     np.testing.assert_array_equal(got, expected)
-    assert np.isnan(got).any(axis=0).nonzero()[0].tolist() == [5, BLOCK + 1]
+    assert np.flatnonzero(np.isnan(got).any(axis=0)).tolist() == [5, BLOCK + 1]
 
 
 def test_logs_side_by_side_do_not_disturb_each_other() -> None:

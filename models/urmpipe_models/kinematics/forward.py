@@ -131,7 +131,7 @@ def positions_over_log(chain: Chain, q: FloatArray) -> FloatArray:
         q: Joint values in [rad] or [m], shape (n, joints).
     """
     position = aligned(3, len(q))
-    fill_over_log(partial(tip_position, chain), q, position)
+    fill_over_log(partial(tip_position, chain), q, [*position])
     return position.T
 
 
