@@ -35,7 +35,7 @@ def folder(tmp_path: Path) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL, signal.SIGTERM])
 def test_a_stopped_comparison_leaves_all_outputs_or_none(forked: Forks, number: int, folder: Path) -> None:
-    found = interrupted(forked, COMPARE, folder, number, moments=10)
+    found = interrupted(forked, COMPARE, folder, number, moments=6)
     assert found["old"] >= 3  # most of its time goes before its outputs are in place
 
 
@@ -51,7 +51,7 @@ def test_a_stopped_command_leaves_all_outputs_or_none(
 @pytest.mark.slow
 @pytest.mark.parametrize("job", JOBS, ids=lambda job: job.name)
 def test_a_file_that_may_not_grow_is_one_line(forked: Forks, job: Job, folder: Path) -> None:
-    found = limited(forked, job, folder, sizes=10 if job is COMPARE else 3)
+    found = limited(forked, job, folder, sizes=6 if job is COMPARE else 2)
     assert found["old"] > found["new"]
 
 
@@ -61,5 +61,5 @@ def test_a_full_disk_is_one_line(forked: Forks, tmp_path: Path) -> None:
         if not mounted:
             pytest.skip("mounting a small disk needs Linux and root")
         write_inputs(tmp_path)
-        found = full(forked, COMPARE, tmp_path, sizes=10)
+        found = full(forked, COMPARE, tmp_path, sizes=6)
     assert found["old"] > found["new"]
