@@ -12,6 +12,7 @@ COMMANDS = [line.strip() for line in README.splitlines() if line.startswith("   
 
 def test_ci_runs_the_test_command_word_for_word() -> None:
     tests = 'python3 -m venv .venv && .venv/bin/pip install -e ".[test]" && .venv/bin/pytest'
+    tests += ' -m "not slow" -n 2 --dist worksteal'
     assert tests in COMMANDS
     assert tests in (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
     assert tests in (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")

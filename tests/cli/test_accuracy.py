@@ -130,7 +130,7 @@ GIVEN = ("accuracy", "--robot", "arm.toml", "--path", "path.csv", "--backend", "
 
 @pytest.mark.slow
 def test_errors_and_verdict(folder: Path, capsys: Captured) -> None:
-    codes = [run([*GIVEN, "--velocities", "0.1,0.05", *more]) for more in ((), ("--limit", "1um"))]
+    codes = [run([*GIVEN, "--velocities", "0.1,0.05", *more]) for more in ((), ("--limit", "2mm"))]
     assert codes == [0, 1]
     slower = "note: the arm runs in NumPy, some hundred times slower than machine code\n"
     assert capsys.readouterr().err == 2 * slower
@@ -171,11 +171,10 @@ def test_the_error_that_decides_is_chosen_and_a_cube_is_its_rows(capsys: Capture
 def test_an_arm_that_diverges(folder: Path, capsys: Captured) -> None:
     (folder / "path.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.49,0\n")
     (folder / "arm.toml").write_text(ARM + MASSES + drive("a", -7500.0) + drive("b"))
-    assert run([*GIVEN, "--velocities", "0.01"]) == 0
+    assert run([*GIVEN, "--velocities", "0.01", "--limit", "1mm"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert found["errors"] == [None]
     assert found["diverged"][0]["joint"] in ("a", "b")
-    assert run([*GIVEN, "--velocities", "0.01", "--limit", "1mm"]) == 1
 
 
 def test_an_arm_without_masses_and_drives(folder: Path, capsys: Captured) -> None:
