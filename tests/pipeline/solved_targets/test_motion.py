@@ -12,7 +12,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.inverse.targets import targets_of
-from urmpipe_models.kinematics.forward import poses_over_log, positions_over_log
+from urmpipe_models.kinematics.forward import points_over_log, positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.joint_log import LogWarning
@@ -61,7 +61,7 @@ def test_targets_without_times_are_no_motion() -> None:
     assert (run.t.tolist(), run.tsp) == ([0.0, 1.0, 2.0, 3.0], 0.0)  # the numbers of the rows
     np.testing.assert_array_equal(run.q, q)  # no turn is resolved between poses that no motion joins
     assert run.tcp is not None
-    np.testing.assert_array_equal(run.tcp.position, poses_over_log(UR5E, q)[0])
+    np.testing.assert_array_equal(run.tcp.position, points_over_log(UR5E, q)[:, -1])
     for rates in (run.qd, run.qdd, run.tcp.velocity, run.tcp.acceleration):
         assert np.isnan(rates).all()
     assert (run.audit, run.warnings) == ((), ())
