@@ -19,8 +19,8 @@ from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.networks.network_file import network_names
 from urmpipe_models.robots.catalogue import robot_names
 
-OF_OTHERS = {"--start-values", "--debug-logging", "--no-arr", "--truncate-length"}
-"""Options of fmpy and ros2 that pages name."""
+OF_OTHERS = {"--start-values", "--debug-logging", "--no-arr", "--truncate-length", "--dist"}
+"""Options of fmpy, ros2 and pytest that pages name."""
 
 
 @pytest.fixture(scope="module")

@@ -231,9 +231,9 @@ def test_everything_wrong_is_said_at_once(robot: Any) -> None:
         "arm.toml: key lengths[2]: found nan, allowed: a finite number",
         "arm.toml: key tilts: found nothing, allowed: a list of finite numbers",
         "arm.toml: key directions: found 1, allowed: a list of finite numbers",
-        "arm.toml: key limits.lower: found [1, 2], allowed: a number, or 0 numbers, one a joint",
-        "arm.toml: key limits.velocity: found 'fast', allowed: a number, or 0 numbers, one a joint",
-        "arm.toml: key limits.acceleration: found [nan], allowed: a number, or 0 numbers, one a joint",
+        "arm.toml: key limits.lower: found [1, 2], allowed: a number, or 0 numbers, one per joint",
+        "arm.toml: key limits.velocity: found 'fast', allowed: a number, or 0 numbers, one per joint",
+        "arm.toml: key limits.acceleration: found [nan], allowed: a number, or 0 numbers, one per joint",
         "arm.toml: key limits.uper: unknown (did you mean upper?); allowed: lower, upper, velocity,"
         " acceleration, effort",
         "arm.toml: key nmae: unknown (did you mean name?); allowed: kind, length_unit, angle_unit, name,"
@@ -300,7 +300,7 @@ def test_faults_in_rows_name_the_row(robot: Any) -> None:
         ),
         (
             'kind = "dh"\nlimits = { upper = [1, 2] }\njoints = [{ d = 1 }, { kind = "fixed" }]',
-            "arm.toml: key limits.upper: found [1, 2], allowed: a number, or 1 numbers, one a joint",
+            "arm.toml: key limits.upper: found [1, 2], allowed: a number, or 1 numbers, one per joint",
         ),
         (
             'kind = "dh"\njoints = [{ kind = "fixed" }]',
