@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -26,11 +27,18 @@ MASTERS: dict[str, tuple[str, Callable[[System, float, int], Trace]]] = {
 }
 
 
-def assert_is_the_run_over_a_log(unit: Unit, trace: Trace, held: dict[str, FloatArray], rtol: float) -> None:
+@cache
+def inputs_and_run(name: str) -> tuple[Unit, dict[str, FloatArray], dict[str, FloatArray]]:
+    """Return a shipped unit, its inputs and its run over a log: seconds of Python for an arm with masses."""
+    unit = shipped_unit(name)
+    held = drawn_inputs(unit, STEPS + 1)
+    return unit, columns(unit, held), columns(unit, run(unit, sample_times(STEPS + 1), held))
+
+
+def assert_is_the_run_over_a_log(trace: Trace, expected: dict[str, FloatArray], rtol: float) -> None:
     """The inputs change every second sample: what is read after a step with the inputs of its beginning is at
     every odd sample what the log's run gives there, for the inputs of that sample.
     """
-    expected = columns(unit, run(unit, sample_times(STEPS + 1), held))
     assert expected.keys() == trace["it"].keys()
     for name, values in trace["it"].items():
         np.testing.assert_allclose(values[1::2], expected[name][1::2], rtol, rtol, err_msg=name)
@@ -44,9 +52,8 @@ def test_a_native_unit_gives_the_numbers_of_its_run_over_a_log(
 ) -> None:
     module, run_master = MASTERS[master]
     need(module)
-    unit = shipped_unit(name)
-    held = drawn_inputs(unit, STEPS + 1)
-    trace = run_master(alone(fmu_of(name), unit, columns(unit, held)), STEP, STEPS)
+    unit, inputs, expected = inputs_and_run(name)
+    trace = run_master(alone(fmu_of(name), unit, inputs), STEP, STEPS)
     # The masters' clocks add up, so that their times and steps differ from k h in the last digits: with
     # values up to 1e4 (torques of a drawn motion) and stiff shafts that is 1e-10 of a value, not 1e-12.
-    assert_is_the_run_over_a_log(unit, trace, held, rtol=1e-10)
+    assert_is_the_run_over_a_log(trace, expected, rtol=1e-10)

@@ -371,14 +371,8 @@ PERTURBATIONS: dict[str, Perturb] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PERTURBATIONS)
-def test_five_perturbed_mechanisms_have_the_answers_of_the_closed_form(name: str) -> None:
-    assert_perturbed(name, 5, seed=3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", PERTURBATIONS)
-def test_a_hundred_perturbed_mechanisms_have_the_answers_of_the_closed_form(name: str) -> None:
-    assert_perturbed(name, 100, seed=7)
+def test_thirty_perturbed_mechanisms_have_the_answers_of_the_closed_form(name: str) -> None:
+    assert_perturbed(name, 30, seed=7)
 
 
 # --- helpers
