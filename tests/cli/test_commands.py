@@ -107,6 +107,7 @@ def test_an_output_that_is_not_ours_or_is_an_input_is_never_replaced(
     assert files_in(tmp_path) == ["log.csv", "thesis.txt"]
 
 
+@pytest.mark.slow
 def test_compare_passes_and_its_exit_code_is_the_verdict(urmpipe: RunCommand, tmp_path: Path) -> None:
     ran = urmpipe(
         "compare", PATH, COPPELIA, MATLAB, LOGS / "solidworks", "--robot", "urm6", "--json", "-o", "a.rrd"

@@ -50,6 +50,7 @@ def test_the_tip_that_a_block_computed_is_judged_as_its_delta_meter_does(recorde
         assert_agrees(found, recorded)
 
 
+@pytest.mark.slow
 def test_a_simulated_arm_compares_as_its_log_does(recorded: Simulation) -> None:
     """By its joints: as the log itself, to the bit, and so as the delta meter of Python, which adds alike."""
     (log,) = urmpipe.compare(PATH, LOG, robot="urm6").runs
@@ -73,6 +74,7 @@ def test_a_simulated_arm_does_not_deviate_from_its_log(recorded: Simulation, blo
         assert not run.delta.any()
 
 
+@pytest.mark.slow
 def test_its_own_tip_agrees_with_its_joints(recorded: Simulation) -> None:
     (run,) = urmpipe.compare(recorded, block="chain").runs
     # The same formulas on the same doubles; a compiler may round products that it fuses, 1e-16 m each.

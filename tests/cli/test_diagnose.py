@@ -49,6 +49,7 @@ def told(capsys: Captured) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 def test_the_first_line_is_verdict_and_answer(capsys: Captured) -> None:
     assert run(["diagnose", PATH, WRONG, *ARM]) == 1
     lines = capsys.readouterr().out.splitlines()

@@ -76,6 +76,7 @@ def test_a_log_whose_period_no_clock_writes_exactly_is_judged_at_its_samples(
     assert result.verdicts[0].worst < 3.5 * 0.5 * 10.0 ** -int(digits[2])
 
 
+@pytest.mark.slow
 def test_a_step_between_the_samples_of_a_log_is_told(slow_motion: dict[str, str]) -> None:
     result = simulate("log-to-delta", arguments=slow_motion, step=0.005)
     assert [(one.kind, one.message) for one in result.warnings] == [(

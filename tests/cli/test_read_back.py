@@ -64,6 +64,7 @@ def written(file: Path) -> tuple[FloatArray, FloatArray, FloatArray]:
     return np.rint(rows[:, 0] * 1e9), rows[:, 1:4], rows[:, 4:]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tcp", "rows"), [("fk", "grid"), ("fk", "file"), ("recorded", None)])
 def test_a_trajectory_comes_back(run: Run, tcp: Any, rows: Any, tmp_path: Path) -> None:
     urmpipe.export(run, output=tmp_path / "a.tum", tcp=tcp, rows=rows)
@@ -128,6 +129,7 @@ def test_a_recording_among_files_or_without_a_run_is_refused(run: Run, tmp_path:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("timed", [True, False])
 def test_solved_targets_come_back(timed: bool, tmp_path: Path) -> None:
     run = urmpipe.ingest(LOGS / "coppeliasim.csv", "urm6")
@@ -162,6 +164,7 @@ def test_a_plan_comes_back(robot: str | None, tmp_path: Path) -> None:
         assert_path(tmp_path / "a.tum", *written(tmp_path / "a.tum"))
 
 
+@pytest.mark.slow
 def test_the_tip_of_a_simulated_arm_comes_back(tmp_path: Path) -> None:
     urmpipe.export(urmpipe.simulate("six-drives", duration=0.1), output=tmp_path / "a.tum")
     assert_path(tmp_path / "a.tum", *written(tmp_path / "a.tum"))

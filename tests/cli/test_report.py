@@ -60,6 +60,7 @@ def test_ik_its_recording_and_the_report_of_it_say_one_verdict(
     )
 
 
+@pytest.mark.slow
 def test_the_numbers_of_compare_stand_in_the_report_of_its_recording(
     urmpipe: RunCommand, recording: Path, tmp_path: Path
 ) -> None:

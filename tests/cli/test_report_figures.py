@@ -33,6 +33,7 @@ def test_options_of_figures_without_a_folder_are_refused_all_at_once(
     assert not recording.with_suffix(".html").exists()
 
 
+@pytest.mark.slow
 def test_figures_are_chosen_written_and_listed(urmpipe: RunCommand, recording: Path, tmp_path: Path) -> None:
     ran = urmpipe(
         "report", recording, "--figures", "new/figures", "--formats", "pdf,svg", "--figure-names", "joints*",

@@ -99,6 +99,7 @@ def following(tmp_path: Path) -> Path:
     return tmp_path / "following.toml"
 
 
+@pytest.mark.slow
 def test_a_unit_of_ones_own_follows_a_column_of_a_table(following: Path) -> None:
     result = simulate(following)
     x, t = result.signal("lag.x").values, result.t
@@ -187,6 +188,7 @@ def test_signals_that_stand_still_come_last(urmpipe: RunCommand, tmp_path: Path)
     assert named == ["lag.x", "lag.error", "lag.u", "still.x", "still.error"]
 
 
+@pytest.mark.slow
 def test_out_of_tolerance_is_exit_code_1_and_json_tells(urmpipe: RunCommand) -> None:
     log = LOGS / "counter_rotating.csv"
     ran = urmpipe(
@@ -290,6 +292,7 @@ def test_a_written_system_asks_for_the_logs_that_stay_with_the_shipped_one(
     assert simulate(tmp_path / "mine.toml", arguments=logs, duration=0.02).verdict == "pass"
 
 
+@pytest.mark.slow
 def test_a_bundled_log_is_not_held_against_a_file_that_is_called_as_another_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -350,6 +353,7 @@ def test_two_outputs_have_two_names(following: Path, tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_an_fmu_that_fails_at_once_leaves_an_empty_recording(following: Path, tmp_path: Path) -> None:
     unit = tmp_path / "follower.py"
     unit.write_text(FOLLOWER.replace("v.u - v.x}", "(v.u - v.x) / (v.gain - v.gain)}"), encoding="utf-8")
@@ -362,6 +366,7 @@ def test_an_fmu_that_fails_at_once_leaves_an_empty_recording(following: Path, tm
     assert read.failed == result.failed
 
 
+@pytest.mark.slow
 def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t,q1,q2\n0,180,90\n0.01,170,80\n", encoding="utf-8")
     run = urmpipe.ingest(tmp_path / "log.csv", unit={"": "deg"})
@@ -400,6 +405,7 @@ def test_progress_rises_to_1(following: Path, tmp_path: Path) -> None:
     assert shares[-1] == 1.0
 
 
+@pytest.mark.slow
 def test_no_meter_judges_positions_of_which_nothing_tells_the_unit(
     urmpipe: RunCommand, tmp_path: Path
 ) -> None:

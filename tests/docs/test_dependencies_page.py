@@ -46,6 +46,7 @@ def test_each_row_says_what_for_and_why() -> None:
     assert all(all(row) for row in users)
 
 
+@pytest.mark.slow
 def test_the_code_of_the_page_lists_this_environment(capsys: pytest.CaptureFixture[str]) -> None:
     exec(snippets(PAGE, "python")[0], {})
     assert re.search(r"^ *[\d.]+ MB  numpy \d", capsys.readouterr().out, re.MULTILINE)

@@ -95,6 +95,7 @@ def test_each_kind_of_warning_has_its_row(made: set[str]) -> None:
     assert [kind for kind in sorted(made) if not any(fnmatch(row, kind) for row in WARNINGS)] == []
 
 
+@pytest.mark.slow
 def test_each_row_of_a_warning_has_its_code(made: set[str]) -> None:
     assert [row for row in sorted(WARNINGS) if not any(fnmatch(row, kind) for kind in made)] == []
 

@@ -75,6 +75,7 @@ def test_both_sides_write_the_same_files(sides: dict[str, Path]) -> None:
     assert files["commands"] - files["functions"] <= ours
 
 
+@pytest.mark.slow
 def test_both_sides_find_the_same(sides: dict[str, Path]) -> None:
     results = [urmpipe.read_recording(folder / "compared.rrd") for folder in sides.values()]
     frames = [one.to_frame() for one in results]
@@ -86,6 +87,7 @@ def test_both_sides_find_the_same(sides: dict[str, Path]) -> None:
     assert maps[0] == maps[1]
 
 
+@pytest.mark.slow
 def test_the_dictionary_of_a_result_is_json(sides: dict[str, Path]) -> None:
     found = urmpipe.read_recording(sides["functions"] / "compared.rrd").to_dict()
     assert json.loads(json.dumps(found, default=str))["verdict"] == "pass"

@@ -9,6 +9,7 @@ import pytest
 from pages import DOCS, script, text_of
 
 
+@pytest.mark.slow
 def test_the_tutorial_shows_what_its_commands_print(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     writer = script(DOCS / "write_tutorial.py")

@@ -103,6 +103,7 @@ def test_a_controller_without_acceleration_tracks_too(figures: Mapping[str, Any]
     assert abs(real[-1] - 1.0) < 1e-4
 
 
+@pytest.mark.slow
 def test_a_held_load_is_turned_by_its_torque_over_the_rigidity(figures: Mapping[str, Any]) -> None:
     system = figures["OneDrive"](load__tau_ext=-50.0, set_point__target=0.0)
     twist = np.diff(figures["simulated"](system, 1e-3, 1.5, "load.theta", "drive.theta1")[-1])

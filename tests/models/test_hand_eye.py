@@ -88,6 +88,7 @@ def test_any_frames_are_found_from_exact_poses(robot: str, turned: bool) -> None
         assert_found(found_in(truth, turned=turned), truth, turned=turned)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), count=st.integers(5, 40), spread=st.floats(0.5, np.pi))
 def test_any_frames_are_found_from_few_poses_and_small_motions(seed: int, count: int, spread: float) -> None:
@@ -191,6 +192,7 @@ OPEN_SETS: list[tuple[FloatArray, FloatArray, list[str], list[str]]] = [
 """Poses, what they leave open without orientations, and with them."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("position", "rotation", "alone", "turned"), OPEN_SETS)
 def test_what_poses_leave_open_is_named_and_the_least_of_it_taken(
     position: FloatArray, rotation: FloatArray, alone: list[str], turned: list[str]

@@ -51,6 +51,7 @@ def found_by_all(q: FloatArray, max_speed: float = math.inf) -> tuple[FloatArray
     return out[:, 0], told[0], unexplained
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("max_speed", [math.inf, 4.0])
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 @pytest.mark.parametrize("missing", [(), (9,), (11,), (7, 9, 11, 13), (8, 9), (11, 12)])

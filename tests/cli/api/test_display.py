@@ -68,6 +68,7 @@ def test_each_public_class_is_a_result_or_named_as_another(results: dict[str, An
     assert all(isinstance(one, Shown) for one in results.values())
 
 
+@pytest.mark.slow
 def test_each_result_is_one_line_at_a_prompt(results: dict[str, Any]) -> None:
     for name, one in results.items():
         shown = repr(one)
@@ -77,6 +78,7 @@ def test_each_result_is_one_line_at_a_prompt(results: dict[str, Any]) -> None:
         assert len(shown) <= 120
 
 
+@pytest.mark.slow
 def test_each_result_shows_its_headline_and_escapes_names_in_a_notebook(results: dict[str, Any]) -> None:
     for name, one in results.items():
         html = one._repr_html_()
@@ -86,6 +88,7 @@ def test_each_result_shows_its_headline_and_escapes_names_in_a_notebook(results:
     assert "&lt;b&gt;&amp;log: 100 rows" in results["Run"]._repr_html_()
 
 
+@pytest.mark.slow
 def test_each_result_has_a_dictionary_and_a_frame_but_for_what_is_described(results: dict[str, Any]) -> None:
     for name, one in results.items():
         if name not in ("Chain", "Network"):
@@ -93,6 +96,7 @@ def test_each_result_has_a_dictionary_and_a_frame_but_for_what_is_described(resu
             assert len(one.to_frame().columns) > 1 or name == "Report"
 
 
+@pytest.mark.slow
 def test_the_lines_say_what_each_holds(results: dict[str, Any]) -> None:
     assert repr(results["Run"]) == "<Run <b>&log: urm6, 100 rows in 0.495 s, grid of 100 samples>"
     line = "<Comparison <b>&log-against-path: pass, on 1 assumption: <b>&log pass (4.56e-05 m), 1 warning>"
@@ -102,6 +106,7 @@ def test_the_lines_say_what_each_holds(results: dict[str, Any]) -> None:
     )
 
 
+@pytest.mark.slow
 def test_of_many_logs_the_worst_is_shown_first(results: dict[str, Any]) -> None:
     one = results["Comparison"]
     (good,) = one.runs
@@ -124,6 +129,7 @@ def test_of_many_logs_the_worst_is_shown_first(results: dict[str, Any]) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_deviation_has_every_quantity_over_time(results: dict[str, Any]) -> None:
     deviation = results["Deviation"]
     frame = deviation.to_frame()
@@ -141,6 +147,7 @@ def test_warnings_are_counted_in_the_line_and_told_in_the_notebook(tmp_path: Pat
     assert all(escape(str(warning)) in run._repr_html_() for warning in run.warnings)
 
 
+@pytest.mark.slow
 def test_each_result_plots_its_main_figure_and_names_those_there_are(results: dict[str, Any]) -> None:
     whole = replace(results["Diagnosis"], comparison=results["Comparison"])  # as urmpipe.diagnose returns it
     plotted = [one for one in (results | {"Diagnosis": whole}).values() if isinstance(one, Result)]
@@ -155,6 +162,7 @@ def test_each_result_plots_its_main_figure_and_names_those_there_are(results: di
     assert "pyplot" not in {name.partition(".")[2] for name in sys.modules if name.startswith("matplotlib.")}
 
 
+@pytest.mark.slow
 def test_a_frame_plots_itself_with_the_extra_as_docs_say(results: dict[str, Any]) -> None:
     axes = results["Deviation"].to_frame().set_index("t").plot()
     assert {"x", "y", "z", "norm"} <= {line.get_label() for line in axes.lines}

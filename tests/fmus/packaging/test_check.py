@@ -172,6 +172,7 @@ def test_an_fmu_that_hangs_is_ended(tmp_path: Path) -> None:
     assert found.problems == ("fmi2DoStep at 0.015 s did not return within 3 s",)
 
 
+@pytest.mark.slow
 def test_an_fmu_that_ends_well_but_early_is_no_good_one(tmp_path: Path) -> None:
     found = check_fmu(built(failing("os._exit(0)"), tmp_path))
     assert found.problems == ("fmi2DoStep at 0.015 s ended the process with the exit code 0",)

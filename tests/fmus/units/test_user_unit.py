@@ -82,6 +82,7 @@ def test_a_unit_carries_the_text_of_its_file_from_which_it_is_made_again(tmp_pat
     assert run(again, np.array([0.0]), {"u": np.array([3.0])})["y"].tolist() == [6.0]
 
 
+@pytest.mark.slow
 @settings(max_examples=30, **PATIENT)
 @given(random_unit_sources())
 def test_any_file_with_a_sound_unit_is_taken(source: str) -> None:

@@ -22,6 +22,7 @@ values = st.recursive(
 )
 
 
+@pytest.mark.slow
 @given(st.dictionaries(keys, values, max_size=4))
 def test_what_is_written_reads_back(table: dict[str, object]) -> None:
     assert tomllib.loads("\n".join(toml_lines(table))) == table

@@ -173,6 +173,7 @@ def test_no_arithmetic_is_refused(text: str, message: str) -> None:
     assert refusal(ValueError, Expression, text) == message
 
 
+@pytest.mark.slow
 @given(st.text(max_size=40))
 def test_any_other_text_is_refused_in_order(text: str) -> None:
     try:

@@ -178,6 +178,7 @@ def on_grid(chain: Chain, path: LineArcPath, law: TimeLaw) -> tuple[FloatArray, 
     return np.abs(rates) / velocity, np.abs(accelerations) / acceleration
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_the_law_of_limits_runs_at_its_limits(case: str) -> None:
     """On its grid no limit is exceeded, and nearly everywhere one is used up."""

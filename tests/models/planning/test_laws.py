@@ -160,6 +160,7 @@ def test_a_swing_keeps_the_total_acceleration(entry: float, a: float, radius: fl
         np.testing.assert_allclose(np.gradient(value, t)[inner], slope[inner], atol=2.0 * allowed)
 
 
+@pytest.mark.slow
 @given(corner_rows(), speeds, rises, st.none() | jerks, arcs, st.floats(0.01, 1.0))
 def test_a_slower_law_is_the_same_in_slower_time(
     rows: PathRows, v: float, a: float, j: float | None, held: Arcs, factor: float
@@ -175,6 +176,7 @@ def test_a_slower_law_is_the_same_in_slower_time(
     np.testing.assert_allclose(other.a[away], factor**2 * one.a[away], atol=1e-6)
 
 
+@pytest.mark.slow
 @given(corner_rows(), speeds, rises, st.none() | jerks, arcs, places)
 def test_times_of_places_lead_back(
     rows: PathRows, v: float, a: float, j: float | None, held: Arcs, shares: list[float]

@@ -107,6 +107,7 @@ def test_both_meanings_of_a_radius_give_one_curve(rows: PathRows) -> None:
     np.testing.assert_allclose(other.points(s).position, one.points(s).position, atol=1e-9)
 
 
+@pytest.mark.slow
 @given(corner_rows(variants=True))
 def test_reversed_rows_give_the_reversed_curve(rows: PathRows) -> None:
     path = path_of(rows)
@@ -194,6 +195,7 @@ def test_arcs_touch_in_a_plane_of_any_place(corner: bool) -> None:
         np.testing.assert_allclose(path.length, [0.5, 0.25 * np.pi, 0.25 * np.pi, 0.5], atol=1e-8)
 
 
+@pytest.mark.slow
 @given(corner_rows(), st.lists(st.floats(-2.0, 2.0), min_size=60, max_size=60))
 def test_the_tool_turns_evenly_from_row_to_row(rows: PathRows, angles: list[float]) -> None:
     turned = np.array(angles).reshape(20, 3)[: len(rows)]

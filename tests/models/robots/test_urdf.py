@@ -328,6 +328,7 @@ def test_a_file_larger_than_any_arm_is_refused(urdf: Any) -> None:
     assert complaint(urdf, "<robot>" + " " * 10**7) == ["arm.urdf: found 10 MB, allowed: 10 MB at most"]
 
 
+@pytest.mark.slow
 def test_what_nests_deep_or_is_no_file_is_one_line(urdf: Any) -> None:
     assert complaint(urdf, "<robot>" + "<a>" * 10**5 + "</a>" * 10**5 + "</robot>") == [
         "arm.urdf: found no link; allowed: one root, or a base link chosen by name"

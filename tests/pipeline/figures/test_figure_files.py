@@ -86,6 +86,7 @@ def test_all_that_is_wrong_with_options_is_told_at_once() -> None:
     assert refused(width=85.0).startswith("figure_width: found 85.0, allowed: column, page, or 40 mm to 1 m")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("width", "millimetres"),
     [("column", 88.0), ("page", 180.0), ("85mm", 85.0), ("3.5in", 88.9), ("9 cm", 90.0), (0.1, 100.0)],
@@ -141,6 +142,7 @@ def test_each_file_says_who_drew_it_and_what_it_shows(tmp_path: Path) -> None:
         assert image.info["Software"].startswith("urmpipe ")
 
 
+@pytest.mark.slow
 def test_one_figure_is_one_file_to_the_byte(tmp_path: Path) -> None:
     first, second = (
         [path.read_bytes() for path in written(with_space(), tmp_path / name, "pdf", "svg", "png")]
@@ -178,6 +180,7 @@ def test_figures_are_chosen_by_title_part_and_pattern(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_ours_are_replaced_and_others_are_left_alone(tmp_path: Path) -> None:
     other = tmp_path / "notes.txt"
     other.write_text("mine")

@@ -25,6 +25,7 @@ def texts(svg: str) -> list[str]:
     return ["".join(one.itertext()) for one in ET.fromstring(svg).iter(f"{SVG}text")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_each_view_has_every_body_in_its_colour(name: str) -> None:
     result = found(name)

@@ -94,6 +94,7 @@ def test_plans_stand_side_by_side(slowed: PlannedPath) -> None:
     assert first.text == f"{100 * slowed.scaled:.1f} %"
 
 
+@pytest.mark.slow
 def test_a_page_grows_little_with_the_samples() -> None:
     """Lines are thinned out: of 40 times as many samples no more than 10 times as much is drawn."""
     short, long = (planned(load_robot("irb60"), CONTOUR, tsp=tsp) for tsp in (0.01, 0.00025))

@@ -278,6 +278,7 @@ def test_what_reads_back_otherwise_is_named(make_comparison: MakeComparison, tmp
     ]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_read_back_is_named(make_run: MakeRun, tmp_path: Path) -> None:
     run = make_run(rows=5)
     path = write_recording(run, tmp_path / "one.rrd")

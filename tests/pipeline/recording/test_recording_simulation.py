@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -174,6 +175,7 @@ def simulations(draw: st.DrawFn) -> Simulation:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(simulation=simulations())
 def test_any_simulation_comes_back_as_it_was(simulation: Simulation, tmp_path: Path) -> None:

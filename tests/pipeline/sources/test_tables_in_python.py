@@ -99,6 +99,7 @@ def frames(draw: st.DrawFn) -> pd.DataFrame:
     return frame
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(frames())
 def test_what_python_holds_reads_as_its_csv(frame: pd.DataFrame) -> None:

@@ -30,6 +30,7 @@ def test_fk_of_ik_is_the_pose_of_ten_thousand_and_the_joints_it_came_from_are_fo
     assert solutions.reached.all(axis=1).mean() > 0.6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrist", WRISTS)
 def test_random_arms_with_any_twist_base_and_tool_are_solved(wrist: str) -> None:
     rng = np.random.default_rng(7)

@@ -136,6 +136,7 @@ def test_a_pseudoinverse_step_is_the_moore_penrose_one() -> None:
     np.testing.assert_allclose(one.q - start, peer, atol=1e-9)  # steps of 1e-3, condition up to 1e3
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(data=st.data())
 def test_chains_of_any_joints_are_solved(chains: SearchStrategy[Chain], data: st.DataObject) -> None:
