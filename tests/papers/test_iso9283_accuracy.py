@@ -220,13 +220,12 @@ def test_machine_code_and_numpy_run_alike(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @needs_native
-@pytest.mark.parametrize("gain", ["velocity", "acceleration"])
-def test_with_a_gain_of_the_wrong_sign_both_diverge_at_the_same_time(gain: str, tmp_path: Path) -> None:
+def test_with_a_gain_of_the_wrong_sign_both_diverge_at_the_same_time(tmp_path: Path) -> None:
     def wrong(one: DrivenJoint | HeldJoint) -> DrivenJoint | HeldJoint:
         """Return a drive that pushes the wrong way, and whose voltage is no limit to that."""
         if isinstance(one, HeldJoint):
             return one
-        gains = one.gains._replace(**{gain: -float(getattr(one.gains, gain))})
+        gains = one.gains._replace(acceleration=-one.gains.acceleration)
         return replace(one, gains=gains, largest_voltage=1e6)
 
     arm, path = irb60(), short_path(tmp_path)

@@ -124,12 +124,6 @@ def test_so_it_is_in_other_noise(cause: str, noise: Noise, oriented: bool) -> No
 
 
 @pytest.mark.slow
-def test_an_outlier_in_a_hundred_samples_changes_no_answer() -> None:
-    answer, wanted = said(CAUSES["r3"], noise=spoilt)
-    assert answer.outcome(wanted) == "named"
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("pair", [("r3", "phi4"), ("theta4", "lag"), ("base", "scale of phi2")])
 def test_two_clear_causes_are_named(pair: tuple[str, str]) -> None:
     answer, wanted = said({**CAUSES[pair[0]], **CAUSES[pair[1]]}, motion="demo")
@@ -201,11 +195,11 @@ def test_noise_that_lasts_a_second_is_no_cause() -> None:
 def test_sizes_lie_in_their_intervals() -> None:
     inside = []
     names = tuple(URM6.coordinates)
-    for seed in range(40):
+    for seed in range(20):
         search, result, _ = found(CAUSES["r3"], seed=seed)
         ((cause,), _) = Explained(search, result, names, names).causes()
         inside.append(cause.low[0] <= -2e-3 <= cause.high[0])
-    assert sum(inside) >= 34  # 95 % of 40 are 38, with a standard deviation of 1.4
+    assert sum(inside) >= 17  # 95 % of 20 are 19, with a standard deviation of 1
 
 
 @pytest.mark.slow
