@@ -133,6 +133,7 @@ def test_compare_of_the_counter_rotating_module_fails(urmpipe: RunCommand, tmp_p
     assert files_in(tmp_path) == ["counter_rotating-against-path.rrd"]
 
 
+@pytest.mark.slow
 def test_recordings_are_operands_too(urmpipe: RunCommand) -> None:
     assert urmpipe("ingest", MATLAB, "--robot", "urm6", "-o", "m.rrd").code == 0
     direct = json.loads(urmpipe("compare", PATH, MATLAB, "--robot", "urm6", "--json", "-o", "a.rrd").out)
@@ -175,6 +176,7 @@ def test_report_refuses_what_is_no_recording(urmpipe: RunCommand) -> None:
     assert "found no recording of urmpipe" in ran.err
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "line", "column", "found"),
     [
@@ -241,6 +243,7 @@ def test_the_demo_goes_the_whole_way(urmpipe: RunCommand, tmp_path: Path) -> Non
     assert recording.startswith(f"Recording: {Path('urmpipe-demo', 'demo.rrd')}  (open it: ")
 
 
+@pytest.mark.slow
 def test_a_tolerance_may_have_its_unit_and_decides(urmpipe: RunCommand) -> None:
     passing = urmpipe(
         "compare", PATH, MATLAB, "--robot", "urm6", "--tolerance", "2.4mm", "--json", "-o", "a.rrd"

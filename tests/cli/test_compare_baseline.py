@@ -20,6 +20,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return lay_logs(tmp_path, monkeypatch)
 
 
+@pytest.mark.slow
 def test_a_log_of_the_baseline_that_is_missing_is_exit_code_1() -> None:
     assert compare("good.csv", "-q", "-o", "before.rrd") == 0
     assert compare("good.csv", "slack.csv", "--baseline", "before.rrd", "-q", "-o", "now.rrd") == 0
@@ -27,6 +28,7 @@ def test_a_log_of_the_baseline_that_is_missing_is_exit_code_1() -> None:
     assert names() == {"before.rrd", "now.rrd"}
 
 
+@pytest.mark.slow
 def test_a_comparison_is_held_against_another(folder: Path, capsys: Captured) -> None:
     assert compare("good.csv", "-q", "-o", "before.rrd") == 0
     (folder / "good.csv").write_bytes((folder / "slack.csv").read_bytes())
@@ -55,6 +57,7 @@ def test_a_comparison_is_held_against_another(folder: Path, capsys: Captured) ->
     assert kept is not None and (kept.verdict, kept.recording) == ("fail", Path("before.rrd"))
 
 
+@pytest.mark.slow
 def test_what_changed_is_printed(folder: Path, capsys: Captured) -> None:
     assert compare("good.csv", "bad.csv", "-q", "-o", "before.rrd") == 1
     (folder / "good.csv").write_bytes((folder / "slack.csv").read_bytes())
@@ -90,6 +93,7 @@ def test_the_report_of_a_recording_says_what_the_exit_code_said(folder: Path) ->
     assert held is not None and since_words(held) in page
 
 
+@pytest.mark.slow
 def test_a_noise_in_mm_without_its_unit_is_told(capsys: Captured) -> None:
     assert compare("good.csv", "-q", "-o", "before.rrd") == 0
     capsys.readouterr()
@@ -144,6 +148,7 @@ def test_a_baseline_is_the_recording_of_a_comparison(capsys: Captured) -> None:
     assert said(capsys) == f"error: --noise: found '-1', {ALLOWED}"
 
 
+@pytest.mark.slow
 def test_a_quiet_failure_against_a_baseline_says_what_is_worse(capsys: Captured) -> None:
     assert compare("good.csv", "bad.csv", "-q", "-o", "before.rrd") == 1
     capsys.readouterr()

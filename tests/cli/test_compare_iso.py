@@ -72,6 +72,7 @@ def read(path: str) -> Comparison:
     return found
 
 
+@pytest.mark.slow
 def test_without_a_tolerance_nothing_is_judged(capsys: Captured) -> None:
     assert run(["compare", "square.csv", *FILES, "--iso"]) == 0
     printed = capsys.readouterr().out
@@ -85,6 +86,7 @@ def test_without_a_tolerance_nothing_is_judged(capsys: Captured) -> None:
     assert {one["verdict"] for one in runs} == {None}
 
 
+@pytest.mark.slow
 def test_a_tolerance_decides_the_exit_code() -> None:
     assert iso(*FILES, "--tolerance", "AP=0.4mm,RP=0.4mm") == 0
     assert iso(*FILES, "--tolerance", "AP=0.1mm,RP=0.4mm") == 1
@@ -222,6 +224,7 @@ def test_a_recording_read_back_has_the_same_criteria_bit_for_bit() -> None:
     assert judged(made).to_dict() == judged(again).to_dict()
 
 
+@pytest.mark.slow
 def test_recordings_are_cycles_too() -> None:
     for name in ("square", *(f"cycle{k}" for k in range(1, 5)), "all"):
         urmpipe.ingest(f"{name}.csv", output=f"{name}.rrd")
@@ -248,6 +251,7 @@ def test_a_lab_s_tolerance_is_for_logs_one_by_one() -> None:
     assert {one.sync.mode for one in read("run.rrd").runs} == {"auto"}
 
 
+@pytest.mark.slow
 def test_a_later_test_is_held_against_an_earlier_one(capsys: Captured) -> None:
     assert iso(*FILES) == 0
     Path("run.rrd").rename("before.rrd")
@@ -418,6 +422,7 @@ def turned_square(ry: float) -> FloatArray:
     return np.column_stack([square, np.tile(quat, (len(square), 1))])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("ry", "kinds"), [(1.0, []), (1.55, ["euler-singular"])])
 def test_angles_that_are_not_separately_defined_are_told(
     ry: float, kinds: list[str], capsys: Captured

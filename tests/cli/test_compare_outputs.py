@@ -80,6 +80,7 @@ def test_all_that_is_wrong_with_a_tolerance_is_told_at_once(capsys: Captured) ->
     assert names() == set()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "tolerance"),
     [
@@ -121,6 +122,7 @@ def test_options_complete_in_the_shell() -> None:
         assert [item.value for item in shell.get_completions(["compare"], option)] == [option]
 
 
+@pytest.mark.slow
 def test_a_verdict_of_fail_writes_all_and_bad_input_nothing_but_its_error(
     folder: Path, capsys: Captured
 ) -> None:
@@ -174,6 +176,7 @@ def test_errors_replace_neither_an_operand_nor_a_file_of_another(folder: Path) -
     assert f"{folder / 'urmpipe.toml'}:1: not valid TOML" in str(error.text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flags", [("-q",), ("-q", "--json")])
 def test_a_quiet_failure_says_why_in_one_place(capsys: Captured, flags: tuple[str, ...]) -> None:
     assert compare("good.csv", *flags) == 0

@@ -146,6 +146,7 @@ print({"pandas", "scipy", "rerun", "pyarrow", "plotly", "rich"} & set(sys.module
     assert done.stdout == "set()\nset()\n"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
 def test_bash_completes_behind_signs_that_split_its_words(folder: Path) -> None:
     program = folder / "urmpipe"

@@ -154,6 +154,7 @@ def test_a_comparison_that_stands_is_not_diagnosed(capsys: Captured) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("operands", [["made.rrd"], [PATH, "made.rrd"]])
 def test_the_recording_of_a_comparison_is_no_log(operands: list[str], capsys: Captured) -> None:
     run(["compare", PATH, RIGHT, *ARM, "-q", "-o", "made.rrd"])

@@ -23,6 +23,7 @@ def by_name(found: Diagnosis) -> dict[str, Cause]:
     return {one.name: one for one in found.causes}
 
 
+@pytest.mark.slow
 def test_the_tilts_of_a_ur5e_are_those_that_its_factory_measured() -> None:
     """The controller's own calibration.conf has them: delta_alpha, a value a joint in [rad]."""
     folder = LOGS / "ur5-factory-calibration"

@@ -134,6 +134,7 @@ def test_the_unit_of_the_page_is_built_and_runs(urmpipe: RunCommand, tmp_path: P
     assert [one.name for one in checked.variables if one.causality == "output"] == ["x", "stopped"]
 
 
+@pytest.mark.slow
 def test_what_a_unit_prints_is_no_part_of_the_json(urmpipe: RunCommand, tmp_path: Path) -> None:
     talking = example().replace("spring = Unit(", "print('hello')\nspring = Unit(")
     talking = talking.replace('lambda v: {"stopped"', "lambda v: print('called') or {\"stopped\"")
@@ -284,12 +285,14 @@ def test_what_was_built_is_told_and_a_folder_gets_it(urmpipe: RunCommand, tmp_pa
     assert (ran.code, ran.err) == (2, f"error: none: found no folder, allowed: {allowed}\n")
 
 
+@pytest.mark.slow
 def test_an_array_is_a_row_of_the_check(urmpipe: RunCommand, meter: Path) -> None:
     cells = [line.split() for line in urmpipe("fmu", "check", meter.name).out.splitlines()]
     arrays = [row[0] for row in cells if row and ".." in row[0]]
     assert arrays == ["reference[1..3]", "actual[1..3]", "delta[1..3]"]
 
 
+@pytest.mark.slow
 def test_no_file_of_the_working_folder_is_taken_for_a_module(
     meter: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -298,6 +301,7 @@ def test_no_file_of_the_working_folder_is_taken_for_a_module(
     assert check_fmu(meter).problems == ()
 
 
+@pytest.mark.slow
 def test_check_tells_warnings_of_an_fmu_and_is_0_all_the_same(urmpipe: RunCommand) -> None:
     held = Scalar("y", 0, start="0", initial="exact")
     warm = Foreign(name="warm", scalars=(held,), terminate="return fmi2Warning;")

@@ -103,6 +103,7 @@ def test_the_table_has_every_solution_and_why_there_is_none() -> None:
     assert found.branch[2] == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("robot", "every"), [("urm6", False), ("urm6", True), ("arm6", True)])
 def test_progress_is_told_and_changes_nothing(robot: str, every: bool) -> None:
     arm = urmpipe.load_robot(robot)

@@ -86,6 +86,7 @@ def test_a_step_between_the_samples_of_a_log_is_told(slow_motion: dict[str, str]
     )]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_bundled_logs_are_those_of_a_shipped_system(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -187,6 +187,7 @@ def test_assemblies_that_are_no_list_are_told(urmpipe: Run) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_recording_and_a_drawing_are_written_and_replaced(urmpipe: Run, tmp_path: Path) -> None:
     arguments = (
         "network",

@@ -29,6 +29,7 @@ def recording(urmpipe: RunCommand, tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_json_lists_no_figures_where_none_were_asked_for(urmpipe: RunCommand, recording: Path) -> None:
     ran = urmpipe("report", recording, "--json")
     assert json.loads(ran.out) == {

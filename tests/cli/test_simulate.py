@@ -128,6 +128,7 @@ def test_a_unit_of_ones_own_shows_its_energies_and_its_limit(urmpipe: RunCommand
     assert "Dashed: the limit of |F|, 6 N; tinted: beyond it." in page
 
 
+@pytest.mark.slow
 def test_the_recording_reads_back_as_the_simulation(following: Path, tmp_path: Path) -> None:
     made = simulate(following, output=tmp_path / "run.rrd", draw=tmp_path / "system.svg")
     assert made.recording == tmp_path / "run.rrd"
@@ -154,6 +155,7 @@ def test_an_fmu_that_fails_leaves_what_was_recorded(
     assert (tmp_path / "following.rrd").exists()
 
 
+@pytest.mark.slow
 def test_the_command_prints_system_verdict_and_signals(urmpipe: RunCommand, tmp_path: Path) -> None:
     ran = urmpipe("simulate", "log-to-delta", "--duration", "0.1")
     lines = ran.out.splitlines()
@@ -265,6 +267,7 @@ def test_what_is_wrong_is_told_before_the_first_step(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_shipped_system_is_written_to_be_changed(urmpipe: RunCommand, tmp_path: Path) -> None:
     ran = urmpipe("simulate", "one-drive", "--write-system", "mine.toml")
     assert (ran.code, ran.err) == (0, "")

@@ -86,6 +86,7 @@ def test_an_fmu_that_ends_the_process_fails_the_run(
     assert recorded(tmp_path).failed == failed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stops", [ENDS, STOPS])
 def test_a_meter_of_a_run_that_ended_early_does_not_pass(
     urmpipe: RunCommand, tmp_path: Path, stops: Foreign
@@ -167,6 +168,7 @@ def test_a_meter_that_is_given_what_is_not_finite_fails_the_run(urmpipe: RunComm
     ]
 
 
+@pytest.mark.slow
 def test_a_meter_that_depends_on_other_blocks_alone_passes_and_strict_does_not(
     urmpipe: RunCommand, tmp_path: Path
 ) -> None:

@@ -38,6 +38,7 @@ def speed_limit(q: FloatArray) -> FloatArray:
     return q + np.where(np.arange(len(q)) < 100, 0.0, 0.2)[:, None]  # in 5 ms
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("spoil", "row"),
     [(outlier_first, 1), (outlier_last, 200), (repeated_samples, 2), (joint_limit, 1), (speed_limit, 101)],
@@ -117,6 +118,7 @@ def test_a_part_of_the_reference_that_an_offset_leaves_out_is_a_doubt(
 LARGE = "a tolerance of 500 mm (axis) accepts any deviation: 0.5 is in m"
 
 
+@pytest.mark.slow
 def test_a_large_tolerance_is_a_doubt_unless_its_unit_says_that_it_is_meant(
     urmpipe: Callable[..., Any], tmp_path: Path
 ) -> None:

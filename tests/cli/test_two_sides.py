@@ -77,6 +77,7 @@ SPECIMENS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SPECIMENS)
 def test_joints_of_two_sides_are_compared_without_a_robot(tmp_path: Path, name: str) -> None:
     words, of_asked, of_done = SPECIMENS[name]

@@ -116,6 +116,7 @@ def test_path_has_three_corners() -> None:
         assert math.degrees(math.acos(cosine)) > 60.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_logs_have_the_times_of_the_path(name: str) -> None:
     q, t = joints_and_times(name)
@@ -138,6 +139,7 @@ def test_joints_move_smoothly_but_for_wraps(name: str) -> None:
     assert np.abs(step).max() < 3.0 * 0.005 + (1e-3 if name == "coppeliasim" else 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_joints_wrap_both_ways_and_turn_more_than_once(name: str) -> None:
     q, _ = joints_and_times(name)
@@ -167,6 +169,7 @@ def test_logs_start_in_the_calibration_pose(name: str) -> None:
     np.testing.assert_allclose(joints_and_times(name)[0][0], CALIBRATION, rtol=0, atol=5e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FOLLOWERS)
 def test_followers_are_within_tolerance(name: str) -> None:
     assert np.abs(delta(name)).max() < TOLERANCE

@@ -40,6 +40,7 @@ def commands() -> list[str]:
     return [line for line in lines if line.startswith("urmpipe ")]
 
 
+@pytest.mark.slow
 def test_both_jobs_run_the_same_and_keep_what_they_write(folder: Path) -> None:
     compare, report, *of_github = commands()
     assert of_github == [compare, report]
@@ -49,6 +50,7 @@ def test_both_jobs_run_the_same_and_keep_what_they_write(folder: Path) -> None:
     assert kept == {path.name for path in folder.glob("verdict.*")}
 
 
+@pytest.mark.slow
 def test_each_exit_code_leaves_the_junit_file_that_the_page_says(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -107,6 +109,7 @@ def test_a_first_run_needs_no_baseline_and_a_later_one_is_held_against_it(folder
     assert types == {"worse-than-baseline"}
 
 
+@pytest.mark.slow
 def test_the_defaults_of_the_page_are_those_of_a_call(folder: Path) -> None:
     (defaults,) = snippets(PAGE, "toml")
     (folder / "urmpipe.toml").write_text(defaults, encoding="utf-8")

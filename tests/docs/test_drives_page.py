@@ -22,6 +22,7 @@ def figures() -> Mapping[str, Any]:
     return runpy.run_path(str(DOCS / "drive_figures.py"))
 
 
+@pytest.mark.slow
 def test_the_table_of_stability_is_what_the_script_computes(figures: Mapping[str, Any]) -> None:
     lines = [line for line in PAGE.splitlines() if re.match(r"\| [\d.]+ ms ", line)]
     assert lines == figures["table"]()

@@ -47,6 +47,7 @@ def test_the_page_of_fmpy_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     np.testing.assert_allclose(shown["fresh"], points_over_log(arm, q)[:, -1, 0], rtol=0.0, atol=1e-15)
 
 
+@pytest.mark.slow
 def test_the_system_of_the_page_runs(tmp_path: Path) -> None:
     system = next(one for one in snippets("docs/simulate.md", "toml") if one.startswith("[system]"))
     (tmp_path / "my-arm.toml").write_text(system, encoding="utf-8")

@@ -33,6 +33,7 @@ def lines_of(text: str) -> list[str]:
     return [line.rstrip() for line in text.strip().splitlines()]
 
 
+@pytest.mark.slow
 def test_the_output_of_the_page_is_what_its_second_command_prints(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -82,6 +82,7 @@ def test_each_key_of_a_diagnosis_is_named() -> None:
     assert {"rms_before", "from_sample", "needs", "reason", "words"} <= found
 
 
+@pytest.mark.slow
 def test_each_key_of_a_test_after_iso_9283_is_named(tmp_path: Path) -> None:
     lay_repeated(tmp_path)
     before = urmpipe.compare(tmp_path / "square.csv", tmp_path / "test.csv", iso=True)

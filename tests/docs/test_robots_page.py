@@ -168,6 +168,7 @@ EXPECTED: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_an_example_is_the_arm_that_it_says(read: Callable[[str], Chain], name: str) -> None:
     chain, expected = read(EXAMPLES[name]), {"acceleration": math.inf, "effort": math.inf} | EXPECTED[name]

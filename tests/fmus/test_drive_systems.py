@@ -90,6 +90,7 @@ def test_eq_20_with_a_plus_tracks_and_settles(figures: Mapping[str, Any]) -> Non
     assert np.abs(settled - 1.0).max() < 0.02
 
 
+@pytest.mark.slow
 def test_eq_20_as_printed_with_a_minus_runs_away(figures: Mapping[str, Any]) -> None:
     system = figures["OneDrive"](**MINUS)
     real, voltage = figures["simulated"](system, 1e-3, 1.0, "load.theta", "controller.u").T
@@ -98,6 +99,7 @@ def test_eq_20_as_printed_with_a_minus_runs_away(figures: Mapping[str, Any]) -> 
     assert figures["spectral_radius"](1e-3, **MINUS) > 1.05
 
 
+@pytest.mark.slow
 def test_a_controller_without_acceleration_tracks_too(figures: Mapping[str, Any]) -> None:
     real = figures["simulated"](figures["OneDrive"](controller__Keps=0.0), 1e-3, 1.5, "load.theta")[:, 0]
     assert abs(real[-1] - 1.0) < 1e-4
@@ -214,6 +216,7 @@ def test_one_drive_nears_the_monolithic_solution_with_the_first_order_of_the_com
     assert errors[-1] < 2e-4  # rad of a move of 1 rad
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_six_drives_start_at_the_calibration_pose_and_arrive_where_their_set_points_do() -> None:
     recorded = run_system("six-drives")

@@ -33,6 +33,7 @@ def test_each_unit_is_what_its_prefix_or_a_turn_says() -> None:
     assert found == pytest.approx(said, rel=1e-15)  # pi and the quotient are rounded, each by 2^-53
 
 
+@pytest.mark.slow
 @given(st.sampled_from(PAIRS), st.floats(1e-6, 1e6))
 def test_there_and_back_is_the_same_value(pair: tuple[str, str], value: float) -> None:
     there = factor(*pair)

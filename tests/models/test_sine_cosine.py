@@ -75,6 +75,7 @@ def test_the_table_holds_the_nearest_doubles() -> None:
     np.testing.assert_array_equal(cosines[2048:], -cosines[:2048])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reach", [1e-3, 1.0, 4.0, 100.0, 2.5e4])
 def test_within_the_limit_they_are_exact_but_for_an_ulp(reach: float) -> None:
     x = np.random.default_rng(1).uniform(-reach, reach, 400)
@@ -82,6 +83,7 @@ def test_within_the_limit_they_are_exact_but_for_an_ulp(reach: float) -> None:
     assert largest_error(np.concatenate((x, between, [reach, -reach]))) < NEAR
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("reach", [2.6e4, 1e6, 1e10, 1e15])
 def test_beyond_the_limit_they_lose_little(reach: float) -> None:
     x = np.random.default_rng(2).uniform(0.99 * reach, reach, 200)

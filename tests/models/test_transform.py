@@ -60,6 +60,7 @@ def test_rotation_about_is_scipys_and_orthogonal(angle: float, polar: float, azi
     np.testing.assert_allclose(matrix((turned @ turned.inverse()).rotation), np.eye(3), atol=ROUNDING)
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1), angles)
 @pytest.mark.parametrize(
     "axis",

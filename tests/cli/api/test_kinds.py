@@ -98,6 +98,7 @@ def given(function: str, run: urmpipe.Run, folder: Path) -> dict[str, Any]:
     return needed | ({"robot": "ur5e"} if "robot" in parameters else {})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("function", "keyword"), [*keywords()])
 def test_what_is_of_a_wrong_kind_is_refused_by_its_keyword(
     function: str, keyword: str, run: urmpipe.Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

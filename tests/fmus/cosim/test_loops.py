@@ -75,6 +75,7 @@ def test_a_ring_of_many_inputs_is_solved() -> None:
     assert np.allclose(recorded.values, expected, rtol=1e-10, atol=0.0)  # the tolerance, by the condition
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("whose", ["u", "y"])
 def test_a_loop_of_small_values_is_solved_to_their_nominal_size(whose: str) -> None:
     """y = 0.99 u + 1e-12 = 1e-10: what the first guess, 0, leaves is within the tolerance of a value of 1."""
@@ -116,6 +117,7 @@ def test_a_ring_with_a_state_is_the_implicit_equation_at_every_instant() -> None
     assert np.allclose(x, (1.0 + 0.1 / 4.0) ** np.arange(11), rtol=1e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("both", [False, True])
 def test_blocks_whose_outputs_follow_only_after_a_step_go_back_and_step_again(both: bool) -> None:
     """From the first step on the ring a = -3 b + 1, b = 4 a + 2 holds at every instant: a = -5/13."""

@@ -22,6 +22,7 @@ CASES = [(folder, "native") for folder in FOLDERS] + [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("folder", "backend"), CASES)
 def test_a_log_is_found_in_any_folder(
     folder: str, backend: str, fmu_of: Callable[..., Path], tmp_path: Path

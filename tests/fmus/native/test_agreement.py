@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import pytest
 
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.unit import Unit
@@ -25,6 +26,7 @@ def index(unit: Unit, name: str) -> int:
     return [scalar for scalar, _ in unit.scalars].index(name)
 
 
+@pytest.mark.slow
 def test_every_step_gives_what_the_instance_gives(native: Callable[..., Any], oscillator: Unit) -> None:
     fmu, instance = native(oscillator, start=0.25), Instance(oscillator, 0.25)
     shown = references(oscillator, "output", "local")
@@ -63,6 +65,7 @@ def test_computed_integers_are_the_nearest_and_booleans_all_but_zero(
         assert fmu.fmu.getBoolean([far]) == [is_far]
 
 
+@pytest.mark.slow
 def test_a_table_gives_the_rows_that_python_finds(native: Callable[..., Any], player: Unit) -> None:
     half = 10_000_000.5e-9
     times = [0.0, 4.999e-3, 0.01, np.nextafter(0.01, 0), 0.0175, 0.025, 0.03, half, -5e-9, -4.5e-9, -1.0]

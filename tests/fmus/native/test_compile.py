@@ -54,6 +54,7 @@ def test_only_fmi_is_visible(built: Callable[..., Path], oscillator: Unit) -> No
     assert {"fmi2Instantiate", "fmi2DoStep", "fmi2GetReal", "fmi2SetFMUstate"} <= names
 
 
+@pytest.mark.slow
 def test_the_error_of_a_compiler_is_told(oscillator: Unit, monkeypatch: pytest.MonkeyPatch) -> None:
     if native_missing() is not None:
         pytest.skip(f"needs {native_missing()}")

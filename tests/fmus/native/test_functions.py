@@ -91,6 +91,7 @@ def test_each_function_gives_what_numpy_gives(native: Callable[..., Any], all_fu
     assert not wrong
 
 
+@pytest.mark.slow
 def test_signs_of_zero_are_kept(native: Callable[..., Any]) -> None:
     """atan2 tells them apart by half a turn."""
     unit = Unit(

@@ -156,6 +156,7 @@ def test_a_log_source_as_python_fmu_plays_the_table_in_its_resources(make: Make,
     fmu.free()
 
 
+@pytest.mark.slow
 @needs_native
 def test_numbers_of_numpy_are_numbers_in_c_and_in_the_description(tmp_path: Path) -> None:
     angles = tuple(np.deg2rad([30.0, 45.0]))

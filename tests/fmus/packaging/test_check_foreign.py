@@ -115,6 +115,7 @@ def test_a_run_that_the_fmu_ends_early_is_no_pass_and_its_values_are_those_of_it
     assert of_run(found) == ("fmi2DoStep at 0.025 s: fmi2DoStep failed with status 2 (discard).",)
 
 
+@pytest.mark.slow
 def test_warnings_of_an_fmu_are_told_and_are_no_problem() -> None:
     warm = 'LOG(m, fmi2Warning, "warm"); v->time = t + h; return fmi2Warning;'
     found = check_fmu(breaking("step", warm))

@@ -93,6 +93,7 @@ def test_the_name_of_an_entry_breaks_no_line(tmp_path: Path) -> None:
     assert refusal(FmuError, open_fmu, path) == f"{path}: found the path 'a\\nerror: b'{PATHS}"
 
 
+@pytest.mark.slow
 def test_what_unpacks_to_many_times_its_size_is_refused(tmp_path: Path) -> None:
     path = packed(tmp_path / "m.fmu", ("resources/zeros", bytes(110_000_000)))
     times = round((110e6 + len(DESCRIPTION)) / path.stat().st_size)

@@ -48,6 +48,7 @@ def test_the_same_unit_is_the_same_bytes(unit: Unit, tmp_path: Path) -> None:
     assert built(unit, tmp_path).read_bytes() == first
 
 
+@pytest.mark.slow
 def test_it_computes_what_an_instance_does_bit_by_bit(unit: Unit, tmp_path: Path) -> None:
     random = np.random.default_rng(5)
     fmu, instance = Loaded(built(unit, tmp_path), start=0.02), Instance(unit)

@@ -104,6 +104,7 @@ def test_it_runs_where_there_is_no_urmpipe(unit: Unit, tmp_path: Path) -> None:
     assert_runs_alone(unit, tmp_path)
 
 
+@pytest.mark.slow
 def test_a_robots_chain_runs_where_there_is_no_urmpipe(tmp_path: Path) -> None:
     assert_runs_alone(make_unit("kinematic_chain", robot=load_robot("urm6"), rates=True), tmp_path)
 

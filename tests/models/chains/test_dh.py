@@ -71,6 +71,7 @@ def test_the_tip_is_the_product_of_the_matrices(
     np.testing.assert_allclose(got, expected @ homogeneous(tool), rtol=0.0, atol=ROUNDING)
 
 
+@pytest.mark.slow
 @given(data=st.data())
 def test_the_points_of_a_standard_arm_are_its_frames_origins(
     dh_rows: SearchStrategy[list[DHRow]], data: st.DataObject

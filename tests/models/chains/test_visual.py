@@ -252,6 +252,7 @@ def test_visuals_come_back_from_the_metadata_of_a_recording(
     assert chain_from_dict(json.loads(json.dumps(chain_to_dict(chain)))) == chain
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_visuals_come_back_from_robot_files(

@@ -172,6 +172,7 @@ def test_they_are_what_numpy_says_pose_by_pose(name: str, orientation: bool) -> 
         assert found.determinant is None
 
 
+@pytest.mark.slow
 @given(st.floats(0.01, 100.0), st.integers(0, 2**32 - 1))
 def test_a_scale_model_is_as_near_to_singular(factor: float, seed: int) -> None:
     rows = (

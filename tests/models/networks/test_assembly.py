@@ -104,6 +104,7 @@ def test_a_four_bar_has_both_its_modes(turn: float) -> None:
     same_angles(values(found, "j3"), expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("turn", [0.0, 0.2, -0.3])
 def test_two_loops_have_the_product_of_their_modes(turn: float) -> None:
     """Of each rocker of the first loop both modes of the second, where its circles meet."""
@@ -126,6 +127,7 @@ def test_two_loops_have_the_product_of_their_modes(turn: float) -> None:
     same_angles(values(found, "D"), [rocker for rocker, _ in expected])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_an_rssr_has_as_many_modes_as_its_circle_meets_the_sphere(seed: int) -> None:
     """Whatever its rod spins: two, of which the output's angle solves A cos + B sin = C."""
@@ -253,6 +255,7 @@ def found_at(network: Network, body: str) -> int:
     return network.body_names.index(body)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_an_arm_with_a_spherical_wrist_has_the_eight_modes_of_its_closed_form(seed: int) -> None:
     """Its tool is fixed to the ground: joint values are those of `solve`, counted from where it is drawn."""
@@ -317,6 +320,7 @@ def test_the_nearest_assembly_is_the_first_of_all() -> None:
 # --- starts
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MECHANISMS)
 @pytest.mark.parametrize("seed", range(5))
 def test_rough_starts_close(name: str, seed: int) -> None:
@@ -399,6 +403,7 @@ def test_two_links_that_are_too_short_are_open_by_what_is_missing(length: float)
     assert found.tried == 51
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [1e-6, 1e-3, 1.0, 1e3, 1e6])
 def test_a_millionth_too_short_is_open_at_every_size(length: float) -> None:
     found = assemble(mechanism_of(two_links(length, (1.0 + 1e-6) * length)), restarts=50)

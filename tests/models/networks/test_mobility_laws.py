@@ -203,6 +203,7 @@ def test_units_order_ground_and_cuts_do_not_matter(name: str, seed: int, power: 
     assert len(facts_of(network).idle) == len(EXPECTED[name].idle)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1e-6, 1e-3, 1e3, 1e6])
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_the_unit_of_length_does_not_matter(name: str, factor: float) -> None:
@@ -393,6 +394,7 @@ def test_one_hinge_of_a_plane_loop_may_slide_two_may_not() -> None:
     assert facts_of(with_kind(four_bar(), "cylindrical", {"j0", "j2"})).mobility == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("build", [four_bar, coupled_loops, bennett, sarrus])
 @pytest.mark.parametrize("seed", range(3))
 def test_joints_of_a_kind_with_the_freedom_leave_the_mobility(
@@ -474,6 +476,7 @@ def in_line(*places: float) -> Network:
     return ring("r" * len(places), np.tile(Z, (len(places), 1)), points)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("network", "expected"),
     [

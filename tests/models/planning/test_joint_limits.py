@@ -50,6 +50,7 @@ def followed(chain: Chain, path: LineArcPath, s: FloatArray) -> JointSlopes:
     return joints_along(chain, path).at(s)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_slopes_are_those_of_the_joint_values(case: str) -> None:
     """By differences in each segment; half the step leaves a quarter of what they differ by.
@@ -76,6 +77,7 @@ def test_slopes_are_those_of_the_joint_values(case: str) -> None:
     assert (np.array(errors[1]) < (2e-3 if case == "poses" else 1.5e-2)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_joints_are_those_of_the_grid_and_go_on_between_its_places(case: str) -> None:
     name, path = CASES[case]
@@ -295,6 +297,7 @@ def test_slopes_that_contradict_a_step_are_seen(monkeypatch: pytest.MonkeyPatch)
     assert np.abs(path.points(found.s[undivided]).position[:, 0]).max() < 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1.0, 1e-6])
 def test_phases_that_meet_are_looked_at_from_both_sides(size: float) -> None:
     """Also of a path of 1 um: the largest usage is that of many times, to the square of their step."""

@@ -103,6 +103,7 @@ def test_a_law_runs_the_whole_path_from_rest_to_rest(
     np.testing.assert_allclose(at_stops.v, 0.0, atol=1e-3)  # a stop is met to 1e-8 m: sqrt(2 a 1e-8)
 
 
+@pytest.mark.slow
 @given(corner_rows(), speeds, rises, st.none() | jerks, arcs)
 def test_a_law_keeps_its_limits(rows: PathRows, v: float, a: float, j: float | None, held: Arcs) -> None:
     path = path_of(rows)
@@ -122,6 +123,7 @@ def test_a_law_keeps_its_limits(rows: PathRows, v: float, a: float, j: float | N
         assert total.max() <= a * (1.0 + 1e-7)  # the place of a bound is known to 1e-9 m
 
 
+@pytest.mark.slow
 @given(corner_rows(), speeds, rises, st.none() | jerks, arcs)
 def test_derivatives_belong_together(rows: PathRows, v: float, a: float, j: float | None, held: Arcs) -> None:
     """By central differences inside each phase; speed is continuous, with a jerk the acceleration, too."""

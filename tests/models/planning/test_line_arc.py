@@ -44,6 +44,7 @@ def test_the_papers_contour() -> None:
     np.testing.assert_allclose(path.corners, corners, atol=ROUNDING)
 
 
+@pytest.mark.slow
 @given(corner_rows(variants=True))
 def test_the_direction_goes_on_where_segments_meet(rows: PathRows) -> None:
     path = path_of(rows)
@@ -55,6 +56,7 @@ def test_the_direction_goes_on_where_segments_meet(rows: PathRows) -> None:
     np.testing.assert_allclose(met, 0.0, atol=ROUNDING * (1.0 + np.abs(path.start).max()))
 
 
+@pytest.mark.slow
 @given(corner_rows(variants=True))
 def test_points_are_on_their_arc_at_unit_speed(rows: PathRows) -> None:
     path = path_of(rows)
@@ -70,6 +72,7 @@ def test_points_are_on_their_arc_at_unit_speed(rows: PathRows) -> None:
     np.testing.assert_allclose(bent, np.where(arc, 1.0 / path.radius[k], 0.0), rtol=ROUNDING, atol=ROUNDING)
 
 
+@pytest.mark.slow
 @given(corner_rows(variants=True), st.floats(0.01, 0.99))
 def test_derivatives_are_those_of_the_place(rows: PathRows, share: float) -> None:
     """By central differences inside every segment, whose error is h^2 / (6 r^2) and h^2 / (6 r^3)."""
@@ -85,6 +88,7 @@ def test_derivatives_are_those_of_the_place(rows: PathRows, share: float) -> Non
     np.testing.assert_allclose(bend, here.curvature * np.minimum(path.radius, 1.0)[:, None], atol=allowed)
 
 
+@pytest.mark.slow
 @given(corner_rows())
 def test_the_length_is_that_of_a_fine_polygon(rows: PathRows) -> None:
     """A polygon through all bounds is shorter by less than (step / r)^2 / 24 of each arc."""
@@ -98,6 +102,7 @@ def test_the_length_is_that_of_a_fine_polygon(rows: PathRows) -> None:
     assert path.total == pytest.approx(float(path.length.sum()), rel=ROUNDING)
 
 
+@pytest.mark.slow
 @given(corner_rows(variants=True))
 def test_both_meanings_of_a_radius_give_one_curve(rows: PathRows) -> None:
     one, other = path_of(rows), path_of(by_first_points(rows))
@@ -119,6 +124,7 @@ def test_reversed_rows_give_the_reversed_curve(rows: PathRows) -> None:
     np.testing.assert_allclose(returned.tangent[inside], -there.tangent[inside], atol=1e-9)
 
 
+@pytest.mark.slow
 @given(corner_rows())
 def test_reversed_first_points_are_the_last_points(rows: PathRows) -> None:
     """Told by the paper's meaning, the way back begins its arcs where the way there ends them."""
@@ -132,6 +138,7 @@ def test_reversed_first_points_are_the_last_points(rows: PathRows) -> None:
     np.testing.assert_allclose(back.points(path.total - s).position, path.points(s).position, atol=1e-9)
 
 
+@pytest.mark.slow
 @given(corner_rows(variants=True), st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6))
 def test_a_rigid_motion_of_the_rows_moves_the_curve(rows: PathRows, motion: list[float]) -> None:
     frame = from_offset(motion)

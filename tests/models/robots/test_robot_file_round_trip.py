@@ -32,6 +32,7 @@ def bits(chain: Chain) -> bytes:
     return np.array(numbers, dtype=float).tobytes()
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_a_dictionary_through_json_is_the_same_chain_bit_by_bit(
@@ -45,6 +46,7 @@ def test_a_dictionary_through_json_is_the_same_chain_bit_by_bit(
     assert back.parameters == chain.parameters
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_toml_file_is_the_same_chain_bit_by_bit(

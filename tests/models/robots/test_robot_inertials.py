@@ -240,6 +240,7 @@ def bits(chain: Chain) -> str:
     return repr((efforts, chain.gravity, parts))
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_toml_file_and_a_dictionary_are_the_same_chain_bit_by_bit(

@@ -174,6 +174,7 @@ def numbers(one: Inertial) -> list[float]:
     return [one.mass, *one.centre, *one.inertia]
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_the_masses_of_a_file_read_back_are_the_same(
@@ -227,6 +228,7 @@ def test_pinocchio_reads_the_same_inertias(shared: Path, file: str, tip: str) ->
     assert_same_inertias(read_urdf(path, tip_link=tip), pin.buildModelFromUrdf(str(path)))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=25)
 @given(data=st.data())
 def test_pinocchio_reads_the_file_that_was_written(

@@ -37,6 +37,7 @@ def panels(figure: Figure) -> list[Panel]:
 # --- words -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_headline_with_a_limit(limited: Accuracy, accuracy: Make) -> None:
     shown = present(limited)
     assert shown.headline == "cube wall xy: irb60 runs up to 0.2 m/s within 0.4 mm (time)"

@@ -21,6 +21,7 @@ from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.tables import ExportOptions
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lazy", [True, False])
 def test_it_comes_back_as_it_was(limited: Accuracy, tmp_path: Path, *, lazy: bool) -> None:
     """Every array bit for bit, and all that is derived from them."""

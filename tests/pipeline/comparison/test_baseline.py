@@ -123,6 +123,7 @@ def test_shares_of_different_tolerances_do_not_compare(paths: Compared) -> None:
     assert found.differences == (Difference("tolerance", {"axis": 0.0035}, {"axis": 0.001}),)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     hnp.arrays(float, (40, 3), elements=st.floats(-0.005, 0.005)),

@@ -113,6 +113,7 @@ def path_at(t: FloatArray, rng: np.random.Generator, name: str) -> Run:
     return run_of(log, None, ReadOptions(), made=provenance("ingest", {}, ()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("align", ["none", "start", "rigid"])
 def test_errors_of_a_motion_turned_and_moved_are_those_of_evo(align: AlignMode) -> None:
     rng = np.random.default_rng(11)

@@ -90,6 +90,7 @@ def test_the_log_s_own_spike_fails_where_the_grid_would_lose_half_of_it() -> Non
     assert on_grid < 0.95 * there  # what the verdict rested on before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rounded", [False, True])
 def test_no_grid_changes_a_verdict(tmp_path: Path, *, rounded: bool) -> None:
     rng = np.random.default_rng(1)

@@ -195,6 +195,7 @@ def test_an_error_replaces_no_file_of_another_and_no_input(paths: Compared, tmp_
         raise LogError("broken")
 
 
+@pytest.mark.slow
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.text(st.characters(categories=["L", "N", "P", "S", "Z", "C"]), min_size=1, max_size=20))
 def test_any_name_of_a_file_is_held(paths: Compared, tmp_path: Path, name: str) -> None:

@@ -317,6 +317,7 @@ def demo() -> Comparison:
     return compare_runs(path, [matlab, solidworks])
 
 
+@pytest.mark.slow
 def test_a_log_that_is_late_deviates_as_fast_as_it_moves(demo: Comparison) -> None:
     """Fig. 9b of [UrmArm2021]_: the norm is largest where the effector is fastest."""
     matlab = demo.runs[0]

@@ -97,6 +97,7 @@ def test_the_middle_of_a_circle_is_as_far_from_every_piece() -> None:
     assert_distances(np.random.default_rng(3).normal(0, 1e-7, (5, 3)), circle, np.ones(1999, bool))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("far", [0.0, 0.9])
 def test_a_log_is_as_far_from_a_path_as_each_of_its_points(far: float) -> None:
     t = np.linspace(0, 20, 5000)
@@ -107,6 +108,7 @@ def test_a_log_is_as_far_from_a_path_as_each_of_its_points(far: float) -> None:
     assert_near(found[::1000], np.array(expected))
 
 
+@pytest.mark.slow
 def test_a_log_in_the_middle_of_a_circle_is_not_held_against_every_piece() -> None:
     angle = np.linspace(0, 6, 100_000)
     circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(100_000)])
@@ -116,6 +118,7 @@ def test_a_log_in_the_middle_of_a_circle_is_not_held_against_every_piece() -> No
     assert looked < 100 * len(points)  # not 1e9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("digits", [6, 12])
 def test_a_path_that_stands_and_trembles_is_met_exactly(digits: int) -> None:
     rng = np.random.default_rng(4)

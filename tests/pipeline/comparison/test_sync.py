@@ -397,6 +397,7 @@ def test_the_offsets_of_the_demo_logs_are_found(demo: dict[str, Trajectory]) -> 
     assert abs(synchronise(demo["matlab"], demo["solidworks"], "auto").offset - 0.004) < 1e-6
 
 
+@pytest.mark.slow
 def test_an_arm_that_counts_one_joint_backwards_makes_another_motion(demo: dict[str, Trajectory]) -> None:
     assert refused(demo["path"], demo["counter_rotating"]) == (
         "counter_rotating.csv: sync: auto: found low similarity of the position to path: -1.36 s with a"

@@ -97,6 +97,7 @@ def test_a_pdf_is_as_wide_as_it_is_asked_for(width: str | float, millimetres: fl
     assert float(page.mediabox.width) / 72.0 * 25.4 == pytest.approx(millimetres, rel=WITHIN)
 
 
+@pytest.mark.slow
 def test_all_formats_have_one_size(tmp_path: Path) -> None:
     pdf, svg, png = written(waves(), tmp_path, "pdf", "svg", "png", width="column", dpi=250)
     size = [float(end) / 72.0 for end in PdfReader(pdf).pages[0].mediabox[2:]]
@@ -109,6 +110,7 @@ def test_all_formats_have_one_size(tmp_path: Path) -> None:
         assert image.info["dpi"] == pytest.approx((250.0, 250.0), rel=1e-3)  # stored as whole dots a metre
 
 
+@pytest.mark.slow
 def test_text_is_text_in_pdf_and_svg(tmp_path: Path) -> None:
     for one in (waves(), with_space()):
         pdf, svg, *_ = written(one, tmp_path, "pdf", "svg")
@@ -151,6 +153,7 @@ def test_one_figure_is_one_file_to_the_byte(tmp_path: Path) -> None:
     assert first == second
 
 
+@pytest.mark.slow
 def test_a_drawing_is_svg_in_any_case(tmp_path: Path) -> None:
     paths = written(with_space(), tmp_path, "pdf")
     assert [path.name for path in paths] == [
@@ -245,6 +248,7 @@ def test_every_plot_of_the_page_has_its_file_and_none_is_blank(tmp_path: Path) -
             assert len(image.convert("RGB").getcolors(1 << 16) or ()) > 20  # a blank one has one colour
 
 
+@pytest.mark.slow
 def test_no_browser_and_no_window_is_needed(tmp_path: Path) -> None:
     """A process with no program in reach, no display, and settings that ask for a window, draws."""
     bare = {

@@ -179,6 +179,7 @@ BAD = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("said", list(BAD))
 def test_bad_rows_are_refused_with_all_that_is_wrong(
     said: str, square: Path, thrice: Path, capsys: pytest.CaptureFixture[str]

@@ -89,6 +89,7 @@ def test_the_same_line_twice_in_one_direction_keeps_its_planes_in_order(tmp_path
     np.testing.assert_allclose(path.crossed[0, :, 2], np.where(path.s > 0.8, 3e-3, 0.0), atol=EXACT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tick", "speed"), [(0.001, 0.1), (0.008, 0.1), (0.004, 0.05), (0.005, 0.3)])
 def test_another_rate_and_another_speed_cross_at_the_same_places(
     tick: float, speed: float, tmp_path: Path
@@ -119,6 +120,7 @@ def bent(degrees: float) -> FloatArray:
     return along(((0, 0, 0), (0.2, 0, 0), end), 0.1, rest=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("degrees", "count"), [(29, 0), (31, 1), (90, 1), (150, 1), (180, 1)])
 def test_a_corner_turns_by_30_degrees_or_more(degrees: float, count: int, tmp_path: Path) -> None:
     values = bent(degrees)
@@ -165,6 +167,7 @@ ZONED = ((0, 0, 0), (0.2, 0, 0), (0.2, 0.3, 0), (0.1, 0.3, 0))
 """Legs of 0.2, 0.3 and 0.1 m: zones of 0.02 m about 0.2, of 0.01 m about 0.5, 0.54 m are free."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 7, 50, 500])
 def test_planes_lie_even_in_all_that_is_in_no_zone(count: int, tmp_path: Path) -> None:
     values = along(ZONED, 0.1, rest=0.2)
@@ -233,6 +236,7 @@ def test_a_reference_with_noise_keeps_its_corners_legs_and_poses(
     assert test.to_dict()["poses"] == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_noise_of_a_reference_tells_no_other_speed(seed: int, tmp_path: Path) -> None:
     wanted = along(SQUARE, 0.2)

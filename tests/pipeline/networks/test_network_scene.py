@@ -90,6 +90,7 @@ def test_normals_are_of_length_1_also_of_no_area() -> None:
 # --- parts -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_symbols_stand_on_the_axes_of_their_joints(name: str) -> None:
     result = found(name)

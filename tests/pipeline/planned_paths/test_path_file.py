@@ -261,6 +261,7 @@ zigzags = st.lists(
 NAMES = ("x", "y", "z", "r", "variant")
 
 
+@pytest.mark.slow
 @given(
     rows=zigzags,
     order=st.permutations(range(5)),

@@ -130,6 +130,7 @@ def test_the_law_is_told_with_what_it_was_given(timing: dict[str, Any], said: st
     assert brief(planned(None, CONTOUR, **timing))["Law"] == said
 
 
+@pytest.mark.slow
 def test_the_law_of_limits_tells_what_was_asked_beside_them() -> None:
     arm = limited("ur5e", acceleration=20.0)
     for timing, said in (

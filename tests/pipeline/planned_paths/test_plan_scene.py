@@ -84,6 +84,7 @@ def test_arcs_of_more_than_half_a_turn_have_finite_planes() -> None:
         assert np.ptp(rectangle, axis=0).max() < 1.0
 
 
+@pytest.mark.slow
 def test_of_many_arcs_or_none_no_planes_are_drawn(ring: PlannedPath) -> None:
     assert len(ring.path.arcs) > ARCS
     for plan in (ring, over_its_axis()):

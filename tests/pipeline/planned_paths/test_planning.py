@@ -153,6 +153,7 @@ def test_the_period_hides_no_obstacle(tsp: float) -> None:
     assert [one.kind for one in plan.obstacles] == ["unreachable"]
 
 
+@pytest.mark.slow
 def test_less_than_a_hundredth_of_the_speed_is_no_plan() -> None:
     free = planned(limited("ur5e", velocity=math.inf), SMALL, tsp=0.0005)
     most = largest(joints_of(free).qd)
@@ -202,6 +203,7 @@ def test_the_law_of_limits_turns_the_arm_near_its_axis(y: float) -> None:
     assert far.duration < plan.duration < far.duration + 2.0 * math.sqrt(math.pi / 10.0)
 
 
+@pytest.mark.slow
 def test_a_determinant_that_passes_through_zero_is_no_plan() -> None:
     plan = over_its_axis()
     (obstacle,) = plan.obstacles
@@ -211,6 +213,7 @@ def test_a_determinant_that_passes_through_zero_is_no_plan() -> None:
     assert at == pytest.approx(0.0, abs=2.0 * plan.path.total / 4000)  # found by the step of the grid
 
 
+@pytest.mark.slow
 def test_a_jump_is_no_plan() -> None:
     plan = behind_the_arm()
     jumps = [one for one in plan.obstacles if one.kind == "jump"]

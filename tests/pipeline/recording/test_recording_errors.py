@@ -81,6 +81,7 @@ def test_a_recording_that_was_cut_off(make_run: MakeRun, tmp_path: Path, share: 
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("application", ["another", "urmpipeline", "my urmpipe"])
 def test_a_recording_of_another_program(tmp_path: Path, application: str) -> None:
     path = foreign(tmp_path / "foreign.rrd", application)
@@ -112,6 +113,7 @@ MADE_BY = {"provenance": {"command": "compare", "inputs": [{"name": "asked.csv"}
 """What recordings of all layouts have said of where they come from."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("version", "said", "again"),
     [
@@ -159,6 +161,7 @@ def test_a_recording_with_damaged_metadata(tmp_path: Path, metadata: str, reason
     assert message.startswith(reason)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rows", "said"),
     [
@@ -198,6 +201,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", str(disk)], check=True)
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_line_and_leaves_the_old_output(make_run: MakeRun, small_disk: Path) -> None:
     path = write_recording(make_run(rows=5), small_disk / "one.rrd")
     before = path.read_bytes()

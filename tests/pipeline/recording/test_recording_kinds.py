@@ -121,6 +121,7 @@ def test_arrays_are_read_when_they_are_used(tmp_path: Path) -> None:
     assert write_recording(back, tmp_path / "again.rrd")
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(first=st.integers(-60, 60), end=st.integers(-60, 60), step=st.sampled_from([1, 2, 7, -1, -3]))
 @example(first=3, end=3, step=1)

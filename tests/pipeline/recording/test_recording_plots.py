@@ -50,6 +50,7 @@ def test_an_array_of_the_result_is_plotted_itself_with_names_and_colours(tmp_pat
     assert "/values" in views(path)["ViewContents:query"]
 
 
+@pytest.mark.slow
 def test_times_are_exact_and_rows_count_from_one_where_times_do_not_tell_them(tmp_path: Path) -> None:
     one = toy(rows=40_000)
     assert list(rows_of(recorded(shown(), tmp_path, one), "/values", SCALARS)) == one.t_ns.tolist()

@@ -59,6 +59,7 @@ def test_one_without_signals_keeps_its_times(make_simulation: MakeSimulation, tm
     assert_comes_back(replace(make_simulation(20), signals=(), verdicts=(), arms=()), tmp_path)
 
 
+@pytest.mark.slow
 def test_a_long_one_comes_back_in_the_order_of_time(make_simulation: MakeSimulation, tmp_path: Path) -> None:
     """Three slices, the ends and the middle sent before the others."""
     assert_comes_back(make_simulation(2 * SLICE + 5), tmp_path)
@@ -87,6 +88,7 @@ def test_a_variable_is_an_entity_with_a_column_a_scalar(
         np.testing.assert_array_equal(found, one.columns)
 
 
+@pytest.mark.slow
 def test_rerun_finds_nothing_wrong(make_simulation: MakeSimulation, tmp_path: Path) -> None:
     path = write_recording(make_simulation(), tmp_path / "a.rrd")
     done = subprocess.run(
@@ -121,6 +123,7 @@ ODD = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_odd_names_are_entities_of_their_own(make_simulation: MakeSimulation, tmp_path: Path) -> None:
     """Also those that are one to Rerun, which drops a blank or a backslash at the end."""
     simulation = make_simulation(3)

@@ -105,6 +105,7 @@ def printed_again(cell: str, value: float, factor: float) -> str:
     return f"{value * factor:.{digits}{'e' if exponent else 'f'}}"
 
 
+@pytest.mark.slow
 def test_numbers_are_those_of_the_json_and_the_recording(everything: Comparison, tmp_path: Path) -> None:
     written = write_recording(everything, tmp_path / "all.rrd")
     read = read_recording(written)

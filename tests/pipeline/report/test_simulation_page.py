@@ -69,6 +69,7 @@ def test_one_that_failed_says_so_before_all(make_simulation: MakeSimulation) -> 
     assert page_of(make_simulation(0, failed="chain: crashed")).figures == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tolerance", "ends"), [(0.0035, "fail"), (0.005, "pass")])
 def test_a_comparison_that_passes_does_not_hide_a_simulation_that_fails(
     make_simulation: MakeSimulation, comparison: Comparison, tolerance: float, ends: str

@@ -39,6 +39,7 @@ def wrap(x: FloatArray) -> FloatArray:
     return x - 2 * np.pi * np.floor((x + np.pi) / (2 * np.pi))
 
 
+@pytest.mark.slow
 @given(st_np.arrays(float, st.tuples(st.integers(3, 60), st.just(6)), elements=st.floats(-1.5, 1.5)))
 @settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_wrapped_log_is_unwrapped_and_the_arm_does_not_notice(tmp_path: Path, steps: FloatArray) -> None:

@@ -51,6 +51,7 @@ def write(file: Path, header: list[str], rows: FloatArray) -> None:
     file.write_text("\n".join(lines), encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("first", "second", "kinds"),
     [

@@ -146,6 +146,7 @@ def torque_table(run: Run) -> list[Table]:
     return [one for one in present(run).body.tables if one.title == "Joint torques"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("derivative", "rows", "made", "words"),
     [

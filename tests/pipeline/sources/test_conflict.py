@@ -64,6 +64,7 @@ def test_each_marker_is_named_wherever_the_conflict_stands(
     assert wrong("\n".join(marked) + "\n", skip_bad=skip_bad) == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("marker", SIGNS)
 @pytest.mark.parametrize("place", [2, 150, 300])
 @pytest.mark.parametrize("table", TABLES)

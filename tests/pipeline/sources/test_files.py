@@ -113,6 +113,7 @@ def test_signs_that_the_file_does_not_have(wrong: Wrong) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_reading_loads_neither_pandas_nor_scipy(tmp_path: Path) -> None:
     """Half a second that a command would lose before it begins."""
     path = tmp_path / "log.csv"

@@ -145,6 +145,7 @@ def _packed_feather(path: Path, rows: int) -> None:
     feather.write_feather(pa.table({f"q{k}": np.zeros(rows) for k in range(7)}), path, compression="zstd")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "write"),
     [

@@ -69,6 +69,7 @@ def test_tum_is_a_path_with_an_orientation(
     assert [one.assumption for one in assumed] == ["the quaternions are x, y, z, w"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", JOINTS)
 @pytest.mark.parametrize("delimiter", [" ", ",", "\t", ";"])
 @pytest.mark.parametrize("head", ["", "# a trajectory\n", "# timestamp tx ty tz qx qy qz qw\n"])

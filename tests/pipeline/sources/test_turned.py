@@ -138,6 +138,7 @@ def test_a_table_in_memory() -> None:
     np.testing.assert_array_equal(read_log([columns], ReadOptions(layout="transposed")).q, q)
 
 
+@pytest.mark.slow
 def test_rows_longer_than_what_is_looked_at_first(read: Read) -> None:
     q = motion(9000, 4)
     text = written(q.T)

@@ -142,6 +142,7 @@ def test_a_matrix_alone_has_its_samples_along_its_longer_side(tmp_path: Path) ->
         is_the_motion(log)
 
 
+@pytest.mark.slow
 def test_a_mat_file_without_samples_is_one_line(tmp_path: Path) -> None:
     path = tmp_path / "log.mat"
     savemat(path, {"name": "run", "fs": 100.0})

@@ -207,6 +207,7 @@ def test_a_still_joint_in_another_base_is_in_the_unit_of_its_name(read: Read) ->
     assert not log.warnings
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tool", [0.0, 0.15])
 @pytest.mark.parametrize(
     ("header", "values", "lengths"),
@@ -237,6 +238,7 @@ SPINNING = np.column_stack((EULER[:, :2], np.remainder(EULER[:, 2] + 3 * T + np.
 RPY = ("roll", "pitch", "yaw")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("header", "values", "taken", "asks"),
     [
@@ -274,6 +276,7 @@ def test_a_rotation_vector_that_flips_tells_its_unit(read: Read) -> None:
         assert (doubted.role, doubted.asks) == ("rotation", True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("names", "values", "said"),
     [

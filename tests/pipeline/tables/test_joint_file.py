@@ -172,6 +172,7 @@ def test_a_log_without_any_row_is_refused(tmp_path: Path) -> None:
 finite = st.floats(-1e3, 1e3, allow_subnormal=True)
 
 
+@pytest.mark.slow
 @given(values=st.lists(st.tuples(finite, finite), min_size=1, max_size=8))
 def test_every_double_comes_back(
     values: list[tuple[float, float]], tmp_path_factory: pytest.TempPathFactory

@@ -19,6 +19,7 @@ from urmpipe_models.kinematics.screws import screws
 from urmpipe_models.robots.catalogue import load_robot
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", UR)
 def test_fk_of_ik_is_the_pose_of_ten_thousand_and_the_joints_it_came_from_are_found(name: str) -> None:
     chain = load_robot(name)

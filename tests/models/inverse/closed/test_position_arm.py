@@ -46,6 +46,7 @@ def left_sides(
     return np.asarray(along**2 + across**2 - f_x**2 - f_y**2)
 
 
+@pytest.mark.slow
 def test_a_general_arm_has_as_many_postures_as_pieper_s_equation_has_roots() -> None:
     generator = np.random.default_rng(12)
     counts = set()

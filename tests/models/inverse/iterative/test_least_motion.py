@@ -55,6 +55,7 @@ def assert_least_motion(chain: Chain, q: FloatArray, home: FloatArray, pose: boo
         assert np.abs(left.fun).max() < 10.0 * LEAST_MOTION, (row, free, left.fun)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "pose"),
     [("urm8", True), ("urm8", False), ("urm6", False), ("panda", True), ("panda", False), ("iiwa14", True)],
