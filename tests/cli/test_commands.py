@@ -147,6 +147,7 @@ def test_recordings_are_operands_too(urmpipe: RunCommand) -> None:
     assert "found the recording of a comparison, allowed: one that ingest wrote" in ran.err
 
 
+@pytest.mark.slow
 def test_a_path_without_time_goes_by_sample_index(urmpipe: RunCommand, tmp_path: Path) -> None:
     rows = np.loadtxt(PATH, delimiter=",", skiprows=1)
     np.savetxt(tmp_path / "as.csv", rows[:, 1:], delimiter=",", header="x,y,z", comments="", fmt="%.9f")

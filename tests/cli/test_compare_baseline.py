@@ -80,6 +80,7 @@ def test_what_changed_is_printed(folder: Path, capsys: Captured) -> None:
     } <= set(lines)
 
 
+@pytest.mark.slow
 def test_the_report_of_a_recording_says_what_the_exit_code_said(folder: Path) -> None:
     assert compare("good.csv", "-q", "-o", "before.rrd") == 0
     noise = ["--noise", "50um,angle=1deg,joint=1deg"]

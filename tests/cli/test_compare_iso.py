@@ -93,6 +93,7 @@ def test_a_tolerance_decides_the_exit_code() -> None:
     assert iso(*FILES, "--tolerance", "AP=0.4mm,AV=5%,PSt=10s,FV=1m/s,AT=0.4mm") == 0
 
 
+@pytest.mark.slow
 def test_json_has_the_cycles_and_every_criterion(capsys: Captured) -> None:
     told = answer(capsys, *FILES, "--tolerance", "AP=0.4mm")["iso"]
     assert isinstance(told, dict)
@@ -134,6 +135,7 @@ def test_given_cycles_are_taken_as_they_are(capsys: Captured) -> None:
     assert len(pairs.cycles) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -193,6 +195,7 @@ def test_a_reference_alone_is_no_test(capsys: Captured) -> None:
     assert "--iso: found no log, allowed: a reference and its cycles" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_junit_and_csv_have_the_criteria() -> None:
     assert iso(*FILES, "--tolerance", "AP=0.1mm,RP=1mm", "--junit", "v.xml", "--csv", "v.csv") == 1
     root = ET.parse("v.xml").getroot()
@@ -208,6 +211,7 @@ def test_junit_and_csv_have_the_criteria() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_recording_read_back_has_the_same_criteria_bit_for_bit() -> None:
     made = urmpipe.compare(
         "square.csv", FILES, iso=True, tolerance="AP=0.4mm", output="run.rrd", junit="v.xml"
@@ -321,6 +325,7 @@ def test_joints_and_their_tool_tell_the_same(name: str, shared: Path) -> None:
         assert found[criterion] == pytest.approx(by_tool[criterion], abs=5e-6), criterion
 
 
+@pytest.mark.slow
 def test_a_plan_gives_its_corners_stops_and_speed() -> None:
     rows = [
         "x,y,z,r",

@@ -29,6 +29,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return lay_logs(tmp_path, monkeypatch)
 
 
+@pytest.mark.slow
 def test_json_csv_junit_and_recording_agree_bit_for_bit(capsys: Captured) -> None:
     tolerance = "axis=3.5mm,norm=5mm,path=3mm,angle=0.5deg,joint=2mrad"
     files = ["--csv", "a.csv", "--junit", "a.xml", "-o", "a.rrd", "--json"]
@@ -62,6 +63,7 @@ def in_json_of(told: dict[str, Any], one: Statistics) -> dict[str, Any]:
     return found
 
 
+@pytest.mark.slow
 def test_what_is_given_replaces_the_default_tolerance_whole(capsys: Captured) -> None:
     assert compare("bad.csv", "--json") == 1
     assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.0035}
@@ -229,6 +231,7 @@ def test_results_are_operands_of_the_function() -> None:
     assert str(error.value) == "output: found a.rrd with an existing comparison, allowed: without"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="only there may a file name hold any bytes")
 def test_a_log_whose_name_is_no_text_is_compared_recorded_and_reported(capsys: Captured) -> None:
     Path("good.csv").rename("gut\udcfc.csv")

@@ -206,6 +206,7 @@ def test_a_map_is_never_replaced_by_the_map_that_it_led_to(lab: Path, capsys: Ca
     assert capsys.readouterr().err.startswith("error: m.toml: found an input of this command, allowed: ")
 
 
+@pytest.mark.slow
 def test_options_of_logs_are_refused_with_recordings_alone(lab: Path, capsys: Captured) -> None:
     assert run([*INGEST, "-q", "--robot", "ur5e"]) == 0
     both = ["compare", "log.rrd", "log.rrd", "--unit", "rad", "--repair"]

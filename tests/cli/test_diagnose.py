@@ -145,6 +145,7 @@ def test_an_alignment_is_refused_with_a_diagnosis(capsys: Captured) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_comparison_that_stands_is_not_diagnosed(capsys: Captured) -> None:
     run(["compare", PATH, RIGHT, *ARM, "-q", "-o", "made.rrd"])
     assert run(["compare", "made.rrd", "--baseline", "made.rrd", "--diagnose"]) == 2

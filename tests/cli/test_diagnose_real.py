@@ -39,6 +39,7 @@ def test_the_tilts_of_a_ur5e_are_those_that_its_factory_measured() -> None:
         assert tilt.low[0] < measured < tilt.high[0], name
 
 
+@pytest.mark.slow
 def test_the_poses_of_a_library_that_rounds_a_ur10() -> None:
     """It has d_1 = 118, a_2 = -612.7 and a_3 = -571.6 mm; the data sheet 127.3, -612 and -572.3 mm."""
     path = LOGS / "pybotics-ur10-fk" / "ur10-joints-poses.csv"

@@ -63,6 +63,7 @@ def test_without_a_name_the_log_beside_is_left_alone(
     assert (tmp_path / "log.csv").read_text() == LOG
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", ["parquet", "mat", "tum"])
 def test_the_suffix_tells_the_format_and_an_export_is_replaced(
     urmpipe: RunCommand, recording: Path, tmp_path: Path, to: str

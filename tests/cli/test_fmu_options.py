@@ -65,6 +65,7 @@ def test_a_log_is_its_rows_in_si_from_its_start(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.table.values, np.radians([[180.0, 0.0], [170.0, -90.0]]), rtol=2.3e-16)
 
 
+@pytest.mark.slow
 def test_a_path_is_p_and_a_folder_of_plots_is_one_log() -> None:
     assert unit_of("log_source", log=LOGS / "path.csv").variables[0].names == ("p[1]", "p[2]", "p[3]")
     plots = unit_of("log_source", log=LOGS / "solidworks").table

@@ -148,6 +148,7 @@ def test_strict_makes_a_choice_an_error_and_writes_nothing(capsys: Captured, fol
     assert sorted(folder.iterdir()) == before
 
 
+@pytest.mark.slow
 def test_a_target_just_out_of_reach_takes_the_nearest_point_within_the_tolerance(
     capsys: Captured, folder: Path
 ) -> None:
@@ -229,6 +230,7 @@ def test_targets_without_solution_are_left_out_of_a_log_and_nothing_at_all_is_no
     assert not (folder / "far-log.csv").exists()
 
 
+@pytest.mark.slow
 def test_a_recording_shows_the_solution_and_every_other_branch_as_a_ghost(
     capsys: Captured, folder: Path
 ) -> None:

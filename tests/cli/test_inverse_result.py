@@ -62,6 +62,7 @@ def test_a_transposed_pose_is_none_and_stops_no_other() -> None:
     assert np.array_equal(found.solutions.q[:1], alone.solutions.q, equal_nan=True)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000))
 def test_the_solution_nearest_to_the_start_is_the_start_itself(seed: int) -> None:

@@ -97,6 +97,7 @@ def test_the_bundled_logs_are_those_of_a_shipped_system(
     assert fingerprint(LOGS / "path.csv") in result.provenance.inputs
 
 
+@pytest.mark.slow
 def test_the_arm_of_a_kinematic_chain_is_that_of_its_joints() -> None:
     result = simulate("log-to-delta", duration=0.5)
     (arm,) = result.arms
@@ -105,6 +106,7 @@ def test_the_arm_of_a_kinematic_chain_is_that_of_its_joints() -> None:
     assert result.t[-1] == 0.5
 
 
+@pytest.mark.slow
 def test_every_file_is_traced_and_every_log_warns() -> None:
     result = simulate("log-to-delta", duration=0.02)
     assert [one.name for one in result.provenance.inputs] == [

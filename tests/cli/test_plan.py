@@ -149,6 +149,7 @@ def test_a_plan_that_fails_is_exit_1(urmpipe: RunCommand) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_quiet_prints_nothing(urmpipe: RunCommand) -> None:
     for arguments, code in ((("path.csv",), 0), (("singular.csv", "--robot", "irb60"), 1)):
         ran = urmpipe("plan", *arguments, "-q")
@@ -173,6 +174,7 @@ def test_help_has_examples(urmpipe: RunCommand) -> None:
     assert all(line.startswith("    urmpipe plan ") for line in examples)
 
 
+@pytest.mark.slow
 def test_start_chooses_the_branch(urmpipe: RunCommand, folder: Path) -> None:
     """The elbow of ur5e up or down at the first sample."""
     (folder / "arm.csv").write_text(
@@ -189,6 +191,7 @@ def test_start_chooses_the_branch(urmpipe: RunCommand, folder: Path) -> None:
 # --- what is written ---------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_csv_has_the_samples_at_their_times(urmpipe: RunCommand, folder: Path) -> None:
     ran = urmpipe("plan", CUBE, "--robot", "irb60", "--tsp", "10ms", "-o", "plan.csv")
     assert ran.code == 0
@@ -203,6 +206,7 @@ def test_a_csv_has_the_samples_at_their_times(urmpipe: RunCommand, folder: Path)
     assert answer(urmpipe, 0, CUBE, "-o", "again.csv")["output"] == "again.csv"
 
 
+@pytest.mark.slow
 def test_a_recording_is_the_plan(urmpipe: RunCommand, folder: Path) -> None:
     ran = urmpipe("plan", "path.csv", "--robot", "irb60", "-o", "plan.rrd")
     assert ran.code == 0
@@ -275,6 +279,7 @@ def test_a_plan_that_fails_writes_no_csv_but_a_recording(urmpipe: RunCommand, fo
     assert back.verdict == "fail"
 
 
+@pytest.mark.slow
 def test_compare_passes_in_both_orders(urmpipe: RunCommand, folder: Path) -> None:
     assert urmpipe("plan", "path.csv", "-o", "alone.csv", "-q").code == 0
     assert urmpipe("plan", "path.csv", "--robot", "irb60", "-o", "plan.csv", "-q").code == 0
@@ -289,6 +294,7 @@ def test_compare_passes_in_both_orders(urmpipe: RunCommand, folder: Path) -> Non
 # --- in Python ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_rows_of_arrays_are_a_path() -> None:
     points = np.array(
         [[1.7, 0.3, 1], [2.0, 0.3, 1], [2.0, -0.3, 1], [1.4, -0.3, 1], [1.4, 0.3, 1], [1.7, 0.3, 1]]

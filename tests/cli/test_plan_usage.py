@@ -85,6 +85,7 @@ def test_a_map_that_is_not_there_is_told_once(capsys: Captured) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_the_base_of_a_map_stands_for_the_robot_beside_it(folder: Path) -> None:
     (folder / "map.toml").write_text("base = [0, 0, 0.1]\n")
     cube = ["plan", CUBE, "--robot", "irb60", "-q"]

@@ -86,6 +86,7 @@ def test_still_poses_leave_and_come_back_with_a_row_a_second(rows: int, tmp_path
     assert_path(tmp_path / "a.tum", times, position, quat)
 
 
+@pytest.mark.slow
 def test_a_recording_gives_the_run_that_it_holds(run: Run, tmp_path: Path) -> None:
     path = there(run.recording)
     for found in (urmpipe.ingest(path), urmpipe.ingest(str(path)), urmpipe.ingest([path])):

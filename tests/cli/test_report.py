@@ -40,6 +40,7 @@ def test_json_lists_no_figures_where_none_were_asked_for(urmpipe: RunCommand, re
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("x", "verdict", "reached"), [(0.3, "pass", ""), (9.0, "fail", "1 of ")])
 def test_ik_its_recording_and_the_report_of_it_say_one_verdict(
     urmpipe: RunCommand, tmp_path: Path, x: float, verdict: str, reached: str

@@ -143,6 +143,7 @@ def test_the_recording_reads_back_as_the_simulation(following: Path, tmp_path: P
     simulate(following, draw=tmp_path / "system.svg")  # one of ours is replaced
 
 
+@pytest.mark.slow
 def test_an_fmu_that_fails_leaves_what_was_recorded(
     urmpipe: RunCommand, following: Path, tmp_path: Path
 ) -> None:
@@ -220,6 +221,7 @@ def test_a_verdict_of_few_samples_says_so(urmpipe: RunCommand, tmp_path: Path) -
     assert said in ran.err.splitlines()
 
 
+@pytest.mark.slow
 def test_quiet_says_nothing(urmpipe: RunCommand) -> None:
     ran = urmpipe("simulate", "log-to-delta", "--duration", "0.01", "-q")
     assert (ran.code, ran.out, ran.err) == (0, "", "")
@@ -232,6 +234,7 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
     assert "log=coppeliasim.csv" in urmpipe("simulate", "--list").out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -285,6 +288,7 @@ def test_a_shipped_system_is_written_to_be_changed(urmpipe: RunCommand, tmp_path
     assert (tmp_path / "mine.toml").read_text(encoding="utf-8") == changed
 
 
+@pytest.mark.slow
 def test_a_written_system_asks_for_the_logs_that_stay_with_the_shipped_one(
     urmpipe: RunCommand, tmp_path: Path
 ) -> None:

@@ -99,6 +99,7 @@ def test_a_meter_of_a_run_that_ended_early_does_not_pass(
     assert ran.code == (1 if stops is STOPS else 2)
 
 
+@pytest.mark.slow
 def test_a_call_that_does_not_return_fails_the_run(urmpipe: RunCommand, tmp_path: Path) -> None:
     hangs = replace(ENDS, name="hangs", step=f"if (t > 0.25) {HANGS}")
     ran = urmpipe(*write(tmp_path, {"bad": hangs}, {ACTUAL: "bad.y"}), "--timeout", "2s", "--json")
@@ -118,6 +119,7 @@ def test_the_time_that_a_call_may_take_is_above_0(urmpipe: RunCommand, tmp_path:
         package.simulate(tmp_path / "system.toml", timeout=-1.0)
 
 
+@pytest.mark.slow
 def test_an_fmu_that_ends_the_run_with_its_last_step_is_judged_as_a_whole(
     urmpipe: RunCommand, tmp_path: Path
 ) -> None:
@@ -156,6 +158,7 @@ def test_a_meter_that_depends_on_what_is_not_finite_does_not_pass(
     assert recorded(tmp_path).verdict == "fail"
 
 
+@pytest.mark.slow
 def test_a_meter_that_is_given_what_is_not_finite_fails_the_run(urmpipe: RunCommand, tmp_path: Path) -> None:
     ran = urmpipe(*write(tmp_path, {"a": GLITCH}, {ACTUAL: "a.y[2]"}, every=10))
     assert ran.code == 2
@@ -206,6 +209,7 @@ def test_the_meter_that_is_in_doubt_decides_before_one_that_passes(tmp_path: Pat
     assert (result.judged_worst.block, result.verdict) == ("m", "fail")
 
 
+@pytest.mark.slow
 def test_compare_passes_no_motion_to_which_leads_what_is_not_finite(
     urmpipe: RunCommand, tmp_path: Path
 ) -> None:

@@ -124,12 +124,14 @@ def test_logs_have_the_times_of_the_path(name: str) -> None:
     assert np.array_equal(t, path_and_times()[1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_joints_are_limited_to_half_a_turn(name: str) -> None:
     # 3.142 is pi in four digits, 4.1e-4 above it
     assert np.abs(joints_and_times(name)[0]).max() < np.pi + 4.2e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_joints_move_smoothly_but_for_wraps(name: str) -> None:
     q, _ = joints_and_times(name)
@@ -163,6 +165,7 @@ def test_joints_keep_away_from_singular_poses(name: str) -> None:
     assert least[600:].min() > 0.05
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["coppeliasim", "matlab", "counter_rotating"])
 def test_logs_start_in_the_calibration_pose(name: str) -> None:
     # half a unit of the fourth digit of 3.142
@@ -197,6 +200,7 @@ def test_matlab_deviation_has_its_minima_at_the_breaks() -> None:
         assert norm[around].max() > 1e-3
 
 
+@pytest.mark.slow
 def test_solidworks_deviates_by_a_constant_shift() -> None:
     difference = delta("solidworks")
     # 1e-4 deg in a file of four decimals moves the tip by up to 2e-6 m

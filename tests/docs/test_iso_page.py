@@ -55,6 +55,7 @@ def test_numbers_of_the_page_are_those_of_the_code() -> None:
     assert f"±{IsoOptions().band * 1e3:g} mm by default" in PAGE
 
 
+@pytest.mark.slow
 def test_the_object_of_the_page_has_the_keys_and_values_of_the_code() -> None:
     told = json.loads(snippets("docs/iso.md", "json")[0])
     found = there(urmpipe.compare("square.csv", "test.csv", iso=True, tolerance="AP=0.4mm").iso).to_dict()
@@ -68,6 +69,7 @@ def rounded(entry: dict[str, Any], digits: int) -> dict[str, Any]:
     return {key: round(value, digits) if isinstance(value, float) else value for key, value in entry.items()}
 
 
+@pytest.mark.slow
 def test_the_code_of_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
     names: dict[str, Any] = {}
     exec(snippets("docs/iso.md", "python")[0], names)
@@ -77,6 +79,7 @@ def test_the_code_of_the_page_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert "AP" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DRAWN["DRAWINGS"])
 def test_the_pictures_are_what_their_script_draws(name: str) -> None:
     """If not: python docs/iso_figures.py."""

@@ -83,6 +83,7 @@ def test_every_kind_is_on_the_page(read: Callable[[str], Chain]) -> None:
     assert shown == [*kinds(), "joints"]  # the last one is the arm with masses
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", kinds())
 def test_the_keys_of_a_kind_are_those_that_are_read(read: Callable[[str], Chain], kind: str) -> None:
     with pytest.raises(RobotError) as caught:

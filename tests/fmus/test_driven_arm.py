@@ -219,6 +219,7 @@ def test_an_arm_at_rest_stays_for_ten_seconds() -> None:
         assert np.abs(found[:, columns] - chain.start).max() <= 1e-9
 
 
+@pytest.mark.slow
 def test_a_held_pendulum_swings_with_the_root_of_k_over_j() -> None:
     m, r, k = 2.0, 0.5, 800.0
     chain = Chain(
@@ -606,6 +607,7 @@ def wristed() -> Chain:
     )
 
 
+@pytest.mark.slow
 def test_a_held_wrist_yields_to_a_force_by_its_square_of_the_length_and_no_drive_moves() -> None:
     chain, force = wristed(), 1e-2
     before, under = at_rest(chain), at_rest(chain, Wrench((0.0, 0.0, force)))

@@ -126,6 +126,7 @@ def spelled(powers: list[tuple[str, int]]) -> str:
     return ".".join(symbol + (str(power) if power != 1 else "") for symbol, power in powers)
 
 
+@pytest.mark.slow
 @given(above=POWERS, below=POWERS)
 def test_a_quotient_has_the_difference_of_exponents_and_the_quotient_of_factors(
     above: list[tuple[str, int]], below: list[tuple[str, int]]

@@ -84,6 +84,7 @@ def test_a_vector_goes_on_by_a_turn_though_none_of_its_components_is_large() -> 
     np.testing.assert_allclose(continuous_vectors(v), expected, rtol=0, atol=1e-15)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(
     steps,

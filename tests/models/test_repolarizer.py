@@ -74,6 +74,7 @@ def test_unwrapping_a_wrapped_motion_gives_it_back(steps: FloatArray, period: fl
 values = st.one_of(st.floats(-7, 7), st.sampled_from([-3.14, -1.57, 0.0, 1.57, 3.14]))  # halves and quarters
 
 
+@pytest.mark.slow
 @given(
     st_np.arrays(float, st.tuples(st.integers(1, 120), st.integers(1, 3)), elements=values),
     st_np.arrays(bool, (120, 3), elements=st.sampled_from([False, False, False, True])),

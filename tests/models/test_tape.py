@@ -39,6 +39,7 @@ def assert_the_bits(got: FloatArray, elements: Sequence[Element]) -> None:
         np.testing.assert_array_equal(values.view(np.int64), expected.view(np.int64))
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @given(data=st.data(), seed=st.integers(0, 2**32 - 1))
 def test_a_pose_over_a_long_log_has_the_bits_of_whole_arrays_and_of_floats(

@@ -41,6 +41,7 @@ def rows(values: NDArray[np.float64]) -> Any:
     return tuple(tuple(row) for row in values.tolist())
 
 
+@pytest.mark.slow
 @given(angles, angles, angles)
 def test_from_rpy_is_scipys_moving_z_y_x(rx: float, ry: float, rz: float) -> None:
     expected = Rotation.from_euler("ZYX", [rz, ry, rx]).as_matrix()

@@ -124,6 +124,7 @@ def test_names_are_those_of_the_joints_of_a_file_as_well(tmp_path: Path) -> None
     assert (run.name, run.log.joints) == ("cell", tuple("abcdef"))
 
 
+@pytest.mark.slow
 def test_tables_are_operands() -> None:
     moved = FRAME.assign(**{"q1 [rad]": FRAME["q1 [rad]"] + 0.001})
     arrow = pa.Table.from_pandas(moved, preserve_index=False)

@@ -133,6 +133,7 @@ def test_a_tool_in_mm_is_refused(length: float, times: int) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_tool_much_longer_than_its_arm_is_allowed() -> None:
     found = urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e", tool=(0.0, 0.0, 11.4))
     assert found.reasons == ["no solution in 20 restarts; nearest: 10.3 m away"]  # taken, and out of reach

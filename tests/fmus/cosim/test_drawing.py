@@ -104,6 +104,7 @@ def arm_plan() -> Plan:
     )
 
 
+@pytest.mark.slow
 def test_arrays_are_one_port_and_one_wire_and_idle_outputs_are_counted() -> None:
     shown = diagram(arm_plan())
     assert shown.wires == (

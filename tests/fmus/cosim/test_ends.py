@@ -145,6 +145,7 @@ def test_one_that_ends_the_run_between_two_is_read_there_alone() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_end_is_recorded_where_only_some_points_are() -> None:
     assert ended(0.9, record_every=3).t_ns.tolist() == [0, 600_000_000, 900_000_000]
     assert ended(1.0, record_every=3).t_ns.tolist() == [0, 600_000_000, 1_000_000_000]

@@ -69,6 +69,7 @@ def test_a_warning_before_a_failure_is_told_too() -> None:
     assert recorded.notes == ("block bad: fmi2DoStep returned fmi2Warning once, at t = 0.2 s",)
 
 
+@pytest.mark.slow
 def test_only_the_last_lines_are_kept_of_a_long_log() -> None:
     talker = Foreign(
         name="talker",
@@ -108,6 +109,7 @@ def test_a_state_that_cannot_be_freed_spoils_no_run_that_is_over() -> None:
     assert len(recorded.t_ns) == 11
 
 
+@pytest.mark.slow
 def test_an_fmu_that_prints_without_end_does_not_fill_the_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -216,11 +218,13 @@ def test_the_process_that_runs_the_fmus_imports_little() -> None:
     assert not {"urmpipe_fmus.unit", "urmpipe_fmus.cosim.plan"} & set(loaded)
 
 
+@pytest.mark.slow
 def test_a_plan_is_made_once_and_holds_no_process() -> None:
     plan = planned({"bad": TROUBLE}, None, {"bad": {"kind": 1}}, step=0.01)
     assert simulate(plan).failed == simulate(plan).failed
 
 
+@pytest.mark.slow
 def test_a_crash_at_the_end_does_not_hide_why_the_run_ended() -> None:
     rude = Foreign(
         name="rude",

@@ -39,6 +39,7 @@ def test_a_nonlinear_ring_is_solved() -> None:
     assert np.allclose(recorded.column("a", "y"), 0.7390851332151607, rtol=0.0, atol=2.0 * TOLERANCE)
 
 
+@pytest.mark.slow
 def test_the_solution_is_followed_over_time() -> None:
     """y = k u + c(t) with u = y^3 by two blocks: y^3 - 2 y + c = 0, from its root at y = 0."""
     t_ns = np.arange(11) * 10**8
@@ -57,6 +58,7 @@ def test_the_solution_is_followed_over_time() -> None:
     assert (y < np.sqrt(2.0 / 3.0)).all()
 
 
+@pytest.mark.slow
 def test_a_ring_of_many_inputs_is_solved() -> None:
     """x = A x + b, with three of each."""
     names = range(3)
@@ -91,6 +93,7 @@ def test_a_loop_of_small_values_is_solved_to_their_nominal_size(whose: str) -> N
     assert np.allclose(y, 1e-10, rtol=2e2 * TOLERANCE, atol=0.0)  # twice the residual, magnified by 100
 
 
+@pytest.mark.slow
 def test_inputs_stay_in_their_range() -> None:
     """y = 1 / sqrt(u) of an input that must be above 0.01: u = 1, from a start at 4."""
     root = Foreign(
@@ -102,6 +105,7 @@ def test_inputs_stay_in_their_range() -> None:
     assert np.allclose(solved({"a": root}, {"a.u": "a.y"}).values, 1.0, rtol=0.0, atol=2.0 * TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_ring_with_a_state_is_the_implicit_equation_at_every_instant() -> None:
     """y = x - 3 y, x' = y by Euler's method: y = x / 4."""
     sum_of = Foreign(
@@ -136,6 +140,7 @@ def rising(port: str) -> LogInput:
 RISING = LogColumn(np.array([0, 10**9]), np.array([0.0, 1.0]))
 
 
+@pytest.mark.slow
 def test_a_block_whose_outputs_follow_at_once_only_before_the_first_step_is_seen_through() -> None:
     """y = 1 - 3 u, in a ring with u = 4 y + c(t): y = (1 - 3 c) / 13."""
     formula = "v->r[1] = 1 - 3 * v->r[0];"
@@ -169,6 +174,7 @@ def test_going_back_undoes_what_a_block_integrated() -> None:
     assert np.allclose(recorded.column("a", "y")[1:], 0.7390851332151607, rtol=0.0, atol=2.0 * TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_block_that_goes_back_is_told_again_what_was_set_before_the_loop() -> None:
     """y = 1 - 3 u + v after a step, in a ring with u = 4 y: y = (1 + v) / 13; z = v is read before it."""
     late = Foreign(
@@ -188,6 +194,7 @@ def test_a_block_that_goes_back_is_told_again_what_was_set_before_the_loop() -> 
     assert np.allclose(recorded.column("a", "y")[1:], expected[1:], rtol=0.0, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_looking_whether_outputs_follow_leaves_no_trace_where_they_do_not() -> None:
     """y = max(u, 0) with u = y / 2 + c(t) below 0: what the block integrates is u, held over each step."""
     limited = Foreign(
@@ -216,6 +223,7 @@ def test_what_has_no_solution_is_told_with_the_loop_and_what_is_left() -> None:
     assert len(recorded.t_ns) == 0
 
 
+@pytest.mark.slow
 def test_outputs_that_may_be_a_step_late_are_told() -> None:
     """A block that cannot save its state cannot go back: what it gives is that of the step before."""
     stuck = gain("stuck", fresh=False, can_save=False)
@@ -248,6 +256,7 @@ def test_inputs_at_the_end_of_their_range_are_not_moved_out_of_it(fresh: bool) -
     assert not recorded.column("a", "refused").any()
 
 
+@pytest.mark.slow
 def test_values_that_are_not_finite_are_told_and_are_no_fault_of_the_block() -> None:
     recorded = ran({"a": gain("log", formula="log(u)")}, {"a.u": "a.y"}, iterate=True)
     assert recorded.failed == (
@@ -256,6 +265,7 @@ def test_values_that_are_not_finite_are_told_and_are_no_fault_of_the_block() -> 
     )
 
 
+@pytest.mark.slow
 def test_a_step_to_where_a_block_gives_no_number_is_shortened_and_no_other_block_sees_it() -> None:
     """y = 2 + 10 log u from u = 9, where Newton steps below 0; the other block counts what is no number."""
     picky = Foreign(

@@ -32,6 +32,7 @@ SUM = Foreign(
 """y = u_1 + 10 u_2 + 100 u_3."""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [1, 12])
 def test_a_row_of_blocks_with_feedthrough_has_no_delay(count: int) -> None:
     names = [f"b{i}" for i in range(count)]
@@ -183,6 +184,7 @@ def test_a_block_without_outputs_runs() -> None:
     assert recorded.values.shape == (11, 0)
 
 
+@pytest.mark.slow
 def test_the_same_plan_runs_again_with_the_same_bits() -> None:
     plan = planned(
         {"decay": gain(), "x": INTEGRATOR}, {"decay.u": "x.y", "x.u": "decay.y"}, {"x": {"x": 1.0}}

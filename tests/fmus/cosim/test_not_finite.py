@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 from foreign_fmus import Foreign, Scalar, gain, ran
 from urmpipe_fmus.cosim import Port
@@ -30,6 +31,7 @@ def noted(*arguments: object, **options: object) -> dict[Port, tuple[float, floa
     return {port: (one.value, one.t, one.count) for port, one in recorded.not_finite.items()}
 
 
+@pytest.mark.slow
 def test_the_first_value_its_time_and_how_many_there_are() -> None:
     found = noted({"a": GLITCH, "b": CLIP}, {"b.u": "a.y"})
     assert list(found) == [Port("a", "y"), Port("a", "high")]

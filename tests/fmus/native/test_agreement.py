@@ -44,6 +44,7 @@ def test_every_step_gives_what_the_instance_gives(native: Callable[..., Any], os
     assert fmu.fmu.getInteger([count]) == [200] == instance.get([count])
 
 
+@pytest.mark.slow
 def test_outputs_are_those_of_the_inputs_just_set(native: Callable[..., Any], oscillator: Unit) -> None:
     fmu = native(oscillator)
     goal, force, k = (index(oscillator, name) for name in ("goal", "force", "k"))

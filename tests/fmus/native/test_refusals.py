@@ -107,6 +107,7 @@ def runaway() -> Unit:
     )
 
 
+@pytest.mark.slow
 def test_a_step_that_runs_away_is_undone(native: Callable[..., Any], runaway: Unit) -> None:
     fmu, instance = native(runaway), Instance(runaway)
     for one in (fmu.fmu.setReal, instance.set):
@@ -234,6 +235,7 @@ def failed_instance(folder: Path, name: str, blocks: int | None = None, **option
     return said
 
 
+@pytest.mark.slow
 def test_where_there_is_no_memory_there_is_no_instance_and_nothing_is_kept(
     built: Callable[..., Path], player: Unit
 ) -> None:

@@ -78,6 +78,7 @@ def test_the_guid_is_that_of_the_content(make: Make, tmp_path: Path) -> None:
     assert content_guid(found) == made.guid
 
 
+@pytest.mark.slow
 def test_other_descriptions_tables_and_backends_have_other_guids(make: Make, tmp_path: Path) -> None:
     units = [make("spring"), make("playback"), make("playback", gain=2.0)]
     guids = {build_fmu(one, tmp_path, backend="python").guid for one in units}
@@ -109,6 +110,7 @@ def test_without_a_compiler_it_is_python_and_a_line_says_why(make: Make, tmp_pat
         build_fmu(make("arm"), tmp_path, backend="native")
 
 
+@pytest.mark.slow
 def test_a_failed_build_leaves_the_file_that_was_there(make: Make, tmp_path: Path) -> None:
     path = build_fmu(make("arm"), tmp_path, backend="python").path
     before = path.read_bytes()

@@ -56,6 +56,7 @@ def test_other_tables_arguments_sources_variables_and_backends_are_other_fmus(ma
     assert len(set(paths)) == len(paths)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", [b"", b"PK", None])
 def test_a_damaged_entry_is_built_again(make: Make, damage: bytes | None) -> None:
     path = cached_fmu(make("arm"), "python")

@@ -66,6 +66,7 @@ def test_a_good_fmu_has_no_problems_and_its_values_are_those_of_an_instance(
     assert [one.after for one in found.variables] == pytest.approx(after, rel=1e-13, abs=1e-15)
 
 
+@pytest.mark.slow
 def test_what_was_found_goes_into_json(make: Make, tmp_path: Path) -> None:
     path = built(make("playback"), tmp_path)
     found = json.loads(json.dumps(check_fmu(path).to_dict(), allow_nan=False))
@@ -102,6 +103,7 @@ class Foreign(Fmi2Slave):
 """
 
 
+@pytest.mark.slow
 def test_an_fmu_of_another_tool_is_checked_too(tmp_path: Path) -> None:
     (tmp_path / "foreign.py").write_text(FOREIGN)
     command = [sys.executable, "-m", "pythonfmu", "build", "-f", "foreign.py"]
@@ -138,6 +140,7 @@ def failing(how: str) -> Unit:
     return replace(unit_of_source(source, "failing.py"), recipe=Recipe("failing.py", source=source))
 
 
+@pytest.mark.slow
 def test_a_step_that_fails_is_told_with_the_last_lines_of_the_log(tmp_path: Path) -> None:
     found = check_fmu(built(failing('raise ValueError("no more")'), tmp_path))
     assert found.problems == (
@@ -158,6 +161,7 @@ def test_an_fmu_that_ends_its_process_does_not_end_ours(tmp_path: Path) -> None:
     assert found.problems == ("fmi2DoStep at 0.015 s ended the process with the exit code 3",)
 
 
+@pytest.mark.slow
 def test_files_of_the_working_folder_are_no_modules(
     make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -167,6 +171,7 @@ def test_files_of_the_working_folder_are_no_modules(
     assert check_fmu(path).problems == ()
 
 
+@pytest.mark.slow
 def test_an_fmu_that_hangs_is_ended(tmp_path: Path) -> None:
     found = check_fmu(built(failing("time.sleep(1000)"), tmp_path), timeout=3.0)
     assert found.problems == ("fmi2DoStep at 0.015 s did not return within 3 s",)
@@ -228,6 +233,7 @@ def test_a_python_fmu_is_not_run_where_its_binary_would_crash(
     assert [one.before for one in found.variables] == [None] * len(found.variables)
 
 
+@pytest.mark.slow
 def test_a_python_fmu_runs_in_a_folder_with_spaces(
     make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -268,6 +274,7 @@ def test_without_a_binary_for_this_platform_it_is_not_run(make: Make, tmp_path: 
 CO_SIMULATION = "FMI 2.0 for co-simulation, as most tools export it, too"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [

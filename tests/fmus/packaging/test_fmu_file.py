@@ -126,6 +126,7 @@ def test_a_description_that_is_too_large_is_refused_unread(tmp_path: Path) -> No
     assert refusal(FmuError, check_fmu, path) == f"{path}: modelDescription.xml: found 32 MB, allowed: 32 MB"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("xml", "said"),
     [

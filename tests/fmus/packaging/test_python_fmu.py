@@ -38,6 +38,7 @@ def random_value(one: Input | Parameter, random: np.random.Generator) -> float:
     return float(round(value)) if one.type == "Integer" else value
 
 
+@pytest.mark.slow
 def test_fmpy_finds_nothing_wrong(unit: Unit, tmp_path: Path) -> None:
     assert validate_fmu(str(built(unit, tmp_path))) == []
 
@@ -119,6 +120,7 @@ def test_no_step_goes_past_the_stop_time(make: Make, tmp_path: Path) -> None:
     fmu.free()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("serialized", [False, True])
 def test_a_restored_state_knows_that_it_runs(make: Make, tmp_path: Path, serialized: bool) -> None:
     fmu = Loaded(built(make("spring"), tmp_path))
@@ -188,6 +190,7 @@ def test_refused_values_leave_all_of_a_call_unset(make: Make, tmp_path: Path) ->
     fmu.free()
 
 
+@pytest.mark.slow
 def test_an_instance_lives_on_after_many_refused_calls(make: Make, tmp_path: Path) -> None:
     fmu, instance = Loaded(built(make("spring"), tmp_path)), Instance(make("spring"))
     for _ in range(2000):

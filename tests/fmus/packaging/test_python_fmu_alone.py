@@ -49,6 +49,7 @@ unit = Unit(name="helped", description="", outputs=helped,
 '''
 
 
+@pytest.mark.slow
 def test_two_fmus_of_files_and_helpers_of_one_name_compute_their_own(tmp_path: Path) -> None:
     """In one process, beside the urmpipe that this test runs on."""
     fmus = {}

@@ -54,6 +54,7 @@ def homogeneous(frame: Transform) -> FloatArray:
     return result
 
 
+@pytest.mark.slow
 @settings(max_examples=50, deadline=None)
 @pytest.mark.parametrize(("build", "matrix"), [(dh_chain, standard), (modified_dh_chain, modified)])
 @given(data=st.data())

@@ -53,6 +53,7 @@ def products(rows: Any, q: Any, tip: Any) -> tuple[list[FloatArray], list[FloatA
     return rotations, [*steps, rotation @ np.array(tip)]
 
 
+@pytest.mark.slow
 @given(st.lists(geometric_rows, min_size=1, max_size=7), st.data())
 def test_it_is_matrix_products_and_the_chain(rows: list[GeometricRow], data: st.DataObject) -> None:
     q = data.draw(st.lists(st.floats(-4.0, 4.0), min_size=len(rows), max_size=len(rows)))

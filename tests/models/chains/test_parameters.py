@@ -74,6 +74,7 @@ def test_a_urdf_with_its_own_values_is_the_same_bit_by_bit(shared: Path, file: s
     assert chain.parameters[6].source == f"URDF joint {first}"
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_a_frame_is_what_stands_before_a_parameter_its_motion_and_what_stands_after(

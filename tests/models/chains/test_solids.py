@@ -59,6 +59,7 @@ def scaled(chain: Chain, factor: float) -> Chain:
 # --- links -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_solids_of_any_arm_can_be_drawn_and_hang_on_moving_joints(

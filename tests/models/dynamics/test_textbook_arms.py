@@ -114,6 +114,7 @@ def textbook(q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> F
     return np.array([first, second])
 
 
+@pytest.mark.slow
 @settings(max_examples=50, deadline=None)
 @given(ANGLES, ANGLES, ANGLES)
 def test_a_parallelogram_has_the_equations_of_absolute_angles(

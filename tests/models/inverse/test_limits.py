@@ -109,6 +109,7 @@ def test_what_there_was_no_solution_for_keeps_its_reason() -> None:
     assert found.reason(0) == "too far" and np.isnan(found.q).all()
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.floats(-math.pi, math.pi), st.floats(-20.0, 20.0), st.floats(0.0, 20.0), st.floats(-30.0, 30.0))
 def test_of_all_turns_within_the_limits_the_nearest_is_taken(

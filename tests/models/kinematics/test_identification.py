@@ -65,6 +65,7 @@ def test_sensitivities_are_the_slopes_of_the_pose(chain: Chain) -> None:
     assert_sensitive(chain, [(twist, 0.0) for twist in twists_of(chain)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("chain", ARMS, ids=lambda chain: chain.name)
 def test_they_are_so_at_large_changes_too(chain: Chain) -> None:
     rng = np.random.default_rng(2)

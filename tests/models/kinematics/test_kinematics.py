@@ -198,6 +198,7 @@ def test_ur5e_is_pinocchios_of_its_dh_parameters() -> None:
     assert_agrees_with_peer(chain, Peer(model, [frame]), random_poses(chain))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "tip", "others"),
     [
@@ -265,6 +266,7 @@ def test_the_poses_that_pybotics_kept_of_a_ur10(shared: Path) -> None:
 # --- finite differences, mimics included -----------------------------------------------------------
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(data=st.data(), seed=st.integers(0, 2**32 - 1))
 def test_motions_are_the_differences_of_poses_and_of_each_other(

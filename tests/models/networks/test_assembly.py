@@ -308,6 +308,7 @@ def test_one_seed_gives_the_same_bits_another_the_same_set(build: Callable[..., 
         assert one.values.keys() == two.values.keys()
 
 
+@pytest.mark.slow
 def test_the_nearest_assembly_is_the_first_of_all() -> None:
     for build in (four_bar, rssr, coupled_loops):
         network = build(drive="s")
@@ -344,6 +345,7 @@ def rough(network: Network, size: float, seed: int) -> Mechanism:
     return mechanism_of(replace(network, joints=joints, bodies=bodies))
 
 
+@pytest.mark.slow
 def test_idle_spins_stay_as_they_are_at_the_start() -> None:
     """The rod's twist about its line against the crank, from the rotation, is that of each start."""
     network = rssr("s")
@@ -389,6 +391,7 @@ def two_links(length: float, distance: float) -> Network:
     return Network("links", (Body("a"), Body("b")), joints)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("length", [1e-6, 1e-3, 1.0, 1e3, 1e6])
 def test_two_links_that_are_too_short_are_open_by_what_is_missing(length: float) -> None:
     found = assemble(mechanism_of(two_links(length, 1.1 * length)), restarts=50)
@@ -438,6 +441,7 @@ def test_a_rod_that_is_too_short_is_named_with_what_is_missing() -> None:
     assert gap.metres == pytest.approx(0.6, rel=1e-9)  # the end comes to 1 m from the point, the rod has 0.4
 
 
+@pytest.mark.slow
 def test_the_gap_of_the_nearest_is_the_least_whatever_the_seed() -> None:
     gaps = [
         assemble(mechanism_of(two_links(1.0, 1.1)), seed=seed, restarts=30).gaps[0].metres
@@ -552,6 +556,7 @@ def test_what_moves_with_its_controls_held_is_a_continuum(network: Network, ways
     assert str(ways) in found.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("network", "modes"),
     [
@@ -626,6 +631,7 @@ def test_progress_ends_at_one() -> None:
     assert all(0.0 <= one <= 1.0 for one in shares)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("far", [1e3, 1e6])
 def test_a_network_far_from_the_ground_assembles_as_one_at_it(far: float) -> None:
     """Pivots 1000 km from the origin of all bodies: rounding of 1e-10 m."""

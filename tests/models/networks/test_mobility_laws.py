@@ -353,6 +353,7 @@ def generator_joint(joint: Joint, constraint: str, side: Transform) -> tuple[Joi
     return extra, replace(joint, bodies=("between", joint.bodies[1]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("build", [four_bar, bennett, sarrus, coupled_loops])
 @pytest.mark.parametrize("seed", range(3))
 def test_redundant_constraints_can_be_set_free_together(build: Callable[..., Network], seed: int) -> None:
@@ -573,6 +574,7 @@ def test_a_spherical_four_bar_moves_although_its_lengths_are_none() -> None:
     np.testing.assert_allclose(poses[:, :3, 3], 0.0, rtol=0.0, atol=1e-12)  # the point stays where it is
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("far", [1e3, 1e6])
 @pytest.mark.parametrize("name", ["four-bar", "bennett", "sarrus", "rccc", "coupled loops"])
 def test_frames_far_from_the_mechanism_do_not_matter(name: str, far: float) -> None:

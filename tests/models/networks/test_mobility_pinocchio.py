@@ -148,6 +148,7 @@ MECHANISMS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MECHANISMS)
 @pytest.mark.parametrize("seed", [None, 0, 1])
 def test_known_mechanisms_move_as_in_pinocchio(name: str, seed: int | None) -> None:

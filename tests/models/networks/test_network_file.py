@@ -549,6 +549,7 @@ def test_many_digits_remarks_and_brackets_are_refused_in_their_place(network: An
     assert said.endswith("nested 60 deep; allowed: 50")
 
 
+@pytest.mark.slow
 def test_a_network_too_large_to_be_assembled_is_refused(network: Any) -> None:
     joints = "".join(
         f'[joints.j{k}]\nkind = "revolute"\nbodies = ["b{k}", "b{k + 1}"]\n[bodies.b{k + 1}]\n'

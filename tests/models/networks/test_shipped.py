@@ -68,6 +68,7 @@ def test_every_shipped_network_is_listed_here() -> None:
     assert {path.stem for path in NETWORKS.glob("*.toml")} == set(MOVES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MOVES)
 def test_it_assembles_from_its_start_and_moves_as_expected(name: str) -> None:
     mechanism = mechanism_of(load_network(name))

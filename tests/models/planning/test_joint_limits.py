@@ -96,6 +96,7 @@ def differences(values: FloatArray, s: FloatArray, at: IndexArray) -> FloatArray
     return np.asarray(weighted / (before + after)[:, None])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_slopes_move_the_tool_along_its_path(case: str) -> None:
     """A step along dq is the tangent, and ddq the curvature: to the third power of the step."""
@@ -111,6 +112,7 @@ def test_slopes_move_the_tool_along_its_path(case: str) -> None:
     assert np.abs(turn).max() < allowed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_polished_joints_are_on_the_path(case: str) -> None:
     name, path = CASES[case]

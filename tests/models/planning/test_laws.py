@@ -143,6 +143,7 @@ def test_derivatives_belong_together(rows: PathRows, v: float, a: float, j: floa
         np.testing.assert_allclose(after.a, before.a, atol=1e-4)
 
 
+@pytest.mark.slow
 @given(st.floats(0.0, 1.0), st.floats(0.1, 20.0), st.floats(0.01, 2.0))
 @example(entry=1e-12, a=6.0, radius=2.0)
 def test_a_swing_keeps_the_total_acceleration(entry: float, a: float, radius: float) -> None:

@@ -46,6 +46,7 @@ def assert_same(chain: Chain, back: Chain) -> None:
         np.testing.assert_allclose(a.rotation, b.rotation, rtol=0.0, atol=SAME)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_the_file_read_back_is_the_same_chain(

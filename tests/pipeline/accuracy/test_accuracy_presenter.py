@@ -47,6 +47,7 @@ def test_headline_with_a_limit(limited: Accuracy, accuracy: Make) -> None:
     assert facts(none.body)["Running speed"] == "none"
 
 
+@pytest.mark.slow
 def test_headline_without_a_limit(accuracy: Make) -> None:
     result = accuracy()
     shown = present(result)
@@ -80,6 +81,7 @@ def test_facts_say_how_it_was_run(accuracy: Make) -> None:
     assert told["Error that decides"] == "time: from the set point of the same time"
 
 
+@pytest.mark.slow
 def test_table_and_checks(limited: Accuracy) -> None:
     asked, tried = present(limited).body.tables
     found = cells(asked)

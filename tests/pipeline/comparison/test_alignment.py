@@ -398,6 +398,7 @@ def test_samples_without_an_orientation_carry_no_tool_between_base_and_probe() -
     np.testing.assert_allclose(found.alignment.tool, OFFSET, atol=ROUNDING)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not TRACKER.is_file(), reason="no logs of others beside the checkout")
 def test_a_probe_at_the_flange_of_a_real_arm_is_found_by_a_laser_tracker() -> None:
     """A fit of base and tool leaves 0.75 to 1.1 mm of a nominal UR10, as its README says."""

@@ -65,6 +65,7 @@ def assert_agree(deviation: Deviation, reference: Run, log: Run, align: AlignMod
     assert deviation.statistics["norm"].rms == pytest.approx(np.sqrt(np.mean(distance**2)), abs=METRES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("align", ["none", "start", "rigid"])
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), count=st.sampled_from([4, 17, 100]))

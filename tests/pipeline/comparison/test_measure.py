@@ -325,6 +325,7 @@ def test_a_log_that_is_late_deviates_as_fast_as_it_moves(demo: Comparison) -> No
     assert matlab.speed[matlab.worst] > 0.999 * matlab.speed.max()
 
 
+@pytest.mark.slow
 def test_the_base_of_solidworks_stands_two_and_a_half_millimetres_off(demo: Comparison) -> None:
     norm = demo.runs[1].statistics["norm"]
     assert norm.mean == pytest.approx(2.5e-3, abs=1e-7)  # roundings mean out over 7383 samples

@@ -196,6 +196,7 @@ def test_nothing_that_is_shown_speaks_of_times(run: Run, found: Comparison) -> N
     assert present(found).opens_at_row == WORST
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("to", ["csv", "parquet", "mat"])
 def test_exports_count_rows(run: Run, found: Comparison, tmp_path: Path, to: Any) -> None:
     for name, result in (("run", run), ("found", found)):
@@ -211,6 +212,7 @@ def test_a_trajectory_of_poses_counts_rows(run: Run, tmp_path: Path) -> None:
     assert stamps == [float(row) for row in range(1, ROWS + 1)]
 
 
+@pytest.mark.slow
 def test_a_recording_and_a_report_of_poses(run: Run, found: Comparison, tmp_path: Path) -> None:
     for name, result in (("run", run), ("found", found)):
         path = write_recording(result, tmp_path / f"{name}.rrd")

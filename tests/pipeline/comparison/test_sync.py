@@ -99,6 +99,7 @@ RATES = st.sampled_from([(0.005, 0.005), (0.005, 0.008), (0.008, 0.005), (0.004,
 SEEDS = st.integers(0, 2**32 - 1)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(SEEDS, STARTS, STARTS, LENGTHS, LENGTHS, RATES, st.sampled_from([smooth, moves]))
 @example(19933, 0.0, 6.0, 14.0, 15.0, (0.005, 0.005), smooth)  # 8 s in both, 0.49 of the motion

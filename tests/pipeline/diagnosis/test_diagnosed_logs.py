@@ -110,6 +110,7 @@ def test_a_path_that_stands_elsewhere_has_another_base() -> None:
     np.testing.assert_allclose(cause.value, -shift, atol=3.5e-5)
 
 
+@pytest.mark.slow
 def test_the_remainder_is_what_the_mended_log_leaves() -> None:
     q = joints()
     q[:, 1] += 0.01

@@ -99,6 +99,7 @@ def test_it_is_so_with_edits() -> None:
     assert_linear(*at_data(ARMS[0], 0.1, edits))
 
 
+@pytest.mark.slow
 def test_it_is_so_with_another_robot() -> None:
     assert_linear(
         *at_data(load_robot("ur5e"), 0.1, (Edit("other_robot", robot=load_robot("ur10"), name="ur10"),))

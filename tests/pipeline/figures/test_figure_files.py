@@ -127,6 +127,7 @@ def test_the_font_is_as_large_as_it_is_asked_for(tmp_path: Path) -> None:
     assert "10px" in label.attrib["style"]  # a px of an SVG of matplotlib's is a pt: its viewBox is its size
 
 
+@pytest.mark.slow
 def test_each_file_says_who_drew_it_and_what_it_shows(tmp_path: Path) -> None:
     pdf, svg, png = written(waves(), tmp_path, "pdf", "svg", "png")
     found = PdfReader(pdf).metadata
@@ -234,6 +235,7 @@ def test_without_matplotlib_one_line_says_how_to_install_it(
     assert [*tmp_path.iterdir()] == []
 
 
+@pytest.mark.slow
 def test_every_plot_of_the_page_has_its_file_and_none_is_blank(tmp_path: Path) -> None:
     """The page names the pictures that a reader saves of it as the files are named."""
     folder = tmp_path / "figures"

@@ -200,6 +200,7 @@ def test_panels_of_other_axes_are_figures_of_their_own() -> None:
     assert plot(both, "both over *", "column", 8.0).axes[0].get_xlabel() == "v in m/s"
 
 
+@pytest.mark.slow
 def test_no_text_lies_on_another_and_none_is_cut_off_in_a_column() -> None:
     long = "a quantity of many words"
     panels = [panel(100.0 * WAVE, f"{long} {k}", limit=0.0035, small=True) for k in range(5)]

@@ -88,6 +88,7 @@ def test_solids_and_sheets_are_faces_and_the_hidden_are_left_out() -> None:
     assert axes.get_xlim()[1] < 2.0
 
 
+@pytest.mark.slow
 def test_a_scene_of_nothing_is_drawn() -> None:
     for position in (np.empty((0, 3)), np.full((5, 3), np.nan), np.ones((1, 3))):
         path = Path("tcp", position, None, RED, values=np.ones(len(position)))

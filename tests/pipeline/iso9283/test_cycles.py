@@ -106,6 +106,7 @@ def test_each_cycle_begins_by_its_own_clock(tmp_path: Path, square: Path) -> Non
     assert [one.row for one in cycles] == [1, 1]
 
 
+@pytest.mark.slow
 def test_a_motion_without_return_is_refused(
     tmp_path: Path, square: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -123,6 +124,7 @@ def test_once_along_an_open_path_is_one_cycle(tmp_path: Path) -> None:
     assert rows(result) == [(1, len(OPEN) + 2 * REST)] and not kinds(result)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("other", [OTHER, SQUARE_PATH[::-1]], ids=["another path", "the other way round"])
 def test_another_motion_between_cycles_is_left_out_and_told(
     other: FloatArray, tmp_path: Path, square: Path
@@ -215,6 +217,7 @@ def test_logs_of_another_motion_alone_are_refused_each_by_its_name(tmp_path: Pat
 POSES = np.array([[0.1 * k, 0.05 * k * k, 0.3] for k in range(5)])
 
 
+@pytest.mark.slow
 def test_30_visits_of_5_still_poses(tmp_path: Path) -> None:
     visits = np.tile(POSES, (30, 1)) + np.random.default_rng(1).normal(0.0, 1e-4, (150, 3))
     reference = still(tmp_path / "poses.csv", POSES)
@@ -251,6 +254,7 @@ def test_a_still_pose_without_a_value_moves_no_other(tmp_path: Path) -> None:
     assert value(iso, "RP") == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tick", "speed", "noise"), [(0.001, 0.1, 1e-4), (0.005, 0.02, 1e-4)])
 def test_noise_beyond_a_step_hides_no_motion(tick: float, speed: float, noise: float, tmp_path: Path) -> None:
     # From row to row it moves as far as it trembles; within 50 ms, by which a rest is told, 1 mm or more.

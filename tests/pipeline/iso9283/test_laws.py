@@ -109,6 +109,7 @@ def same(one: IsoTest, other: IsoTest, names: set[str]) -> None:
             assert second[key] == (None if wanted is None else pytest.approx(wanted, abs=allowed, rel=0)), key
 
 
+@pytest.mark.slow
 def test_the_set_tells_every_criterion_but_vap(unmoved: IsoTest) -> None:
     values = overall(unmoved)
     assert set(values) == set(UNITS) - {"vAP"}
@@ -137,6 +138,7 @@ def test_shifts_and_turns_about_the_base_change_no_angle(
         same(unmoved, moved(Path(folder), about((0.0, 0.0, 1.0), angle), shift), set(UNITS))
 
 
+@pytest.mark.slow
 def test_identical_cycles_have_no_spread(tmp_path: Path) -> None:
     place, turns = next(cycles())
     rows = np.column_stack((place, quaternions(turns.reshape(-1, 9), "matrix")))

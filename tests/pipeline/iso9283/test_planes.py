@@ -29,6 +29,7 @@ def circle(radius: float, middle: tuple[float, float] = (0.0, 0.0), rows: int = 
     return np.column_stack((x + radius * np.cos(turn), y + radius * np.sin(turn), np.full_like(turn, 0.3)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", [(1.0, 0.0), (0.6, 0.8)])
 def test_a_circle_run_eccentrically_by_e_is_off_by_e(way: tuple[float, float], tmp_path: Path) -> None:
     e = 1e-3
@@ -179,6 +180,7 @@ def test_planes_lie_even_in_all_that_is_in_no_zone(count: int, tmp_path: Path) -
     np.testing.assert_allclose(path.s, wanted, atol=EXACT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.1, 1.0])
 def test_no_plane_lies_in_a_zone(speed: float, tmp_path: Path) -> None:
     values = along(ZONED, speed, rest=0.2)

@@ -242,6 +242,7 @@ def titles(shown: Presentation) -> list[str]:
     return [one.title for one in shown.body.sections]
 
 
+@pytest.mark.slow
 def test_one_cycle_has_no_repeatability(tmp_path: Path) -> None:
     shown = recorded(squares(1, {"AP": 1e-3}), tmp_path)
     assert "RP" not in cells(shown.body.tables[0])["name"]
@@ -265,6 +266,7 @@ def test_still_poses_have_no_path(tmp_path: Path) -> None:
     assert all(one.t_ns is None for one in scene.paths)
 
 
+@pytest.mark.slow
 def test_a_curve_without_rests_has_no_poses_corners_or_legs(tmp_path: Path) -> None:
     turn = np.linspace(0.0, 1.8 * np.pi, 800)
     curve = 0.2 * np.column_stack((np.cos(turn), np.sin(turn), 0.2 * turn))

@@ -195,6 +195,7 @@ def legs(*numbers: float) -> dict[str, float]:
     return {f"leg {k}": number for k, number in enumerate(numbers, 1)}
 
 
+@pytest.mark.slow
 def test_every_criterion_is_told_once_in_its_unit(iso: IsoTest) -> None:
     assert [one.name for one in iso.overall] == list(UNITS)
     assert {one.name: one.unit for one in iso.overall} == UNITS

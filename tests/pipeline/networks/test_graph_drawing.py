@@ -99,6 +99,7 @@ def test_a_loop_goes_round_its_bodies(name: str) -> None:
         assert nearest.max() < 1e-9
 
 
+@pytest.mark.slow
 def test_the_same_graph_gives_the_same_drawing() -> None:
     assert graph_svg(found("chain")) == graph_svg(replace(found("chain")))
 

@@ -60,6 +60,7 @@ def test_every_assembly_has_a_picture() -> None:
     assert titles == [f"assembly {k}" for k in range(1, len(result.assemblies) + 1)]
 
 
+@pytest.mark.slow
 def test_one_file_has_all_drawings_below_each_other() -> None:
     one, every = found("bars"), found("bars", every=True)
     for result, count in ((one, 2), (every, 3), (found("too long"), 2)):

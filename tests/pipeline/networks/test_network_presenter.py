@@ -92,6 +92,7 @@ def test_the_mobility_is_what_its_table_adds_up_to() -> None:
         assert rows["mobility"] - rows["Kutzbach"] == rows.get("redundant", 0)
 
 
+@pytest.mark.slow
 def test_assemblies_have_a_row_each_and_a_single_one_a_row_a_variable() -> None:
     every = found("stewart-gough", every=True)
     table = cells(tables("stewart-gough", every=True)[f"Assemblies ({len(every.assemblies)})"])

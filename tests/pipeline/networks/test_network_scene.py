@@ -108,6 +108,7 @@ def test_symbols_stand_on_the_axes_of_their_joints(name: str) -> None:
             np.testing.assert_allclose(away - (away @ n) * n, 0.0, rtol=0, atol=1e-9)  # as far as it closes
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_bodies_reach_their_joints_and_elements(name: str) -> None:
     result = found(name)

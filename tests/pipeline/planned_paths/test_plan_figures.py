@@ -60,6 +60,7 @@ def test_a_law_that_runs_at_its_limit_is_not_out_of_it(contour: PlannedPath, alo
             assert panel.limit is None or np.abs(values(panel)).max() <= panel.limit
 
 
+@pytest.mark.slow
 def test_without_limits_of_the_law_none_are_drawn() -> None:
     plan = planned(limited("ur5e", acceleration=20.0), SMALL, law="limits")
     figure = drawn(plan)[LAW]
@@ -67,6 +68,7 @@ def test_without_limits_of_the_law_none_are_drawn() -> None:
     assert "Dashed" not in figure.caption
 
 
+@pytest.mark.slow
 def test_arcs_are_tinted(alone: PlannedPath) -> None:
     tinted = there(panels(drawn(alone)[LAW])["s′"].tinted)
     for k, kind in enumerate(alone.path.kinds):
@@ -139,6 +141,7 @@ def test_the_distance_from_singular_poses_is_that_of_the_plan(slowed: PlannedPat
         assert (mark.t_ns, mark.value) == (slowed.t_ns[nearest], values(panel)[nearest])
 
 
+@pytest.mark.slow
 def test_the_determinant_passes_through_zero_where_the_pose_is_singular() -> None:
     plan = over_its_axis()
     signs = np.sign(values(panels(drawn(plan)[SINGULAR])["det J"]))
@@ -152,6 +155,7 @@ def test_of_a_jacobian_that_is_not_square_there_is_no_determinant() -> None:
     assert list(panels(drawn(plan)[SINGULAR])) == ["σ min"]
 
 
+@pytest.mark.slow
 def test_the_unit_of_the_determinant_follows_its_joints() -> None:
     """Each row of a velocity has a length, but for the columns of joints that slide."""
     axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -84,6 +84,7 @@ def test_every_plan_has_a_page(name: str) -> None:
         assert lines[-len(wanted) :] == wanted  # behind those of stops
 
 
+@pytest.mark.slow
 def test_plans_stand_side_by_side(slowed: PlannedPath) -> None:
     page = page_of(slowed, FAILED["jump"]())
     assert page.banner.state == "fail"

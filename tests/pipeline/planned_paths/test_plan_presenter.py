@@ -94,6 +94,7 @@ def test_what_decides_is_the_largest_share_of_a_limit(slowed: PlannedPath, conto
     assert isinstance(present(contour).body.facts[0].value, str)
 
 
+@pytest.mark.slow
 def test_by_an_acceleration_speeds_fall_as_its_root() -> None:
     plan = planned(limited("ur5e", acceleration=2.0), SMALL)
     name, limit, share, _ = there(plan.joints).most_used

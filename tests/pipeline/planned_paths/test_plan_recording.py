@@ -57,6 +57,7 @@ def test_its_samples_stand_at_their_times(tmp_path: Path) -> None:
     assert {0, len(plan) - 1} <= {*at.tolist()}
 
 
+@pytest.mark.slow
 def test_it_is_an_operand_of_compare(tmp_path: Path) -> None:
     """Against itself, and the path alone on either side."""
     plan, alone = PLANS["contour"](), planned(None, CONTOUR)
@@ -84,6 +85,7 @@ def test_its_run_has_the_rates_that_were_planned(name: str) -> None:
         np.testing.assert_allclose(speed, plan.motion.v[plan.reached], atol=1e-7)  # singular to 1e-9
 
 
+@pytest.mark.slow
 def test_it_leaves_as_its_run_does(tmp_path: Path) -> None:
     plan = PLANS["turned, slowed down"]()
     options = ExportOptions("csv", "file")

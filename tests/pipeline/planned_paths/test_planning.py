@@ -280,6 +280,7 @@ def test_the_tool_is_turned_as_the_rows_say() -> None:
     assert np.abs(miss).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_the_law_of_limits_stops_where_the_turn_changes_and_does_not_warn() -> None:
     turned = np.array([DOWN, DOWN @ [[0, -1, 0], [1, 0, 0], [0, 0, 1]], DOWN])
     points = np.array([[0.4, -0.2, 0.3], [0.5, 0.0, 0.3], [0.4, 0.2, 0.3]])
@@ -342,6 +343,7 @@ def test_a_table_has_columns_of_its_own_for_joints_of_any_name() -> None:
     np.testing.assert_array_equal(frame[["d_q_x", "d_q_t", "d_q_z"]], joints_of(plan).qd)
 
 
+@pytest.mark.slow
 def test_what_is_needed_to_repeat_it_is_kept() -> None:
     start = np.array([0.0, -1.5, 1.5, -1.5, -1.5, 0.0])
     request = Request(load_robot("ur5e"), start, checked_timing(Timing(arcs="total")))
@@ -372,6 +374,7 @@ def test_segments_have_their_times() -> None:
     assert sum(one["duration"] for one in segments) == pytest.approx(4.780324, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_what_is_told_of_limits() -> None:
     plan = planned(limited("ur5e", velocity=3.0, acceleration=[50.0, *[math.inf] * 5]), SMALL)
     told = plan.to_dict()["limits"]

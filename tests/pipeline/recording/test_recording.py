@@ -140,6 +140,7 @@ def test_a_comparison_comes_back_as_it_was(make_comparison: MakeComparison, tmp_
     assert_same(round_trip(comparison, tmp_path), comparison)
 
 
+@pytest.mark.slow
 def test_what_changed_since_a_baseline_comes_back_as_it_was(
     make_comparison: MakeComparison, tmp_path: Path
 ) -> None:
@@ -312,6 +313,7 @@ def rerun_tool(*arguments: str) -> str:
     return done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_progress_is_told_up_to_one(make_run: MakeRun, tmp_path: Path) -> None:
     shares: list[float] = []
     write_recording(make_run(rows=70_000), tmp_path / "run.rrd", progress=shares.append)

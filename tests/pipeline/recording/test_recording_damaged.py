@@ -66,6 +66,7 @@ def test_a_changed_value_is_told(make_run: MakeRun, tmp_path: Path) -> None:
         np.asarray(lazily.log.q)
 
 
+@pytest.mark.slow
 def test_a_changed_letter_of_the_metadata_is_told(make_run: MakeRun, tmp_path: Path) -> None:
     path = write_recording(make_run(rows=5), tmp_path / "whole.rrd")
     run = read_recording(path)

@@ -219,6 +219,7 @@ def test_an_arm_that_only_slides_has_ghosts(tmp_path: Path) -> None:
 # --- which is which --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_each_branch_has_a_colour_of_its_own_and_its_name(make_solved: MakeSolved, tmp_path: Path) -> None:
     names = tuple(f"branch {k}" for k in range(1, 9))
     path = write_recording(make_solved(names=names), tmp_path / "solved.rrd")

@@ -282,6 +282,7 @@ def test_panels_of_other_axes_become_figures_of_their_own() -> None:
     assert (second.title, second.over) == ("Title over ‖v‖", "‖v‖")
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_few_rows_or_none_are_drawn(count: int) -> None:
@@ -371,6 +372,7 @@ def test_drawings_are_images_and_texts_stay_texts() -> None:
     assert base64.b64decode(data_address("<svg/>").removeprefix("data:image/svg+xml;base64,")) == b"<svg/>"
 
 
+@pytest.mark.slow
 def test_plotly_accepts_every_figure_of_every_kind(
     comparison: Comparison, hostile: Comparison, bare_run: Run, make_simulation: Any
 ) -> None:

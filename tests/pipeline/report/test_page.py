@@ -269,6 +269,7 @@ def test_json_in_a_script_comes_back() -> None:
         script_json([float("nan")])
 
 
+@pytest.mark.slow
 def test_a_report_of_four_logs_is_small(comparison: Comparison) -> None:
     four = replace(comparison, runs=comparison.runs * 2)
     # every trace is decimated to the same number of points, however long the log is

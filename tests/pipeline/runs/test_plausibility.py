@@ -225,6 +225,7 @@ def test_nothing_is_said_of_sound_logs(
 # Real logs, and the whole way
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "pattern", ["coppeliasim.csv", "matlab.csv", "counter_rotating.csv", "solidworks/phi*.csv"]
 )
@@ -233,6 +234,7 @@ def test_nothing_is_said_of_the_bundled_logs(pattern: str) -> None:
     assert {w.kind for w in run.warnings} <= {"assumed-unit"}
 
 
+@pytest.mark.slow
 @needs_shared
 @pytest.mark.parametrize(
     ("file", "robot"),

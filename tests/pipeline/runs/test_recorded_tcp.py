@@ -324,6 +324,7 @@ REAL = {
 }
 
 
+@pytest.mark.slow
 @needs_shared
 @pytest.mark.parametrize("file", REAL)
 def test_real_logs_are_of_their_robot(file: str) -> None:

@@ -33,6 +33,7 @@ JOINTS = [f"q{k} [rad]" for k in range(1, 8)]
 XYZ = ["x [m]", "y [m]", "z [m]"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ARMS)
 def test_the_recorded_tcp_singles_a_robot_out(name: str, tmp_path: Path) -> None:
     robot = load_robot(name)

@@ -348,6 +348,7 @@ def test_a_plan_beyond_an_effort_has_one_warning_of_its_own() -> None:
     assert [one for one in plan.as_run().warnings if one.kind == "effort-limit"] == [warning]
 
 
+@pytest.mark.slow
 def test_a_plan_within_its_efforts_or_in_the_way_of_something_has_no_such_warning() -> None:
     weak = limited("ur10", effort=1.0)
     points = np.array([[0.5, 0.5, 0.3], [-0.5, -0.5, 0.3]])
@@ -358,6 +359,7 @@ def test_a_plan_within_its_efforts_or_in_the_way_of_something_has_no_such_warnin
             assert [one for one in warnings if one.kind == "effort-limit"] == []
 
 
+@pytest.mark.slow
 def test_a_plan_on_another_arm_is_told_to_move_slower() -> None:
     run = on_robot(planned(load_robot("ur10"), SMALL).as_run(), limited("ur10", effort=60.0))
     (warning,) = (one for one in run.warnings if one.kind == "effort-limit")

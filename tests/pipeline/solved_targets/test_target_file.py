@@ -56,6 +56,7 @@ def test_all_specimens_with_a_tool_are_tried() -> None:
     assert OPTIONS.keys() <= TRUTHS.keys()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TRUTHS)
 def test_a_specimen_with_a_tool_gives_its_poses_as_targets(name: str) -> None:
     truth, targets = (
@@ -75,6 +76,7 @@ def test_a_specimen_with_a_tool_gives_its_poses_as_targets(name: str) -> None:
         assert targets.clock_start_ns / 1e9 == pytest.approx(truth.start, abs=truth.t_within, rel=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", ["ur5e-rtde-static", "ur-rtde-10rows"])
 @pytest.mark.skipif(not LOGS.is_dir(), reason="the real logs in ../shared/logs are not here")
 def test_the_recorded_tool_of_a_real_log_is_a_path(folder: str) -> None:

@@ -71,6 +71,7 @@ def test_several_columns_of_arrays_beside_others(
     np.testing.assert_array_equal(log.qd, np.array(pd.DataFrame(2 * Q)) * (np.pi / 180))
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.integers(1, 30), st.integers(2, 9), st.booleans(), st.sampled_from(["\n", "\r\n"]))
 def test_any_number_of_rows_and_columns(rows: int, joints: int, lists: bool, newline: str) -> None:
@@ -102,6 +103,7 @@ def test_plain_cells_that_look_like_arrays(read: Read, wrong: Wrong) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_control_signs_beyond_the_head(read: Read, wrong: Wrong) -> None:
     lines = [f"{0.1 * k:.1f},[1 {k % 3}]" for k in range(9000)]
     lines[8000] = "800.0,\x01"

@@ -94,6 +94,7 @@ def test_a_joint_that_rests_belongs_to_its_block(tmp_path: Path) -> None:
     assert columns_of(log, "joint") == [1, 2, 3, 4, 5, 6]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("blocks", "answer"), [("q tau", 0), ("tau q", 1)])
 @pytest.mark.parametrize("joints", [2, 6, 7])
 def test_blocks_that_nothing_proves_are_asked_about(
@@ -122,6 +123,7 @@ def test_columns_that_turn_too_far_for_an_arm_are_asked_about_before_units(
     assert asked.value.findings[0].hints[0].value == ["1-5"]
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 10_000), joints=st.integers(3, 7), order=st.permutations(["q", "tau", "temp"]))
 def test_what_are_no_rates_proves_nothing(seed: int, joints: int, order: Sequence[str]) -> None:
     """Torques hold a part that goes with the rate, of another size for each joint: the periods differ."""
@@ -130,6 +132,7 @@ def test_what_are_no_rates_proves_nothing(seed: int, joints: int, order: Sequenc
     assert not proved_blocks(motion.table(" ".join(order)), joints)
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 10_000), noise=st.floats(0.0, 0.1))
 def test_the_period_that_measured_rates_tell(seed: int, noise: float) -> None:
     """Noise of a tenth of the rates moves the least squares by its square, a percent, and by chance."""

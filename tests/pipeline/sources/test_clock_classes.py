@@ -214,6 +214,7 @@ def test_a_segment_and_its_rows_are_no_seconds(wrong: Wrong, read: Read) -> None
     assert [column.role for column in log.columns].count("time") == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("names", [(), ("t",), ("timestamp",)])
 @pytest.mark.parametrize("unit", [SECOND, MS, 1000, 1])
 def test_the_size_of_a_unix_time_tells_its_unit(read: Read, names: tuple[str, ...], unit: int) -> None:
@@ -224,6 +225,7 @@ def test_the_size_of_a_unix_time_tells_its_unit(read: Read, names: tuple[str, ..
     assert log.clock_start_ns == UNIX
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("first", "step", "kind", "cure"),
     [

@@ -49,6 +49,7 @@ def said(*found: tuple[int, str]) -> list[str]:
     return [f"log.csv:{line}: found {text!r}, {SIGNS[text]}, {allowed}" for line, text in found]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("skip_bad", [False, True])
 @pytest.mark.parametrize("place", [0, 1, 2, 150, -1, None])
 @pytest.mark.parametrize("table", TABLES)
@@ -144,6 +145,7 @@ def test_a_ruler_among_comments_and_a_row_of_empty_cells_are_no_markers(read: Re
     assert read("\n".join([header, *wide, "|||||||", "|||||||"])).rows == 300
 
 
+@pytest.mark.slow
 def test_a_row_of_many_empty_cells_between_bars_is_looked_at_once(read: Read) -> None:
     began = time.perf_counter()
     row = f"{'|' * 1000}0.1|0.2"

@@ -122,6 +122,7 @@ def test_four_digits_only_if_all_cells_have_them(read: Read) -> None:
     assert read(JOINTS.replace("+1.571e+00", "+1.57e+00")).digits is None
 
 
+@pytest.mark.slow
 def test_a_large_export_is_read_in_blocks(write: Callable[..., object]) -> None:
     """More than a block and more than the head that is looked at: nothing may be lost where they end."""
     rows = 60_000

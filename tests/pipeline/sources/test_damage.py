@@ -156,6 +156,7 @@ def test_a_message_is_no_header(read: Read, message: str) -> None:
     assert read(joined(*rows(300), message, *rows(300, 3.0)), skip_bad=True).rows == 600
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("also", ["", "# paused\n"])
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
 def test_a_last_cell_that_is_cut_is_no_value(read: Read, wrong: Wrong, encoding: str, also: str) -> None:

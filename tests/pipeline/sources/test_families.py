@@ -31,6 +31,7 @@ def table(names: str, sign: str = ",") -> str:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("names", "joints", "rates"),
     [

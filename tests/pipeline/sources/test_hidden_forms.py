@@ -34,6 +34,7 @@ def with_line(lines: Sequence[str], number: int, line: str) -> str:
     return "\n".join([*lines[: number - 1], line, *lines[number:]]) + "\n"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("at", [1, 2, 11, 20])
 def test_rows_of_ros2_with_a_message_among_them(wrong: Wrong, read: Read, at: int) -> None:
     lines = (SPECIMENS / "ros2_echo_joint_states.csv").read_text().splitlines()
@@ -103,6 +104,7 @@ def test_a_row_with_a_cell_behind_those_that_the_header_names(wrong: Wrong, at: 
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", [0.0, 1486559106.0])
 @pytest.mark.parametrize("at", [2, 20, 39])
 @pytest.mark.parametrize("cell", ["0.0", "9e9", "", "x"])

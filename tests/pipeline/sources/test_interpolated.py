@@ -104,6 +104,7 @@ def test_jumps_without_a_row_between_are_none(form: RotationForm, read: Read) ->
     assert "interpolated-orientation" not in kinds(log)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["vector", "rpy"])
 def test_many_rows_between_contradict_the_kinematics(form: RotationForm, read: Read) -> None:
     robot = load_robot("ur5e")

@@ -56,6 +56,7 @@ def test_a_line_of_too_many_columns(wrong: Wrong, text: str) -> None:
     assert wrong(text) == [f"log.csv: {WIDE}"]
 
 
+@pytest.mark.slow
 def test_too_many_names(wrong: Wrong) -> None:
     assert wrong(_table(MOST_COLUMNS + 1)) == [f"log.csv:1: {WIDE}"]
 

@@ -186,6 +186,7 @@ def test_a_sign_turns_the_recorded_rates_too(read: Read) -> None:
 SPECIMENS = Path(__file__).parents[2] / "specimens"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [
     "clock_iso_utc.csv", "clock_time_of_day.csv", "clock_minutes.csv", "clock_date_and_time.csv",
     "clock_sec_nanosec.csv", "clock_ms_unsaid.csv", "matlab_timetable.csv", "coppeliasim_three_graphs.csv",

@@ -49,6 +49,7 @@ def about_rows(log: JointLog) -> list[str]:
     return [warning.message for warning in log.warnings if warning.kind in ("end-rows", "start-rows")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("count", "place"), [(1, "data row 301"), (40, "data rows 301 to 340")])
 @pytest.mark.parametrize(("sign", "header"), [(",", True), (";", True), ("\t", True), (",", False)])
 @pytest.mark.parametrize("ticks", [True, False])

@@ -236,6 +236,7 @@ def measured(
 DEG = np.pi / 180.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["xyz", "rpy", "vector"])
 @pytest.mark.parametrize(("unit", "turn"), [(1e-3, DEG), (1.0, 1.0), (1e-2, DEG)], ids=["mm deg", "m", "cm"])
 def test_units_and_form_of_a_measured_tool_are_told_by_the_joints(

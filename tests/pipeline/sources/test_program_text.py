@@ -156,6 +156,7 @@ def test_plc_text_that_is_no_table(wrong: Wrong, text: str, said: str) -> None:
     assert wrong(text) == [f"log.csv{said}"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not LOGS.is_dir(), reason="the real logs in ../shared/logs are not here")
 def test_plc_real_identification_run() -> None:
     """12,501 samples at 0.8 ms of six joints: the joints are phi_r, in deg by their speeds."""

@@ -96,6 +96,7 @@ def test_tables_come_back_as_they_were(table: Written) -> None:
     assert log.clock_start == table.times[0] / 10**9
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.decimals(0, 10**6, allow_nan=False, places=12), min_size=3, max_size=20, unique=True))
 def test_decimal_times_are_rounded_once(times: list[object]) -> None:

@@ -296,6 +296,7 @@ def _same_tool(log: JointLog, truth: Truth) -> None:
         assert between.magnitude().max() <= truth.rotation_within
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", WRONG, ids=_name)
 def test_what_is_wrong_with_a_specimen_is_said(case: Wrong) -> None:
     stopped, said = outcome(case)

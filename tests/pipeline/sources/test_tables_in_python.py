@@ -275,6 +275,7 @@ def test_arrays_are_a_log(what: str, t: Any, q: Any) -> None:
     assert (log.joints, log.warnings) == (("q1", "q2", "q3"), ())
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(st.integers(1, 7), st.integers(2, 40), st.sampled_from([0.001, 0.0123, 0.1]), st.booleans())
 def test_arrays_read_as_their_csv(joints: int, rows: int, period: float, wraps: bool) -> None:

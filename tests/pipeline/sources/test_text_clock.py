@@ -310,6 +310,7 @@ def test_dates_are_exact_parsed_and_by_row(start: datetime, steps: list[int], wr
     assert [times.tolist() for times in read if times is not None] == [wanted, wanted]
 
 
+@pytest.mark.slow
 def test_a_log_with_dates_and_the_same_with_seconds_have_the_same_times(tmp_path: Path) -> None:
     """Rows are read by the block: the last of one and the first of the next keep their places."""
     count = 70_000

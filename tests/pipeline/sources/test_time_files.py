@@ -48,6 +48,7 @@ def test_a_file_of_times(write: Write, times: str, name: str, header: str, first
     assert "assumed-period" not in [warning.kind for warning in log.warnings]
 
 
+@pytest.mark.slow
 def test_a_row_of_times_longer_than_what_is_sniffed(write: Write) -> None:
     count = 50_000
     joints = write("".join(f"{k % 7}.5,{k % 3}.25\n" for k in range(count)), "q.csv")

@@ -51,6 +51,7 @@ def assert_path(log: JointLog, position: FloatArray, quat: FloatArray) -> None:
     np.testing.assert_allclose(same, 1.0, rtol=0.0, atol=1e-12)  # rounding of a matrix and back
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", JOINTS)
 @pytest.mark.parametrize("rows", [1, 2, 200])
 @pytest.mark.parametrize("clock", ["even", "irregular", "unix", "rows", "rising x"])
@@ -115,6 +116,7 @@ def test_the_other_order_of_a_quaternion_is_told(read: Read) -> None:
     assert not [one for one in log.warnings if one.kind == "assumed-form"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", JOINTS)
 @pytest.mark.parametrize("rows", [1, 2, 60])
 @pytest.mark.parametrize("form", ["kitti", "with a clock", "whole", "whole with a clock"])

@@ -60,6 +60,7 @@ def test_joints_as_rows(sign: str, decimal: str, read: Read) -> None:
     np.testing.assert_array_equal(read(text, layout="transposed").q, q)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sign", "decimal"), STYLES)
 def test_a_time_as_the_first_row(sign: str, decimal: str, read: Read) -> None:
     q = motion(joints=7)
@@ -91,6 +92,7 @@ def test_rows_that_begin_with_a_name_are_joints(names: list[str], head: str, rea
     )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", [2, 6, 7])
 @pytest.mark.parametrize("end", ["\n", " "])
 def test_numbers_one_by_one_sample_by_sample(joints: int, end: str, read: Read) -> None:
@@ -105,6 +107,7 @@ def test_numbers_one_by_one_sample_by_sample(joints: int, end: str, read: Read) 
     np.testing.assert_array_equal(read(text, layout=answers[0]).q, q)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", [2, 6, 7])
 @pytest.mark.parametrize("head", ["", "q\n"])
 def test_numbers_one_by_one_joint_by_joint(joints: int, head: str, read: Read) -> None:

@@ -328,6 +328,7 @@ def test_positions_where_no_arm_works_are_doubted(unit: str, per_m: float, read:
     follow_hints(lambda **given: read(table, **given), log)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "table",
     [

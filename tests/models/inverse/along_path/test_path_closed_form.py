@@ -113,6 +113,7 @@ def test_a_path_within_an_aligned_wrist_keeps_the_free_joints_still(robot: str) 
     assert [one.text for one in path.singular] == ["samples 0 to 200, 0.000 to 1.000 s: wrist aligned"]
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=15)
 @given(st.integers(0, 10_000), st.sampled_from(["arm6", "ur5e"]))
 def test_a_walk_is_what_taking_the_nearest_sample_by_sample_gives(seed: int, robot: str) -> None:

@@ -105,6 +105,7 @@ def test_the_distance_to_singular_poses_is_told_along_the_path(followed: JointPa
     assert smallest[1000:].min() > 1e-3
 
 
+@pytest.mark.slow
 def test_windows_give_what_one_sample_after_the_other_gives(
     followed: JointPath, demo_path: FloatArray
 ) -> None:

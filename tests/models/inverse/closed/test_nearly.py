@@ -116,6 +116,7 @@ def test_an_arm_as_built_has_every_branch_away_from_singular_poses(name: str) ->
     assert_all_found(chain, q, form.solve(targets_of(chain, q)))
 
 
+@pytest.mark.slow
 def test_random_arms_with_sliding_joints_are_solved_beside_their_forms() -> None:
     generator = np.random.default_rng(5)
     for kinds in ("RRR", "PRR", "RRP", "RPR"):
@@ -261,6 +262,7 @@ def test_what_stands_at_q0_is_a_pose_as_any_other(tmp_path: Path) -> None:
     assert math.isfinite(nearly(chain).deviation[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["arm6", "ur5e"])
 def test_beside_a_singular_pose_an_arm_stays_where_it_is_wished(name: str) -> None:
     chain = as_built(load_robot(name), 3e-4)

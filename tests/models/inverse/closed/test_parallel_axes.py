@@ -43,6 +43,7 @@ def test_random_arms_with_any_twist_base_and_tool_are_solved(wrist: str) -> None
         assert apart(solutions, q).max() < 1e-6  # near singular poses: the root of the rounding
 
 
+@pytest.mark.slow
 def test_axes_5_and_6_that_pass_each_other_closely_leave_all_digits() -> None:
     rng = np.random.default_rng(9)
     for number in range(30):

@@ -29,6 +29,7 @@ def eaik_solutions(chain: Chain, targets: Targets, row: int) -> FloatArray:
     return np.array(found).reshape(-1, 6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrist", ["ur", *WRISTS])
 def test_eaik_finds_as_many_solutions_and_the_same(wrist: str) -> None:
     # EAIK returns wrong values where axes 2, 3, 4 are antiparallel: its arms here have them one way

@@ -170,6 +170,7 @@ def arm_points(found: Screws, centre: FloatArray, q: FloatArray) -> tuple[FloatA
     return points[0], points[1], points[2]
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 2**32 - 1), special=st.sampled_from(sorted(SPECIAL)))
 @settings(max_examples=25, deadline=None)
 def test_names_base_tool_and_zeros_change_no_branch(seed: int, special: str) -> None:

@@ -46,6 +46,7 @@ def planar() -> Chain:
 # --- what is solved ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["urm6", "panda", "ur5e"])
 def test_random_reachable_poses_are_solved(robot: str) -> None:
     chain = load_robot(robot)
@@ -90,6 +91,7 @@ def test_a_singular_target_is_met_however_short_the_steps_towards_it() -> None:
     assert_solved(chain, targets, found)
 
 
+@pytest.mark.slow
 def test_of_the_solutions_that_are_found_first_the_nearest_to_the_start_is_taken() -> None:
     """Attempts come one, two, four, ... at a time; here each is made alone."""
     chain = load_robot("urm6")
@@ -176,6 +178,7 @@ def test_every_solution_is_distinct_ordered_and_met() -> None:
 # --- the same again ----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", ["urm6", "urm8"])
 def test_the_same_seed_finds_the_same_and_another_seed_begins_elsewhere(robot: str) -> None:
     chain = load_robot(robot)
