@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -94,13 +95,23 @@ def test_a_block_that_ends_the_process_is_told(code: str, how: str) -> None:
     assert with_trouble(trouble_in("step", code)).failed == failed
 
 
+def runs(pid: str) -> bool:
+    """Tell whether a process is there, and not only its exit code."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").split()[2] != "Z"
+    except OSError:
+        return False
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for the process in /proc")
 def test_what_an_fmu_started_ends_with_it() -> None:
     said = 'LOG(m, fmi2Error, "%d", pid); return fmi2Error;'
     forks = trouble_in("step", f"int pid = fork(); if (!pid) {HANGS} {said}")
     pid = there(re.search(r"fmi2Error: (\d+)$", there(with_trouble(forks).failed)))[1]
-    state = Path(f"/proc/{pid}/stat")
-    assert not state.exists() or state.read_text().split()[2] == "Z"
+    late = time.monotonic() + 30.0  # s: nothing but the kill ends it, and that takes a moment
+    while runs(pid) and time.monotonic() < late:
+        time.sleep(0.01)
+    assert not runs(pid)
 
 
 def test_many_short_calls_are_none_that_hangs() -> None:
