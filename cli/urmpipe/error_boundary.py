@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 SHOWN_FINDINGS = 20
 """Errors printed line by line; the others are counted."""
 
+OWN_ERROR = "(an error in urmpipe;"
+"""How a line marks an error that nobody raised on purpose."""
+
 
 def open_streams() -> None:
     """Make both outputs take whatever a name of a file holds, also where the caller has closed them."""
@@ -71,7 +74,7 @@ def findings_of(error: BaseException) -> Sequence[Finding]:
         case ValueError() if str(error).startswith("embedded null "):  # what a path cannot hold
             said = "found a null character, allowed: none in the name of a file"
         case _:
-            said = f"{type(error).__name__}: {error} (an error in urmpipe; --debug shows the traceback)"
+            said = f"{type(error).__name__}: {error} {OWN_ERROR} --debug shows the traceback)"
     return [Finding(said)]
 
 

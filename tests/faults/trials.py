@@ -12,8 +12,7 @@ from pathlib import Path
 
 from forks import Ended, Forks
 from jobs import Job, check_whole
-
-FAULT = "a fault of urmpipe itself"
+from urmpipe.error_boundary import OWN_ERROR
 
 Content = dict[str, bytes]
 
@@ -129,7 +128,7 @@ def _check_end(job: Job, ended: Ended, *, killed: bool) -> None:
     """Hold that a command ended by itself, in order, and that nothing of it is left."""
     assert not ended.hung, (job.name, ended)
     assert not ended.left, (job.name, ended)
-    assert FAULT not in ended.err, (job.name, ended)
+    assert OWN_ERROR not in ended.err, (job.name, ended)
     if not killed:
         assert "Traceback" not in ended.err, (job.name, ended)
 

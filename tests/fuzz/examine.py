@@ -14,6 +14,8 @@ from tests.fuzz.byte_mutators import mutate
 from tests.fuzz.corpus import Specimen
 from tests.fuzz.kinds import Kind
 
+from urmpipe.error_boundary import OWN_ERROR, findings_of
+
 FAULT, ABORT, SLOW, LARGE = "fault", "abort", "slow", "large"
 """What can be wrong: an error that is none of urmpipe's, an end of the process, too long, too much memory."""
 
@@ -22,9 +24,6 @@ MEMORY = 10**9
 
 AREAS = ("urmpipe", "urmpipe_models", "urmpipe_pipeline", "urmpipe_fmus", "urmpipe_datasets")
 """The packages of ours, by which places in a traceback are known."""
-
-MARK = "(a fault of urmpipe itself"
-"""How the command line marks an error that nobody raised on purpose."""
 
 
 @dataclass(frozen=True)
@@ -67,8 +66,6 @@ def changed(kind: Kind, specimens: list[Specimen], chosen: Specimen, rng: Random
 
 def examine(kind: Kind, path: Path, made: Path, rng: Random) -> Outcome:
     """Read a file as its kind is read, and return what came of it."""
-    from urmpipe.error_boundary import findings_of
-
     _reset_peak()
     error: BaseException | None = None
     begin = time.perf_counter()
@@ -82,7 +79,7 @@ def examine(kind: Kind, path: Path, made: Path, rng: Random) -> Outcome:
     try:
         lines = [one.words("command line") for one in findings_of(error)]
     except Exception as second:  # an error that cannot be told
-        lines, error = [MARK], second
+        lines, error = [OWN_ERROR], second
     text = "".join(traceback.format_exception(error))[-20_000:]
     problem = _problem(error, lines, peak)
     return Outcome(seconds, peak, problem, type(error).__name__, _where(error), text)
@@ -92,7 +89,7 @@ def _problem(error: BaseException, lines: list[str], peak: int) -> str:
     """Return what is wrong with an error and its lines; empty if nothing is."""
     if not isinstance(error, Exception):  # the command line would end with a traceback, as of a panic in Rust
         return ABORT
-    if any(MARK in line or not line.isprintable() for line in lines):
+    if any(OWN_ERROR in line or not line.isprintable() for line in lines):
         return FAULT
     return LARGE if isinstance(error, MemoryError) or peak > MEMORY else ""
 

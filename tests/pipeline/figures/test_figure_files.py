@@ -208,7 +208,7 @@ def test_a_foreign_file_stays_and_nothing_is_written(suffix: FigureFormat, tmp_p
     with pytest.raises(OutputError) as caught:
         written(waves(), tmp_path, "pdf", "svg", "png")
     assert str(caught.value) == (
-        f"{foreign}: found a file that is no figure of urmpipe's, allowed: a new name, or such a figure to"
+        f"{foreign}: found a file that is not a figure of urmpipe, allowed: a new name, or such a figure to"
         " replace"
     )
     assert [*tmp_path.iterdir()] == [foreign]
@@ -269,7 +269,10 @@ import sys
 from pathlib import Path
 from toys import figure, panel, shown, toy
 from urmpipe_pipeline.figures import FigureOptions, write_figures
-files = write_figures([shown(figure(panel(toy())))], FigureOptions(Path("figures"), ("pdf",)))
+from urmpipe_pipeline.figures.plot import plot
+waves = shown(figure(panel(toy())))
+plot(waves, None, "page", 8.0)
+files = write_figures([waves], FigureOptions(Path("figures"), ("pdf",)))
 print("matplotlib.pyplot" in sys.modules, sum(file.path.exists() for file in files))
 """
 

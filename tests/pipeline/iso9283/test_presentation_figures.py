@@ -170,7 +170,7 @@ def test_a_small_overshoot_far_from_its_corner_is_told_and_not_drawn(iso: IsoTes
     aside = replace(one, beyond=far + np.array([1e-5, 0.0, 0.0]), foot=far, overshoot=1e-5)
     drawing = corner_drawing(iso, replace(path, corners=(aside,)))
     assert not list(lengths(ET.fromstring(drawing.svg), "CO"))
-    assert "CO: 80.00 mm from the corner" in drawing.svg and "CO 0.0100 mm" in drawing.alt
+    assert "CO: 80.00 mm from the corner" in drawing.svg and "CO 0.01000 mm" in drawing.alt
 
 
 # --- plots -----------------------------------------------------------------------------------------
