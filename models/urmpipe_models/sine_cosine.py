@@ -77,7 +77,7 @@ def cosine_sine_into(x: FloatArray, c: FloatArray, s: FloatArray, *work: FloatAr
     Args:
         x: Any shape and strides.
         c: An array of the same shape, apart from x.
-        s: Another one.
+        s: Another one, of the same shape.
         work: `WORK` more.
     """
     if not (x.min(initial=0.0) >= -_MOST and x.max(initial=0.0) <= _MOST):
@@ -131,7 +131,7 @@ def _less_turns(x: FloatArray) -> FloatArray:
 
 @cache
 def table() -> tuple[FloatArray, FloatArray]:
-    """Return cos and sin of k 2 pi / 4096, shape (4096,), each the nearest double.
+    """Return cos and sin [-] of k 2 pi / 4096, shape (4096,), each the nearest double.
 
     One step after the other is added in whole numbers of 2^-128, up to an eighth of a turn; the rest is
     symmetry. The errors of 512 steps reach 1e-35, and no value is that close to the middle of two doubles.

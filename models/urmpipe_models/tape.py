@@ -35,7 +35,7 @@ Operation: TypeAlias = tuple[Callable[..., object], Callable[[Sequence[FloatArra
 
 
 def aligned(rows: int, length: int) -> FloatArray:
-    """Return an array of shape (rows, length), not filled, each row of which starts a line of the cache."""
+    """Return an empty array in any unit, shape (rows, length); each row starts at a line of the cache."""
     width = -(-length // _LINE) * _LINE
     memory = np.empty(rows * width + _LINE)
     start = -memory.ctypes.data // memory.itemsize % _LINE
@@ -47,8 +47,8 @@ def fill_over_log(function: Function, q: FloatArray, targets: Sequence[FloatArra
 
     Args:
         function: Of one element per coordinate, by + - *, their like among NumPy's ufuncs, and `cosine_sine`.
-        q: One row a sample, shape (n, coordinates).
-        targets: An array of shape (n,) for each element that the function returns.
+        q: Joint values in [rad] or [m], shape (n, coordinates).
+        targets: For each element that the function returns an array in its unit, shape (n,).
     """
     if len(q) < LONG:
         columns = np.ascontiguousarray(q.T, dtype=np.float64)

@@ -100,7 +100,7 @@ def test_a_display_that_does_not_answer_is_one_line(
     assert ran.code == 2
     assert ran.err.startswith(
         "error: the viewer ended with exit code 1, allowed: a display and a graphics driver that it can use;"
-        " what is wrong it says itself: "
+        " to see its messages: "
     )
     assert ran.err.count("\n") == 1
 

@@ -78,11 +78,8 @@ def by_kinematics(run: Run) -> Trajectory:
     """
     if run.tcp is None or run.robot is None:
         raise LogError(without_robot(run))
-    if run.rows is None:
-        position, quat = run.tcp.position, quaternions(run.tcp.euler_zyx, "zyx")
-    else:
-        position, rotation = poses_over_log(run.robot, run.rows.q)
-        quat = quaternions(rotation.reshape(-1, 9), "matrix")
+    position, rotation = poses_over_log(run.robot, run.q if run.rows is None else run.rows.q)
+    quat = quaternions(rotation.reshape(-1, 9), "matrix")
     return _by_joints(run, position, continuous_quaternions(quat))
 
 

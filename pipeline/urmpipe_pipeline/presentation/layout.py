@@ -44,7 +44,7 @@ class TwoScales:
         return self._odd(values, sizes, np.array([0.0, BAND_SHARE, 1.0]))
 
     def value(self, heights: FloatArray) -> FloatArray:
-        """Return the values that stand at some heights, in any shape: the inverse of `height`."""
+        """Return the values, in the limit's unit, at heights [-] of any shape: the inverse of `height`."""
         sizes = np.array([0.0, self.limit, self.top])
         return self._odd(heights, np.array([0.0, BAND_SHARE, 1.0]), sizes)
 

@@ -60,7 +60,7 @@ def line(
         unit: Unit of the values; empty without one.
         points: How many of its samples may stay.
         keep: Samples that stay in any case.
-        at: Where the values stand on an axis of two scales, shape (n,); None: where they are.
+        at: Where the values stand on an axis of two scales [-], shape (n,); None: where they are.
         **more: Further settings of the trace.
     """
     kept: IntArray = np.union1d(decimate(values, points, t), np.asarray(keep, dtype=np.int64))
