@@ -6,6 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("any-load", settings.default, deadline=None)  # a busy machine is no fault
+settings.load_profile("any-load")
 
 SHARED = Path(__file__).resolve().parents[1].parent / "shared"
 

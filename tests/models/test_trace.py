@@ -24,7 +24,7 @@ from urmpipe_models.drives.drive import (
     shaft_torque,
 )
 from urmpipe_models.drives.set_point import JointMotion, set_point
-from urmpipe_models.kinematics.forward import forward, jacobian
+from urmpipe_models.kinematics.forward import forward, jacobian, tip_position
 from urmpipe_models.kinematics.identification import Twist, sensitivities
 from urmpipe_models.kinematics.motion import motions
 from urmpipe_models.robots.catalogue import load_robot
@@ -89,6 +89,7 @@ def test_forward_jacobian_and_motions_trace_with_symbolic_joints(symbols: list[A
     q, qd, qdd = symbols
     x, xd, xdd = (symbol.elements() for symbol in symbols)
     pose_of = traced("pose", [q], [*forward(chain, x)[-1].translation])
+    position_of = traced("position", [q], [*tip_position(chain, x)])
     euler_of = traced("euler", [q], [*euler_zyx(forward(chain, x)[-1].rotation)])
     zxz_of = traced("zxz", [q], [*euler_zxz(forward(chain, x)[-1].rotation)])
     jacobian_of = traced("jacobian", [q], flat(jacobian(chain, x)))
@@ -96,6 +97,7 @@ def test_forward_jacobian_and_motions_trace_with_symbolic_joints(symbols: list[A
     for values in np.random.default_rng(11).uniform(-1.0, 1.0, (20, 3, 6)).tolist():
         tip = forward(chain, values[0])[-1]
         assert_traced(pose_of(values[0]), flat(tip.translation))
+        assert_traced(position_of(values[0]), flat(tip_position(chain, values[0])))
         assert_traced(euler_of(values[0]), flat(euler_zyx(tip.rotation)), size=20.0)  # 1 / cos(ry)
         assert_traced(zxz_of(values[0]), flat(euler_zxz(tip.rotation)), size=20.0)  # 1 / sin(x)
         assert_traced(jacobian_of(values[0]), flat(jacobian(chain, values[0])))
