@@ -24,7 +24,8 @@ from urmpipe_models.drives.drive import (
     shaft_torque,
 )
 from urmpipe_models.drives.set_point import JointMotion, set_point
-from urmpipe_models.kinematics.forward import forward, jacobian, tip_position
+from urmpipe_models.kinematics.forward import forward, jacobian
+from urmpipe_models.kinematics.frames import tip_position
 from urmpipe_models.kinematics.identification import Twist, sensitivities
 from urmpipe_models.kinematics.motion import motions
 from urmpipe_models.robots.catalogue import load_robot

@@ -202,6 +202,7 @@ def _legend(axes: Axes, entries: Entries, levels: int) -> int:
     )
 
     def write(columns: int) -> Legend:
+        """Write the legend in so many columns."""
         return axes.legend(
             [*entries.values()], [*entries], loc="lower left", ncols=columns, borderaxespad=0.0,
             bbox_to_anchor=(0.0, 1.0), bbox_transform=axes.transAxes + above,

@@ -182,6 +182,7 @@ def _saver(one: Listed, options: FigureOptions) -> Callable[[Path, str], None]:
     }
 
     def save(path: Path, suffix: str) -> None:
+        """Write the figure in the format of a suffix."""
         sheet.savefig(path, format=suffix, dpi=options.dpi, metadata=metadata[suffix])
         if suffix == "svg":
             _write_svg(path, path.read_text(encoding="utf-8"), one)

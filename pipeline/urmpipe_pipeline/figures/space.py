@@ -108,6 +108,7 @@ def _place(made: Sheet, axes: Axes3D, size: Size, entries: dict[str, Artist], sc
     square, box = _fitted(made, axes)
 
     def write(columns: int) -> Legend:
+        """Write the legend in so many columns."""
         legend: Legend = axes.legend(
             [*entries.values()], [*entries], loc="upper left", ncols=columns, borderaxespad=0.0,
             bbox_to_anchor=(0.01, 0.995), bbox_transform=made.transFigure,
