@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import quaternions, slerp
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
@@ -78,9 +78,11 @@ def by_kinematics(run: Run) -> Trajectory:
     """
     if run.tcp is None or run.robot is None:
         raise LogError(without_robot(run))
-    position, rotation = poses_over_log(run.robot, run.q if run.rows is None else run.rows.q)
-    quat = quaternions(rotation.reshape(-1, 9), "matrix")
-    return _by_joints(run, position, continuous_quaternions(quat))
+    tcp = run.tcp
+    if run.rows is not None:  # by the arithmetic of the grid, so that no grid changes a bit of a verdict
+        still = np.zeros_like(run.rows.q)
+        tcp = point_over_log(run.robot, run.rows.q, still, still)
+    return _by_joints(run, tcp.position, continuous_quaternions(quaternions(tcp.euler_zyx, "zyx")))
 
 
 def as_recorded(run: Run) -> Trajectory:

@@ -13,7 +13,7 @@ from made_runs import TSP, URM6, path_run, run_of
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.visual import Mesh, Visual
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_models.kinematics.forward import positions_over_log
+from urmpipe_models.kinematics.forward import points_over_log, positions_over_log
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.joint_log import LogColumn, LogWarning
@@ -30,7 +30,7 @@ def q() -> FloatArray:
 
 
 def test_a_path_made_by_the_arm_itself_has_no_deviation(q: FloatArray) -> None:
-    result = compare_runs(path_run(positions_over_log(URM6, q)), [run_of(q)])
+    result = compare_runs(path_run(points_over_log(URM6, q)[:, -1]), [run_of(q)])
     assert result.verdict == "pass"
     assert result.runs[0].delta.max() == 0.0
     assert result.runs[0].left_out == 0
@@ -83,7 +83,7 @@ def test_samples_without_a_reference_or_a_value_are_left_out_and_counted(q: Floa
 
 
 def test_an_offset_shifts_the_log_against_the_reference(q: FloatArray) -> None:
-    wanted = path_run(positions_over_log(URM6, q))
+    wanted = path_run(points_over_log(URM6, q)[:, -1])
     late = compare_runs(wanted, [run_of(q[100:])], CompareOptions(sync=0.5)).runs[0]
     assert late.delta.max() == 0.0
     assert late.sync.offset == 0.5
@@ -91,7 +91,7 @@ def test_an_offset_shifts_the_log_against_the_reference(q: FloatArray) -> None:
 
 
 def test_an_offset_is_estimated_and_what_it_leaves_out_on_both_sides_is_told(q: FloatArray) -> None:
-    wanted = path_run(positions_over_log(URM6, q)[:450])
+    wanted = path_run(points_over_log(URM6, q)[:, -1][:450])
     broken = q[100:].copy()
     broken[30, 2] = np.nan
     result = compare_runs(wanted, [run_of(broken)], CompareOptions(sync="auto"))
@@ -137,7 +137,7 @@ def test_one_log_alone_has_one_clock(q: FloatArray) -> None:
 
 
 def test_logs_with_one_name_are_told_apart(q: FloatArray) -> None:
-    wanted = path_run(positions_over_log(URM6, q))
+    wanted = path_run(points_over_log(URM6, q)[:, -1])
     assert [r.name for r in compare_runs(wanted, [run_of(q), run_of(q), run_of(q, name="b")]).runs] == [
         "log", "log-2", "b",
     ]  # fmt: skip
@@ -177,7 +177,7 @@ def test_a_log_that_misses_a_path_for_want_of_a_tool_says_so(q: FloatArray) -> N
 
 
 def test_a_path_held_against_a_log_is_told(q: FloatArray) -> None:
-    path = path_run(positions_over_log(URM6, q))
+    path = path_run(points_over_log(URM6, q)[:, -1])
     (warning,) = compare_runs(run_of(q), [path]).warnings
     assert (warning.kind, warning.message) == (
         "path-as-log",
@@ -188,7 +188,7 @@ def test_a_path_held_against_a_log_is_told(q: FloatArray) -> None:
 
 
 def test_what_is_lacking_is_named(q: FloatArray) -> None:
-    wanted = path_run(positions_over_log(URM6, q))
+    wanted = path_run(points_over_log(URM6, q)[:, -1])
     with pytest.raises(LogError) as error:
         compare_runs(wanted, [run_of(q, robot=None)])
     assert str(error.value) == ("log.csv: no robot, so no forward kinematics; robot=NAME|FILE sets one")
@@ -237,7 +237,7 @@ def test_an_unknown_tool_centre_point_is_refused() -> None:
 
 def test_what_is_wrong_with_the_reference_is_told(q: FloatArray) -> None:
     doubt = LogWarning("assumed-unit", "taken as m", 3)
-    reference = replace(path_run(positions_over_log(URM6, q)), warnings=(doubt,))
+    reference = replace(path_run(points_over_log(URM6, q)[:, -1]), warnings=(doubt,))
     result = compare_runs(reference, [run_of(q)])
     assert result.warnings == (LogWarning("assumed-unit", "taken as m", 3, "path"),)
 
@@ -270,7 +270,7 @@ def test_kinematics_of_different_robots_are_told(q: FloatArray) -> None:
         LogWarning("robots-differ", "the kinematics are those of different robots: a as urm6, b as urm6b"),
     )
     assert compare_runs(run_of(q), [run_of(q, robot=other)]).warnings  # logs of one name are two logs
-    path = path_run(positions_over_log(URM6, q))
+    path = path_run(points_over_log(URM6, q)[:, -1])
     assert not compare_runs(path, [run_of(q)]).warnings
 
 
@@ -279,7 +279,7 @@ def test_meshes_that_went_away_since_the_log_was_read_are_told_once(q: FloatArra
     mesh.write_bytes(b"solid")
     shown = replace(URM6, visuals=(Visual("phi1", Mesh(str(mesh))),))
     logs = [run_of(q, name=name, robot=shown) for name in ("one", "other")]
-    path = path_run(positions_over_log(URM6, q))
+    path = path_run(points_over_log(URM6, q)[:, -1])
     assert compare_runs(path, logs).warnings == ()
     mesh.unlink()
     gone = missing_visuals(shown)
