@@ -71,26 +71,25 @@ def signs(joints: Sequence[int]) -> Edits:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("motion", ["demo", "rich"])
-@pytest.mark.parametrize("joints", [(0,), (2,), (5,), (0, 5), (1, 3)])
-def test_signs_of_one_joint_or_two_are_named_from_50_samples(motion: str, joints: tuple[int, ...]) -> None:
-    answer, wanted = said({}, signs(joints), motion=motion, samples=SHORT, seed=sum(joints))
-    assert wanted <= answer.sure
+def test_the_sign_of_each_joint_is_named_from_50_samples(motion: str) -> None:
+    for j in range(6):
+        answer, wanted = said({}, signs((j,)), motion=motion, samples=SHORT, seed=j)
+        assert wanted <= answer.sure, j
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("motion", ["demo", "rich"])
-def test_so_are_all_of_them(motion: str) -> None:
-    for count in (1, 2):
-        for seed, joints in enumerate(combinations(range(6), count)):
-            answer, wanted = said({}, signs(joints), motion=motion, samples=SHORT, seed=seed)
-            assert wanted <= answer.sure, joints
+def test_so_are_the_signs_of_each_two_joints() -> None:
+    for seed, joints in enumerate(combinations(range(6), 2)):
+        motion = ("demo", "rich")[seed % 2]
+        answer, wanted = said({}, signs(joints), motion=motion, samples=SHORT, seed=seed)
+        assert wanted <= answer.sure, (motion, joints)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["urm6", "ur5e", "panda", "rail_arm"])
 def test_a_sign_and_an_exchange_of_any_arm_are_named(robot: str) -> None:
     chain = rail_arm() if robot == "rail_arm" else load_robot(robot)
-    for edit in (Edit("joint_sign", (0,)), Edit("joint_sign", (3,)), Edit("joints_swapped", (1, 3))):
+    for edit in (Edit("joint_sign", (3,)), Edit("joints_swapped", (1, 3))):
         answer, wanted = said({}, (edit,), chain=chain)
         assert answer.outcome(wanted) == "named"
 
@@ -116,8 +115,13 @@ def test_a_clear_cause_is_named(cause: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("cause", CAUSES)
-@pytest.mark.parametrize(("noise", "oriented"), [(spoilt, False), (fine, False), (uniform, True)])
+@pytest.mark.parametrize(
+    ("cause", "noise", "oriented"),
+    [
+        (cause, *kind)
+        for cause, kind in zip(CAUSES, 3 * [(spoilt, False), (fine, False), (uniform, True)], strict=True)
+    ],
+)
 def test_so_it_is_in_other_noise(cause: str, noise: Noise, oriented: bool) -> None:
     answer, wanted = said(CAUSES[cause], noise=noise, oriented=oriented)
     assert answer.outcome(wanted) == "named"
@@ -172,8 +176,8 @@ def test_correlated_noise_is_no_cause(lasting: float) -> None:
     def noise(rng: np.random.Generator, position: FloatArray) -> FloatArray:
         return drifting(rng, position, lasting)
 
-    silent = [not said({}, noise=noise, seed=seed)[0].best for seed in range(8)]
-    assert sum(silent) >= 7  # 5 % are allowed to alarm
+    silent = [not said({}, noise=noise, seed=seed)[0].best for seed in range(4)]
+    assert sum(silent) >= 3  # 5 % are allowed to alarm
 
 
 @pytest.mark.slow
@@ -184,22 +188,14 @@ def test_white_noise_is_no_cause(samples: int, trials: int) -> None:
 
 
 @pytest.mark.slow
-def test_noise_that_lasts_a_second_is_no_cause() -> None:
-    def noise(rng: np.random.Generator, position: FloatArray) -> FloatArray:
-        return drifting(rng, position, 1.0)
-
-    assert not said({}, noise=noise)[0].best
-
-
-@pytest.mark.slow
 def test_sizes_lie_in_their_intervals() -> None:
     inside = []
     names = tuple(URM6.coordinates)
-    for seed in range(20):
+    for seed in range(10):
         search, result, _ = found(CAUSES["r3"], seed=seed)
         ((cause,), _) = Explained(search, result, names, names).causes()
         inside.append(cause.low[0] <= -2e-3 <= cause.high[0])
-    assert sum(inside) >= 17  # 95 % of 20 are 19, with a standard deviation of 1
+    assert sum(inside) >= 8  # 95 % of 10 are 9.5, with a standard deviation of 0.7
 
 
 @pytest.mark.slow
