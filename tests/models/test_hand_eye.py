@@ -83,7 +83,7 @@ def assert_found(found: HandEye, truth: Truth, *, turned: bool) -> None:
 @pytest.mark.parametrize("turned", [True, False])
 @pytest.mark.parametrize("robot", ["ur10", "ur5e", "urm6", "arm6"])
 def test_any_frames_are_found_from_exact_poses(robot: str, turned: bool) -> None:
-    for seed in range(25):
+    for seed in range(8):
         truth = random_truth(seed, robot=robot)
         assert_found(found_in(truth, turned=turned), truth, turned=turned)
 
@@ -249,13 +249,14 @@ def test_the_form_of_orientations_is_the_one_that_leaves_no_angle(form: Rotation
     alike = {"zyz", "zxz"}  # these differ by quarter turns of base and tool
     for other in (one for one in FORMS if quaternions_fit(columns, one)):
         guess = matrices(quaternions(columns, other))
-        miss = rotation_miss(truth.rotation, guess)
-        known = rotation_miss(truth.rotation, guess, truth.base)
-        assert (miss < 1e-7) == (other == form or {form, other} == alike), other
-        assert (known < 1e-7) == (other == form), other
-        if columns.shape[1] == 3:
-            in_degrees = matrices(quaternions(np.radians(columns), other))
-            assert rotation_miss(truth.rotation, in_degrees) > 0.1
+        fits = rotation_miss(truth.rotation, guess) < 1e-7
+        assert fits == (other == form or {form, other} == alike), other
+        if fits:  # else no base fits, and the known one is of them
+            known = rotation_miss(truth.rotation, guess, truth.base)
+            assert (known < 1e-7) == (other == form), other
+    if columns.shape[1] == 3:
+        in_degrees = matrices(quaternions(np.radians(columns), form))
+        assert rotation_miss(truth.rotation, in_degrees) > 0.1
 
 
 def quaternions_fit(columns: FloatArray, form: RotationForm) -> bool:

@@ -159,9 +159,9 @@ def test_the_arm_with_a_spring_is_the_same_but_for_counterweight_and_spring() ->
 def test_the_sampled_loop_is_stable_all_along_the_contour(robot: str) -> None:
     arm = load_robot(robot)
     plan = planned(CONTOUR, arm, 0.1)
-    places = np.arange(0.0, plan.motion.s[-1], 0.01)  # m: a pose every 10 mm
+    places = np.arange(0.0, plan.motion.s[-1], 0.025)  # m: a pose every 25 mm, two along each arc
     poses = joints_of(plan)[0][np.searchsorted(plan.motion.s, places)]
-    assert len(poses) > 200
+    assert len(poses) > 80
     assert max(spectral_radius(arm, q) for q in poses) < 1.0
 
 
@@ -225,7 +225,7 @@ def test_with_a_gain_of_the_wrong_sign_both_diverge_at_the_same_time(tmp_path: P
         """Return a drive that pushes the wrong way, and whose voltage is no limit to that."""
         if isinstance(one, HeldJoint):
             return one
-        gains = one.gains._replace(acceleration=-one.gains.acceleration)
+        gains = one.gains._replace(acceleration=-4.0 * one.gains.acceleration)  # soon: NumPy steps slowly
         return replace(one, gains=gains, largest_voltage=1e6)
 
     arm, path = irb60(), short_path(tmp_path)

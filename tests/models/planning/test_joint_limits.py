@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from urmpipe_models.planning.from_rows import path_of
 from urmpipe_models.planning.joint_limits import largest_usage, law_of_limits
 from urmpipe_models.planning.joint_motion import JointSlopes, targets_at
 from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.path_joints import joints_along
+from urmpipe_models.planning.path_joints import PathJoints, joints_along
 from urmpipe_models.planning.rows import PathRows
 from urmpipe_models.planning.time_law import TimeLaw
 from urmpipe_models.planning.trapezoid import trapezoid_law
@@ -46,8 +47,17 @@ CASES = {
 """An arm with a closed form, and one with a joint too many at positions, that moves as little as it can."""
 
 
-def followed(chain: Chain, path: LineArcPath, s: FloatArray) -> JointSlopes:
-    return joints_along(chain, path).at(s)
+@cache
+def joints_of(case: str) -> PathJoints:
+    """Return the joints of a case: they follow the path once for all tests."""
+    name, path = CASES[case]
+    return joints_along(load_robot(name), path)
+
+
+def limited(case: str, velocity: float, acceleration: float) -> PathJoints:
+    """Return the joints of a case with limits, which change no value."""
+    name, _ = CASES[case]
+    return replace(joints_of(case), chain=arm(name, velocity, acceleration))
 
 
 @pytest.mark.slow
@@ -58,8 +68,8 @@ def test_slopes_are_those_of_the_joint_values(case: str) -> None:
     Least motion finds each place of the grid from the one before, and so leaves the null space of a redundant
     arm as it comes: an error of the grid, whatever the places.
     """
-    name, path = CASES[case]
-    joints, errors = joints_along(load_robot(name), path), []
+    joints, errors = joints_of(case), []
+    path = joints.path
     for count in (100, 200):
         parts = (np.linspace(a, b, count) for a, b in zip(path.bounds[:-1], path.bounds[1:], strict=True))
         s = np.unique(np.concatenate([*parts]))
@@ -80,8 +90,7 @@ def test_slopes_are_those_of_the_joint_values(case: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_joints_are_those_of_the_grid_and_go_on_between_its_places(case: str) -> None:
-    name, path = CASES[case]
-    joints = joints_along(load_robot(name), path)
+    joints = joints_of(case)
     np.testing.assert_allclose(joints.at(joints.s).q, joints.grid.q, atol=1e-9)  # what it is followed to
     h = 1e-9
     steps = np.abs(joints.at(joints.s[1:-1] + h).q - joints.at(joints.s[1:-1] - h).q)
@@ -100,13 +109,13 @@ def differences(values: FloatArray, s: FloatArray, at: IndexArray) -> FloatArray
 @pytest.mark.parametrize("case", CASES)
 def test_slopes_move_the_tool_along_its_path(case: str) -> None:
     """A step along dq is the tangent, and ddq the curvature: to the third power of the step."""
-    name, path = CASES[case]
-    chain, s = load_robot(name), np.linspace(0.01, path.total - 0.01, 80)
+    path = joints_of(case).path
+    s = np.linspace(0.01, path.total - 0.01, 80)
     s = s[np.abs(s[:, None] - path.bounds).min(axis=1) > 2e-4]
-    found = followed(chain, path, s)
+    found = joints_of(case).at(s)
     h = 1e-4
     ahead = found.q + h * found.dq + 0.5 * h * h * found.ddq
-    miss, turn = misses(chain, ahead, targets_at(path, s + h))
+    miss, turn = misses(joints_of(case).chain, ahead, targets_at(path, s + h))
     allowed = 10.0 * h**3 / path.radius.min() ** 2  # the third derivative of an arc is 1 / r^2
     assert np.abs(miss).max() < allowed
     assert np.abs(turn).max() < allowed
@@ -115,18 +124,18 @@ def test_slopes_move_the_tool_along_its_path(case: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_polished_joints_are_on_the_path(case: str) -> None:
-    name, path = CASES[case]
-    chain, s = load_robot(name), np.linspace(0.0, path.total, 300)
-    found = followed(chain, path, s)
-    assert np.linalg.norm(misses(chain, found.q, targets_at(path, s))[0], axis=1).max() < 1e-14
+    joints = joints_of(case)
+    path, s = joints.path, np.linspace(0.0, joints.path.total, 300)
+    found = joints.at(s)
+    assert np.linalg.norm(misses(joints.chain, found.q, targets_at(path, s))[0], axis=1).max() < 1e-14
 
 
 class Sampled:
     """Our joint values as a path of TOPP-RA, on its own grid."""
 
-    def __init__(self, chain: Chain, path: LineArcPath, s: FloatArray) -> None:
-        self.slopes, self.s = followed(chain, path, s), s
-        self.path_interval, self.dof = np.array([0.0, path.total]), len(chain.coordinates)
+    def __init__(self, joints: PathJoints, s: FloatArray) -> None:
+        self.slopes, self.s = joints.at(s), s
+        self.path_interval, self.dof = np.array([0.0, joints.path.total]), len(joints.chain.coordinates)
         self.waypoints = None
 
     def __call__(self, places: FloatArray, order: int = 0) -> FloatArray:
@@ -134,50 +143,62 @@ class Sampled:
         return np.asarray(values[np.searchsorted(self.s, np.clip(places, 0.0, self.s[-1]))])
 
 
-def by_toppra(chain: Chain, path: LineArcPath, s: FloatArray, scheme: DiscretizationType) -> float:
+def by_toppra(joints: PathJoints, s: FloatArray, scheme: DiscretizationType) -> float:
     """Return the duration that TOPP-RA finds on places of the path."""
+    chain = joints.chain
     both = np.ones((len(chain.coordinates), 2)) * [-1.0, 1.0]
     limits = [
         JointVelocityConstraint(chain.moving[0].velocity * both),
         JointAccelerationConstraint(chain.moving[0].acceleration * both, discretization_scheme=scheme),
     ]
-    instance = TOPPRA(limits, Sampled(chain, path, s), gridpoints=s, parametrizer="ParametrizeConstAccel")
+    instance = TOPPRA(limits, Sampled(joints, s), gridpoints=s, parametrizer="ParametrizeConstAccel")
     _, speeds, _ = instance.compute_parameterization(0.0, 0.0)
     return float((2.0 * np.diff(s) / (speeds[1:] + speeds[:-1])).sum())
 
 
+BOTH, RATES, ACCELERATIONS = (2.0, 5.0), (0.4, 20.0), (5.0, 1.0)
+"""Limits of rates in [rad/s] and accelerations in [rad/s2]: both count, rates count, accelerations count."""
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("case", CASES)
-@pytest.mark.parametrize("way", ["line", "contour"])
-@pytest.mark.parametrize(("velocity", "acceleration"), [(2.0, 5.0), (0.4, 20.0), (5.0, 1.0)])
-def test_the_law_of_limits_is_as_fast_as_toppra(
-    case: str, way: str, velocity: float, acceleration: float
-) -> None:
+@pytest.mark.parametrize(
+    ("case", "way", "limits"),
+    [  # every two of them together
+        ("poses", "line", BOTH),
+        ("poses", "contour", RATES),
+        ("poses", "line", ACCELERATIONS),
+        ("positions", "contour", BOTH),
+        ("positions", "line", RATES),
+        ("positions", "contour", ACCELERATIONS),
+    ],
+)
+def test_the_law_of_limits_is_as_fast_as_toppra(case: str, way: str, limits: tuple[float, float]) -> None:
     """Within 1 %, and never faster by more than 0.1 %, on the same places and the same joint values.
 
     TOPP-RA knows one curvature at a place. Interpolating, it would hold the end of a line to that of the arc
     behind it, which costs 1 %: so a path with arcs is held against its collocation.
     """
-    name, path = CASES[case]
+    joints = limited(case, *limits)
     if way == "line":
         ends = np.array([[0.0, 0.1, 0.0], [0.1, -0.2, 0.0]])
-        path = path_of(PathRows(path.points(path.stops).position + ends))
-    chain = arm(name, velocity, acceleration)
-    law = law_of_limits(joints_along(chain, path))
-    s = np.append([phase.s for phase in law.phases], path.total)
+        path = joints.path
+        joints = joints_along(joints.chain, path_of(PathRows(path.points(path.stops).position + ends)))
+    law = law_of_limits(joints)
+    s = np.append([phase.s for phase in law.phases], joints.path.total)
     wanted = by_toppra(
-        chain, path, s, DiscretizationType.Interpolation if way == "line" else DiscretizationType.Collocation
+        joints, s, DiscretizationType.Interpolation if way == "line" else DiscretizationType.Collocation
     )
     assert 0.999 * wanted <= law.duration <= 1.01 * wanted
 
 
-def on_grid(chain: Chain, path: LineArcPath, law: TimeLaw) -> tuple[FloatArray, FloatArray]:
+def on_grid(joints: PathJoints, law: TimeLaw) -> tuple[FloatArray, FloatArray]:
     """Return how much of their limits rates and accelerations use, just inside both ends of every phase."""
     ends = law.ends
     begin = np.append(0.0, ends[:-1])
     t = np.sort(np.concatenate((begin + 1e-9 * (ends - begin), ends - 1e-9 * (ends - begin))))
     found = law.at(t)
-    rates, accelerations = followed(chain, path, found.s).rates(found.v, found.a)
+    rates, accelerations = joints.at(found.s).rates(found.v, found.a)
+    chain = joints.chain
     velocity, acceleration = chain.moving[0].velocity, chain.moving[0].acceleration
     return np.abs(rates) / velocity, np.abs(accelerations) / acceleration
 
@@ -186,10 +207,8 @@ def on_grid(chain: Chain, path: LineArcPath, law: TimeLaw) -> tuple[FloatArray, 
 @pytest.mark.parametrize("case", CASES)
 def test_the_law_of_limits_runs_at_its_limits(case: str) -> None:
     """On its grid no limit is exceeded, and nearly everywhere one is used up."""
-    name, path = CASES[case]
-    chain = arm(name, 1.0, 5.0)
-    law = law_of_limits(joints_along(chain, path))
-    rates, accelerations = on_grid(chain, path, law)
+    joints = limited(case, 1.0, 5.0)
+    rates, accelerations = on_grid(joints, law_of_limits(joints))
     assert rates.max() < 1.0 + 1e-6  # so far inside an interval they are looked at
     assert accelerations.max() < 1.0 + 1e-6
     used = np.maximum(rates.max(axis=1), accelerations.max(axis=1))
@@ -197,12 +216,13 @@ def test_the_law_of_limits_runs_at_its_limits(case: str) -> None:
 
 
 def test_speed_and_acceleration_of_the_tool_hold_too() -> None:
-    name, path = CASES["poses"]
-    law = law_of_limits(joints_along(arm(name, 5.0, 50.0), path), 0.2, 1.0)
+    law = law_of_limits(limited("poses", 5.0, 50.0), 0.2, 1.0)
     found = law.at(np.linspace(0.0, law.duration, 5000))
     assert found.v.max() <= 0.2 * (1.0 + 1e-9)
     assert np.abs(found.a).max() <= 1.0 + 1e-9
-    assert law.duration == pytest.approx(path.total / 0.2 + 0.2 / 1.0, rel=1e-3)  # the joints hardly matter
+    assert law.duration == pytest.approx(
+        CASES["poses"][1].total / 0.2 + 0.2 / 1.0, rel=1e-3
+    )  # the joints hardly matter
 
 
 def test_it_rests_at_stops_and_where_the_turn_changes_its_rate() -> None:
@@ -229,8 +249,7 @@ def test_a_joint_without_room_gives_no_freedom() -> None:
     *others, last = chain.joints
     locked = replace(chain, joints=(*others, replace(last, lower=0.3, upper=0.3)))
     path = square(0.3, 0.3, turned=False)
-    s = np.linspace(0.0, path.total, 200)
-    found = followed(locked, path, s)
+    found = joints_along(locked, path).at(np.linspace(0.0, path.total, 200))
     np.testing.assert_array_equal(found.q[:, -1], 0.3)
     np.testing.assert_array_equal(found.dq[:, -1], 0.0)
     np.testing.assert_array_equal(found.ddq[:, -1], 0.0)
@@ -241,9 +260,8 @@ def test_a_joint_without_room_gives_no_freedom() -> None:
 @pytest.mark.parametrize("case", CASES)
 def test_the_largest_usage_is_that_of_many_places(case: str) -> None:
     """Also where s'' steps, in the middle of an interval: by ten times as many places as the grid has."""
-    name, path = CASES[case]
-    joints = joints_along(arm(name, 1.0, 2.0), path)
-    law = trapezoid_law(path, 0.5, 6.0)
+    joints = limited(case, 1.0, 2.0)
+    law = trapezoid_law(joints.path, 0.5, 6.0)
     found = law.at(np.linspace(0.0, law.duration, 40_000)[1:-1])
     rates, accelerations = joints.at(found.s).rates(found.v, found.a)
     wanted = max(np.abs(rates).max() / 1.0, np.sqrt(np.abs(accelerations).max() / 2.0))
@@ -254,37 +272,36 @@ def test_the_largest_usage_is_that_of_many_places(case: str) -> None:
     )  # in proportion
 
 
+@cache
+def narrow_panda() -> tuple[PathJoints, TimeLaw]:
+    """Return the joints of panda at positions, its third one from -0.02 to 0.02 rad, and their law."""
+    chain = load_robot("panda")
+    joints = [replace(one, acceleration=10.0) for one in chain.joints]
+    joints[2] = replace(joints[2], lower=-0.02, upper=0.02)
+    found = joints_along(replace(chain, joints=tuple(joints)), square(0.3, 0.4, turned=False))
+    return found, law_of_limits(found)
+
+
 @pytest.mark.slow
 def test_a_joint_that_comes_to_its_limit_makes_the_others_step() -> None:
-    """Of panda at positions; while its third joint rests on a limit the others move otherwise."""
-    chain = load_robot("panda")
-    narrow = tuple(
-        replace(one, lower=-0.02, upper=0.02) if one.name == "panda_joint3" else one for one in chain.joints
-    )
-    path = square(0.3, 0.4, turned=False)
-    joints = joints_along(replace(chain, joints=narrow), path)
+    """While the third joint rests on a limit the others move otherwise."""
+    joints, law = narrow_panda()
     assert joints.reached
     assert len(joints.rate_steps) > 0
-    q = joints.at(np.linspace(0.0, path.total, 3000)).q[:, 2]
+    q = joints.at(np.linspace(0.0, joints.path.total, 3000)).q[:, 2]
     assert np.abs(q).max() <= 0.02
     at = joints.grid.q[joints.rate_steps, 2]
     np.testing.assert_allclose(np.abs(at), 0.02, atol=1e-11)
-    limited = tuple(replace(one, acceleration=10.0) for one in narrow)
-    law = law_of_limits(joints_along(replace(chain, joints=limited), path))
     np.testing.assert_allclose(law.at(law.time_at(joints.s[joints.rate_steps])).v, 0.0, atol=1e-6)
-    assert not len(joints_along(chain, path).rate_steps)
+    assert not len(joints_along(load_robot("panda"), joints.path).rate_steps)
 
 
 @pytest.mark.slow
 def test_the_contact_with_a_limit_is_found() -> None:
     """The law of limits rests there: by differences no joint accelerates more than it may."""
-    chain = load_robot("panda")
-    joints = [replace(one, acceleration=10.0) for one in chain.joints]
-    joints[2] = replace(joints[2], lower=-0.02, upper=0.02)
-    found = joints_along(replace(chain, joints=tuple(joints)), square(0.3, 0.4, turned=False))
-    law = law_of_limits(found)
+    joints, law = narrow_panda()
     t = np.arange(0.0, law.duration, 0.001)
-    q = found.at(law.at(t).s).q
+    q = joints.at(law.at(t).s).q
     assert np.abs(np.diff(q, n=2, axis=0)).max() / 0.001**2 < 1.01 * 10.0  # differences over phases that meet
 
 
