@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from urmpipe_models.errors import OptionError, RobotError
 from urmpipe_models.kinematics.frames import frames
 from urmpipe_models.lagrange.c_code import c_code
 from urmpipe_models.lagrange.equations import TERMS
-from urmpipe_models.lagrange.open_form import open_form
+from urmpipe_models.lagrange.open_form import OpenForm, open_form
 from urmpipe_models.lagrange.text import equations_text
 from urmpipe_models.transform import from_offset
 
@@ -33,6 +34,12 @@ CASES = [(count, seed) for count, seeds in QUICK.items() for seed in seeds]
 
 def seeded_arm(count: int, seed: int) -> Chain:
     return random_arm(np.random.default_rng(seed), count)
+
+
+@cache
+def seeded_form(count: int, seed: int) -> OpenForm:
+    """Return the open form of an arm: seconds of SymPy, once for all tests."""
+    return open_form(seeded_arm(count, seed))
 
 
 def parallel_neighbours(chain: Chain) -> int:
@@ -64,7 +71,7 @@ def test_each_term_is_that_of_the_numeric_dynamics_in_text_and_in_c(
 ) -> None:
     rng = np.random.default_rng(seed)
     chain = random_arm(rng, count)
-    form = open_form(chain)
+    form = seeded_form(count, seed)
     library, text = compiled(c_code(form), tmp_path), text_terms(equations_text(form))
     for _ in range(5):
         motion, wrench = random_motion(rng, chain), rng.normal(0.0, 5.0, 6).tolist()
@@ -89,7 +96,7 @@ def test_each_term_is_that_of_the_numeric_dynamics_in_text_and_in_c(
 def test_the_work_of_the_drives_is_the_change_of_energy(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     chain = random_arm(rng, count)
-    terms = text_terms(equations_text(open_form(chain)))
+    terms = text_terms(equations_text(seeded_form(count, seed)))
     amplitude, begin, omega = rng.normal(0.0, 0.7, (3, count))
 
     def motion(t: float) -> Motion:
@@ -120,7 +127,7 @@ def test_the_work_of_the_drives_is_the_change_of_energy(count: int, seed: int) -
 @pytest.mark.slow
 @pytest.mark.parametrize(("count", "seed"), CASES)
 def test_the_reduction_adds_no_operation(count: int, seed: int) -> None:
-    for one in open_form(seeded_arm(count, seed)).costs:
+    for one in seeded_form(count, seed).costs:
         assert one.reduced.additions <= one.operations.additions
         assert one.reduced.multiplications <= one.operations.multiplications
 

@@ -83,7 +83,7 @@ def assert_right(mechanism: Mechanism, x: FloatArray) -> int:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(15))
 def test_random_networks_far_from_closing(seed: int) -> None:
     rng = np.random.default_rng(seed)
     network = driven_at_random(random_network(rng, bodies=4, extra=2, elements=3), rng)
