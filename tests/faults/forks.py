@@ -51,10 +51,15 @@ class Ended:
 
 
 class Forks:
-    """The process that is forked."""
+    """The process that is forked.
+
+    Attributes:
+        written: What commands wrote undisturbed, by the command's name and the output's.
+    """
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self._process = process
+        self.written: dict[str, dict[str, bytes]] = {}
 
     def run(
         self,

@@ -23,7 +23,8 @@ def interrupted(forks: Forks, job: Job, folder: Path, number: int, moments: int)
     Returns:
         How often it ended before its outputs were in place, and after.
     """
-    whole, plain = _written(forks, job, folder)
+    plain = _undisturbed(forks, job, folder)
+    whole = forks.written[job.name]
     found: Counter[str] = Counter()
     for moment in range(moments):
         before = _old(job, folder, whole)
@@ -38,7 +39,7 @@ def interrupted(forks: Forks, job: Job, folder: Path, number: int, moments: int)
 
 def limited(forks: Forks, job: Job, folder: Path, sizes: int) -> Counter[str]:
     """Run a command while no file may have more than a share of the bytes that its largest output needs."""
-    whole, _ = _written(forks, job, folder)
+    whole = _whole(forks, job, folder)
     largest = max(map(len, whole.values()))
 
     def run(share: float) -> Ended:
@@ -50,7 +51,7 @@ def limited(forks: Forks, job: Job, folder: Path, sizes: int) -> Counter[str]:
 
 def full(forks: Forks, job: Job, folder: Path, sizes: int) -> Counter[str]:
     """Run a command on a disk with no more room than a share of what all its outputs need."""
-    whole, _ = _written(forks, job, folder)
+    whole = _whole(forks, job, folder)
     largest = sum(map(len, whole.values()))
 
     def run(share: float) -> Ended:
@@ -81,13 +82,21 @@ def _refused(
     return found
 
 
-def _written(forks: Forks, job: Job, folder: Path) -> tuple[Content, Ended]:
-    """Run a command undisturbed, and return what it wrote and how it ended."""
+def _whole(forks: Forks, job: Job, folder: Path) -> Content:
+    """Return what a command writes undisturbed; it runs once for all trials."""
+    if job.name not in forks.written:
+        _undisturbed(forks, job, folder)
+    return forks.written[job.name]
+
+
+def _undisturbed(forks: Forks, job: Job, folder: Path) -> Ended:
+    """Run a command undisturbed, keep what it wrote, and return how it ended."""
     for name in job.outputs:
         (folder / name).unlink(missing_ok=True)
     ended = forks.run(job.line.split(), folder)
     assert ended.code in (0, 1), ended
-    return {name: (folder / name).read_bytes() for name in job.outputs}, ended
+    forks.written[job.name] = {name: (folder / name).read_bytes() for name in job.outputs}
+    return ended
 
 
 def _old(job: Job, folder: Path, whole: Content) -> dict[str, tuple[int, bytes] | None]:
