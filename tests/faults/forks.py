@@ -18,9 +18,14 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from pathlib import Path
+from pkgutil import walk_packages
 from typing import Any
 
-from urmpipe.main import COMMANDS
+import urmpipe
+import urmpipe_datasets
+import urmpipe_fmus
+import urmpipe_models
+import urmpipe_pipeline
 
 HANGS = 100.0
 """Time in [s] after which a command hangs: each takes a second or two."""
@@ -105,11 +110,19 @@ def forks() -> Iterator[Forks]:
 def _answer_orders() -> None:
     """Read orders, a line each, and tell how each ended."""
     libraries = ("fmpy", "pandas", "plotly.graph_objects", "pyarrow.parquet", "rerun.blueprint", "scipy.io")
-    for name in (*libraries, *(f"urmpipe.commands.{name}" for name in COMMANDS)):
+    for name in (*libraries, *_modules()):
         import_module(name)
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # of a fork that is not the command yet
     while line := sys.stdin.readline():
         print(json.dumps(asdict(_ended(json.loads(line)))), flush=True)
+
+
+def _modules() -> Iterator[str]:
+    """Yield the modules of urmpipe, most of which a command imports where it needs them."""
+    for package in (urmpipe, urmpipe_pipeline, urmpipe_fmus, urmpipe_models, urmpipe_datasets):
+        for one in walk_packages(package.__path__, f"{package.__name__}."):
+            if not one.name.endswith("__main__"):
+                yield one.name
 
 
 def _ended(order: dict[str, Any]) -> Ended:

@@ -19,7 +19,7 @@ WARM = 12
 @pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counted in /proc")
 def test_thirty_rounds_leave_nothing_behind(tmp_path: Path) -> None:
-    """A recording left 4 threads and 2.5 MB behind: each round makes two, so that would be 160 threads and 50 MB here."""
+    """A recording left 4 threads and 2.5 MB behind: that would be 160 threads and 100 MB here."""
     done = subprocess.run(
         [sys.executable, Path(__file__).with_name("calls.py"), str(WARM + 20)],
         cwd=tmp_path, env=environment(), capture_output=True, text=True, check=True, timeout=500,
