@@ -168,7 +168,10 @@ def _be_the_command(order: dict[str, Any], out: int, err: int) -> None:
     if order["limit"] is not None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (order["limit"], resource.RLIM_INFINITY))
     sys.argv = ["urmpipe", *order["arguments"]]
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    except KeyboardInterrupt:  # it came before the command began
+        os._exit(1)
     main()
 
 
