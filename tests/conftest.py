@@ -14,11 +14,20 @@ settings.load_profile("any-load")
 SHARED = Path(__file__).resolve().parents[1].parent / "shared"
 
 
+@pytest.fixture(scope="session")
+def session_folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that goes with the session, the same for all processes of pytest-xdist."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if hasattr(request.config, "workerinput") else own) / "session"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
 @pytest.fixture(scope="session", autouse=True)
-def fmu_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Let this process and those it starts keep built FMUs in a folder that goes with the session."""
+def fmu_cache(session_folder: Path) -> Iterator[None]:
+    """Let the processes of this session and those they start keep built FMUs in one folder."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("URMPIPE_CACHE", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("URMPIPE_CACHE", str(session_folder / "cache"))
         yield
 
 

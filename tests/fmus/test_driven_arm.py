@@ -169,7 +169,7 @@ def test_the_unit_is_what_dop853_makes_of_the_equations_and_no_energy_is_lost() 
     whole, unit = OneSystem(chain, wrench), Instance(make_unit("driven_arm", robot=chain))
     put(unit, internal_step=2.5e-4, force=wrench.force, moment=wrench.moment)
     before = whole.stored()
-    for n in range(30):
+    for n in range(24):
         whole.sample(wanted(n * PERIOD))
         whole.go(PERIOD)
         points = wanted(n * PERIOD)[:, whole.driven]
@@ -209,14 +209,21 @@ def test_it_starts_in_equilibrium_with_shafts_twisted_and_currents_and_voltages_
 @pytest.mark.slow
 @needs_native
 def test_an_arm_at_rest_stays_for_ten_seconds() -> None:
-    for chain in (urm6(), with_drives(with_masses(load_robot("urm6")), held=["phi2", "phi4"])):
+    # the arms of test_three_ways.py, whose FMUs are in the session's cache
+    for chain in (urm6(), with_drives(with_masses(sliding_arm()), held=["wrist"])):
         unit = make_unit("driven_arm", robot=chain)
         with FmuRun(cached_fmu(unit, "native"), unit, {}) as fmu:
             found = fmu.over(PERIOD * np.arange(2001, dtype=np.float64), {})
         names = [name for one in unit.variables if one.causality == "output" for name in one.names]
-        columns = [k for k, name in enumerate(names) if name.startswith("phi[")]
-        assert len(columns) == 6
-        assert np.abs(found[:, columns] - chain.start).max() <= 1e-9
+        columns = [k for k, name in enumerate(names) if name.startswith(("phi[", "s["))]
+        assert len(columns) == len(chain.start)
+        turning = [
+            start for start, one in zip(chain.start, chain.moving, strict=True) if one.kind == "revolute"
+        ]
+        sliding = [
+            start for start, one in zip(chain.start, chain.moving, strict=True) if one.kind == "prismatic"
+        ]
+        assert np.abs(found[:, columns] - [*turning, *sliding]).max() <= 1e-9
 
 
 @pytest.mark.slow
@@ -271,7 +278,7 @@ def test_the_internal_step_is_one_at_which_a_stiff_joint_is_stable(
     for one in (arm, coarse):  # no controller: its samples swing the link by themselves
         put(one, phi=1e-3, **(dict.fromkeys(("Kphi", "Kw", "Keps"), 0.0) if rotor else {}))
     put(coarse, internal_step=4.0 * unit.internal_step)
-    for n in range(20):
+    for n in range(8):  # hundreds of internal steps
         arm.do_step(n * PERIOD, PERIOD)
     assert abs(read(arm, "phi")[0]) < 1.1e-3
     with pytest.raises(UnitError, match="is not finite"):
@@ -406,7 +413,7 @@ def test_the_blocks_near_the_unit_with_the_first_order_of_the_communication_step
     duration = 0.6
     expected = as_one_function(duration)
     errors = []
-    for parts in (5, 10, 20, 40):
+    for parts in (5, 10, 20):
         recorded = run_system(PERIOD / parts, duration)
         assert recorded.failed is None
         found = np.column_stack([recorded.column("arm", f"phi[{k}]") for k in range(1, 7)])
@@ -473,7 +480,7 @@ def test_a_spring_beside_a_drive_takes_its_torque_from_the_drive_and_the_arm_sta
         else:
             assert own == other
     unit = Instance(make_unit("driven_arm", robot=chain))
-    for n in range(20):
+    for n in range(10):
         unit.do_step(n * PERIOD, PERIOD)
     stayed = read(unit, "phi", "s")[[0, 2, 1]]
     np.testing.assert_allclose(
@@ -521,7 +528,7 @@ def test_with_springs_no_energy_is_lost_and_the_unit_is_what_dop853_makes_of_the
     whole, unit = OneSystem(chain, PUSH), Instance(make_unit("driven_arm", robot=chain))
     put(unit, internal_step=2.5e-4, force=PUSH.force, moment=PUSH.moment)
     before = whole.stored()
-    for n in range(16):
+    for n in range(10):
         whole.sample(wanted(n * PERIOD))
         whole.go(PERIOD)
         (turn, slide, _), names = wanted(n * PERIOD).T, ("set_{}", "set_{}d", "set_{}dd")
@@ -583,7 +590,7 @@ def test_a_stiff_spring_beside_a_drive_shortens_the_internal_step() -> None:
     assert unit.internal_step == pytest.approx(1.4 / np.sqrt(1e7 / 0.1), rel=1e-2)
     arm = Instance(unit)
     put(arm, phi=1e-3, Kphi=0.0, Kw=0.0, Keps=0.0)
-    for n in range(20):
+    for n in range(8):
         arm.do_step(n * PERIOD, PERIOD)
     assert abs(read(arm, "phi")[0]) < 1.1e-3
 
@@ -707,15 +714,16 @@ def test_above_a_spectral_radius_of_1_the_simulation_grows_by_it_and_below_it_di
     gain = 0.75
     while spectral_radius(with_gain(gain), np.zeros(1)) < 1.05:
         gain *= 1.2
-    for chain, grows in ((with_gain(0.75), False), (with_gain(gain), True)):
-        radius = spectral_radius(chain, np.zeros(1))
-        assert (radius > 1.0) == grows
-        instance, sizes = Instance(make_unit("driven_arm", robot=chain)), []
-        rest = read(instance, "last")[0]
-        put(instance, phi=1e-7)
-        for n in range(120):
-            instance.do_step(n * PERIOD, PERIOD)
-            sizes.append(abs(read(instance, "last")[0] - rest))
-        early, late = max(sizes[40:60]), max(sizes[100:120])
-        # a slow swing shows its largest sample in a window to a factor of 2: 2^(1/60) - 1
-        assert (late / early) ** (1.0 / 60.0) == pytest.approx(radius, abs=1.2e-2)
+    gains = np.array([0.75, gain])
+    radii = [spectral_radius(with_gain(one), np.zeros(1)) for one in gains.tolist()]
+    assert radii[0] < 1.0 < radii[1]
+    instance, sizes = Instance(make_unit("driven_arm", robot=with_gain(0.75))), []
+    rest = read(instance, "last")[0]  # of any gain
+    put(instance, phi=1e-7)
+    instance.set([instance.reference("Kw[1]")], [gains])  # an element for each arm
+    for n in range(120):
+        instance.do_step(n * PERIOD, PERIOD)
+        sizes.append(np.abs(read(instance, "last")[0] - rest))
+    early, late = (np.max(sizes[first : first + 20], axis=0) for first in (40, 100))
+    # a slow swing shows its largest sample in a window to a factor of 2: 2^(1/60) - 1
+    np.testing.assert_allclose((late / early) ** (1.0 / 60.0), radii, rtol=0.0, atol=1.2e-2)

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from peers import need_builds_for
-from shipped_units import CROSS_BUILT, shipped_unit
+from shipped_units import shipped_unit
 from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.cache import cached_fmu
 from urmpipe_fmus.description import Backend
@@ -31,12 +31,17 @@ def fmu_of() -> Fmu:
 
 
 @pytest.fixture(scope="session")
-def cross_built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Units built by zig for linux64 and win64, by name: one set for all tests."""
+def cross_built(session_folder: Path) -> Callable[[str], Path]:
+    """Return a function that gives a unit for linux64 and win64 by name, built by zig once a session."""
     platforms = ["linux64", "win64"]
     need_builds_for(*platforms)
-    folder = tmp_path_factory.mktemp("cross_built")
-    return {
-        name: build_fmu(shipped_unit(name), folder / f"{name}.fmu", platforms=platforms).path
-        for name in CROSS_BUILT
-    }
+
+    def build(name: str) -> Path:
+        """Return the FMU out of the session's folder; it is renamed into its place when it is whole."""
+        path = session_folder / "cross_built" / f"{name}.fmu"
+        if not path.exists():
+            path.parent.mkdir(exist_ok=True)
+            build_fmu(shipped_unit(name), path, platforms=platforms)
+        return path
+
+    return build

@@ -62,9 +62,9 @@ def test_a_binary_needs_only_the_c_library_and_shows_only_the_functions_of_fmi(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CROSS_BUILT)
 def test_a_cross_built_binary_loads_where_the_c_library_is_of_2012(
-    name: str, cross_built: dict[str, Path], tmp_path: Path
+    name: str, cross_built: Callable[[str], Path], tmp_path: Path
 ) -> None:
-    path = binary(cross_built[name], tmp_path)
+    path = binary(cross_built(name), tmp_path)
     assert_needs_only_the_c_library(path)
     assert {symbol for symbol in exported(path) if not symbol.startswith("fmi2")} == set()
     versions = re.findall(r"GLIBC_([0-9.]+)", readelf("--version-info", path))

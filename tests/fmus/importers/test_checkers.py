@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from peers import fmpy, fmutool
+from peers import fmutool
 from shipped_units import shipped
 
 BACKENDS = ("native", "python")
@@ -17,8 +17,9 @@ BACKENDS = ("native", "python")
 @pytest.mark.parametrize("name", shipped())
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_fmpy_validate_finds_nothing(name: str, backend: str, fmu_of: Callable[..., Path]) -> None:
-    said = fmpy("validate", str(fmu_of(name, backend)))
-    assert (said.returncode, said.stdout.strip()) == (0, "No problems found."), said.stdout
+    from fmpy.validation import validate_fmu
+
+    assert validate_fmu(str(fmu_of(name, backend))) == []
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -106,11 +106,11 @@ def number(cell: str) -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CROSS_BUILT)
 def test_a_windows_binary_gives_the_numbers_of_its_run_over_a_log(
-    name: str, cross_built: dict[str, Path], wine: Mapping[str, str], tmp_path: Path
+    name: str, cross_built: Callable[[str], Path], wine: Mapping[str, str], tmp_path: Path
 ) -> None:
     unit = shipped_unit(name)
     held = drawn_inputs(unit, STEPS + 1)
-    fmu = Path(shutil.copy(cross_built[name], tmp_path / "it.fmu"))
+    fmu = Path(shutil.copy(cross_built(name), tmp_path / "it.fmu"))
     found = simulated(fmu, unit, columns(unit, held), wine)
     expected = columns(unit, run(unit, sample_times(STEPS + 1), held))
     for shown, values in expected.items():

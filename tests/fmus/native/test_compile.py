@@ -108,14 +108,7 @@ def test_windows_and_linux_give_the_same_bits(
     linux = host(tmp_path, [*zig, TARGETS["linux64"]])
     windows = host(tmp_path, [*zig, TARGETS["win64"]], "host.exe")
     arm = make_unit("kinematic_chain", robot=load_robot("urm6"), rates=True)
-    for unit in (
-        elementary,
-        oscillator,
-        player,
-        arm,
-        make_unit("dc_drive"),
-        make_unit("repolarizer", joints=6),
-    ):
+    for unit in (elementary, oscillator, player, arm):
         folder = tmp_path / f"a {unit.name} \u00fc"
         write(folder, unit, ["linux64", "win64"])
         given = script(unit, 1000, 1)

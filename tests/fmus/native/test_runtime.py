@@ -14,11 +14,11 @@ import pytest
 
 from c_host import host, ran, script, write
 from made_masses import with_drives, with_masses
+from sliding_arm import sliding_arm
 from urmpipe_fmus.native import native_missing, this_platform
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
 from urmpipe_fmus.variable import Input, Memory, State
-from urmpipe_models.robots.catalogue import load_robot
 
 HERE = Path(__file__).parent
 
@@ -55,7 +55,7 @@ pytestmark = pytest.mark.skipif(
 @pytest.fixture
 def units(oscillator: Unit, player: Unit, elementary: Unit) -> Sequence[Unit]:
     """Units with states and memories, a table, elementary functions, and an arm with drives."""
-    arm = make_unit("driven_arm", robot=with_drives(with_masses(load_robot("urm6")), held=["phi6"]))
+    arm = make_unit("driven_arm", robot=with_drives(with_masses(sliding_arm()), held=["wrist"]))
     return (oscillator, player, elementary, arm)
 
 
