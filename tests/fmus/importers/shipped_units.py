@@ -25,6 +25,10 @@ CROSS_BUILT = ("kinematic_chain", "repolarizer", "delta_meter", "log_source", "d
 """Units that are built for Linux and Windows: with integers, truths, a table, states."""
 
 
+EVERY_PART = ("kinematic_chain", "repolarizer", "log_source", "dc_drive", "driven_arm")
+"""Units that have all parts of the runtime between them: memories, integers, a table, states, both."""
+
+
 def swinging_joints(rows: int, joints: int = 6, period: float = STEP) -> Table:
     """Return a log of joints in [rad] that swing by less than half a turn."""
     t = sample_times(rows, period)

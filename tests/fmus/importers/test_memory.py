@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from peers import said_by
-from shipped_units import shipped
+from shipped_units import EVERY_PART
 
 CYCLES = """
 import gc, os, sys
@@ -55,7 +55,7 @@ print(resident() - before)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", EVERY_PART)
 def test_thousands_of_instances_leave_resident_memory_flat(name: str, fmu_of: Callable[..., Path]) -> None:
     said = said_by(sys.executable, "-c", CYCLES, str(fmu_of(name)))
     assert said.stdout.strip().lstrip("-").isdecimal(), said.stdout
