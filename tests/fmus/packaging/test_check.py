@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -19,6 +20,7 @@ from asserting import refusal
 from foreign_fmus import Foreign, Scalar, fmu
 from urmpipe_fmus.archive import write_fmu
 from urmpipe_fmus.build import build_fmu
+from urmpipe_fmus.cache import cached_fmu
 from urmpipe_fmus.check import check_fmu
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import native_missing, this_platform
@@ -34,6 +36,8 @@ def built(unit: Unit, folder: Path, backend: str = "python") -> Path:
     missing = native_missing([this_platform()])
     if backend == "native" and missing:
         pytest.skip(f"needs the native backend: {missing}")
+    if backend == "native":
+        return Path(shutil.copy(cached_fmu(unit, "native"), folder))
     return build_fmu(unit, folder, backend=backend).path  # type: ignore[arg-type]
 
 
