@@ -6,7 +6,8 @@ the extended Bayesian information criterion
     n ln(max(RSS / N, floor)) + k ln n + 2 ln C(K, s),
 
 with RSS the sum of the N squares that s of K groups with k columns leave, and n the number of independent
-ones among them: N divided by the autocorrelation time. The lowest score is best.
+ones among them: N divided by the autocorrelation time. The lowest score is best. A subset does not count
+where the columns of a group move less than the floor: RSS cannot show that under larger noise.
 
 Source: [ChenChen2008]_ eq. 2, gamma = 1.
 """
@@ -124,8 +125,12 @@ class Selection:
 
     def left(self, subsets: Sequence[Subset]) -> FloatArray:
         """Return the mean square [-] that each of some subsets leaves, shape (len(subsets),)."""
+        return self._solved(subsets)[0]
+
+    def _solved(self, subsets: Sequence[Subset]) -> tuple[FloatArray, FloatArray]:
+        """Return the mean squares [-] that subsets leave, and that the least of their groups moves."""
         gram, moment = self._scaled
-        explained = np.zeros(len(subsets))
+        explained, least = np.zeros(len(subsets)), np.full(len(subsets), np.inf)
         columns = [self.columns(subset) for subset in subsets]
         sizes = np.array([len(one) for one in columns])
         for size in np.unique(sizes[sizes > 0]):
@@ -135,8 +140,20 @@ class Selection:
             inner = gram[taken[:, :, np.newaxis], taken[:, np.newaxis, :]]
             found = np.linalg.solve(inner, right[:, :, np.newaxis])[:, :, 0]
             explained[at] = (found * right).sum(axis=1)
-        left: FloatArray = np.maximum(self.normal.square - explained, 0.0) / max(self.normal.count, 1)
-        return left
+            owner = self._owner[taken]
+            alike = owner[:, :, np.newaxis] == owner[:, np.newaxis, :]
+            moved = np.einsum("sc,scd,sd->sc", found, inner * alike, found)
+            least[at] = (alike * moved[:, np.newaxis, :]).sum(axis=2).min(axis=1)
+        count = max(self.normal.count, 1)
+        return np.maximum(self.normal.square - explained, 0.0) / count, least / count
+
+    @cached_property
+    def _owner(self) -> IntArray:
+        """The group of each column, shape (p,)."""
+        owner = np.zeros(len(self.normal.gram), dtype=np.int64)
+        for g, columns in enumerate(self.groups):
+            owner[columns] = g
+        return owner
 
     @cached_property
     def _columns(self) -> list[tuple[int, ...]]:
@@ -148,10 +165,11 @@ class Selection:
         return [c for g in sorted(subset) for c in self._columns[g]]
 
     def scores(self, subsets: Sequence[Subset]) -> FloatArray:
-        """Return the score [-] of each of some subsets, shape (len(subsets),)."""
-        left = self.left(subsets)
+        """Return the score [-] of each of some subsets, shape (len(subsets),): inf where one does not count."""
+        left, moved = self._solved(subsets)
         penalty = [self.penalty(sum(len(self._columns[g]) for g in one), len(one)) for one in subsets]
-        return np.asarray(self.independent * np.log(np.maximum(left, self.floor)) + np.array(penalty))
+        scores = self.independent * np.log(np.maximum(left, self.floor)) + np.array(penalty)
+        return np.where(moved < self.floor, np.inf, scores)
 
     def penalty(self, columns: int, groups: int) -> float:
         """Return what a subset of some groups with some columns in all pays."""
@@ -197,7 +215,7 @@ class Selection:
 
 
 def without_twins(
-    normal: Normal, groups: Sequence[IntArray], largest: FloatArray
+    normal: Normal, groups: Sequence[IntArray], largest: FloatArray, first: Sequence[int] = ()
 ) -> tuple[list[int], dict[int, int]]:
     """Return which groups stand for all: twins are told by one, and what moves nothing not at all.
 
@@ -205,16 +223,18 @@ def without_twins(
         normal: The normal equations.
         groups: The columns of each group, shape (k,) each; of twins the first stands for all.
         largest: The squares of the columns [-] before anything was taken away, shape (p,).
+        first: Groups that stand for their twins before all others.
 
     Returns:
-        The groups that stand, and for each twin the group that tells it.
+        The groups that stand, in order, and for each twin the group that tells it.
     """
     gram = normal.gram
     square = np.maximum(np.diag(gram), 0.0)
     size = np.sqrt(np.where(square > 0.0, square, 1.0))
     stand: list[int] = []
     twins: dict[int, int] = {}
-    for g, columns in enumerate(groups):
+    for g in [*first, *(g for g in range(len(groups)) if g not in first)]:
+        columns = groups[g]
         if (square[columns] <= NOTHING * largest[columns]).all():
             continue
         if len(columns) == 1:
@@ -225,4 +245,4 @@ def without_twins(
                 twins[g] = twin
                 continue
         stand.append(g)
-    return stand, twins
+    return sorted(stand), twins

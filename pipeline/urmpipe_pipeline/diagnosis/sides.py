@@ -127,7 +127,10 @@ def _of_joints(matched: Matched, reference: Side, log: Side) -> Question:
     model = JointsModel(
         groups, _motion(run), _clock(matched, run, log=True), matched.sample, q, sliding, run.robot
     )
-    rounding = np.hypot(_rounding(run.on_rows.q, run), _rounding(q.T, run))
+    rounding = np.sqrt(
+        _rounding(run.on_rows.q, run) ** 2 + _rounding(q.T, run) ** 2
+        + _between(matched, reference.trajectory, _ordered_joints(reference.trajectory, run)) ** 2
+    )  # fmt: skip
     recorded = run.log.tcp_position is not None
     alone = (
         "diagnosed alone, the log is compared with the one that it recorded"
@@ -174,7 +177,7 @@ def _of_arm(matched: Matched, reference: Side, log: Side) -> Question:
     )
     rounding = np.sqrt(
         _rounding(position, run) ** 2 + _by_joints(model, _rounding(run.on_rows.q, run)) ** 2
-        + _between(matched, reference.trajectory) ** 2
+        + _between(matched, reference.trajectory, reference.trajectory.position) ** 2
     )  # fmt: skip
     rounding = np.concatenate((rounding, np.zeros(len(model.blocks) - 3)))
     count = len(robot.moving)
@@ -215,7 +218,7 @@ def _of_places(matched: Matched, reference: Side, log: Side) -> Question:
     )  # fmt: skip
     rounding = np.sqrt(
         _rounding(matched.reference, run) ** 2 + _rounding(matched.actual, run) ** 2
-        + _between(matched, reference.trajectory) ** 2
+        + _between(matched, reference.trajectory, reference.trajectory.position) ** 2
     )  # fmt: skip
     rounding = np.concatenate((rounding, np.zeros(len(model.blocks) - 3)))
     told = [NotLookedFor((*STRUCTURE, *JOINTS, "turns", "other_robot"), "no side has joints")]
@@ -304,17 +307,27 @@ def _by_joints(model: ArmModel, rounding: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt((columns * rounding[:, np.newaxis] ** 2).sum(axis=0)))
 
 
-def _between(matched: Matched, reference: Trajectory) -> FloatArray:
-    """Return what lines between samples of the reference leave, in [m]: an eighth of second differences.
+def _ordered_joints(reference: Trajectory, run: Run) -> FloatArray:
+    """Return the joints of a reference in the order of a log, by name, else by place, shape (m, joints)."""
+    q, names = np.asarray(reference.q), run.log.joints
+    return q[:, [reference.joints.index(one) for one in names]] if {*reference.joints} == {*names} else q
+
+
+def _between(matched: Matched, reference: Trajectory, values: FloatArray) -> FloatArray:
+    """Return what lines between samples of the reference leave: an eighth of second differences, shape (k,).
 
     Nothing where the rows of the log meet its samples.
+
+    Args:
+        matched: Both sides at the same times.
+        reference: The reference at its own samples.
+        values: What is interpolated of it in [m] or [rad], shape (m, k).
     """
     at_ns = matched.t_ns + round(matched.sync.offset * 1e9)
     if len(reference.t_ns) < 3:
-        return np.zeros(3)
+        return np.zeros(values.shape[1])
     after = np.clip(np.searchsorted(reference.t_ns, at_ns), 1, len(reference.t_ns) - 1)
     away = np.minimum(*(np.abs(at_ns - reference.t_ns[beside]) for beside in (after - 1, after)))
     if np.median(away) <= ROUNDING_NS:
-        return np.zeros(3)
-    second = np.diff(reference.position, 2, axis=0)
-    return np.asarray(np.sqrt(np.nanmean(second**2, axis=0)) / 8.0)
+        return np.zeros(values.shape[1])
+    return np.asarray(np.sqrt(np.nanmean(np.diff(values, 2, axis=0) ** 2, axis=0)) / 8.0)
