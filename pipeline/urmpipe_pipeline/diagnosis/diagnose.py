@@ -14,10 +14,11 @@ from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.diagnosis.edits import later_edits, turn_edits
 from urmpipe_pipeline.diagnosis.explain import Explained
 from urmpipe_pipeline.diagnosis.fit import Model, residual
+from urmpipe_pipeline.diagnosis.found import Found
 from urmpipe_pipeline.diagnosis.hypotheses import State, zero
 from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.result import Diagnosis, NotLookedFor, Remainder, rms
-from urmpipe_pipeline.diagnosis.search import Found, Search
+from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.diagnosis.sides import AT_REST, Question, Side, question
 from urmpipe_pipeline.log_edits import Edits
 

@@ -11,10 +11,12 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.deciding import deciding_joint
 from urmpipe_pipeline.diagnosis.fit import Model
+from urmpipe_pipeline.diagnosis.found import Explanation, Found
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.diagnosis.result import Alternative, Cause, rms
-from urmpipe_pipeline.diagnosis.search import Explanation, Found, Search
+from urmpipe_pipeline.diagnosis.search import COARSE, Search
 from urmpipe_pipeline.diagnosis.shares import shapley_shares
+from urmpipe_pipeline.diagnosis.twins import exchanged, same_at_full_size
 from urmpipe_pipeline.log_edits import Edit
 
 SAMPLES = 4_000
@@ -75,13 +77,20 @@ class Explained:
     def causes(self) -> tuple[tuple[Cause, ...], tuple[Alternative, ...]]:
         """Return the named causes, the largest share first, and what the log does not decide between."""
         best = self.found.best
-        every = [best, *self.found.others]
+        every = [best, *(one for one in self.found.others if self._relevant(one))]
         common = set.intersection(*(set(_parts(one)) for one in every))
         named = self._causes(best, common)
         if len(every) == 1:
             return named, ()
         needs = self._needs(every)
         return named, tuple(Alternative(self._causes(one, set(_parts(one)) - common), needs) for one in every)
+
+    def _relevant(self, one: Explanation) -> bool:
+        """Tell whether each cause of an explanation has a number whose interval lies beside 0."""
+        return all(
+            (np.abs(one.state.of(self.model.groups[g])) > CONFIDENCE * self._deviations(one, g)).any()
+            for g in one.subset
+        )
 
     def _causes(self, one: Explanation, wanted: set[Part]) -> tuple[Cause, ...]:
         """Return some causes of an explanation, the largest share first."""
@@ -134,7 +143,7 @@ class Explained:
         joint = () if group.joint is None else (self.names[group.joint],)
         return Cause(
             group.kind, self._name(group), joint, group.segment, group.axis, middle, group.unit, low, high,
-            twins=tuple(self._twins(g, values)),
+            twins=tuple(self._twins(g, one.state)),
         )  # fmt: skip
 
     def _name(self, group: Group) -> str:
@@ -151,19 +160,26 @@ class Explained:
         own = [columns.index(c) for c in self.model.groups[g].columns]
         return np.asarray(np.sqrt(np.maximum(variance[own], 0.0)))
 
-    def _twins(self, g: int, values: FloatArray) -> Iterator[str]:
+    def _twins(self, g: int, state: State) -> Iterator[str]:
         """Yield the names of what would do the very same as a group, or as one of its three numbers."""
         groups, group = self.model.groups, self.model.groups[g]
-        yield from (self._called(groups[other]) for other, told in self.found.twins.items() if told == g)
         for h, other in enumerate(groups):
-            if h == g or h in self.found.twins or len(group.columns) == len(other.columns) == 1:
+            like = self.found.twins.get(h) == g
+            single = len(group.columns) == len(other.columns) == 1
+            if h == g or not (like or (h not in self.found.twins and not single)):
                 continue
             for k, c in enumerate(group.columns):
                 own = f" ({'xyz'[k]})" if len(group.columns) > 1 else ""
                 for i, d in enumerate(other.columns):
-                    if values[k] and self._same(c, d):
+                    if state.values[c] and (like or self._same(c, d)) and self._stays_same(state, c, d):
                         axis = f" {'xyz'[i]}" if len(other.columns) > 1 else ""
                         yield f"{self._called(other)}{axis}{own}"
+
+    def _stays_same(self, state: State, c: int, d: int) -> bool:
+        """Tell whether a number in place of another leaves the same at its full size."""
+        other = exchanged(state, c, d, self.found.normal.gram)
+        some = replace(self.found.rows, at=self.search.spread(COARSE))
+        return same_at_full_size(self.search, state, other, some)
 
     def _called(self, group: Group) -> str:
         """Return what a cause is called among twins."""

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.diagnosis.fit import Model, Rows, fitted, inliers, normal_equations, residual
+from urmpipe_pipeline.diagnosis.fit import Model, Rows, cost, fitted, inliers, normal_equations, residual
+from urmpipe_pipeline.diagnosis.found import Explanation, Found, Stable
 from urmpipe_pipeline.diagnosis.hypotheses import State, zero
 from urmpipe_pipeline.diagnosis.independence import LONGEST, autocorrelation_time
 from urmpipe_pipeline.diagnosis.plausible import further_edit, plausible_edits, projected
 from urmpipe_pipeline.diagnosis.selection import Normal, Selection, Subset, without_twins
+from urmpipe_pipeline.diagnosis.twins import exchanged, same_at_full_size
 from urmpipe_pipeline.log_edits import Edits
 
 COARSE = 300
@@ -43,66 +44,6 @@ SHOWN = 5
 """So many explanations that are not told apart are named."""
 
 
-class Explanation(NamedTuple):
-    """Causes, with their sizes.
-
-    Attributes:
-        state: Edits and numbers.
-        subset: The groups whose numbers are taken.
-        score: Lower is better.
-    """
-
-    state: State
-    subset: Subset
-    score: float
-
-
-@dataclass(frozen=True, eq=False)
-class Found:
-    """What a search found.
-
-    Attributes:
-        best: The best explanation.
-        others: Those that the log does not tell from it.
-        rows: The rows that counted: without outliers, in the weights of their noise.
-        tau: The autocorrelation time of what stays, in rows.
-        variance: Mean square of what stays of a component in its weight, not below the floor.
-        normal: The normal equations there.
-        twins: Which groups are told by another.
-    """
-
-    best: Explanation
-    others: tuple[Explanation, ...]
-    rows: Rows
-    tau: float
-    variance: float
-    normal: Normal
-    twins: dict[int, int]
-
-
-class _Stable(NamedTuple):
-    """An explanation that its own fit selects again.
-
-    Attributes:
-        state: Edits and numbers.
-        subset: The groups that are taken.
-        tau: The autocorrelation time of what stays, in rows.
-        rows: The rows without outliers.
-        selection: What it was selected from.
-    """
-
-    state: State
-    subset: Subset
-    tau: float
-    rows: Rows
-    selection: Selection
-
-    def score(self, tau: float) -> float:
-        """Return its score where so many rows tell as much as one."""
-        selection = replace(self.selection, independent=self.selection.normal.count / tau)
-        return float(selection.scores([self.subset])[0])
-
-
 @dataclass(frozen=True, eq=False)
 class Search:
     """A search among the hypotheses of a model.
@@ -115,6 +56,7 @@ class Search:
         starts: Explanations to start from besides, such as a lag that the motions tell.
         usual: Groups that differ from arm to arm, with the size that is usual: only more is a cause.
         timed: Whether the rows follow each other in time: neighbours may then tell the same.
+        first: Groups that stand for their twins before all others.
     """
 
     model: Model
@@ -124,6 +66,7 @@ class Search:
     starts: tuple[State, ...] = ()
     usual: Mapping[int, float] = field(default_factory=dict)
     timed: bool = True
+    first: tuple[int, ...] = ()
 
     @property
     def zero(self) -> State:
@@ -179,7 +122,7 @@ class Search:
         forced = self._columns(self.forced)
         groups = [np.array(group.columns) for group in self.model.groups]
         beside = normal.without(forced, np.zeros(len(forced)))
-        stand, twins = without_twins(beside, groups, np.diag(normal.gram))
+        stand, twins = without_twins(beside, groups, np.diag(normal.gram), self.first)
         return [g for g in stand if g not in self.forced], twins
 
     def _columns(self, groups: Sequence[int]) -> list[int]:
@@ -255,16 +198,56 @@ class Search:
             if one.score < found.score(found.tau):
                 again = self._stable(few, one.state, None)
                 found = min(found, again, key=lambda each, tau=found.tau: each.score(tau))  # type: ignore[misc]
+        search, found, rivals = self._with_twins(few, found)
         most = found.score(found.tau) + NEAR
         same = found.state.edits, found.subset
-        near = [one for one in near if one.score < most and (one.state.edits, one.subset) != same]
+        near = [one for one in (*near, *rivals) if one.score < most and (one.state.edits, one.subset) != same]
         if len(few.at) < len(every.at):
-            found = self._stable(every, found.state, found.subset)
+            found = search._stable(every, found.state, found.subset)
+        return search._concluded(found, near)
+
+    def _with_twins(self, few: Rows, found: Stable) -> tuple[Search, Stable, list[Explanation]]:
+        """Return the best explanation with twins in place of its causes, what finds it, and its rivals.
+
+        Twins do the same to first order. At full size one of them may leave less, or need fewer causes.
+        """
+        search, rivals = self, []
+        for _ in range(ROUNDS):
+            others = list(search._exchanged(few, found))
+            scores = [other.score(found.tau) for _, other in others]
+            now = found.score(found.tau)
+            rivals += [
+                Explanation(*other[:2], score) for (_, other), score in zip(others, scores, strict=True)
+            ]
+            if min(scores, default=np.inf) >= now:
+                break
+            rivals.append(Explanation(*found[:2], now))
+            search, found = others[int(np.argmin(scores))]
+        return search, found, rivals
+
+    def _exchanged(self, few: Rows, found: Stable) -> Iterator[tuple[Search, Stable]]:
+        """Yield what is found where a twin that differs at full size stands for a cause."""
+        gram, some = found.selection.normal.gram, replace(found.rows, at=self.spread(COARSE))
+        for twin, g in self._distinct[1].items():
+            if g in found.subset:
+                other = exchanged(found.state, *self._columns([g, twin]), gram)
+                if not same_at_full_size(self, found.state, other, some):
+                    search = replace(self, first=(twin, *self.first))
+                    yield search, search._stable(few, other, None)
+
+    def _concluded(self, found: Stable, near: list[Explanation]) -> Found:
+        """Return an explanation with what stays of it, and with those that are not told from it.
+
+        Who takes more causes has to leave less.
+        """
         state, subset, tau, rows, selection = found
         state = self._beside_usual(state, subset, selection.normal)
         final = Explanation(state, subset, float(selection.scores([subset])[0]))
         variance = max(float(selection.left([subset])[0]), selection.floor)
         near += self._neighbours(selection, final, rows)
+        few = replace(rows, at=rows.at[:: max(len(rows.at) // MANY, 1)])
+        simple, least = _count(final), cost(self.model, state, few)
+        near = [one for one in near if _count(one) <= simple or cost(self.model, one.state, few) < least]
         near = list({(one.state.edits, one.subset): one for one in near}.values())
         shown = tuple(sorted(near, key=_score)[:SHOWN])
         return Found(final, shown, rows, tau, variance, selection.normal, self._distinct[1])
@@ -278,7 +261,7 @@ class Search:
         values[columns] = np.linalg.solve(normal.gram[np.ix_(columns, columns)], normal.moment[columns])
         return replace(state, values=values)
 
-    def _stable(self, every: Rows, state: State, subset: Subset | None) -> _Stable:
+    def _stable(self, every: Rows, state: State, subset: Subset | None) -> Stable:
         """Return an explanation that is selected again where its fit leads.
 
         The autocorrelation time is that of what stays: of the whole, the causes themselves would count as
@@ -300,7 +283,7 @@ class Search:
             if chosen == subset and selection.best(among) == chosen:
                 break
             subset = chosen
-        return _Stable(state, chosen - beyond, tau, rows, selection)
+        return Stable(state, chosen - beyond, tau, rows, selection)
 
     def _tau(self, state: State, rows: Rows) -> float:
         """Return the autocorrelation time of what an explanation leaves: the longest, of places or turns."""
@@ -312,17 +295,30 @@ class Search:
         )
 
     def _neighbours(self, selection: Selection, final: Explanation, rows: Rows) -> Iterator[Explanation]:
-        """Yield other subsets of nearly the same score, neither a part of the best nor around it."""
+        """Yield other subsets of nearly the same score, neither a part of the best nor around it.
+
+        Their score is that of what they leave at full size, after a fit.
+        """
         every = selection.neighbours(final.subset, self._distinct[0])
         subsets = [one for one in every if not (one <= final.subset or one >= final.subset)]
         scores = selection.scores(subsets) if subsets else np.zeros(0)
         few = replace(rows, at=rows.at[:: max(len(rows.at) // MANY, 1)])
+        left, least = float(selection.left([final.subset])[0]), cost(self.model, final.state, few)
         for i in np.argsort(scores, kind="stable").tolist()[:SHOWN]:
+            if scores[i] >= final.score + NEAR:
+                break
             state = self.fitted(final.state, subsets[i], few)
             told = all(state.of(self.model.groups[g]).any() for g in subsets[i])  # else the fit got nowhere
-            if scores[i] < final.score + NEAR and told and not self._beyond(state):
-                yield Explanation(state, subsets[i], float(scores[i]))
+            after = left * cost(self.model, state, few) / max(least, np.finfo(float).tiny)
+            score = selection.score(after, subsets[i])
+            if score < final.score + NEAR and told and not self._beyond(state):
+                yield Explanation(state, subsets[i], score)
 
 
 def _score(one: Explanation) -> float:
     return one.score
+
+
+def _count(one: Explanation) -> int:
+    """Return how many causes an explanation takes."""
+    return len(one.subset) + len(one.state.edits)

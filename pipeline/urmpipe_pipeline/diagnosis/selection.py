@@ -165,11 +165,16 @@ class Selection:
         return [c for g in sorted(subset) for c in self._columns[g]]
 
     def scores(self, subsets: Sequence[Subset]) -> FloatArray:
-        """Return the score [-] of each of some subsets, shape (len(subsets),): inf where one does not count."""
+        """Return the scores [-] of some subsets, shape (len(subsets),): inf where one does not count."""
         left, moved = self._solved(subsets)
         penalty = [self.penalty(sum(len(self._columns[g]) for g in one), len(one)) for one in subsets]
         scores = self.independent * np.log(np.maximum(left, self.floor)) + np.array(penalty)
         return np.where(moved < self.floor, np.inf, scores)
+
+    def score(self, left: float, subset: Subset) -> float:
+        """Return the score [-] of a subset that leaves a mean square [-]."""
+        size = sum(len(self._columns[g]) for g in subset)
+        return self.independent * log(max(left, self.floor)) + self.penalty(size, len(subset))
 
     def penalty(self, columns: int, groups: int) -> float:
         """Return what a subset of some groups with some columns in all pays."""

@@ -31,7 +31,8 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.diagnosis.explain import Explained
-from urmpipe_pipeline.diagnosis.search import Found, Search
+from urmpipe_pipeline.diagnosis.found import Found
+from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.log_edits import Edit, Edits
 
 URM6 = load_robot("urm6")
