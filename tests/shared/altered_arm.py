@@ -20,9 +20,10 @@ from urmpipe_models.repolarizer import repolarize
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.arm_groups import arm_groups, time_groups
 from urmpipe_pipeline.diagnosis.edits import later_edits
+from urmpipe_pipeline.diagnosis.found import Explanation, Found
 from urmpipe_pipeline.diagnosis.hypotheses import State, numbered
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
-from urmpipe_pipeline.diagnosis.search import Explanation, Found, Search
+from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.log_edits import Edit, Edits, robot_edits, sign_edits, swap_edits, unit_edits
 
 DURATION = 36.91

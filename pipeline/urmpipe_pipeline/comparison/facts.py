@@ -14,7 +14,9 @@ from urmpipe_pipeline.comparison.alignment import as_option, placed
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
+from urmpipe_pipeline.comparison.warnings import rests
 from urmpipe_pipeline.comparison.wording import decided_words, out_words, size_of, stretch_words, used_words
+from urmpipe_pipeline.diagnosis.diagnose import LEAST_SAMPLES
 from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts
 from urmpipe_pipeline.presentation.section import Advice, Fact, Place, Ref, Value
 from urmpipe_pipeline.runs.parts import log_facts
@@ -87,8 +89,12 @@ def _why(one: Deviation, result: Comparison) -> Iterator[Fact]:
 
 
 def _undiagnosed(one: Deviation) -> Iterator[Fact]:
-    """Yield what says why a log is out of tolerance; nothing if that is known, or with an alignment."""
-    if one.verdict == "fail" and one.diagnosis is None and one.alignment.mode == "none":
+    """Yield what says why a log is out of tolerance.
+
+    Nothing if that is known, with an alignment, or where a diagnosis finds nothing: in one pose, or in few.
+    """
+    told = len(one.sample) >= LEAST_SAMPLES and not rests(one)
+    if one.verdict == "fail" and one.diagnosis is None and one.alignment.mode == "none" and told:
         yield Fact("Cause", Advice(hints=(Hint("diagnose", True, "says why"),)))
 
 

@@ -131,12 +131,12 @@ def thin_evidence(one: Deviation) -> Iterator[LogWarning]:
         yield LogWarning(
             "partly-judged", f"{said}; a sample without a value is out of tolerance", about=one.name
         )
-    if one.run.timed and _rests(one):
+    if one.run.timed and rests(one):
         said = f"{text.counted(len(one.sample), 'sample')} compared, all in one pose"
         yield LogWarning("one-pose", f"{said}: the verdict is on that pose alone", about=one.name)
 
 
-def _rests(one: Deviation) -> bool:
+def rests(one: Deviation) -> bool:
     """Tell whether a log stays where it is while it is compared: its tool centre point, and its joints."""
     return extent(one.actual) < AT_REST and extent(one.run.on_rows.q[one.sample]) < AT_REST
 

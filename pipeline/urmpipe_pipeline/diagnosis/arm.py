@@ -115,6 +115,10 @@ class ArmModel:
         """Return what an explanation leaves of positions in [m], shape (3, n)."""
         return self.residual(state, rows)[:3]
 
+    def wanted(self, rows: IntArray) -> FloatArray:
+        """Return where the tool centre point should be in [m], shape (3, n)."""
+        return self.position[:, rows]
+
     def _left(self, pose: Transform, state: State, rows: IntArray, inside: BoolArray) -> FloatArray:
         factor = next((edit.value for edit in state.edits if edit.kind == "path_unit"), 1.0)
         left = np.empty((len(self.blocks), len(rows)))

@@ -17,6 +17,7 @@ from urmpipe_pipeline.diagnosis.fit import Model, residual
 from urmpipe_pipeline.diagnosis.found import Found
 from urmpipe_pipeline.diagnosis.hypotheses import State, zero
 from urmpipe_pipeline.diagnosis.joints import JointsModel
+from urmpipe_pipeline.diagnosis.one_pose import tool_hypotheses
 from urmpipe_pipeline.diagnosis.result import Diagnosis, NotLookedFor, Remainder, rms
 from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.diagnosis.sides import AT_REST, Question, Side, question
@@ -35,6 +36,11 @@ ARM = 1.0
 USUAL = {"link_length": 5e-4, "tilt": 1e-3, "joint_offset": 1e-3, "joint_scale": 5e-4}
 """How far an arm is usually from its data sheet, by kind in [m], [rad] and [-]: where a device measured it,
 what is no more is its own geometry. Those of a UR10, fitted to 300 measured poses, were within twice this."""
+
+UNLIKE = 0.5
+"""A remainder of more than this share of the reference's motion leaves no likeness of the two motions."""
+
+UNRELATED = "more than half of how far the reference moves: probably different motions"
 
 OWN = "the arm's own geometry, as a calibration finds it"
 
@@ -65,12 +71,15 @@ def diagnose(
         lag: An offset of the clocks in [s], besides how they were put together, at which both move alike.
     """
     with threadpool_limits(1, "blas"):  # blocks of rows run side by side already
-        return _diagnosed(deviation, question(matched, reference, log), lag)
+        asked = question(matched, reference, log)
+        if reason := _tells_nothing(asked):
+            recorded = reference.run is log.run
+            held = _tolerance(deviation, LENGTHS, DEFAULT_TOLERANCE) if recorded else 0.0
+            return _nothing(deviation, asked, reason, held)
+        return _diagnosed(deviation, asked, lag)
 
 
 def _diagnosed(deviation: Deviation, asked: Question, lag: float | None) -> Diagnosis:
-    if reason := _tells_nothing(asked):
-        return _nothing(deviation, asked, reason)
     model, timed = asked.model, deviation.run.timed
     edits = (*asked.edits, *(_later(asked) if timed else ()))
     starts = tuple(_late(model, lag))
@@ -95,10 +104,25 @@ def _diagnosed(deviation: Deviation, asked: Question, lag: float | None) -> Diag
         causes=causes,
         undecided=undecided,
         not_looked_for=asked.not_looked_for,
-        remainder=Remainder(stays, (stays / whole) ** 2 if whole else 0.0, OWN if search.usual else ""),
+        remainder=_remainder(deviation, model, whole, stays, OWN if search.usual else ""),
         sample=asked.sample,
         mended=asked.sign * after.T,
     )
+
+
+def _remainder(deviation: Deviation, model: Model, whole: float, stays: float, words: str) -> Remainder:
+    """Return what stays of a whole deviation, root mean squares in [m] or [rad].
+
+    Where it is out of tolerance, and more than half of how far the reference moves about its mean, no cause
+    has made the two move alike.
+    """
+    wanted = model.wanted(np.arange(model.rows))
+    moves = rms((wanted - np.nanmean(wanted, axis=1, keepdims=True)).T)
+    kinds = LENGTHS if _in_metres(model) else ("joint",)
+    held = _tolerance(deviation, kinds, DEFAULT_TOLERANCE)
+    different = stays > max(held, UNLIKE * moves)
+    share = (stays / whole) ** 2 if whole else 0.0
+    return Remainder(stays, share, UNRELATED if different else words, different)
 
 
 def _later(asked: Question) -> Iterator[Edits]:
@@ -172,13 +196,27 @@ def _tells_nothing(asked: Question) -> str:
 
 def _unit(asked: Question) -> Literal["m", "rad"]:
     """Return the unit of what is judged: that of joints alone is taken as rad."""
-    return "rad" if isinstance(asked.model, JointsModel) and asked.model.chain is None else "m"
+    return "m" if _in_metres(asked.model) else "rad"
 
 
-def _nothing(deviation: Deviation, asked: Question, reason: str) -> Diagnosis:
-    """Return a diagnosis that names nothing, and says why."""
+def _in_metres(model: Model) -> bool:
+    """Tell whether positions are judged, not joints alone."""
+    return not isinstance(model, JointsModel) or model.chain is not None
+
+
+def _nothing(deviation: Deviation, asked: Question, reason: str, held: float = 0.0) -> Diagnosis:
+    """Return a diagnosis that names nothing, and says why.
+
+    Args:
+        deviation: The comparison.
+        asked: What was held against what.
+        reason: Why nothing can be told.
+        held: What the tool that a log recorded may be off in [m]: beyond it, one that agrees is a hypothesis.
+    """
     model = asked.model
     left = model.deviation(zero(model.groups), np.arange(model.rows))
+    before = rms(left.T)
+    undecided, mended = tool_hypotheses(model, held) if before > held > 0.0 else ((), left)
     kinds = tuple(
         dict.fromkeys([*(g.kind for g in model.groups), *(e.kind for edits in asked.edits for e in edits)])
     )
@@ -187,11 +225,11 @@ def _nothing(deviation: Deviation, asked: Question, reason: str) -> Diagnosis:
         verdict=deviation.verdict,
         samples=model.rows,
         unit=_unit(asked),
-        rms=rms(left.T),
+        rms=before,
         causes=(),
-        undecided=(),
+        undecided=undecided,
         not_looked_for=(NotLookedFor(kinds, reason), *asked.not_looked_for),
-        remainder=Remainder(rms(left.T), 1.0, reason),
+        remainder=Remainder(rms(mended.T), (rms(mended.T) / before) ** 2 if before else 1.0, reason),
         sample=asked.sample,
-        mended=asked.sign * left.T,
+        mended=asked.sign * mended.T,
     )

@@ -58,6 +58,9 @@ class Model(Protocol):
     def deviation(self, state: State, rows: IntArray) -> FloatArray:
         """Return what an explanation leaves of what is judged, in [m] or [rad], shape (k, n)."""
 
+    def wanted(self, rows: IntArray) -> FloatArray:
+        """Return what is judged of where the model should be, in [m] or [rad], shape (k, n)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Rows:

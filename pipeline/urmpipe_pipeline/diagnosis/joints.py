@@ -85,6 +85,10 @@ class JointsModel:
         if self.chain is None:
             return self.residual(state, rows)
         joints = self.motion.joints(state, self.groups, self.clock, self.sample, rows)
-        wanted = positions_over_log(self.chain, self.q[:, rows].T)
-        left = (wanted - positions_over_log(self.chain, joints.q.T)).T
+        left = self.wanted(rows) - positions_over_log(self.chain, joints.q.T).T
         return np.asarray(np.where(joints.inside, left, np.nan))
+
+    def wanted(self, rows: IntArray) -> FloatArray:
+        """Return where the reference is: positions in [m], shape (3, n); without an arm its joints."""
+        q = self.q[:, rows]
+        return q if self.chain is None else positions_over_log(self.chain, q.T).T

@@ -69,6 +69,10 @@ class PlaceModel:
         """Return what an explanation leaves of positions in [m], shape (3, n)."""
         return self.residual(state, rows)[:3]
 
+    def wanted(self, rows: IntArray) -> FloatArray:
+        """Return where the tool centre point should be in [m], shape (3, n)."""
+        return self.position[:, rows]
+
     def linear(
         self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
     ) -> tuple[FloatArray, FloatArray]:

@@ -5,29 +5,32 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from urmpipe_pipeline.diagnosis.result import Cause, Diagnosis
+from urmpipe_pipeline.diagnosis.result import Alternative, Cause, Diagnosis
 from urmpipe_pipeline.diagnosis.wording import (
     KINDS,
-    SAID,
     cause_words,
     explained,
     explanation_words,
     interval_words,
     remainder_words,
+    share_words,
     undecided_words,
     value_words,
 )
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, table_of
 from urmpipe_pipeline.presentation.section import Fact, Presentation, Section, Table, Value
 
-ADDED = "Value: the change of the robot or of the reading of the log that makes both sides agree."
-ALONE = "rms without it: remaining deviation if only this cause is removed. Share: of the mean square."
+ADDED = "Value: to be added to the robot or to the reading of the log, so that both sides agree."
+ALONE = (
+    "rms without it: remaining deviation if only this cause is removed. Share: of the mean square; all shares"
+    " and the remainder make up 100 %. Below 0: the cause hides a part of another."
+)
 
 
 def present(result: Diagnosis) -> Presentation:
     """Return what a diagnosis alone shows; a report and a recording show the comparison that it stands in."""
     tables = tuple(diagnosis_tables(result))
-    facts = tuple(replace(one, brief=True) for one in diagnosis_facts(result)[1:])
+    facts = tuple(replace(one, brief=one.name != "Undecided") for one in diagnosis_facts(result)[1:])
     body = Section(f"Diagnosis of {result.name}", None, facts, tables, warnings=result.warnings)
     return Presentation(result.name, result.sentence, result.verdict, (), body)
 
@@ -42,7 +45,8 @@ def diagnosis_facts(result: Diagnosis) -> tuple[Fact, ...]:
     return (
         Fact("Cause", result.sentence, leads=True),
         Fact("Meaning", meaning, brief=False, leads=True),
-        Fact("Undecided", undecided, brief=False, page=False),  # the cause says it
+        Fact("Undecided", undecided, brief=False, page=False),  # the cause and a table say it
+        Fact("Twins", "; ".join(_twins(result)), page=False),  # meaning or tables of a page say it
         Fact(
             "Remaining deviation",
             remainder_words(result.remainder, result.unit) if stays else "",
@@ -51,6 +55,13 @@ def diagnosis_facts(result: Diagnosis) -> tuple[Fact, ...]:
         ),
         Fact("Not tested", "; ".join(_not_looked_for(result)), brief=False),
     )
+
+
+def _twins(result: Diagnosis) -> Iterator[str]:
+    """Yield causes with their twins, which the log does not tell from them."""
+    for one in (*result.causes, *(cause for each in result.undecided for cause in each.causes)):
+        if one.twins:
+            yield f"{cause_words(one)}, or its twin {' or '.join(one.twins)}"
 
 
 def _not_looked_for(result: Diagnosis) -> Iterator[str]:
@@ -63,14 +74,24 @@ def _not_looked_for(result: Diagnosis) -> Iterator[str]:
 def diagnosis_tables(result: Diagnosis) -> Iterator[Table]:
     """Yield the causes, and the explanations that are not told apart."""
     if result.causes:
-        several = len(result.causes) > 1
+        several = len(result.causes) > 1 or result.remainder.different
         columns = columns_of(result.causes, _heads(result.unit))
         yield Table("Causes", columns, f"{ADDED} {ALONE}", several, page=several)
     if result.undecided:
-        heads = {"explanation": "Explanation", "needs": "a motion that would decide"}
-        rows = [(explanation_words(one), one.needs or "none") for one in result.undecided]
-        many = len(rows) > SAID  # else the answer names them all
-        yield replace(table_of("Undecided between", heads, rows, brief=many), page=many)
+        heads = {
+            "explanation": "Explanation",
+            "interval": "95 % interval",
+            "twins": "twins",
+            "needs": "a motion that would decide",
+        }
+        rows = [(explanation_words(one), *_of_causes(one), one.needs or "none") for one in result.undecided]
+        yield table_of("Undecided between", heads, rows, brief=True)
+
+
+def _of_causes(one: Alternative) -> tuple[str, str]:
+    """Return the intervals and the twins of the causes of an explanation."""
+    intervals = "; ".join(filter(None, map(interval_words, one.causes)))
+    return intervals, ", ".join(twin for cause in one.causes for twin in cause.twins)
 
 
 def _heads(unit: str) -> Heads[Cause]:
@@ -82,5 +103,5 @@ def _heads(unit: str) -> Heads[Cause]:
         "from_row": ("from row", lambda one: None if one.from_sample is None else Value(one.from_sample + 1)),
         "twins": ("twins", lambda one: ", ".join(one.twins)),
         "rms_after": ("rms without it", lambda one: Value(one.rms_after, unit)),
-        "share": ("share", lambda one: Value(one.share, "%")),
+        "share": ("share", lambda one: share_words(one.share)),
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from urmpipe_pipeline import text
@@ -42,27 +43,44 @@ SHOWN = {"m": ("mm", 1e3), "rad": ("deg", 57.29577951308232), "s": ("ms", 1e3), 
 DIGITS = 4
 """Digits after the point at most, as of lengths and angles elsewhere."""
 
+MAIN = 3
+"""So many causes stand in a sentence at most; a table has all of them."""
+
+SMALL = 1e-3
+"""Share of the mean square below which a cause stands in the table alone."""
 
 SAID = 2
 """So many explanations that are not told apart stand in a sentence; a table has all of them."""
 
 
 def sentence(result: Diagnosis) -> str:
-    """Return the answer in one sentence: the causes, of several with their shares, and what they change.
+    """Return the answer in one sentence: the main causes, of several with their shares, and what they change.
 
-    Where something is not decided, it stands behind them.
+    Where something is not decided, it stands behind them. Different motions have no causes worth a sentence.
     """
     before, after = (amount(one, result.unit) for one in (result.rms, result.remainder.rms))
     causes, alternatives = result.causes, result.undecided
+    if result.remainder.different:
+        found = (
+            f"the causes found leave rms {after} of {before}" if causes else f"no cause found: rms {before}"
+        )
+        return f"probably different motions: {found}"
     if not causes and not alternatives:
         taken = f" ({result.remainder.words})" if result.remainder.words else ""
         return f"no cause found: rms {before} remains{taken}"
     several = len(causes) > 1
-    said = [f"{cause_words(one)}{f' ({share_words(one.share)})' if several else ''}" for one in causes]
-    if alternatives:
+    main = [one for one in causes if abs(one.share) >= SMALL] or list(causes[:1])
+    said = [f"{cause_words(one)}{f' ({_share_of(one)})' if several else ''}" for one in main[:MAIN]]
+    said += [f"{len(main) - MAIN} more"] if len(main) > MAIN else []
+    if alternatives and (not causes or any(abs(c.share) >= SMALL for a in alternatives for c in a.causes)):
         said.append(f"{_either(alternatives)} ({_deciding(alternatives)})")
     stays = f", {share_words(result.remainder.share)} of the mean square remains" if len(said) > 1 else ""
     return f"{text.enumerated(said)}: rms {before} -> {after}{stays}"
+
+
+def _share_of(one: Cause) -> str:
+    """Return the share of a cause; of one that hides a part of the others, that it does."""
+    return share_words(one.share) if one.share >= 0.0 else "hides a part of the others"
 
 
 def undecided_words(alternatives: Sequence[Alternative]) -> str:
@@ -112,7 +130,9 @@ def remainder_words(one: Remainder, unit: str) -> str:
 
 def share_words(share: float) -> str:
     """Return a share of the mean square in [%]: what explains next to nothing has no digits."""
-    return "under 0.01 %" if 0.0 < abs(share) < 1e-4 else text.percent(share)
+    if 0.0 < abs(share) < 1e-4:
+        return "under 0.01 %"
+    return f"-{text.percent(-share)}" if share < 0.0 else text.percent(share)
 
 
 def amount(value: float, unit: str) -> str:
@@ -152,16 +172,25 @@ def joint_names(one: Cause) -> tuple[str, ...]:
 
 
 def joints_words(names: Sequence[str]) -> str:
-    """Return what joints are called: "module 3 (phi3)" of a URM arm, "joints q1 and q2" of others."""
+    """Return what joints are called: "module 3 (phi3)" of a URM arm, "joints q1 and q2" or "elbow_joint"."""
     modules = [found for found in map(MODULE.fullmatch, names) if found]
     urm = len(modules) == len(names)
-    said = [f"{one[1]} ({one[0]})" for one in modules] if urm else names
-    return f"{'module' if urm else 'joint'}{'s' if len(names) > 1 else ''} {text.enumerated(said)}"
+    said = text.enumerated([f"{one[1]} ({one[0]})" for one in modules] if urm else list(names))
+    if not urm and all("joint" in name.lower() for name in names):
+        return said  # a name says it already
+    return f"{'module' if urm else 'joint'}{'s' if len(names) > 1 else ''} {said}"
 
 
 def _needs(of: str = "") -> Callable[[Cause], str]:
     """Return a function that writes "d_1 needs -9.3 mm", with a given name or else that of the cause."""
     return lambda one: f"{of or one.name} needs {value_words(one)}"
+
+
+def _offset(one: Cause) -> str:
+    """Return by how much a joint reads too high or too low: the opposite of what it needs."""
+    size = replace(one, value=(abs(one.value[0]),))
+    way = "high" if one.value[0] < 0.0 else "low"
+    return f"{joints_words(joint_names(one))} reads {value_words(size).removeprefix('+')} too {way}"
 
 
 def _sign(one: Cause) -> str:
@@ -185,7 +214,7 @@ _CLAUSES: Mapping[str, Callable[[Cause], str]] = {
     "half_turn": lambda one: f"{joints_words(joint_names(one))} needs half a turn",
     "mirrored": lambda one: f"{joints_words(joint_names(one))} is mirrored",
     "turns": lambda one: f"{joints_words(joint_names(one))} needs {value_words(one)}",
-    "joint_offset": lambda one: f"{joints_words(joint_names(one))} needs an offset of {value_words(one)}",
+    "joint_offset": _offset,
     "joint_scale": lambda one: f"{joints_words(joint_names(one))} needs a factor of {value_words(one)}",
     "compliance": lambda one: (
         f"{joints_words(joint_names(one))} is compliant: {value_words(one)} of its acceleration"

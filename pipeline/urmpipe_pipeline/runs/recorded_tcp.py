@@ -10,6 +10,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.messages import Hint
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.transform import Transform, from_offset
@@ -28,6 +29,9 @@ FAR_RECORDED = "recorded-tcp-far"
 
 FAR = 0.03
 """Root mean square distance in [m] that no calibration and no rounding explain."""
+
+TURNED = np.radians(2.0)
+"""Angle in [rad] between kinematics and recorded orientation that no calibration explains: a tool has it."""
 
 EXPLAINED = 1.0 / 25.0
 """What explains a motion leaves no more of it: a wrong arm and some tool leave a fifth by chance."""
@@ -91,7 +95,7 @@ def lacking_tool(robot: Chain | None, log: JointLog, *, turned: bool = False) ->
     said = _stays(robot, own, turned=turned)
     if not np.isfinite(poses.fit(robot).with_tool):
         said = f"{said}, and the log moves too little to show why: {_asked(robot)}"
-        return [LogWarning(LACKING_TOOL, said)]
+        return [LogWarning(LACKING_TOOL, said, hints=tuple(_tool_here(robot, poses)))]
     hints = tuple(_placing(robot, poses, own, turned=turned))
     return [LogWarning(LACKING_TOOL, said, hints=hints)] if hints else []
 
@@ -110,6 +114,19 @@ def _placing(robot: Chain, poses: RecordedPoses, own: Apart, *, turned: bool) ->
         if _judged(left, turned=turned).clearly_nearer(own) and left.distance <= CLOSE_WITH_TOOL:
             does = f"brings them within {left.said(turned=turned or (len(frame) > 3 and name == 'tool'))}"
             yield Hint(name, frame, does, robot=_in_catalogue(robot, name))
+
+
+def _tool_here(robot: Chain, poses: RecordedPoses) -> Iterator[Hint]:
+    """Yield the tool with which an arm meets poses that are too few to tell one: a hypothesis."""
+    bare = replace(robot, tool=Transform())
+    position, rotation = poses_over_log(bare, poses.q)
+    shift = np.einsum("nji,nj->ni", rotation, poses.position - position).mean(axis=0)
+    turned = poses.apart(bare, tool=False).angle > TURNED
+    tool = _frame((*shift.tolist(), *(poses.tool_turn(bare) if turned else ())))
+    left = poses.apart(replace(robot, tool=from_offset(tool)), tool=False)
+    if left.distance <= CLOSE_WITH_TOOL:
+        does = f"brings them within {left.said(turned=turned)} here"
+        yield Hint("tool", tool, does, robot=_in_catalogue(robot, "tool"))
 
 
 def _judged(apart: Apart, *, turned: bool) -> Apart:
@@ -140,8 +157,8 @@ def _asked(robot: Chain) -> str:
     """Return what to look at first: a tool or a base that is not there, or the tool that is."""
     length = float(np.linalg.norm(robot.tool.translation))
     if not length:
-        return "is a tool or a base missing?"
-    return f"is the tool, {length * 1e3:.1f} mm long, the right one, or a base missing?"
+        return "perhaps a tool or a base is missing"
+    return f"perhaps the tool, {length * 1e3:.1f} mm long, is another, or a base is missing"
 
 
 def _clearly_nearer(robot: Chain, log: JointLog, poses: RecordedPoses, own: Apart) -> list[_Other]:

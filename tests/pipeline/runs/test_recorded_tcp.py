@@ -131,15 +131,19 @@ def test_a_small_shift_of_the_base_is_found(base: tuple[float, ...], said: str) 
 def test_no_tool_is_found_for_a_log_that_hardly_moves_or_needs_more_than_a_tool() -> None:
     still = np.repeat(Q[:1], len(Q), axis=0)
     (warning,) = lacking_tool(UR5E, log(still, positions_over_log(UR5E, still) + np.array([0.0, 0.0, 0.15])))
-    assert warning.message == (
+    up = np.linalg.inv(poses_over_log(UR5E, still[:1])[1][0])[:, 2] * 0.15
+    shown = ",".join(f"{value:g}" for value in np.round(up, 4) + 0.0)
+    assert warning.words("command line") == (
         "the kinematics of ur5e stay 150.0 mm (rms) from the recorded TCP, and the log moves too"
-        " little to show why: is a tool or a base missing?"
+        " little to show why: perhaps a tool or a base is missing; --robot ur5e --tool"
+        f" {shown} brings them within {1e3 * np.linalg.norm(np.round(up, 4) - up):.2f} mm here"
     )
     tooled = UR5E.placed(tool=translation(0.0, 0.0, 0.1))
     (warning,) = lacking_tool(tooled, log(still, positions_over_log(UR5E, still)))
-    assert warning.message == (
+    assert warning.words("command line") == (
         "the kinematics of ur5e stay 100.0 mm (rms) from the recorded TCP, and the log moves too"
-        " little to show why: is the tool, 100.0 mm long, the right one, or a base missing?"
+        " little to show why: perhaps the tool, 100.0 mm long, is another, or a base is missing;"
+        " --robot ur5e --tool 0,0,0 brings them within 0.00 mm here"
     )
     assert lacking_tool(UR5E, log(Q, 1.3 * positions_over_log(UR5E, Q) + np.sin(9 * T))) == []
 
