@@ -61,10 +61,8 @@ def sentence(result: Diagnosis) -> str:
     before, after = (amount(one, result.unit) for one in (result.rms, result.remainder.rms))
     causes, alternatives = result.causes, result.undecided
     if result.remainder.different:
-        found = (
-            f"the causes found leave rms {after} of {before}" if causes else f"no cause found: rms {before}"
-        )
-        return f"probably different motions: {found}"
+        found = f"the causes found leave {after} of it" if causes or alternatives else "no cause found"
+        return f"probably different motions: rms {before}, {found}"
     if not causes and not alternatives:
         taken = f" ({result.remainder.words})" if result.remainder.words else ""
         return f"no cause found: rms {before} remains{taken}"

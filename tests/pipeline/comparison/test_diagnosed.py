@@ -15,6 +15,7 @@ from urmpipe_models.errors import OptionError
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.facts import decisive_facts
 from urmpipe_pipeline.comparison.mended import cause_marks
 from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts, diagnosis_tables
 from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR, MENDED_COLOUR
@@ -48,6 +49,8 @@ def test_a_log_out_of_tolerance_says_what_tells_its_cause(paths: Compared) -> No
     assert facts(far)["Cause"] == hint.value
     assert "Cause" not in facts(near)
     assert "cause" not in far.properties
+    few = paths({"log": off(0.5, 9)}).runs[0]
+    assert not [fact for fact in decisive_facts(few, "red") if fact.name == "Cause"]  # nor does a diagnosis
     aligned = replace(result.runs[0], alignment=replace(result.runs[0].alignment, mode="rigid"))
     (section, _) = present(replace(result, runs=(aligned, result.runs[1]))).body.sections
     assert "Cause" not in facts(section)  # a diagnosis is refused with an alignment
@@ -67,9 +70,11 @@ def test_causes_and_what_is_undecided_are_tables_and_what_was_not_looked_for_is_
         "from_row": [None, 4],
         "twins": ["", "d_5, tool shift z"],
         "rms_after": [SIGN.rms_after, LENGTH.rms_after],
-        "share": [SIGN.share, LENGTH.share],
+        "share": ["99.80 %", "0.2 %"],
     }
-    assert cells(tables["Undecided between"])["needs"] == ["phi5", "phi5"]
+    undecided = cells(tables["Undecided between"])
+    assert undecided["needs"] == ["phi5", "phi5"]
+    assert undecided["interval"][1] == "+0.1089 to +0.1203 deg"
 
 
 def test_one_cause_is_no_table_in_the_terminal(paths: Compared) -> None:
@@ -138,7 +143,7 @@ def test_what_is_named_is_marked_on_the_arm(arms: Compared) -> None:
     twice = replace(SIGN, kind="joint_offset", value=(0.1,), unit="rad")
     both = replace(one, diagnosis=replace(found, causes=(SIGN, twice)))
     assert [mark.words for mark in cause_marks(both, chain)] == [
-        "module 3 (phi3) counter-rotates and module 3 (phi3) needs an offset of +5.7296 deg"
+        "module 3 (phi3) counter-rotates and module 3 (phi3) reads 5.7296 deg too low"
     ]
 
 

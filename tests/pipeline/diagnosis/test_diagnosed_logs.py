@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from altered_arm import DURATION, demo_motion, poses, rich_motion, times, unifor
 from altered_log import POSES, TRACKER, diagnosed, diagnosed_record, drawn, tracked
 from made_runs import path_run, run_of
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 
@@ -140,6 +143,70 @@ def test_of_a_log_at_rest_nothing_is_named() -> None:
     assert not found.causes
     assert not found.undecided
     assert found.not_looked_for[0].reason == "the log is at rest: one pose"
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_lines_between_the_samples_of_the_reference_are_no_cause(seed: int) -> None:
+    """125 Hz, read at 100 Hz: lines lie h^2 q'' / 12 from the motion, as a joint that yields would."""
+    moved, late = demo_motion(), 0.04
+    asked = run_of(np.asarray(moved(np.arange(1500) * 0.008 + 1.0)), URM6, name="asked", tsp=0.008)
+    q = np.asarray(moved(np.arange(1190) * 0.01 + 1.0 - late))
+    q[:, 2] += np.radians(0.5)
+    noise = np.random.default_rng(seed).normal(0.0, np.radians(0.003), q.shape)
+    found = diagnosed(asked, run_of(q + noise, URM6, tsp=0.01))
+    assert {kind for kind, *_ in answer(found)} == {"time_lag", "joint_offset"}
+
+
+SCARA = """
+kind = "dh"
+name = "scara"
+joints = [
+    { name = "shoulder", d = 0.3, a = 0.325 },
+    { name = "elbow", a = 0.275, alpha = 3.141592653589793 },
+    { name = "quill", kind = "prismatic", d = 0.05 },
+    { name = "wrist" },
+]
+tool = { translation = [0, 0, 0.08] }
+"""
+
+
+def test_of_twins_that_of_full_size_is_named(tmp_path: Path) -> None:
+    """A tilt below the elbow moves the tool as the elbow's zero does, up to 1.2 deg squared."""
+    (tmp_path / "scara.toml").write_text(SCARA, "utf-8")
+    scara = load_robot(tmp_path / "scara.toml")
+    t = np.arange(400) * PERIOD * 2.0
+    waves = [0.8 * np.sin(t), 0.5 + 0.6 * np.sin(1.7 * t), 0.05 + 0.04 * np.sin(2.3 * t), np.sin(0.9 * t)]
+    q = np.column_stack(waves)
+    position, _ = poses(scara, q, oriented=False)
+    q += np.random.default_rng(3).normal(0.0, 1e-5, q.shape)
+    q[:, 1] -= np.radians(1.2)
+    found = diagnosed(path_run(position.T, tsp=2.0 * PERIOD), run_of(q, scara, tsp=2.0 * PERIOD))
+    assert answer(found) == [("joint_offset", ("q2",), None)]
+    assert found.causes[0].twins == ()
+    assert found.causes[0].value[0] == pytest.approx(np.radians(1.2), abs=1e-5)  # noise is 1e-5 a sample
+
+
+def test_motions_that_have_nothing_in_common_are_different() -> None:
+    one, other = (rich_motion(URM6, seed)(times(300)) for seed in (1, 2))
+    found = diagnosed(run_of(np.asarray(one), URM6), run_of(np.asarray(other), URM6))
+    assert found.remainder.different
+    assert found.sentence.startswith("probably different motions: rms ")
+
+
+def test_in_one_pose_the_tool_that_a_recorded_position_lacks_is_a_hypothesis() -> None:
+    q = np.tile(joints()[300], (20, 1))
+    (position,), (rotation,) = poses_over_log(URM6, q[:1])
+    tool = np.array([0.0034, 0.0013, 0.15])
+    recorded = np.tile(position + rotation @ tool, (20, 1))
+    found = diagnosed_record(run_of(q, URM6, recorded))
+    assert found.causes == ()
+    kinds = [[cause.kind for cause in one.causes] for one in found.undecided]
+    assert kinds == [["tool_shift"], ["base_shift"], []]
+    assert found.undecided[0].causes[0].value == pytest.approx(tool, abs=1e-12)
+    assert found.remainder.words == "the log is at rest: one pose"
+    assert found.remainder.rms < 1e-12
+    near = diagnosed_record(run_of(q, URM6, recorded - 0.99 * (rotation @ tool)))
+    assert near.undecided == ()  # 1.5 mm are within the tolerance
 
 
 @pytest.mark.slow

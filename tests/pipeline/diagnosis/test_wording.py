@@ -17,6 +17,7 @@ from urmpipe_pipeline.diagnosis.wording import (
     explained,
     remainder_words,
     sentence,
+    share_words,
     undecided_words,
 )
 
@@ -30,10 +31,14 @@ SENTENCES = {
     "joint q1 needs -2 turns from row 13 on": Cause(
         "turns", "q1", ("q1",), value=(-2.0,), unit="turns", from_sample=12
     ),
-    "module 1 (phi1) needs an offset of +0.1146 deg": OFFSET,
-    "joint slide needs an offset of -2.5000 mm": Cause(
+    "module 1 (phi1) reads 0.1146 deg too low": OFFSET,
+    "joint slide reads 2.5000 mm too high": Cause(
         "joint_offset", "slide", ("slide",), value=(-0.0025,), unit="m"
     ),
+    "elbow_joint reads 0.5730 deg too high": Cause(
+        "joint_offset", "elbow_joint", ("elbow_joint",), value=(-0.01,), unit="rad"
+    ),
+    "Joint1 and Joint2 are exchanged": Cause("joints_swapped", "Joint1 and Joint2", ("Joint1", "Joint2")),
     "joint q1 needs a factor of 1.0125": Cause("joint_scale", "q1", ("q1",), value=(1.0125,)),
     "joint q1 is compliant: +0.00013 s2 of its acceleration": Cause(
         "compliance", "q1", ("q1",), value=(1.3e-4,), unit="s2"
@@ -114,9 +119,51 @@ def test_one_cause_is_the_answer_with_the_deviation_before_and_after() -> None:
 
 def test_of_several_causes_each_has_its_share_and_what_stays_is_told() -> None:
     assert sentence(diagnosis(SIGN, OFFSET, LENGTH, remainder=Remainder(0.001, 6e-6))) == (
-        "module 3 (phi3) counter-rotates (99.80 %), module 1 (phi1) needs an offset of +0.1146 deg (0 %) and"
-        " r_4 needs +1.2000 mm from row 4 on (0.2 %): rms 416.57 mm -> 1 mm, under 0.01 % of the mean square"
-        " remains"
+        "module 3 (phi3) counter-rotates (99.80 %) and r_4 needs +1.2000 mm from row 4 on (0.2 %):"
+        " rms 416.57 mm -> 1 mm, under 0.01 % of the mean square remains"
+    )
+
+
+def test_the_answer_has_three_causes_at_most_and_none_of_next_to_no_share() -> None:
+    names = ("r_1", "r_2", "r_3", "r_4", "r_5", "r_6")
+    shares = (0.9, 0.2, 0.05, 0.04, 2e-4, -0.191)
+    causes = [
+        replace(LENGTH, name=one, from_sample=None, share=share)
+        for one, share in zip(names, shares, strict=True)
+    ]
+    assert sentence(diagnosis(*causes, remainder=Remainder(0.001, 6e-6))) == (
+        "r_1 needs +1.2000 mm (90.0 %), r_2 needs +1.2000 mm (20.0 %), r_3 needs +1.2000 mm (5.0 %) and 2 more"
+        ": rms 416.57 mm -> 1 mm, under 0.01 % of the mean square remains"
+    )
+    tiny = Alternative((causes[4],)), Alternative((replace(causes[4], name="r_7"),))
+    assert sentence(diagnosis(SIGN, remainder=Remainder(0.001, 6e-6), undecided=tiny)) == (
+        "module 3 (phi3) counter-rotates: rms 416.57 mm -> 1 mm"
+    )
+
+
+def test_a_cause_that_hides_a_part_of_another_has_no_share_in_the_answer() -> None:
+    hides = replace(LENGTH, from_sample=None, share=-1.2)
+    assert sentence(diagnosis(replace(SIGN, share=2.2), hides, remainder=Remainder(0.001, 6e-6))) == (
+        "module 3 (phi3) counter-rotates (220.0 %) and r_4 needs +1.2000 mm (hides a part of the others):"
+        " rms 416.57 mm -> 1 mm, under 0.01 % of the mean square remains"
+    )
+
+
+@pytest.mark.parametrize(
+    ("share", "said"),
+    [(1.798, "179.8 %"), (-1.2, "-120.0 %"), (-0.0005, "-0.05 %"), (-2.1e-7, "under 0.01 %"), (0.0, "0 %")],
+)
+def test_shares_are_plain_percents(share: float, said: str) -> None:
+    assert share_words(share) == said
+
+
+def test_different_motions_are_the_answer_and_not_what_happens_to_leave_less() -> None:
+    left = Remainder(0.19238, 0.158, "more than half", different=True)
+    assert sentence(diagnosis(SIGN, OFFSET, remainder=left)) == (
+        "probably different motions: rms 416.57 mm, the causes found leave 192.38 mm of it"
+    )
+    assert sentence(diagnosis(remainder=left)) == (
+        "probably different motions: rms 416.57 mm, no cause found"
     )
 
 
@@ -128,8 +175,8 @@ def test_nothing_named_is_said_with_what_it_is_taken_for() -> None:
 def test_what_is_undecided_names_both_and_what_would_decide() -> None:
     both = (Alternative((BASE,), "phi5"), Alternative((OFFSET, LENGTH), "phi5"))
     said = (
-        "either the base needs (+0.0000, +0.0000, +0.1146) deg or module 1 (phi1) needs an offset of"
-        " +0.1146 deg and r_4 needs +1.2000 mm from row 4 on: a motion of phi5 would decide"
+        "either the base needs (+0.0000, +0.0000, +0.1146) deg or module 1 (phi1) reads"
+        " 0.1146 deg too low and r_4 needs +1.2000 mm from row 4 on: a motion of phi5 would decide"
     )
     assert undecided_words(both) == said
     either = said.removesuffix(": a motion of phi5 would decide") + " (a motion of phi5 would decide)"
@@ -145,7 +192,7 @@ def test_what_is_undecided_names_both_and_what_would_decide() -> None:
 def test_one_explanation_may_be_nothing_and_the_log_may_not_decide() -> None:
     said = undecided_words((Alternative((OFFSET,)), Alternative(())))
     assert said == (
-        "either module 1 (phi1) needs an offset of +0.1146 deg or none of these: this log cannot decide"
+        "either module 1 (phi1) reads 0.1146 deg too low or none of these: this log cannot decide"
     )
 
 
