@@ -132,8 +132,8 @@ def test_the_answer_has_three_causes_at_most_and_none_of_next_to_no_share() -> N
         for one, share in zip(names, shares, strict=True)
     ]
     assert sentence(diagnosis(*causes, remainder=Remainder(0.001, 6e-6))) == (
-        "r_1 needs +1.2000 mm (90.0 %), r_2 needs +1.2000 mm (20.0 %), r_3 needs +1.2000 mm (5.0 %) and 2 more"
-        ": rms 416.57 mm -> 1 mm, under 0.01 % of the mean square remains"
+        "r_1 needs +1.2000 mm (90.0 %), r_2 needs +1.2000 mm (20.0 %), r_3 needs +1.2000 mm (5.0 %)"
+        " and 2 more: rms 416.57 mm -> 1 mm, under 0.01 % of the mean square remains"
     )
     tiny = Alternative((causes[4],)), Alternative((replace(causes[4], name="r_7"),))
     assert sentence(diagnosis(SIGN, remainder=Remainder(0.001, 6e-6), undecided=tiny)) == (
