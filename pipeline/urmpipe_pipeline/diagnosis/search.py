@@ -147,12 +147,14 @@ class Search:
         forced = self._columns(self.forced)
         usual = [(c, size) for g, size in self.usual.items() if g in among for c in self._columns([g])]
         damping = np.array([*(0.0 for _ in forced), *(size**-2.0 for _, size in usual)])
-        normal = normal_equations(self.model, state, rows).without([*forced, *(c for c, _ in usual)], damping)
+        every = normal_equations(self.model, state, rows)
+        normal = every.without([*forced, *(c for c, _ in usual)], damping)
+        whole = every.without(forced, np.zeros(len(forced))).gram if usual else None
         groups = tuple(np.array(group.columns) for group in self.model.groups)
         floor = float(np.mean((self.floor * rows.weight) ** 2))
         edits = state.edits
         numbers = sum(1 + (edit.first > 0) for edit in edits)
-        return Selection(normal, groups, normal.count / tau, floor, len(edits), numbers, len(among))
+        return Selection(normal, groups, normal.count / tau, floor, len(edits), numbers, len(among), whole)
 
     def _explained(self, rows: Rows, state: State, tau: float = 1.0, most: float = np.inf) -> Explanation:
         """Return the best explanation with some edits, selected anew where the last fit led until it stays.

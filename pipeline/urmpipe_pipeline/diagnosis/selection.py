@@ -105,6 +105,8 @@ class Selection:
         taken: Causes that are taken besides, those that are there or not.
         numbers: Their numbers: one each, and one more where it begins at some row.
         hypotheses: K, among how many causes is chosen.
+        whole: J^T J [-] before numbers of a usual size were taken away, shape (p, p): by it a group moves
+            what it moves, though the usual could do so too; None where none were.
     """
 
     normal: Normal
@@ -114,14 +116,16 @@ class Selection:
     taken: int
     numbers: int
     hypotheses: int
+    whole: FloatArray | None = None
 
     @cached_property
-    def _scaled(self) -> tuple[FloatArray, FloatArray]:
+    def _scaled(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The normal equations of columns of unit length."""
         size = np.sqrt(np.maximum(np.diag(self.normal.gram), 0.0))
         by = np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)
         gram = self.normal.gram * by[:, np.newaxis] * by
-        return gram + _RIDGE * np.eye(len(gram)), self.normal.moment * by
+        whole = gram if self.whole is None else self.whole * by[:, np.newaxis] * by
+        return gram + _RIDGE * np.eye(len(gram)), self.normal.moment * by, whole
 
     def left(self, subsets: Sequence[Subset]) -> FloatArray:
         """Return the mean square [-] that each of some subsets leaves, shape (len(subsets),)."""
@@ -129,7 +133,7 @@ class Selection:
 
     def _solved(self, subsets: Sequence[Subset]) -> tuple[FloatArray, FloatArray]:
         """Return the mean squares [-] that subsets leave, and that the least of their groups moves."""
-        gram, moment = self._scaled
+        gram, moment, whole = self._scaled
         explained, least = np.zeros(len(subsets)), np.full(len(subsets), np.inf)
         columns = [self.columns(subset) for subset in subsets]
         sizes = np.array([len(one) for one in columns])
@@ -140,9 +144,9 @@ class Selection:
             inner = gram[taken[:, :, np.newaxis], taken[:, np.newaxis, :]]
             found = np.linalg.solve(inner, right[:, :, np.newaxis])[:, :, 0]
             explained[at] = (found * right).sum(axis=1)
-            owner = self._owner[taken]
+            own, owner = whole[taken[:, :, np.newaxis], taken[:, np.newaxis, :]], self._owner[taken]
             alike = owner[:, :, np.newaxis] == owner[:, np.newaxis, :]
-            moved = np.einsum("sc,scd,sd->sc", found, inner * alike, found)
+            moved = np.einsum("sc,scd,sd->sc", found, own * alike, found)
             least[at] = (alike * moved[:, np.newaxis, :]).sum(axis=2).min(axis=1)
         count = max(self.normal.count, 1)
         return np.maximum(self.normal.square - explained, 0.0) / count, least / count
