@@ -240,7 +240,7 @@ class Search:
     def _concluded(self, found: Stable, near: list[Explanation]) -> Found:
         """Return an explanation with what stays of it, and with those that are not told from it.
 
-        Who takes more causes has to leave less.
+        Who takes more causes has to leave less, and each of them moves the floor or more.
         """
         state, subset, tau, rows, selection = found
         state = self._beside_usual(state, subset, selection.normal)
@@ -249,7 +249,11 @@ class Search:
         near += self._neighbours(selection, final, rows)
         few = replace(rows, at=rows.at[:: max(len(rows.at) // MANY, 1)])
         simple, least = _count(final), cost(self.model, state, few)
-        near = [one for one in near if _count(one) <= simple or cost(self.model, one.state, few) < least]
+        near = [
+            one for one in near
+            if (_count(one) <= simple or cost(self.model, one.state, few) < least)
+            and (one.state.edits != state.edits or selection.moving(one.subset) == one.subset)
+        ]  # fmt: skip
         near = list({(one.state.edits, one.subset): one for one in near}.values())
         shown = tuple(sorted(near, key=_score)[:SHOWN])
         return Found(final, shown, rows, tau, variance, selection.normal, self._distinct[1])
@@ -285,7 +289,9 @@ class Search:
             if chosen == subset and selection.best(among) == chosen:
                 break
             subset = chosen
-        return Stable(state, chosen - beyond, tau, rows, selection)
+        kept = selection.moving(chosen - beyond)
+        state = state if kept == chosen else self.fitted(state, kept, rows)
+        return Stable(state, kept, tau, rows, selection)
 
     def _tau(self, state: State, rows: Rows) -> float:
         """Return the autocorrelation time of what an explanation leaves: the longest, of places or turns."""

@@ -6,8 +6,8 @@ the extended Bayesian information criterion
     n ln(max(RSS / N, floor)) + k ln n + 2 ln C(K, s),
 
 with RSS the sum of the N squares that s of K groups with k columns leave, and n the number of independent
-ones among them: N divided by the autocorrelation time. The lowest score is best. A subset does not count
-where the columns of a group move less than the floor: RSS cannot show that under larger noise.
+ones among them: N divided by the autocorrelation time. The lowest score is best. Of the
+best, groups whose columns move less than the floor are dropped: RSS cannot show that under larger noise.
 
 Source: [ChenChen2008]_ eq. 2, gamma = 1.
 """
@@ -129,12 +129,8 @@ class Selection:
 
     def left(self, subsets: Sequence[Subset]) -> FloatArray:
         """Return the mean square [-] that each of some subsets leaves, shape (len(subsets),)."""
-        return self._solved(subsets)[0]
-
-    def _solved(self, subsets: Sequence[Subset]) -> tuple[FloatArray, FloatArray]:
-        """Return the mean squares [-] that subsets leave, and that the least of their groups moves."""
-        gram, moment, whole = self._scaled
-        explained, least = np.zeros(len(subsets)), np.full(len(subsets), np.inf)
+        gram, moment, _ = self._scaled
+        explained = np.zeros(len(subsets))
         columns = [self.columns(subset) for subset in subsets]
         sizes = np.array([len(one) for one in columns])
         for size in np.unique(sizes[sizes > 0]):
@@ -144,20 +140,23 @@ class Selection:
             inner = gram[taken[:, :, np.newaxis], taken[:, np.newaxis, :]]
             found = np.linalg.solve(inner, right[:, :, np.newaxis])[:, :, 0]
             explained[at] = (found * right).sum(axis=1)
-            own, owner = whole[taken[:, :, np.newaxis], taken[:, np.newaxis, :]], self._owner[taken]
-            alike = owner[:, :, np.newaxis] == owner[:, np.newaxis, :]
-            moved = np.einsum("sc,scd,sd->sc", found, own * alike, found)
-            least[at] = (alike * moved[:, np.newaxis, :]).sum(axis=2).min(axis=1)
-        count = max(self.normal.count, 1)
-        return np.maximum(self.normal.square - explained, 0.0) / count, least / count
+        left: FloatArray = np.maximum(self.normal.square - explained, 0.0) / max(self.normal.count, 1)
+        return left
 
-    @cached_property
-    def _owner(self) -> IntArray:
-        """The group of each column, shape (p,)."""
-        owner = np.zeros(len(self.normal.gram), dtype=np.int64)
-        for g, columns in enumerate(self.groups):
-            owner[columns] = g
-        return owner
+    def moving(self, subset: Subset) -> Subset:
+        """Return the groups of a subset that move the floor or more, the least dropped first."""
+        gram, moment, whole = self._scaled
+        while subset:
+            columns = self.columns(subset)
+            x = np.zeros(len(gram))
+            x[columns] = np.linalg.solve(gram[np.ix_(columns, columns)], moment[columns])
+            own = ((g, self.columns([g])) for g in sorted(subset))
+            moved = {g: float(x[at] @ whole[np.ix_(at, at)] @ x[at]) / self.normal.count for g, at in own}
+            least = min(moved, key=lambda g: moved[g])
+            if moved[least] >= self.floor:
+                break
+            subset -= {least}
+        return subset
 
     @cached_property
     def _columns(self) -> list[tuple[int, ...]]:
@@ -169,11 +168,10 @@ class Selection:
         return [c for g in sorted(subset) for c in self._columns[g]]
 
     def scores(self, subsets: Sequence[Subset]) -> FloatArray:
-        """Return the scores [-] of some subsets, shape (len(subsets),): inf where one does not count."""
-        left, moved = self._solved(subsets)
+        """Return the score [-] of each of some subsets, shape (len(subsets),)."""
+        left = self.left(subsets)
         penalty = [self.penalty(sum(len(self._columns[g]) for g in one), len(one)) for one in subsets]
-        scores = self.independent * np.log(np.maximum(left, self.floor)) + np.array(penalty)
-        return np.where(moved < self.floor, np.inf, scores)
+        return np.asarray(self.independent * np.log(np.maximum(left, self.floor)) + np.array(penalty))
 
     def score(self, left: float, subset: Subset) -> float:
         """Return the score [-] of a subset that leaves a mean square [-]."""
