@@ -232,7 +232,8 @@ class Search:
         gram, some = found.selection.normal.gram, replace(found.rows, at=self.spread(COARSE))
         for twin, g in self._distinct[1].items():
             if g in found.subset:
-                other = exchanged(found.state, *self._columns([g, twin]), gram)
+                c, d = self._columns([g, twin])
+                other = exchanged(found.state, c, d, gram)
                 if not same_at_full_size(self, found.state, other, some):
                     search = replace(self, first=(twin, *self.first))
                     yield search, search._stable(few, other, None)

@@ -157,8 +157,8 @@ def test_lines_between_the_samples_of_the_reference_are_no_cause(seed: int) -> N
         return np.asarray(rest + wide * np.sin(2.0 * np.pi * often * t[:, np.newaxis] + np.arange(6)))
 
     arm = load_robot("ur5e")
-    asked = run_of(moved(np.arange(2500) * 0.008), arm, name="asked", tsp=0.008)
-    q = moved(np.arange(1990) * 0.01 - 0.04)
+    asked = run_of(moved(np.linspace(0.0, 2499 * 0.008, 2500)), arm, name="asked", tsp=0.008)
+    q = moved(np.linspace(-0.04, 19.85, 1990))
     q[:, 2] += np.radians(0.5)
     noise = np.random.default_rng(seed).normal(0.0, np.radians(0.003), q.shape)
     found = diagnosed(asked, run_of(q + noise, arm, tsp=0.01))

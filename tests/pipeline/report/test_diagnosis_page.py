@@ -24,8 +24,8 @@ def test_its_parts_stand_where_they_are_read_first(comparison: Comparison) -> No
     assert not part.folded
     assert isinstance(part.blocks[0], Figure)
     grids = [block for block in part.blocks if isinstance(block, Grid)]
-    assert [(one.title, one.folded) for one in grids[:2]] == [
-        ("Causes", False), ("Statistics of position and path", False),
+    assert [(one.title, one.folded) for one in grids[:3]] == [
+        ("Causes", False), ("Undecided between", False), ("Statistics of position and path", False),
     ]  # fmt: skip
     assert [one.text for one in grids[0].rows[1]] == [
         "r_4 needs +1.2000 mm from row 4 on", "+1.2000 mm", "+1.1000 to +1.3000 mm", "4",
