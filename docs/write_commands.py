@@ -47,10 +47,12 @@ The shell completes options, names, files of the right kind, columns of the log 
 names what was found, what is allowed, and the next step; with `--json` it is also an object on standard
 output. Closing a pipe early, as `head` does, does not change the exit code.
 
-**Defaults.** `urmpipe.toml`, in the working folder or above it, sets options for all commands, or for one
-command in its table. Each command prints the defaults that it uses; options on the command line override
-them. Options for the output of a single call (`output`, `json`, `junit`, `csv`, `baseline`, `audit`,
-`write-map`, `explain`, `draw`, `list`) have no default.
+**Defaults.** `urmpipe.toml` sets options for all commands, or for one command in its table. The files in the
+working folder and in every folder above it are merged: if several set an option, the nearest file decides.
+Options on the command line override them all. A command prints the defaults that it uses, and their file.
+Options for the output of a single call (`output`, `json`, `junit`, `csv`, `baseline`, `audit`, `write-map`,
+`explain`, `draw`, `list`) have no default. An upper file's `tool` also applies to the `robot` of a nearer
+file, unless that file sets `tool`, too.
 
     robot = "ur5e"
     tool = [0, 0, 0.15]

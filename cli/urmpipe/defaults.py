@@ -6,14 +6,15 @@
     [compare]               # for one command
     tolerance = {axis = 0.002, angle = "0.5deg"}
 
-A key is the name of an option without its dashes. The file is looked for in the working folder and those
-above it; options on the command line come first. Files named in it are seen from its own folder.
+A key is the name of an option without its dashes. The files in the working folder and in those above it
+hold together: of an option that several set, the nearest file decides. Options on the command line come
+first. Files named in a file are seen from its own folder.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,14 +38,39 @@ TABLES = ("tolerance", "noise")
 """Options whose value may be a table: what the command line has as KIND=VALUE,..."""
 
 
-def find_defaults() -> Path | None:
-    """Return the nearest `urmpipe.toml` in the working folder or above it."""
+def find_defaults() -> list[Path]:
+    """Return each `urmpipe.toml` in the working folder and above it, the nearest first."""
     folder = Path.cwd()
-    return next((one / NAME for one in (folder, *folder.parents) if (one / NAME).is_file()), None)
+    return [one / NAME for one in (folder, *folder.parents) if (one / NAME).is_file()]
+
+
+def deciding_defaults(
+    command: click.Command, files: Sequence[Path], commands: Mapping[str, click.Command]
+) -> dict[Path, dict[str, Any]]:
+    """Return the values of a command's options by the file that decides each, without files that decide none.
+
+    Args:
+        command: The command.
+        files: The files, the nearest first.
+        commands: All commands: every key must be an option of one of them.
+
+    Raises:
+        OptionError: With everything that is wrong with any of the files.
+    """
+    from urmpipe_models.errors import for_each
+
+    decided: set[str] = set()
+    by_file = {}
+    each = for_each(lambda path: defaults_for(command, path, commands), files)
+    for path, values in zip(files, each, strict=True):
+        if own := {name: value for name, value in values.items() if name not in decided}:
+            by_file[path] = own
+        decided |= own.keys()
+    return by_file
 
 
 def defaults_for(command: click.Command, path: Path, commands: Mapping[str, click.Command]) -> dict[str, Any]:
-    """Return the values of a command's options, by the names of its parameters.
+    """Return the values of a command's options in one file, by the names of its parameters.
 
     Args:
         command: The command.

@@ -21,7 +21,7 @@ from typing import Any
 import click
 
 from urmpipe import __version__
-from urmpipe.defaults import defaults_for, find_defaults
+from urmpipe.defaults import deciding_defaults, find_defaults
 from urmpipe.error_boundary import (
     close_streams,
     findings_of,
@@ -68,9 +68,9 @@ class LazyGroup(Group):
             return None
         command = self._load(cmd_name)
         asked = not isinstance(command, click.Group) and not ctx.resilient_parsing  # a shell that completes
-        path = find_defaults() if asked else None
-        if path is not None:
-            ctx.default_map = {cmd_name: self._defaults(ctx, command, path)}
+        files = find_defaults() if asked else []
+        if files:
+            ctx.default_map = {cmd_name: self._defaults(ctx, command, files)}
         return command
 
     def _load(self, name: str) -> click.Command:
@@ -80,13 +80,14 @@ class LazyGroup(Group):
             raise TypeError(f"urmpipe.commands.{name} defines no command of its name")
         return command
 
-    def _defaults(self, ctx: click.Context, command: click.Command, path: Path) -> dict[str, Any]:
-        """Return what urmpipe.toml says for a command, and leave what -q does not suppress in the context."""
-        values = defaults_for(command, path, {name: self._load(name) for name in COMMANDS})
-        if values:
-            options = {param.name: max(param.opts, key=len).lstrip("-") for param in command.params}
-            ctx.obj = Defaults(path, {options[name]: value for name, value in values.items()})
-        return values
+    def _defaults(self, ctx: click.Context, command: click.Command, files: Sequence[Path]) -> dict[str, Any]:
+        """Return the defaults in files, the nearest first, and leave their origin in the context."""
+        by_file = deciding_defaults(command, files, {name: self._load(name) for name in COMMANDS})
+        options = {param.name: max(param.opts, key=len).lstrip("-") for param in command.params}
+        ctx.obj = Defaults(
+            {path: {options[name]: value for name, value in own.items()} for path, own in by_file.items()}
+        )
+        return {name: value for own in by_file.values() for name, value in own.items()}
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands with their short help, without loading them."""

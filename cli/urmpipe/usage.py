@@ -18,19 +18,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Defaults:
-    """What an urmpipe.toml says for a command.
+    """The defaults of a command.
 
     Attributes:
-        path: The file.
-        values: Its values by the long names of options, without dashes.
+        by_file: The values that each urmpipe.toml sets, the nearest file first, by the long names of options
+            without dashes.
     """
 
-    path: Path
-    values: dict[str, Any]
+    by_file: dict[Path, dict[str, Any]]
 
-    def __str__(self) -> str:
-        """Return what is told of them: the file, and each value as TOML has it, without quotes."""
-        return f"defaults of {self.path}: {', '.join(f'{k}={_shown(v)}' for k, v in self.values.items())}"
+    def lines(self) -> Iterator[str]:
+        """Yield a line for each file: its name, and its values as TOML has them, without quotes."""
+        for path, values in self.by_file.items():
+            yield f"defaults of {path}: {', '.join(f'{k}={_shown(v)}' for k, v in values.items())}"
+
+    def file_of(self, option: str) -> Path:
+        """Return the file that sets an option."""
+        return next(path for path, values in self.by_file.items() if option in values)
 
 
 def _shown(value: Any) -> str:
@@ -114,7 +118,7 @@ def place_of(ctx: click.Context | None, param: click.Parameter, found: Finding) 
     by_file = ctx is not None and ctx.get_parameter_source(param.name or "") == ParameterSource.DEFAULT_MAP
     if ctx is not None and by_file and isinstance(ctx.obj, Defaults):
         said = ": ".join(filter(None, (f"key {_long(param)}", found.message)))
-        return replace(found, message=said, file=str(ctx.obj.path), parameter=None)
+        return replace(found, message=said, file=str(ctx.obj.file_of(_long(param))), parameter=None)
     if isinstance(param, click.Option):
         return replace(found, parameter=param.name)
     return replace(found, message=": ".join(filter(None, (_told(param), found.message))), parameter=None)

@@ -56,11 +56,34 @@ def test_the_command_line_comes_before_the_defaults(lab: Path, capsys: Captured)
     assert found["units"]["a"] == "rad"  # type: ignore[index]
 
 
-def test_the_nearest_file_is_taken(lab: Path, capsys: Captured) -> None:
-    (lab / "urmpipe.toml").write_text('robot = "ur5e"\n')
-    (lab / "today" / "urmpipe.toml").write_text('robot = "ur10"\nunit="deg"\n')
+def test_of_an_option_in_several_files_the_nearest_decides(lab: Path, capsys: Captured) -> None:
+    upper, nearer = lab / "urmpipe.toml", lab / "today" / "urmpipe.toml"
+    upper.write_text('robot = "ur5e"\nunit = "deg"\n[ingest]\ntsp = "10ms"\nstrict = true\n')
+    nearer.write_text('robot = "ur10"\ntsp = "5ms"\n')
     assert run(["ingest", "log.csv", "--json"]) == 0
-    assert result(capsys)["robot"] == "ur10"
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert (found["robot"], found["tsp"], found["units"]["a"]) == ("ur10", 0.005, "deg")
+    assert err.splitlines() == [
+        f"note: defaults of {nearer}: robot=ur10, tsp=5ms",
+        f"note: defaults of {upper}: unit=deg, strict=true",
+    ]
+
+
+def test_each_error_names_the_file_that_it_is_in(lab: Path, capsys: Captured) -> None:
+    upper, nearer = lab / "urmpipe.toml", lab / "today" / "urmpipe.toml"
+    upper.write_text("tsp = true\n")
+    nearer.write_text("strict = 1\n")
+    assert run(["ingest", "log.csv", "-q"]) == 2
+    assert capsys.readouterr().err == (
+        f"error: {nearer}: key strict: found 1, allowed: true or false\n"
+        f"error: {upper}: key tsp: found true, allowed: a text, a number, or a list of them\n"
+    )
+    upper.write_text("tsp = -1\n")
+    nearer.write_text('robot = "ur10"\n')
+    assert run(["ingest", "log.csv", "-q"]) == 2
+    said = "key tsp: found '-1', allowed: a positive time in s, such as 0.005 or 5ms"
+    assert capsys.readouterr().err == f"error: {upper}: {said}\n"
 
 
 def test_files_in_it_are_seen_from_its_folder(lab: Path, capsys: Captured) -> None:

@@ -144,5 +144,6 @@ def _tell_defaults(ctx: click.Context, param: click.Parameter, quiet: bool) -> b
     if ctx.obj and not quiet:
         from urmpipe.printing.terminal import say
 
-        say(f"note: {ctx.obj}", err=True)
+        for line in ctx.obj.lines():
+            say(f"note: {line}", err=True)
     return quiet
