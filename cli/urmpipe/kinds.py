@@ -203,6 +203,7 @@ KINDS = {
     "iso": FLAG,
     "jerk": Kind(_is_number, "a number, in m/s3"),
     "junit": PATH,
+    "keep_going": FLAG,
     "law": _one_of("trapezoid", "jerk", "limits"),
     "lazy": FLAG,
     "limit": Kind(_is_number, "a number, in m"),

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from os.path import isdir, isfile  # of a name that no file may have Path raises
 from pathlib import Path
-from typing import TypeAlias
+from typing import TypeAlias, TypeVar
 
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError, for_each, shown
+from urmpipe_models.errors import (
+    Finding,
+    LogError,
+    OptionError,
+    RecordingError,
+    UrmpipeError,
+    for_each,
+    shown,
+)
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.unjudged import Unjudged
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.results import kind_of, read_recording
@@ -39,6 +48,8 @@ MADE_RUNS: tuple[type[MadeRun], ...] = (Run, SolvedTargets, PlannedPath)
 Operand: TypeAlias = Path | Held | MadeRun | Simulation
 """What stands for a run, or is read as one."""
 
+Given = TypeVar("Given")
+
 
 def load_runs(
     operands: Sequence[Operand],
@@ -50,6 +61,7 @@ def load_runs(
     derivative: Method | None = None,
     block: str | Sequence[str] | None = None,
     judged: Sequence[Hint] = (WITH_BASELINE,),
+    unjudged: list[Unjudged] | None = None,
 ) -> list[Run]:
     """Return the runs of several operands, or both sides of one log; the reading options hold for every log.
 
@@ -64,6 +76,7 @@ def load_runs(
         derivative: How the joints of CSV files are differentiated.
         block: The block whose motion is meant of every simulation, or one for each of them in their order.
         judged: What the recording of a comparison, which is no operand, can be given to.
+        unjudged: Takes the logs behind the reference that cannot be read, if another can; None: none may be.
 
     Raises:
         UrmpipeError: With everything that is wrong with any of them: a bad CSV, a recording without a run.
@@ -89,13 +102,19 @@ def load_runs(
     if sides is not None:
         _refuse_sides(operands, sides)
     each = [(operand, None) for operand in operands]
-    runs = for_each(run_of, each if sides is None else [(operands[0], one) for one in (sides, sides[::-1])])
-    blocks.refuse_unused()
     if sides is not None:
-        return _on_one_arm(runs)
-    if shared:
+        both = for_each(run_of, [(operands[0], one) for one in (sides, sides[::-1])])
+        blocks.refuse_unused()
+        return _on_one_arm(both)
+    found = for_each(run_of, each) if unjudged is None else _runs_or_errors(run_of, each)
+    blocks.refuse_unused()
+    runs = [one for one in found if isinstance(one, Run)]
+    if shared and len(runs) == len(found):
         _refuse_unreached(read, runs)
-    return _told_apart(operands, runs)
+    named = list(zip(_names(operands, found), found, strict=True))
+    if unjudged is not None:
+        unjudged += [Unjudged(name, one.findings) for name, one in named if isinstance(one, UrmpipeError)]
+    return [replace(one, name=name) for name, one in named if isinstance(one, Run)]
 
 
 def _read(
@@ -107,6 +126,29 @@ def _read(
     stem = log.name if isinstance(log, Held) else log.resolve().stem
     name = name if read.side is None else f"{stem} ({read.side[0]})"
     return ingest_log(files, robot=robot, read=read, tsp=tsp, derivative=derivative, name=name)
+
+
+def _runs_or_errors(make: Callable[[Given], Run], each: Sequence[Given]) -> Sequence[Run | UrmpipeError]:
+    """Return what a function makes of the reference and of logs, or what is wrong with a log.
+
+    Raises:
+        UrmpipeError: With all that is wrong, if it is the reference, or every log.
+    """
+
+    def tried(one: Given) -> Run | UrmpipeError:
+        try:
+            return make(one)
+        except UrmpipeError as error:
+            return error
+
+    def made(one: Run | UrmpipeError) -> Run:
+        if isinstance(one, Run):
+            return one
+        raise one
+
+    found = [tried(one) for one in each]
+    reference, *logs = (isinstance(one, Run) for one in found)
+    return found if reference and any(logs) else for_each(made, found)
 
 
 class _Blocks:
@@ -162,18 +204,22 @@ def _refuse_unreached(read: ReadOptions, runs: Sequence[Run]) -> None:
         raise OptionError(*said)
 
 
-def _told_apart(operands: Sequence[Operand], runs: Sequence[Run]) -> list[Run]:
-    """Return runs of which no two have one name: those of files by these, or by their folders, too."""
+def _names(operands: Sequence[Operand], runs: Sequence[Run | UrmpipeError]) -> list[str]:
+    """Return names of runs, of which no two are one: of files by these, or by their folders, too."""
     files = [one.resolve() if isinstance(one, Path) else None for one in operands]
-    stems = [None if path is None else path.name if path.is_dir() else path.stem for path in files]
+    stems = ["" if path is None else path.name if path.is_dir() else path.stem for path in files]
+    own = [
+        run.name if isinstance(run, Run) else stem or operand.name
+        for operand, run, stem in zip(operands, runs, stems, strict=True)
+    ]
 
-    def named(run: Run, path: Path | None, stem: str | None) -> Run:
-        """Return a run under a name of its own."""
-        if path is None or stem is None or [one.name for one in runs].count(run.name) == 1:
-            return run
-        return replace(run, name=stem if stems.count(stem) == 1 else f"{stem} ({path.parent.name})")
+    def named(name: str, path: Path | None, stem: str) -> str:
+        """Return a name of its own."""
+        if path is None or own.count(name) == 1:
+            return name
+        return stem if stems.count(stem) == 1 else f"{stem} ({path.parent.name})"
 
-    return [named(*each) for each in zip(runs, files, stems, strict=True)]
+    return [named(*each) for each in zip(own, files, stems, strict=True)]
 
 
 def _recorded(operand: Path, judged: Sequence[Hint]) -> MadeRun | Simulation:

@@ -31,6 +31,7 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
+from urmpipe_pipeline.comparison.unjudged import Unjudged, judge_others
 from urmpipe_pipeline.comparison.warnings import BEYOND, EXCHANGED, LARGE_NOISE, large_noises
 from urmpipe_pipeline.operands import (
     MADE_RUNS,
@@ -89,6 +90,7 @@ def compare(
     baseline: PathLike | Comparison | None = None,
     noise: float | Mapping[str, float] | None = None,
     strict: bool = False,
+    keep_going: bool = False,
     output: PathLike | None = None,
     junit: PathLike | None = None,
     csv: PathLike | None = None,
@@ -134,6 +136,8 @@ def compare(
         noise: Changes since then that mean nothing, in [m], or in [m] and [rad] by kind; default: 1 um and
             1 urad.
         strict: Whether a warning is an error.
+        keep_going: Whether logs are judged even if others cannot be: these are then the result's `unjudged`,
+            and its `verdict` is None, or fail. Not with `iso`.
         output: The recording (.rrd) to write.
         junit: A JUnit file (XML) to write.
         csv: A table to write, one row a log and quantity.
@@ -166,17 +170,24 @@ def compare(
             _allowed(tolerance, iso=iso), tcp, _clocks(sync, iso=iso),
             align, _with_unit(tolerance), diagnose, test,
         )  # fmt: skip
+        if keep_going and iso:
+            raise OptionError(Finding(parameter="keep_going", found="with iso", allowed="one of the two"))
         _refuse_unused(operands, {**reading, "tsp": tsp, "derivative": derivative, "sides": sides})
         earlier = None if baseline is None else _earlier(baseline)
         load = partial(
             load_runs, sides=sides, robot=given.arm, read=given.options, tsp=tsp, derivative=derivative,
             block=block, judged=() if diagnose else (WITH_BASELINE,),
         )  # fmt: skip
+
+        def checked(made: Comparison) -> Comparison:
+            """Return a comparison with the doubts about a noise, if no doubt is an error."""
+            made = made if earlier is None else _with_noise(made, level)
+            _refuse_doubts(strict, made)
+            return made
+
         made = None if operands[1:] or earlier is None else _made_before(reference, output)
-        made = made or _compared(operands, load, options)
-        if earlier is not None:
-            made = _with_noise(made, level)
-        _refuse_doubts(strict, made)
+        going = [] if keep_going else None
+        made = checked(made) if made else _compared(operands, load, options, checked, going)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         shown = present(result)
         written.write("junit", lambda part, path: write_junit(shown, part, path, voice))
@@ -249,17 +260,27 @@ def _noise_level(
 
 def _compared(
     operands: Sequence[Path | str | Held | MadeRun | Simulation | Comparison],
-    load: Callable[[Sequence[Path | Held | MadeRun | Simulation]], list[Run]],
+    load: Callable[..., list[Run]],
     options: CompareOptions,
+    checked: Callable[[Comparison], Comparison],
+    unjudged: list[Unjudged] | None,
 ) -> Comparison:
     """Return the comparison of some logs with a reference, or of one log with what it recorded itself."""
     if any(isinstance(one, Comparison) for one in operands):
         raise OptionError("found a comparison as the reference, allowed: with a baseline, and without logs")
     given = (Path(one) if isinstance(one, (str, Path)) else one for one in operands)
-    first, *others = load([one for one in given if not isinstance(one, Comparison)])
+    first, *others = load([one for one in given if not isinstance(one, Comparison)], unjudged=unjudged)
     if options.iso is not None and not others:
         raise OptionError(Finding(parameter="iso", found="no log", allowed="a reference and its cycles"))
-    return compare_runs(first, others, options) if others else compare_recorded(first, options)
+    if not others:
+        return checked(compare_recorded(first, options))
+
+    def judge(runs: Sequence[Run]) -> Comparison:
+        return checked(compare_runs(first, runs, options))
+
+    if unjudged is None:
+        return judge(others)
+    return replace(judge_others(judge, others, unjudged), unjudged=tuple(unjudged))
 
 
 def _made_before(reference: Operand | Comparison, output: PathLike | None) -> Comparison | None:

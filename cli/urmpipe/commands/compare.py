@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
+from urmpipe.error_boundary import print_findings
 from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.comparing import comparing_options
 from urmpipe.options.completion import tolerances
@@ -96,6 +97,12 @@ def _cycles(text: str) -> tuple[tuple[int, int], ...]:
     " at which REFERENCE rests].",
 )
 @option(
+    Heading.JUDGING,
+    "--keep-going",
+    is_flag=True,
+    help="If a log cannot be judged, judge the others, write the outputs, and exit with code 2.",
+)
+@option(
     Heading.OUTPUT,
     "--junit",
     metavar="FILE.xml",
@@ -167,6 +174,8 @@ def compare(
     for name in ("tolerance", "sync") if options["iso"] else ():
         if not options_given(ctx, name.__eq__):
             options[name] = None  # the defaults, and what a lab says, are for logs that are judged one by one
+    if not options_given(ctx, "keep_going".__eq__):
+        options["keep_going"] &= not options["iso"]
     target = None if made else output or Path(default_name(reference, logs))
     replaces = target is not None and target.exists()
     with terminal.progress(f"Writing {target}", shown=target is not None) as progress:
@@ -184,6 +193,9 @@ def compare(
     written = {"JUnit": options["junit"], "Statistics": options["csv"]}
     terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces, written))
     terminal.tell_failure(result)
+    if result.unjudged:
+        print_findings([error for log in result.unjudged for error in log.errors], as_json=False)
+        return 2
     return 1 if result.verdict == "fail" else 0
 
 

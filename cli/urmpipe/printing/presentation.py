@@ -40,10 +40,11 @@ def print_presentation(one: shown.Presentation, *, every: bool = False) -> None:
     _print_verdict(console, one)
     told = {fact.name for fact in one.facts}
     _print_section(console, one.body, told, every=every)
-    sections = _chosen(one.body.sections)
+    below = [part for part in one.body.sections if not part.errors]  # those are on standard error
+    sections = _chosen(below)
     for section in sections:
         _print_section(console, section, set())
-    if left := len(one.body.sections) - len(sections):
+    if left := len(below) - len(sections):
         console.print(f"{text.counted(left, 'more section')}: --json, or the report")
 
 

@@ -91,6 +91,7 @@ def against_baseline(
     if now.iso is not None or before.iso is not None:
         return _tests(now, before, level)
     pairs = _pairs(now, before)
+    gone = _absent(before, {old.name: (run, old) for run, old in pairs})
     return BaselineComparison(
         name=before.name,
         recording=before.recording,
@@ -99,7 +100,7 @@ def against_baseline(
             change for pair in pairs if not _on_grid(now, before, pair) for change in _changes(*pair, level)
         ),
         new=tuple(_absent(now, {run.name: (run, old) for run, old in pairs})),
-        gone=tuple(_absent(before, {old.name: (run, old) for run, old in pairs})),
+        gone=tuple(one for one in gone if one not in [Absent(log.name) for log in now.unjudged]),
         differences=tuple(_differences(now, before, pairs)),
     )
 
@@ -138,7 +139,7 @@ def _noise_of(one: Criterion, noise: Mapping[str, float]) -> float:
 
 def _pairs(now: Comparison, before: Comparison) -> list[Pair]:
     """Return the logs of both that are held against each other: by name, or the only ones."""
-    if len(now.runs) == len(before.runs) == 1:
+    if len(now.runs) + len(now.unjudged) == len(before.runs) == 1:
         return [(now.runs[0], before.runs[0])]
     old = {run.name: run for run in before.runs}
     return [(run, old[run.name]) for run in now.runs if run.name in old]

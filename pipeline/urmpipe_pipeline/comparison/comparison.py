@@ -12,6 +12,7 @@ from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Verdict
 from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.comparison.unjudged import Unjudged
 from urmpipe_pipeline.iso9283.result import IsoTest
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
@@ -43,6 +44,7 @@ class Comparison(Result):
         assumptions: What the verdict takes for granted, each as the end of "assuming ...".
         on_rows: Whether the logs were judged on their own rows; before that was so, on the grid.
         iso: The test after ISO 9283 whose cycles the runs are; its criteria are judged, the runs are not.
+        unjudged: The logs without a verdict, where the others were judged all the same.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Comparison(Result):
     assumptions: tuple[str, ...] = ()
     on_rows: bool = False
     iso: IsoTest | None = None
+    unjudged: tuple[Unjudged, ...] = ()
 
     @property
     def within_tolerance(self) -> bool:
@@ -69,11 +72,14 @@ class Comparison(Result):
         """Pass if every log passes and, where there is a baseline, nothing is worse than there.
 
         Of a test after ISO 9283 its criteria count; None if none of them has a tolerance, without a baseline.
+        None, too, if a log could not be judged, and nothing else failed.
         """
         if self.iso is not None and self.iso.verdict is None:
             return None if self.baseline is None else self.baseline.verdict
         kept = self.baseline is None or self.baseline.verdict == "pass"
-        return "pass" if self.within_tolerance and kept else "fail"
+        if not (self.within_tolerance and kept):
+            return "fail"
+        return None if self.unjudged else "pass"
 
     def covered(self, run: Deviation) -> float:
         """Return the share of the reference's samples, 0..1, that lie within the time of a log."""
@@ -136,12 +142,14 @@ class Comparison(Result):
         worse = ", worse than the baseline" if self.baseline and self.baseline.verdict == "fail" else ""
         count = len(self.assumptions)
         assumed = f", on {number_of(count, 'assumption')}" if count else ""
-        return line_of(f"{self.name}: {self.verdict}{share}{worse}{assumed}", *logs)
+        lost = (f"{one.name} not judged" for one in self.unjudged)
+        return line_of(f"{self.name}: {self.verdict or 'incomplete'}{share}{worse}{assumed}", *lost, *logs)
 
     def _notes(self) -> list[str]:
         """Return what is to be known of it, and of its logs."""
         of_logs = [one.of(run.name) for run in self.runs for one in run.run.warnings]
-        return [str(one) for one in (*self.warnings, *of_logs)]
+        errors = [one for log in self.unjudged for one in log.errors]
+        return [str(one) for one in (*errors, *self.warnings, *of_logs)]
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a log and quantity, as `rows`."""
@@ -162,5 +170,9 @@ class Comparison(Result):
             "warnings": [one.to_dict(voice) for one in self.warnings],
             "baseline": None if self.baseline is None else self.baseline.to_dict(),
             "iso": None if self.iso is None else self.iso.to_dict(),
+            "unjudged": [
+                {"name": log.name, "errors": [one.to_dict(voice) for one in log.errors]}
+                for log in self.unjudged
+            ],
             "recording": str(self.recording) if self.recording else None,
         }

@@ -65,6 +65,7 @@ def present(result: Comparison) -> Presentation:
         lines=tuple(comparison_lines(result)),
         rows=partial(statistics_rows, result),
         created=result.provenance.created,
+        word="incomplete" if result.verdict is None else "",
     )
 
 
@@ -84,6 +85,8 @@ def _against(result: Comparison) -> tuple[Fact, ...]:
 
 def _body(result: Comparison) -> Section:
     sections = [_log(one, result) for one in result.runs]
+    for log in result.unjudged:
+        sections.append(Section(log.name, errors=log.errors, rank=len(sections)))
     if result.baseline is not None:
         sections.append(baseline_section(result.baseline, len(sections)))
     return Section(
@@ -147,6 +150,7 @@ def _properties(result: Comparison, one: Deviation) -> dict[str, Any]:
     longest = one.longest_out
     return {
         "reference": result.reference.name,
+        "robot": one.run.robot.name if one.run.robot else None,
         "verdict": one.verdict,
         **({"cause": one.diagnosis.sentence} if one.diagnosis else {}),
         "assumptions": "; ".join(result.assumptions),

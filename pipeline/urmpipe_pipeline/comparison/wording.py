@@ -23,11 +23,13 @@ NAMED = 3
 def verdict_words(one: Comparison) -> str:
     """Return which logs are out of tolerance against what, or that all are within, and what that rests on."""
     failed = [run for run in one.runs if run.verdict == "fail"]
-    said = f"{_who(failed or one.runs, len(one.runs))} {'out of' if failed else 'within'} tolerance"
+    total = len(one.runs) + len(one.unjudged)
+    said = f"{_who(failed or one.runs, total)} {'out of' if failed else 'within'} tolerance"
     said += f" against {one.reference.name}{_points(one)}{_part(one)}"
     if one.baseline and one.baseline.verdict == "fail":
         said += f", {'and' if failed else 'but'} worse than the baseline {one.baseline.name}"
-    return said + assuming(one.assumptions)
+    lost = f"; not judged: {text.enumerated([log.name for log in one.unjudged])}" if one.unjudged else ""
+    return said + assuming(one.assumptions) + lost
 
 
 def _who(runs: Sequence[Deviation], total: int) -> str:

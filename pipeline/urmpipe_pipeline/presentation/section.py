@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
-from urmpipe_models.messages import Hint
+from urmpipe_models.messages import Finding, Hint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.figure import Drawing, Figure, SpaceFigure, Text
 from urmpipe_pipeline.presentation.scene import Scene
@@ -207,6 +207,7 @@ class Section:
         properties: Of that suite: names and plain values.
         events: Returns them in any order; called only where they are shown.
         warnings: What a person should know.
+        errors: Why it could not be judged; then it is a test suite of JUnit, too.
         notice: What must not be overseen.
         sections: The parts below it.
         rank: Its place among its neighbours where they are read from best to worst, or by importance, 0 the
@@ -224,6 +225,7 @@ class Section:
     properties: Mapping[str, Any] = field(default_factory=dict)
     events: Callable[[], Iterable[Event]] = nothing
     warnings: tuple[LogWarning, ...] = ()
+    errors: tuple[Finding, ...] = ()
     notice: str = ""
     sections: tuple[Section, ...] = ()
     rank: int = 0

@@ -30,6 +30,7 @@ from urmpipe_pipeline.report.tables import (
     Anchors,
     Grid,
     ShownFact,
+    errors_table,
     from_worst,
     grid,
     shown_facts,
@@ -213,6 +214,8 @@ def _content(
     body = anchors.is_body(section)
     first = [one for one in section.tables if one.page and not (body and one in _ranking(section))]
     tables = [grid(table, anchors.href, folds=False) for table in first]
+    if section.errors:
+        tables.append(grid(errors_table(section.errors), anchors.href))
     if section.warnings:
         tables.append(grid(warnings_table(section.warnings), anchors.href))
     shown = [one for block in blocks for one in _shown(block, anchors, span)]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
+from urmpipe_models.errors import Finding
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.brief import head
@@ -142,6 +143,17 @@ def grid(table: Table, href: Href, *, folds: bool = True) -> Grid:
         tuple(zip(*(cells for _, cells in kept), strict=True)),
         table.folded or (folds and rows > LONG),
         " ".join(filter(None, (more, table.note))),
+    )
+
+
+def errors_table(errors: Sequence[Finding]) -> Table:
+    """Return why a part could not be judged, one line an error."""
+    return Table(
+        f"Errors ({len(errors)})",
+        (
+            Column("place", "Place", [one.place() for one in errors]),
+            Column("message", "What", [one.sentence("command line") for one in errors]),
+        ),
     )
 
 

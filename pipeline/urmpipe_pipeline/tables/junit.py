@@ -67,9 +67,7 @@ def write_errors(path: Path, inputs: Sequence[Path], findings: Sequence[Finding]
     """
     root = ET.Element("testsuites", name="urmpipe compare")
     suite = ET.SubElement(root, "testsuite", name="urmpipe compare")
-    for number, finding in enumerate(findings, start=1):
-        case = _case(suite, finding.file or "urmpipe compare", f"can be compared ({number})")
-        _reason(case, "error", BAD_INPUT, finding.words(voice))
+    _add_errors(suite, findings, voice)
     _count(suite)
     with suppress(OutputError), guarded_output(path, inputs, "junit") as part:
         _write(root, part, path)
@@ -92,13 +90,13 @@ def _suites(
 ) -> Iterator[ET.Element]:
     """Yield the test suite of a section that judges something, and those of the sections below it."""
     warnings = (*section.warnings, *above)
-    if section.checks or section.properties:
-        yield _suite(section, timestamp, [f"{one.kind}: {one.words(voice)}" for one in warnings])
+    if section.checks or section.properties or section.errors:
+        yield _suite(section, timestamp, warnings, voice)
     for one in section.sections:
         yield from _suites(one, timestamp, warnings, voice)
 
 
-def _suite(section: Section, timestamp: str, warnings: Sequence[str]) -> ET.Element:
+def _suite(section: Section, timestamp: str, warnings: Sequence[LogWarning], voice: Voice) -> ET.Element:
     suite = ET.Element("testsuite", name=_plain(section.title))
     if section.properties:
         properties = ET.SubElement(suite, "properties")
@@ -108,12 +106,21 @@ def _suite(section: Section, timestamp: str, warnings: Sequence[str]) -> ET.Elem
         case = _case(suite, check.about or section.title, check.name)
         if check.verdict == "fail":
             _reason(case, "failure", check.kind, check.words)
+    _add_errors(suite, section.errors, voice, section.title)
     if warnings:
-        ET.SubElement(suite, "system-out").text = "\n".join(map(_plain, warnings))
+        told = (f"{one.kind}: {one.words(voice)}" for one in warnings)
+        ET.SubElement(suite, "system-out").text = "\n".join(map(_plain, told))
     _count(suite)
     if timestamp:
         suite.set("timestamp", timestamp)
     return suite
+
+
+def _add_errors(suite: ET.Element, findings: Sequence[Finding], voice: Voice, about: str = "") -> None:
+    """Add a test case for each error, of a class for all or of its file's name."""
+    for number, finding in enumerate(findings, start=1):
+        case = _case(suite, about or finding.file or "urmpipe compare", f"can be compared ({number})")
+        _reason(case, "error", BAD_INPUT, finding.words(voice))
 
 
 def _count(suite: ET.Element) -> None:
