@@ -81,17 +81,29 @@ def run_script(folder: Path, script: str) -> int:
 
 
 @pytest.mark.slow
-def test_the_worst_exit_code_of_several_logs_is_kept(folder: Path) -> None:
-    (folder / "logs").mkdir()
-    log = (folder / "robot_data.csv").read_text(encoding="utf-8")
-    (folder / "logs" / "a.csv").write_text("broken\n")
-    (folder / "logs" / "b.csv").write_text(log, encoding="utf-8")
-    each, _ = snippets(PAGE, "sh")
-    assert run_script(folder, each) == 2
-    errors = {
-        path.name: ET.parse(path).getroot().get("errors") for path in sorted(folder.glob("verdict-*.xml"))
+def test_a_night_judges_all_that_it_can_and_keeps_the_worst_exit_code(folder: Path) -> None:
+    (jobs,) = snippets(PAGE, "text")
+    (folder / "jobs.txt").write_text(jobs, encoding="utf-8")
+    (folder / "accepted").mkdir()
+    compare = "urmpipe compare path.csv a.csv coppelia.csv --robot urm6 -q -o accepted/urm6.rrd"
+    assert run_in_process(compare) == 0
+    (folder / "coppelia.csv").unlink()
+    night, _ = snippets(PAGE, "sh")
+    assert run_script(folder, night) == 2
+    found = {
+        path.name: [
+            (case.get("classname"), [one.tag for one in case]) for case in ET.parse(path).iter("testcase")
+        ]
+        for path in sorted((folder / "night").glob("*.xml"))
     }
-    assert errors == {"verdict-a.xml": "1", "verdict-b.xml": "0"}
+    assert list(found) == ["ur5e.xml", "urm6.xml"]
+    assert {("a", ()), ("a against baseline", ()), ("coppelia", ("error",))} == {
+        (name, tuple(tags)) for name, tags in found["urm6.xml"]
+    }
+    assert {tuple(tags) for _, tags in found["ur5e.xml"]} == {()}
+    page = (folder / "night" / "report.html").read_text(encoding="utf-8")
+    assert "coppelia.csv" in page
+    assert "found no such file" in page
 
 
 @pytest.mark.slow
