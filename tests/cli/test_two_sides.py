@@ -230,3 +230,18 @@ def test_rows_without_times_are_a_guess_where_they_are_not_compared_one_by_one(t
     assert urmpipe.compare(one, two, robot="ur5e").assumptions == ()
     assert urmpipe.compare(one, two, robot="ur5e", sync=0.1).assumptions == guess
     assert urmpipe.compare(one, fewer, robot="ur5e").assumptions == guess
+
+
+def test_a_log_with_both_sides_names_the_command_that_compares_them(tmp_path: Path) -> None:
+    asked, done = motions()
+    names = ["timestamp", *six("target_q_{}"), *six("actual_q_{}"), *six("actual_TCP_pose_{}")]
+    away = 0.5 * vectors(done)[::-1]  # of no arm
+    log = written(tmp_path / "rtde.csv", names, T, asked, done, away)
+    (unused,) = (
+        one for one in urmpipe.ingest(log, robot="ur5e").log.inferences if one.what == "columns not used"
+    )
+    assert [one.spelled("command line") for one in unused.hints] == ["urmpipe compare --sides target,actual"]
+    assert refusal(LogError, urmpipe.compare, log) == (
+        "rtde.csv: no robot is given, and no single one of the catalogue fits the recorded tool centre point"
+        " as it is; robot=NAME|FILE sets one; tool=[X, Y, Z] adds its tool"
+    )

@@ -73,8 +73,8 @@ def ingest(
     from urmpipe_pipeline.operands import is_log
 
     if explain and output:
-        found = f"{output} with explain, which writes no recording"
-        raise OptionError(Finding(parameter="output", found=found, allowed="one of the two"))
+        allowed = "no output: --explain writes no recording"
+        raise OptionError(Finding(parameter="output", found=str(output), allowed=allowed))
     options, _ = for_logs(ctx, logs, options)
     alone = explain or (output is None and not any(map(is_log, logs)))  # a recording is one already
     target = None if alone else output or Path(default_name(logs))

@@ -241,7 +241,8 @@ def _differing(was: Mapping[str, Any], made: Mapping[str, Any], of: str = "") ->
 def _made(result: Comparison) -> dict[str, Any]:
     """Return how a comparison was made: reference, tolerance, options, versions."""
     reference = result.reference
-    options = {name: value for name, value in result.provenance.options.items() if name != "tolerance"}
+    unshown = ("tolerance", "diagnose")  # it stands by itself; it changes no figure
+    options = {name: value for name, value in result.provenance.options.items() if name not in unshown}
     versions = {f"version of {name}": value for name, value in result.provenance.versions.items()}
     return {
         "reference": reference.name,

@@ -19,6 +19,7 @@ from urmpipe_pipeline.comparison.iso_cycles import IsoOptions, judge_cycles
 from urmpipe_pipeline.comparison.matching import (
     JOINTS_ALONE,
     NO_ROBOT,
+    NO_ROBOT_FITS,
     as_recorded,
     by_joints_alone,
     by_kinematics,
@@ -318,7 +319,7 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     if not log.joints:
         raise LogError(lacking(run, "a path alone, which has no joints; allowed: a log to compare with it"))
     if run.robot is None:
-        raise LogError(lacking(run, *NO_ROBOT))
+        raise LogError(lacking(run, *(NO_ROBOT if log.tcp_position is None else NO_ROBOT_FITS)))
     if log.tcp_position is None:
         said = "one log, which recorded no tool centre point; allowed: a reference before the log"
         doubts = [one.as_finding() for one in log.warnings if one.kind == TCP_NOT_READ]

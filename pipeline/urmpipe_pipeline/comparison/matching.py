@@ -65,6 +65,13 @@ ORIENTED = "joints with a robot, or a recorded orientation"
 NO_ROBOT = ("no robot, so no forward kinematics", Hint("robot", None, "sets one"))
 """What a run without kinematics lacks, and what to give."""
 
+NO_ROBOT_FITS = (
+    "no robot is given, and no single one of the catalogue fits the recorded tool centre point as it is",
+    Hint("robot", None, "sets one"),
+    Hint("tool", None, "adds its tool"),
+)
+"""The same of a log by whose recorded poses a robot was looked for."""
+
 AS_RECORDED = Hint("tcp", "recorded", "uses the recorded tool centre point")
 JOINTS_ALONE = Hint("tolerance", "joint=0.1deg", "compares the joints only")
 """What else to give where both sides have joints."""

@@ -95,9 +95,12 @@ def lacking_tool(robot: Chain | None, log: JointLog, *, turned: bool = False) ->
     said = _stays(robot, own, turned=turned)
     if not np.isfinite(poses.fit(robot).with_tool):
         said = f"{said}, and the log moves too little to show why: {_asked(robot)}"
-        return [LogWarning(LACKING_TOOL, said, hints=tuple(_tool_here(robot, poses)))]
+        return [LogWarning(LACKING_TOOL, said, hints=tuple(_tool_here(robot, poses)) or _SET)]
     hints = tuple(_placing(robot, poses, own, turned=turned))
     return [LogWarning(LACKING_TOOL, said, hints=hints)] if hints else []
+
+
+_SET = (Hint("tool", None, "sets it"), Hint("base", None, "sets it"))
 
 
 def _placing(robot: Chain, poses: RecordedPoses, own: Apart, *, turned: bool) -> Iterator[Hint]:

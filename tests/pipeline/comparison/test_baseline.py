@@ -123,6 +123,11 @@ def test_shares_of_different_tolerances_do_not_compare(paths: Compared) -> None:
     assert found.differences == (Difference("tolerance", {"axis": 0.0035}, {"axis": 0.001}),)
 
 
+def test_a_diagnosis_is_no_difference_since_it_changes_no_figure(paths: Compared) -> None:
+    plain, diagnosed = (paths({"a": off(0.003, 30)}, diagnose=diagnose) for diagnose in (False, True))
+    assert against_baseline(diagnosed, plain).differences == ()
+
+
 @pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(

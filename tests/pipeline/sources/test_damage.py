@@ -178,7 +178,7 @@ def test_a_last_cell_that_is_cut_is_no_value(read: Read, wrong: Wrong, encoding:
 
 def test_a_byte_of_no_text_has_a_line(wrong: Wrong) -> None:
     text = joined(*rows(100), "1.00,0.\0,1.5", *rows(9, 1.01))
-    assert wrong(text) == ["log.csv:102: found the byte b'\\x00', allowed: text, as in the lines above"]
+    assert wrong(text) == ["log.csv:102: found the byte 0x00, allowed: text, as in the lines above"]
     assert wrong("GIF\0\n") == ["log.csv: found a binary file, allowed: a text table (CSV)"]
 
 

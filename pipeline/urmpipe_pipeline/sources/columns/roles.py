@@ -29,6 +29,7 @@ from urmpipe_pipeline.sources.columns.joint_names import (
 )
 from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, turns_as_quaternion, with_form
 from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, OTHER_ROBOT, by_arm, take, which_joints
+from urmpipe_pipeline.sources.columns.sides import SIDES
 from urmpipe_pipeline.sources.columns.tcp_like import about_odd_rows, about_tcp
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -279,9 +280,16 @@ def _with_rest(
 ) -> Roles:
     used = frozenset(roles.columns)
     rest = [column for column in numeric if column not in used]
-    said += not_used(rest, "no role is known for them")
+    said += [replace(one, hints=_sides_of(rest, used)) for one in not_used(rest, "no role is known for them")]
     warnings = about_odd_rows(rest, layouts) or ([] if roles.position else about_tcp(rest))
     return replace(roles, inferences=tuple(said), warnings=tuple(warnings))
+
+
+def _sides_of(rest: Sequence[Column], used: frozenset[Column]) -> tuple[Hint, ...]:
+    """Return how to compare the columns that are not used with those that are, if their names pair them."""
+    of_rest, of_used = (frozenset().union(*(one.words for one in columns)) for columns in (rest, used))
+    pairs = [pair for pair in SIDES if pair[0] in of_rest and pair[1] in of_used]
+    return tuple(Hint("sides", list(pair), "compares them", call="compare") for pair in pairs[:1])
 
 
 def not_used(rest: Sequence[Column], why: str) -> list[Inference]:

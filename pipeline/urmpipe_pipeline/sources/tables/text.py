@@ -226,7 +226,7 @@ def _no_text(path: Path, raw: bytes) -> Finding:
     line = raw.count(b"\n", 0, place) + 1
     if line <= _TITLE_LINES:
         return Finding("found a binary file, allowed: a text table (CSV)", file=str(path))
-    found = f"the byte {raw[place : place + 1]!r}"
+    found = f"the byte 0x{raw[place]:02x}"
     return Finding(file=str(path), line=line, found=found, allowed="text, as in the lines above")
 
 
