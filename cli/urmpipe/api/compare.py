@@ -186,8 +186,8 @@ def compare(
             return made
 
         made = None if operands[1:] or earlier is None else _made_before(reference, output)
-        going = [] if keep_going else None
-        made = checked(made) if made else _compared(operands, load, options, checked, going)
+        unjudged: list[Unjudged] | None = [] if keep_going else None
+        made = checked(made) if made else _compared(operands, load, options, checked, unjudged)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         shown = present(result)
         written.write("junit", lambda part, path: write_junit(shown, part, path, voice))
