@@ -100,20 +100,22 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
             arrows,
         )
         return
+    supposed = tuple(mended_path(one))
+    said = "The colour is the distance from the reference at the same time"
+    said += ": blue within the tolerance, orange to crimson beyond it." if allowed_norm(one) else "."
+    said += " Green, dashed: where the log would be without the causes named above." if supposed else ""
     yield SpaceFigure(
         "Path in space",
-        "The colour is the distance from the reference at the same time:"
-        " blue within the tolerance, orange to crimson beyond it." if allowed_norm(one)
-        else "The colour is the distance from the reference at the same time.",
+        said,
         f"Paths of the reference and of {one.name} in three dimensions. The verdict was decided at"
         f" x, y, z = {text.point(place)} m: {amount_words(one.decisive)}.",
         (
             Path("reference", one.reference, one.t_ns, REFERENCE_COLOUR, asked=True, sample=one.sample),
+            *supposed,
             Path(
                 "actual: ‖Δ‖", one.actual, one.t_ns, AXIS_COLOURS["norm"], values=column(one.delta, 3),
                 limit=allowed_norm(one), sample=one.sample, kept=(one.decided_at,),
             ),
-            *mended_path(one),
         ),
         spots,
     )  # fmt: skip

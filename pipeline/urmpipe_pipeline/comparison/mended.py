@@ -35,10 +35,10 @@ def mended_figure(one: Deviation) -> Iterator[Figure]:
     over = "time" if one.run.timed else "the rows"
     yield Figure(
         f"Deviation over {over} without the causes",
-        "What stays when the causes are taken away. Dashed: the tolerance; tinted: out of it.",
+        "What stays when the causes above are taken away. Dashed: the tolerance; tinted: out of it.",
         f"Deviation of {one.name} over {over} without the causes: {found.sentence}."
         f" What stays: {remainder_words(found.remainder, found.unit)}.",
-        (View("delta mended", panels),),
+        (View("delta without the causes", panels),),
         share=3.0,
         beside=True,
         folded=True,
@@ -55,8 +55,8 @@ def _panels(one: Deviation, found: Diagnosis) -> Iterator[Panel]:
         looks = [(f"Δ {joint.quantity}", joint_colour(k)) for k, joint in enumerate(held)]
     mended = np.asarray(found.mended)
     for k, ((name, colour), statistics) in enumerate(zip(looks, held, strict=True)):
-        line = _line(one, found.sample, mended[:, k], f"{name} mended", colour)
-        yield Panel(name, statistics.unit, (line,), one.axis_ns, statistics.tolerance, small=True)
+        line = _line(one, found.sample, mended[:, k], f"{name} without the causes", colour)
+        yield Panel(name, statistics.unit, (line,), one.axis_ns, statistics.tolerance, small=True, close=True)
 
 
 def _line(one: Deviation, sample: IntArray, values: FloatArray, name: str, colour: str) -> Line:
@@ -76,7 +76,9 @@ def mended_path(one: Deviation) -> Iterator[Path]:
     both, own, mended = np.intersect1d(one.sample, found.sample, return_indices=True)
     position = np.asarray(one.reference)[own] - np.asarray(found.mended)[mended]
     t_ns = one.t_ns[own] if one.run.timed else None
-    yield Path("mended", position, t_ns, MENDED_COLOUR, sample=both, line=one.run.timed)
+    yield Path(
+        "without the causes", position, t_ns, MENDED_COLOUR, supposed=True, sample=both, line=one.run.timed
+    )
 
 
 def cause_marks(one: Deviation, chain: Chain) -> tuple[ArmMark, ...]:

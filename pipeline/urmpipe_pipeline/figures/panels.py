@@ -5,6 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -113,7 +114,7 @@ def _scale(axes: Axes, panel: Panel, curves: Sequence[Curve], factor: float) -> 
         axes.set_ylim(-0.15, 1.15)
         axes.yaxis.set_major_locator(FixedLocator([0, 1]))
     elif (scales := two_scales(panel)) is not None:
-        shown = TwoScales(factor * scales.limit, factor * scales.top)
+        shown = replace(scales, inner=factor * scales.inner, top=factor * scales.top)
         axes.set_yscale("function", functions=(shown.height, shown.value))
         axes.yaxis.set_major_locator(FixedLocator(_ticks(shown, signed=panel.signed)))
         axes.yaxis.set_major_formatter(FuncFormatter(_plain))
@@ -122,14 +123,11 @@ def _scale(axes: Axes, panel: Panel, curves: Sequence[Curve], factor: float) -> 
 
 
 def _ticks(scales: TwoScales, *, signed: bool) -> list[float]:
-    """Return the ticks of an axis of two scales that have room for their words, the outermost first."""
-    zero, limit, *beyond = scales.ticks()
-    kept: list[float] = []
-    for one in reversed(beyond):
-        next_to = scales.height(np.array([limit, one, *kept[-1:]]))
-        if np.diff(next_to).min() >= APART * (1 + signed):
-            kept.append(one)
-    found = [limit, *kept]
+    """Return the ticks of an axis of two scales that have room for their words, the limit first."""
+    zero, inner, outer = scales.ticks()
+    apart = float(np.diff(scales.height(np.array([inner, outer])))[0])
+    limit = outer if scales.close else inner
+    found = [inner, outer] if apart >= APART * (1 + signed) else [limit]
     return sorted([zero, *found, *(-one for one in found if signed)])
 
 
@@ -261,7 +259,8 @@ def _limit(axes: Axes, panel: Panel, unit: str, factor: float) -> Entries:
     if above:
         return {drawable(words): line}
     axes.axhspan(-high if panel.signed else 0.0, high, color=BAND, linewidth=0, zorder=0.4)
-    beyond = ", smaller scale beyond" if axes.get_yscale() == "function" else ""
+    scales = two_scales(panel)
+    beyond = "" if scales is None else ", on a smaller scale" if scales.close else ", smaller scale beyond"
     patch = Patch(facecolor=BAND, edgecolor=INK, linestyle=(0, (2, 1.5)), linewidth=line.get_linewidth())
     return {drawable(f"{words}{beyond}"): patch}
 

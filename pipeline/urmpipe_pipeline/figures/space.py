@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import product
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgba
+from matplotlib.colors import Colormap, FuncNorm, LinearSegmentedColormap, Normalize, to_rgba
 from matplotlib.legend import Legend
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
@@ -27,10 +28,12 @@ from urmpipe_pipeline.figures.size import Size
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.palette import VALUE_SCALE
 from urmpipe_pipeline.presentation.figure import SpaceFigure
+from urmpipe_pipeline.presentation.layout import LIMITED_SCALE, value_scales
 from urmpipe_pipeline.presentation.scene import Path, Sheets, Solid
 
 VALUES = LinearSegmentedColormap.from_list("urmpipe values", list(VALUE_SCALE))
-"""Small to large."""
+LIMITED = LinearSegmentedColormap.from_list("urmpipe values with a limit", list(LIMITED_SCALE))
+"""Small to large; up to a limit, and beyond it."""
 
 VIEW = {"elev": 22.0, "azim": -50.0}
 """Looked at from the front right, a little from above, in [deg]."""
@@ -61,16 +64,35 @@ BACK, FRONT = 0.7, 1.6
 """Width of paths: of those in the back, and of the one in front, in widths of a line."""
 
 
-class Scale(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class Scale:
     """A scale of colours.
 
     Attributes:
         norm: From values to shares of it.
+        colours: From shares to colours.
         words: Quantity and unit.
+        ticks: Values that have a tick, with its words; empty for round ones.
     """
 
     norm: Normalize
+    colours: Colormap
     words: str
+    ticks: Mapping[float, str]
+
+    @classmethod
+    def of(cls, values: FloatArray, limit: float | None, words: str) -> Scale:
+        """Return the scale of some values, shape (n,), and of what is allowed of them, all in one unit."""
+        scales = value_scales(values, limit)
+        if scales is None:
+            return cls(Normalize(0.0, float(np.nanmax(values, initial=0.0)) or 1.0), VALUES, words, {})
+        norm = FuncNorm((scales.height, scales.value), 0.0, scales.top)
+        ticks = {one: f"{one:.4g}{' allowed' * (one == scales.inner)}" for one in scales.ticks()}
+        return cls(norm, LIMITED, words, ticks)
+
+    def __call__(self, values: FloatArray) -> FloatArray:
+        """Return the colours of values, shape (n, 4)."""
+        return np.asarray(self.colours(self.norm(values)))
 
 
 def drawn_space(figure: SpaceFigure, size: Size) -> Sheet:
@@ -125,9 +147,11 @@ def _place(made: Sheet, axes: Axes3D, size: Size, entries: dict[str, Artist], sc
     for number, scale in enumerate(reversed(scales), start=1):
         bottom = (SCALE * number - BAR) * em(size) / whole
         bar = made.colorbar(
-            ScalarMappable(scale.norm, VALUES), orientation="horizontal",
+            ScalarMappable(scale.norm, scale.colours), orientation="horizontal",
             cax=made.add_axes((0.2, bottom, 0.6, BAR_HIGH * em(size) / whole)),
         )  # fmt: skip
+        if scale.ticks:
+            bar.set_ticks([*scale.ticks], labels=[*scale.ticks.values()])
         bar.set_label(scale.words)
         bar.outline.set_visible(False)
 
@@ -164,19 +188,25 @@ def _extent(made: Sheet, axes: Axes3D) -> Bbox:
 
 def _path(axes: Axes3D, path: Path, size: Size, entries: dict[str, Artist], *, front: bool) -> Scale | None:
     """Draw a path as a line, as one of many colours, or as dots, and tell the legend, or return its scale."""
-    place, values, unit = _kept(path)
+    place, values, limit, unit = _kept(path)
     width = size.font / 8.0 * (FRONT if front else BACK)
     if path.values is not None and path.line:
         pieces = np.stack((place[:-1], place[1:]), axis=1)
-        return _coloured(axes, pieces, values[1:], in_unit(path.name, unit), width)
-    look = {"linestyle": "--" if path.asked else "-"} if path.line else {"marker": "o", "linestyle": "none"}
+        scale = Scale.of(values, limit, in_unit(path.name, unit))
+        _coloured(axes, pieces, scale(values[1:]), width)
+        return scale
+    look = (
+        {"linestyle": ":" if path.supposed else "--" if path.asked else "-"}
+        if path.line
+        else {"marker": "o", "linestyle": "none"}
+    )
     (line,) = axes.plot(*place.T, color=path.colour, linewidth=width, markersize=2.5, **look)
     entries[drawable(path.name)] = line
     return None
 
 
-def _kept(path: Path) -> tuple[FloatArray, FloatArray, str]:
-    """Return the places of a path that are drawn, their values and the unit of these; NaN breaks the line."""
+def _kept(path: Path) -> tuple[FloatArray, FloatArray, float | None, str]:
+    """Return the drawn places of a path, their values, the limit and unit of these; NaN breaks the line."""
     position = np.asarray(path.position[:], np.float64)
     unit, factor = text.SHOWN.get(path.unit, (path.unit, 1.0))
     values = np.full(len(position), np.nan) if path.values is None else factor * np.asarray(path.values[:])
@@ -186,18 +216,16 @@ def _kept(path: Path) -> tuple[FloatArray, FloatArray, str]:
     kept = np.union1d(decimate(columns, points_for(path.t_ns), t), np.asarray(path.kept, dtype=np.int64))
     gaps = np.cumsum(np.diff(rows, prepend=rows[:1]) > 1)[kept]
     breaks = np.flatnonzero(np.diff(gaps) > 0) + 1
-    return np.insert(position[kept], breaks, np.nan, axis=0), np.insert(values[kept], breaks, np.nan), unit
+    place = np.insert(position[kept], breaks, np.nan, axis=0)
+    return place, np.insert(values[kept], breaks, np.nan), path.limit and factor * path.limit, unit
 
 
-def _coloured(axes: Axes3D, ends: FloatArray, values: FloatArray, words: str, width: float) -> Scale:
-    """Draw pieces of lines, shape (n, 2, 3), in the colours of their values, and return their scale."""
-    scale = Scale(Normalize(0.0, float(np.nanmax(values, initial=0.0)) or 1.0), words)
+def _coloured(axes: Axes3D, ends: FloatArray, colours: FloatArray, width: float) -> None:
+    """Draw pieces of lines, shape (n, 2, 3), each in its colour, shape (n, 4)."""
     whole = np.isfinite(ends).all(axis=(1, 2))
-    colours = VALUES(scale.norm(values[whole]))
     if whole.any():  # matplotlib cannot place an empty collection
-        lines = Line3DCollection(ends[whole], colors=colours, linewidths=width, capstyle="round")
+        lines = Line3DCollection(ends[whole], colors=colours[whole], linewidths=width, capstyle="round")
         axes.add_collection3d(lines)
-    return scale
 
 
 def _sheets(axes: Axes3D, sheets: Sheets) -> dict[str, Artist]:
@@ -233,8 +261,9 @@ def _arrows(axes: Axes3D, figure: SpaceFigure) -> Scale | None:
         return None
     unit, factor = text.SHOWN.get(arrows.unit, (arrows.unit, 1.0))
     ends, values = np.stack((arrows.start, arrows.end), axis=1), factor * arrows.values
-    scale = _coloured(axes, ends, values, in_unit(arrows.name, unit), FRONT)
-    axes.scatter(*arrows.start.T, color=VALUES(scale.norm(values)), s=6.0, depthshade=False)
+    scale = Scale.of(values, arrows.limit and factor * arrows.limit, in_unit(arrows.name, unit))
+    _coloured(axes, ends, scale(values), FRONT)
+    axes.scatter(*arrows.start.T, color=scale(values), s=6.0, depthshade=False)
     return scale
 
 

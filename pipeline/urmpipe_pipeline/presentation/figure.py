@@ -117,6 +117,7 @@ class Panel:
         share: Height relative to other panels.
         display_unit: A unit that people prefer to `unit`, such as deg; empty for none.
         limit_name: What a legend calls the limit.
+        close: Whether values far within the limit are shown close up: the panel is about them.
     """
 
     title: str
@@ -134,6 +135,7 @@ class Panel:
     share: float = 1.0
     display_unit: str = ""
     limit_name: str = "tolerance"
+    close: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.palette import BEYOND_SCALE, WITHIN_SCALE
 from urmpipe_pipeline.presentation.figure import Computed, Line, Panel
 
 FAINT = 12.0
@@ -20,38 +21,53 @@ BAND_SHARE = 0.3
 MANY = 3
 """So many set points with their answers are plotted apart, a pair a plot."""
 
+LIMITED_SCALE = tuple(zip((0.0, BAND_SHARE, BAND_SHARE, 1.0), (*WITHIN_SCALE, *BEYOND_SCALE), strict=True))
+"""Colours of values that have a limit, by their heights on an axis of two scales."""
+
+CLOSE_SHARE = 0.65
+"""Share that the values take of an axis that shows them close up."""
+
 STEPS = (1.0, 2.0, 5.0)
 """What the largest tick may be, times a power of ten: at least two fifths of the largest value."""
 
 
 @dataclass(frozen=True, slots=True)
 class TwoScales:
-    """An axis with one linear scale up to the limit and a smaller one beyond it; it grows everywhere.
+    """An axis with one linear scale up to a value and a smaller one beyond it; it grows everywhere.
 
-    The height above 0 is `BAND_SHARE` at the limit and 1 at `top`; below 0 it is the negative of that.
+    The height above 0 is `share` at the value and 1 at `top`; below 0 it is the negative of that.
 
     Attributes:
-        limit: Largest absolute value allowed, in any unit, above 0.
-        top: Largest absolute value drawn, in the same unit, above `limit`.
+        inner: Where the scale changes, in any unit, above 0: the limit, or the largest value far within it.
+        top: The largest value drawn, or the limit, in the same unit, above `inner`.
+        share: Height of `inner`, 0 to 1.
     """
 
-    limit: float
+    inner: float
     top: float
+    share: float = BAND_SHARE
+
+    @property
+    def close(self) -> bool:
+        """Whether the limit is the top, and values far within it are shown close up."""
+        return self.share == CLOSE_SHARE
 
     def height(self, values: FloatArray) -> FloatArray:
         """Return where values of the limit's unit stand on the axis, in any shape; NaN stays NaN."""
-        sizes = np.array([0.0, self.limit, self.top])
-        return self._odd(values, sizes, np.array([0.0, BAND_SHARE, 1.0]))
+        sizes = np.array([0.0, self.inner, self.top])
+        return self._odd(values, sizes, np.array([0.0, self.share, 1.0]))
 
     def value(self, heights: FloatArray) -> FloatArray:
         """Return the values, in the limit's unit, at heights [-] of any shape: the inverse of `height`."""
-        sizes = np.array([0.0, self.limit, self.top])
-        return self._odd(heights, np.array([0.0, BAND_SHARE, 1.0]), sizes)
+        sizes = np.array([0.0, self.inner, self.top])
+        return self._odd(heights, np.array([0.0, self.share, 1.0]), sizes)
 
     def ticks(self) -> list[float]:
-        """Return the sizes that have a tick: 0, the limit, and the largest round one, the limit far below."""
-        power = 10.0 ** np.floor(np.log10(self.top))
-        return [0.0, self.limit, float(max(one * power for one in STEPS if one * power <= self.top))]
+        """Return the sizes that have a tick, from 0 up: the limit, and the largest round value."""
+        drawn = self.inner if self.close else self.top
+        power = 10.0 ** np.floor(np.log10(drawn))
+        largest = float(max(one * power for one in STEPS if one * power <= drawn))
+        return [0.0, *sorted((largest, self.top if self.close else self.inner))]
 
     @staticmethod
     def _odd(values: FloatArray, known: FloatArray, shown: FloatArray) -> FloatArray:
@@ -62,20 +78,24 @@ class TwoScales:
         return np.asarray(np.sign(values) * np.where(size > known[2], beyond, np.interp(size, known, shown)))
 
 
-def band_vanishes(panel: Panel) -> bool:
-    """Tell whether a linear axis would show the tolerance as a line: the lines go far beyond it."""
-    return two_scales(panel) is not None
-
-
 def two_scales(panel: Panel) -> TwoScales | None:
     """Return the axis that shows the tolerance of a panel and all its values, in the unit of the panel.
 
     None where a linear or the panel's logarithmic axis shows both, and where nothing is allowed or limited.
+    Values far within the limit are shown close up only if the panel says that it is about them.
     """
     if not panel.limit or panel.logarithmic or panel.over is not None:
         return None
     largest = max((_largest(one) for one in panel.lines), default=0.0)
+    if panel.close and 0.0 < largest < panel.limit / FAINT:
+        return TwoScales(largest, panel.limit, CLOSE_SHARE)
     return TwoScales(panel.limit, largest) if largest > FAINT * panel.limit else None
+
+
+def value_scales(values: FloatArray, limit: float | None) -> TwoScales | None:
+    """Return where the colours of sizes stand, shape (n,), with a limit in their unit; None without one."""
+    largest = float(np.nanmax(values, initial=0.0))
+    return TwoScales(limit, max(largest, 2.0 * limit)) if limit else None
 
 
 def small_multiples(panel: Panel) -> tuple[Panel, ...]:

@@ -73,6 +73,7 @@ class Path:
         t_ns: Times in [ns], shape (n,); None: it does not move along it.
         colour: As #rrggbb.
         asked: True for what was asked for: drawn broad and dashed, so that what was done shows in the gaps.
+        supposed: True for what would be: a page and a figure draw it thin and dashed.
         label: What is written at the moving point.
         values: What it is coloured by (small to large), in `unit`, shape (n,); None for its colour.
         unit: SI unit of `values`.
@@ -89,6 +90,7 @@ class Path:
     t_ns: IntArray | None
     colour: str
     asked: bool = False
+    supposed: bool = False
     label: str = ""
     values: FloatArray | None = None
     unit: str = "m"

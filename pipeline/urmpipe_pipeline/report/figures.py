@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.arrays import IntArray
 from urmpipe_pipeline.presentation.curves import Span, axis_of, by_axis, panels_of, place_of, span_of
 from urmpipe_pipeline.presentation.figure import Figure, Over, Panel, View
-from urmpipe_pipeline.presentation.layout import band_vanishes, small_multiples
+from urmpipe_pipeline.presentation.layout import small_multiples, two_scales
 from urmpipe_pipeline.report import spec
 from urmpipe_pipeline.report.panels import MARKED, Names, drawn_panel
 from urmpipe_pipeline.report.spec import Spec
@@ -32,7 +32,8 @@ SMALL_MULTIPLE_PX = 150
 """Height of a plot among many small ones."""
 
 BROKEN = " The axis has two scales: a larger one within the tolerance, a smaller one beyond it."
-"""Said of a figure whose tolerance would vanish on one scale."""
+CLOSE = " The axis has two scales: a larger one for the values, a smaller one from there to the tolerance."
+"""Said of a figure whose tolerance, or whose values, would vanish on one scale."""
 
 LEGEND_Y, OVER_LEGEND_Y = 1.025, 1.06
 """Where the legend begins, in heights of the plot: above the words at the head of a line through it; in a
@@ -102,13 +103,18 @@ def _whole(figure: Figure, times: Span) -> Iterator[spec.Figure]:
         span = times if over == "t" else span_of(panels)
         yield spec.Figure(
             title,
-            f"{figure.caption}{_left_out(panels)}{BROKEN if any(map(band_vanishes, panels)) else ''}",
+            f"{figure.caption}{_left_out(panels)}{_scales_of(panels)}",
             figure.alt if isinstance(figure.alt, str) else figure.alt(),
             _spec(figure, panels, span),
             _height(panels),
             over=over,
             folded=figure.folded,
         )
+
+
+def _scales_of(panels: Sequence[Panel]) -> str:
+    close = {found.close for panel in panels if (found := two_scales(panel)) is not None}
+    return f"{BROKEN if False in close else ''}{CLOSE if True in close else ''}"
 
 
 def _left_out(panels: Sequence[Panel]) -> str:

@@ -24,7 +24,7 @@ from urmpipe_pipeline.presentation.curves import (
     shown_unit,
 )
 from urmpipe_pipeline.presentation.figure import Mark, Over, Panel, Shape
-from urmpipe_pipeline.presentation.layout import BAND_SHARE, TwoScales, two_scales
+from urmpipe_pipeline.presentation.layout import TwoScales, two_scales
 from urmpipe_pipeline.report import spec
 from urmpipe_pipeline.report.spec import MUTED, Spec, typed
 from urmpipe_pipeline.report.traces import (
@@ -249,7 +249,7 @@ def _shapes(
         return [*found, level(high, words)]
     out = out_of_limit(panel, curves)
     found += shaded(out, np.ones(len(out), dtype=np.bool_), span.length)
-    high = high if scales is None else BAND_SHARE
+    high = high if scales is None else float(scales.height(np.array(panel.limit)))
     if panel.signed:
         return [band(-high, high), *found, level(high, words), level(-high)]
     measured = (one for one in curves if not one.line.dashed)

@@ -10,9 +10,9 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.decimate import decimate, points_for
 from urmpipe_pipeline.joint_log import seconds
-from urmpipe_pipeline.palette import BEYOND_SCALE, VALUE_SCALE, WITHIN_SCALE
+from urmpipe_pipeline.palette import VALUE_SCALE
 from urmpipe_pipeline.presentation.figure import SpaceFigure
-from urmpipe_pipeline.presentation.layout import BAND_SHARE, TwoScales
+from urmpipe_pipeline.presentation.layout import LIMITED_SCALE, value_scales
 from urmpipe_pipeline.presentation.scene import Arrows, Path, Sheets, Solid, Spot
 from urmpipe_pipeline.report.spec import Figure, Spec, base_layout, space_axis, typed
 from urmpipe_pipeline.report.traces import label
@@ -38,9 +38,6 @@ TINT = 0.12
 
 LIGHT = {"ambient": 0.6, "diffuse": 0.6, "specular": 0.1}
 """How solids are lit: their colours stay those of the legend."""
-
-ENDS = (0.0, BAND_SHARE, BAND_SHARE, 1.0)
-"""Where the colours of values within a limit and beyond it begin and end, on an axis of two scales."""
 
 BACK_PX, FRONT_PX, VALUES_PX = 2, 5, 6
 """Width of a path: of those in the back, of the one in front, and of one that its values colour."""
@@ -88,7 +85,7 @@ def _path(path: Path, width: int, dot: int) -> Spec:
     said += "<br>x %{x:.4f} m<br>y %{y:.4f} m<br>z %{z:.4f} m"
     if path.values is not None:
         said += f"<br>%{{customdata[1]:.{text.DIGITS}f}} {label(unit)}"
-    style = {"color": path.colour, "width": width}
+    style = {"color": path.colour, "width": width, "dash": "dash" if path.supposed else "solid"}
     return _in_space(place) | {
         "mode": "lines" if path.line else "markers",
         "marker": {"color": path.colour, "size": dot},
@@ -113,13 +110,13 @@ def _picked(values: FloatArray, kept: IntArray, sample: IntArray | None) -> Floa
 def _by_value(name: str, values: FloatArray, unit: str, limit: float | None) -> Spec:
     """Return a line's style that colours it by its values, all in one unit, with their scale."""
     largest = float(np.nanmax(values, initial=0.0))
-    scales = _scales(values, limit)
+    scales = value_scales(values, limit)
     ticks: Spec = {}
     if scales is not None:
         places = scales.height(np.array(scales.ticks())).tolist()
         words = ["0", f"{limit:.4g} allowed", f"{scales.ticks()[2]:.4g}"]
         ticks = {"tickvals": places, "ticktext": words}
-    colours = VALUE_SCALE if scales is None else tuple(zip(ENDS, WITHIN_SCALE + BEYOND_SCALE, strict=True))
+    colours = VALUE_SCALE if scales is None else LIMITED_SCALE
     return {
         "color": typed(values if scales is None else scales.height(values)),
         "colorscale": [list(stop) for stop in colours],
@@ -137,12 +134,6 @@ def _by_value(name: str, values: FloatArray, unit: str, limit: float | None) -> 
             "yanchor": "top",
         },
     }
-
-
-def _scales(values: FloatArray, limit: float | None) -> TwoScales | None:
-    """Return where the colours of values stand that have a limit in their unit."""
-    largest = float(np.nanmax(values, initial=0.0))
-    return TwoScales(limit, max(largest, 2.0 * limit)) if limit else None
 
 
 def _sheets(sheets: Sheets) -> Iterator[Spec]:
@@ -189,7 +180,7 @@ def _arrows(arrows: Arrows) -> Iterator[Spec]:
     unit, factor = text.SHOWN.get(arrows.unit, (arrows.unit, 1.0))
     values, row = factor * arrows.values, arrows.sample + 1
     limit = arrows.limit and factor * arrows.limit
-    style, scales = _by_value(arrows.name, values, unit, limit), _scales(values, limit)
+    style, scales = _by_value(arrows.name, values, unit, limit), value_scales(values, limit)
     heights = values if scales is None else scales.height(values)
     apart = np.full_like(arrows.start, np.nan)
     yield _in_space(np.stack((arrows.start, arrows.end, apart), axis=1).reshape(-1, 3)) | {

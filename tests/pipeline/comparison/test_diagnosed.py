@@ -125,7 +125,7 @@ def test_joints_alone_are_drawn_one_by_one_beside_their_deviation(arms: Compared
 def test_the_mended_path_lies_beside_the_reference_by_what_stays(paths: Compared) -> None:
     result = diagnosed(paths({"log": off(0.01)}))
     one = result.runs[0]
-    (mended,) = (path for path in scene_of(present(result)).paths if path.name == "mended")
+    (mended,) = (path for path in scene_of(present(result)).paths if path.name == "without the causes")
     assert mended.colour == MENDED_COLOUR
     np.testing.assert_array_equal(mended.position, (one.reference - one.delta[:, :3] / 100.0)[::2])
     np.testing.assert_array_equal(mended.t_ns, one.t_ns[::2])
@@ -153,7 +153,7 @@ def test_without_a_cause_nothing_is_mended(paths: Compared) -> None:
     nothing = replace(diagnosis_of(one), causes=(), undecided=())
     result = replace(result, runs=(replace(one, diagnosis=nothing),))
     assert not any(figure.beside for figure in figures(present(result).body.sections[0]))
-    assert not any(path.name == "mended" for path in scene_of(present(result)).paths)
+    assert not any(path.name == "without the causes" for path in scene_of(present(result)).paths)
 
 
 ALIGNED = "align: found rigid, allowed: none with a diagnosis: base and tool are possible causes"

@@ -13,7 +13,7 @@ from toys import shown
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.figures.plot import plot
 from urmpipe_pipeline.figures.sheet import Sheet
-from urmpipe_pipeline.palette import VALUE_SCALE
+from urmpipe_pipeline.palette import BEYOND_SCALE, VALUE_SCALE, WITHIN_SCALE
 from urmpipe_pipeline.presentation.figure import SpaceFigure
 from urmpipe_pipeline.presentation.scene import Path, Sheets, Solid, Spot
 
@@ -63,6 +63,23 @@ def test_a_path_is_coloured_by_its_values_with_a_scale_in_mm() -> None:
     assert lines.get_colors()[-1][:3] == pytest.approx(_rgb(VALUE_SCALE[-1][1]))
     assert scale.get_xlabel() == "‖Δ‖ in mm"
     assert scale.get_xlim() == pytest.approx((0.0, 59.0))
+
+
+def test_a_path_with_a_limit_has_the_colours_of_a_report_with_a_change_at_the_limit() -> None:
+    sizes = 1e-3 * np.arange(60.0)
+    wanted = Path("reference", HELIX, None, RED, asked=True)
+    supposed = Path("without the causes", HELIX, None, RED, supposed=True)
+    made = drawn(paths=(wanted, supposed, Path("‖Δ‖", HELIX, None, RED, values=sizes, limit=0.0305)))
+    axes, scale = made.axes
+    (lines,) = (one for one in axes.collections if isinstance(one, Line3DCollection))
+    colours = lines.get_colors()
+    assert colours[0][:3] == pytest.approx(_rgb(WITHIN_SCALE[0]), abs=0.03)  # of row 1 of 30
+    assert colours[29][:3] == pytest.approx(_rgb(WITHIN_SCALE[1]), abs=0.03)
+    assert colours[30][:3] == pytest.approx(_rgb(BEYOND_SCALE[0]), abs=0.03)
+    assert colours[-1][:3] == pytest.approx(_rgb(BEYOND_SCALE[1]), abs=0.03)
+    assert [one.get_text() for one in scale.get_xticklabels()] == ["0", "30.5 allowed", "50"]
+    # What only would be is no wider than what was asked for, and hides nothing.
+    assert [(one.get_linestyle(), one.get_linewidth()) for one in axes.lines[:2]] == [("--", 0.7), (":", 0.7)]
 
 
 def _rgb(colour: str) -> list[float]:

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from urmpipe_pipeline.presentation.figure import Line, Mark, Over, Panel
 from urmpipe_pipeline.presentation.layout import (
     BAND_SHARE,
+    CLOSE_SHARE,
     FAINT,
     TwoScales,
-    band_vanishes,
     small_multiples,
     two_scales,
 )
@@ -29,8 +29,7 @@ def panel(largest: float, **more: object) -> Panel:
 
 
 def test_a_tolerance_vanishes_below_far_larger_values_only() -> None:
-    assert not band_vanishes(panel(0.999 * FAINT * LIMIT))
-    assert band_vanishes(panel(1.001 * FAINT * LIMIT))
+    assert two_scales(panel(0.999 * FAINT * LIMIT)) is None
     assert two_scales(panel(0.807)) == TwoScales(LIMIT, 0.807)
 
 
@@ -39,7 +38,19 @@ def test_a_tolerance_vanishes_below_far_larger_values_only() -> None:
     [{"limit": None}, {"limit": 0.0}, {"logarithmic": True}, {"over": Over(np.arange(4.0), "‖v‖", "m/s")}],
 )
 def test_without_a_band_nothing_vanishes(more: dict[str, object]) -> None:
-    assert not band_vanishes(panel(0.807, **more))
+    assert two_scales(panel(0.807, **more)) is None
+
+
+def test_values_far_within_the_tolerance_are_shown_close_up_where_they_are_the_subject() -> None:
+    few = 0.5 * LIMIT / FAINT
+    assert two_scales(panel(few)) is None
+    assert two_scales(panel(0.0, close=True)) is None
+    assert two_scales(panel(1.001 * LIMIT / FAINT, close=True)) is None
+    scales = two_scales(panel(few, close=True))
+    assert scales == TwoScales(few, LIMIT, CLOSE_SHARE)
+    np.testing.assert_allclose(scales.height(np.array([few, -LIMIT])), [CLOSE_SHARE, -1.0])
+    assert scales.ticks() == pytest.approx([0.0, 1e-4, LIMIT])  # in m: few is 0.146 mm
+    assert two_scales(panel(0.807, close=True)) == two_scales(panel(0.807))
 
 
 @given(SIZES, st.floats(1e-3, 10.0), st.floats(12.0, 1e3))

@@ -59,7 +59,7 @@ def test_its_answer_stands_in_the_summary_and_mended_deviations_in_a_tab(
     assert "Cause: **module 3 (phi3) counter" in text.replace("\\", "")
     assert said in text.replace("\\", "")
     tabs = views(path)["ViewBlueprint:display_name"]
-    assert tabs.index("delta mended [mm]") == tabs.index("delta = reference - log [mm]") + 3
+    assert tabs.index("delta without the causes [mm]") == tabs.index("delta = reference - log [mm]") + 3
 
 
 def test_what_is_named_is_marked_where_the_arm_is(diagnosed: Comparison, tmp_path: Path) -> None:
