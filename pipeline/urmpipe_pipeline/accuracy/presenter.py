@@ -108,7 +108,7 @@ def _page(result: Accuracy) -> Iterator[Block]:
     """Yield what only a page shows: errors over velocity, the arm and the path of the motion shown first."""
     yield velocity_figure(result)
     yield arm_drawing(result)
-    yield path_figure(shown_motion(result))
+    yield path_figure(result)
     if result.provenance.inputs:
         yield inputs_table("Input files", result.provenance.inputs)
     yield provenance_table(result.provenance)

@@ -29,20 +29,23 @@ def accuracy_scene(result: Accuracy) -> Scene:
     arm = Arm(result.robot, motion.q, motion.t_ns, run_colour(0), kept=(at,))
     now = Path("planned", motion.planned, motion.t_ns, REFERENCE_COLOUR, asked=True, kept=(at,), line=False)
     larger = _larger(motion)
-    said = f"real path coloured by ‖Δ‖{f', in crimson the {larger.name}' if larger else ''}"
+    by = "‖Δ‖" if result.decides == "time" else "its distance from the planned one"
+    said = f"real path coloured by {by}{f', in crimson the {larger.name}' if larger else ''}"
     title = f"Arm and paths at {at_velocity(motion.velocity)} [m], {said}"
-    return Scene(title, (arm,), (*_paths(motion), now), (_worst(motion),))
+    return Scene(title, (arm,), (*_paths(result, motion), now), (_worst(motion),))
 
 
-def path_figure(motion: DrivenMotion) -> SpaceFigure:
-    """Return the planned and the real path of a motion, and its deviation enlarged."""
+def path_figure(result: Accuracy) -> SpaceFigure:
+    """Return the planned and the real path of the shown motion, and its deviation enlarged."""
+    motion = shown_motion(result)
     larger = _larger(motion)
+    nearest = "set point" if result.decides == "time" else "planned path"
     drawn = f" Crimson: {larger.name}." if larger else ""
     return SpaceFigure(
         f"Path in space at {at_velocity(motion.velocity)}",
-        f"Equal scale on all axes. Grey: planned; the colour is the distance from the set point.{drawn}",
+        f"Equal scale on all axes. Grey: planned; the colour is the distance from the {nearest}.{drawn}",
         f"Planned and real path at {at_velocity(motion.velocity)} in space. {_worst(motion).words}.",
-        _paths(motion),
+        _paths(result, motion),
         (*ends(motion.position), _worst(motion)),
     )
 
@@ -68,10 +71,12 @@ def arm_drawing(result: Accuracy) -> Drawing:
     return Drawing(f"Arm on the path at {at_velocity(motion.velocity)}", alt, svg)
 
 
-def _paths(motion: DrivenMotion) -> tuple[Path, ...]:
-    """Return the planned path, the real one coloured by its deviation, and the deviation enlarged."""
+def _paths(result: Accuracy, motion: DrivenMotion) -> tuple[Path, ...]:
+    """Return the planned path, the real one coloured by the error that decides, the deviation enlarged."""
+    by_time = result.decides == "time"
     real = Path(
-        "real: ‖Δ‖", motion.position, motion.t_ns, AXIS_COLOURS["norm"], values=motion.delta[:, 3],
+        "real: ‖Δ‖" if by_time else "real: distance from the path", motion.position, motion.t_ns,
+        AXIS_COLOURS["norm"], values=motion.delta[:, 3] if by_time else motion.from_path, limit=result.limit,
         kept=(motion.worst,),
     )  # fmt: skip
     larger = _larger(motion)
