@@ -6,7 +6,7 @@ A new kind is a folder with its result and its presenter, and its line here.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeGuard
 
@@ -123,7 +123,8 @@ def read_recording(path: Path, *, lazy: bool = False) -> Result:
 
 def present(result: Result) -> Presentation:
     """Return what a result shows."""
-    return kind_of(result).present(result)
+    shown = kind_of(result).present(result)
+    return replace(shown, recording=result.recording.name) if result.recording else shown
 
 
 def exports(result: Result) -> Exports:

@@ -38,7 +38,13 @@ from urmpipe_pipeline.iso9283.wording import (
     worst_first,
 )
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.presentation.parts import inputs_table, minute, provenance_table, recording_fact
+from urmpipe_pipeline.presentation.parts import (
+    inputs_table,
+    minute,
+    minute_of,
+    provenance_table,
+    recording_fact,
+)
 from urmpipe_pipeline.presentation.section import (
     Block,
     Cell,
@@ -223,8 +229,8 @@ def _line(result: Comparison, test: IsoTest) -> Mapping[str, Cell]:
     """Return the line of a test among several."""
     return {
         "Test": Ref(f"Test {result.name}"),
-        "Recording": str(result.recording or ""),
-        "Made": minute(result.provenance),
+        "Recording": result.recording.name if result.recording else "",
+        "Made [UTC]": minute_of(result.provenance.created),
         "Reference": result.reference.name,
         "Verdict": Judged(result.verdict),
         "Cycles": Value(len(test.cycles)),

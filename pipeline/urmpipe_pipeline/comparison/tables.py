@@ -12,7 +12,7 @@ from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
 from urmpipe_pipeline.comparison.facts import alignment_words, largest, place_of
 from urmpipe_pipeline.comparison.wording import size_of, symbol
 from urmpipe_pipeline.palette import run_colour
-from urmpipe_pipeline.presentation.parts import Heads, columns_of, minute, rows_table
+from urmpipe_pipeline.presentation.parts import Heads, columns_of, minute_of, rows_table
 from urmpipe_pipeline.presentation.section import Cell, Column, Judged, Ref, Table, Value
 
 ABOUT = {"axis": "position", "norm": "position", "path": "path", "angle": "orientation", "joint": "joints"}
@@ -126,13 +126,14 @@ def comparison_lines(result: Comparison) -> Iterator[dict[str, Cell]]:
         worse = lost.count(one.name)
         yield {
             "Log": reference_of(result, one),
-            "Recording": str(result.recording or ""),
-            "Made": minute(result.provenance),
-            "Reference": result.reference.name,
+            "Recording": result.recording.name if result.recording else "",
+            "Robot": one.run.robot.name if one.run.robot else "",
             "Verdict": Judged(one.verdict),
-            "Assuming": "; ".join(result.assumptions),
             "Worse than its baseline": f"in {quantities(worse)}" if worse else "",
             **{title: cell(one) for title, cell in _sizes(result).values()},
+            "Reference": result.reference.name,
+            "Assuming": "; ".join(result.assumptions),
+            "Made [UTC]": minute_of(result.provenance.created),
         }
 
 

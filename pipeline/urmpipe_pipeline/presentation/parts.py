@@ -103,8 +103,13 @@ def recording_fact(recording: Path | None) -> Fact:
 
 def minute(provenance: Provenance) -> str:
     """Return when a result was made, to the minute: "2026-11-22 10:30 UTC"."""
-    created = provenance.created[:16].replace("T", " ")
+    created = minute_of(provenance.created)
     return f"{created} UTC" if created else ""
+
+
+def minute_of(created: str) -> str:
+    """Return a time of ISO 8601 to the minute: "2026-11-22 10:30"; empty stays empty."""
+    return created[:16].replace("T", " ")
 
 
 def ends(position: FloatArray) -> tuple[Spot, ...]:

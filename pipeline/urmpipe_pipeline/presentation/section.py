@@ -250,6 +250,7 @@ class Presentation:
             of one name stand below each other.
         rows: Returns what `--csv` writes.
         created: When it was made (ISO 8601), for JUnit; empty where that is not known.
+        recording: The name of its recording; empty where there is none.
     """
 
     name: str
@@ -264,3 +265,4 @@ class Presentation:
     lines: tuple[Mapping[str, Cell], ...] = ()
     rows: Callable[[], Table] | None = None
     created: str = ""
+    recording: str = ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
@@ -12,6 +11,7 @@ from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.presentation.curves import Span
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure, Text
 from urmpipe_pipeline.presentation.figure import Figure as GivenFigure
+from urmpipe_pipeline.presentation.parts import minute_of
 from urmpipe_pipeline.presentation.section import Block, Presentation, Ref, Section, Table
 from urmpipe_pipeline.report.figures import SMALL_PX, Links, Multiples, drawn_figures, time_span
 from urmpipe_pipeline.report.space import drawn_space
@@ -126,11 +126,12 @@ class Page:
 
     @property
     def contents(self) -> tuple[Part, ...]:
-        """The parts that the tables above them do not lead to; none if they are few."""
+        """The parts that the tables above them do not lead to, nor into; none if they are few."""
         tables = (table for summary in self.summaries for table in summary.tables)
         known = {cell.href for table in tables for row in table.rows for cell in row}
         known |= {card.href for summary in self.summaries for card in summary.cards}
-        left = [one for part in self.parts for one in part.every() if f"#{one.ident}" not in known]
+        every = [one for part in self.parts for one in part.every()]
+        left = [one for one in every if not any(f"#{part.ident}" in known for part in one.every())]
         return tuple(left) if len(left) >= FEW else ()
 
 
@@ -143,11 +144,10 @@ def lay_out(presentations: Sequence[Presentation]) -> Page:
     if not presentations:
         raise OptionError("a report needs at least one run, comparison or simulation; found none")
     shown = [(one, Anchors(one.body, f"r{number}")) for number, one in enumerate(presentations, start=1)]
-    titles = Counter(one.body.title for one in presentations)
     judged = sum(len(judged_parts(one.body)) for one in presentations)
     banner = banner_of(shown)
     first, *others = (
-        _part(one.body, anchors, Links(), _made(one) if titles[one.body.title] > 1 else "", folds=judged > 1)
+        _part(one.body, anchors, Links(), _which(one, presentations), folds=judged > 1)
         for one, anchors in worst_first(shown)
     )
     above = {(fact.name, fact.value) for fact in banner.facts}
@@ -160,9 +160,14 @@ def lay_out(presentations: Sequence[Presentation]) -> Page:
     )
 
 
-def _made(one: Presentation) -> str:
-    """Return what tells a result from others of its title: when it was made, to the minute."""
-    return f" ({one.created[:16].replace('T', ' ')})" if one.created else ""
+def _which(one: Presentation, every: Sequence[Presentation]) -> str:
+    """Return what tells a result from others of its title: its recording's name, or when it was made."""
+    alike = [other for other in every if other.body.title == one.body.title]
+    if len(alike) == 1:
+        return ""
+    alone = one.recording and sum(other.recording == one.recording for other in alike) == 1
+    said = one.recording if alone else minute_of(one.created)
+    return f" ({said})" if said else ""
 
 
 def _summaries(shown: Sequence[tuple[Presentation, Anchors]]) -> Iterator[Summary]:

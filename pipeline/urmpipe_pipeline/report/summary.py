@@ -13,6 +13,7 @@ from urmpipe_pipeline.presentation.section import (
     Cell,
     Column,
     Fact,
+    Judged,
     Presentation,
     Ref,
     Section,
@@ -29,7 +30,7 @@ PLAIN = "plain"
 """How a banner, a card and a badge without a verdict look."""
 
 TOLD = 4
-"""Headlines of further results that stand in the banner; more of them are counted."""
+"""Headlines of results that stand in the banner; more of them are counted."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +40,9 @@ class Banner:
     Attributes:
         state: pass, fail, or plain where nothing was judged.
         word: The same in capitals, or what stands for it.
-        headline: Of the worst result, one sentence.
-        facts: What explains it.
-        others: What else was found, a sentence each.
+        headline: How many results fail, or how the only one came out.
+        facts: What explains it, of the worst.
+        others: What else was found, the worst first, a sentence each.
     """
 
     state: str
@@ -87,18 +88,45 @@ def word_of(verdict: Verdict, instead: str = "") -> str:
 
 
 def banner_of(shown: Sequence[tuple[Presentation, Anchors]]) -> Banner:
-    """Return the verdict: the worst result leads, none of the others hides behind it."""
-    (worst, anchors), *others = worst_first(shown)
+    """Return the verdict on all results: the worst explains it, none of the others hides behind it."""
+    others = worst_first(shown)
+    worst, anchors = others[0]
+    counted = _counted([one for one, _ in shown if one.verdict])
+    others = others if counted else others[1:]
     told = [f"{word_of(one.verdict, one.word)}: {one.headline.rstrip('.')}." for one, _ in others[:TOLD]]
     if left := Counter(word_of(one.verdict, one.word) for one, _ in others[TOLD:]):
         told.append(f"And {', '.join(f'{count} more: {word}' for word, count in left.items())}.")
     return Banner(
         worst.verdict or PLAIN,
         word_of(worst.verdict, worst.word),
-        worst.headline,
+        counted or worst.headline,
         tuple(_short(worst.facts, anchors)),
         tuple(told),
     )
+
+
+def _counted(judged: Sequence[Presentation]) -> str:
+    """Return how many of several judged results and their lines fail, or that all pass; empty for one.
+
+    As in "3 of 10 logs, in 3 of 5 recordings": lines are counted if all are of one kind, and if no result
+    fails for another reason than its lines.
+    """
+    if len(judged) < 2:
+        return ""
+    failed = [one for one in judged if one.verdict == "fail"]
+    results = "recordings" if all(one.recording for one in judged) else "results"
+    said = _share(len(failed), len(judged), results)
+    lines = [(next(iter(line)), line.get("Verdict")) for one in judged for line in one.lines]
+    known = [one for one in failed if any(line.get("Verdict") == Judged("fail") for line in one.lines)]
+    heads = {head for head, _ in lines}
+    if len(heads) != 1 or len(known) < len(failed):
+        return said
+    out = sum(verdict == Judged("fail") for _, verdict in lines)
+    return f"{_share(out, len(lines), f'{heads.pop().lower()}s')}, in {said}"
+
+
+def _share(count: int, total: int, noun: str) -> str:
+    return f"{count} of {total} {noun}" if count else f"all {total} {noun}"
 
 
 def worst_first(shown: Sequence[tuple[Presentation, Anchors]]) -> list[tuple[Presentation, Anchors]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -64,9 +65,9 @@ def test_the_worst_result_leads_and_the_others_stand_below() -> None:
         [toy("near", "pass", near), read, toy("far", "fail", far), toy("further", "fail", further)]
     )
     banner = page.banner
-    assert (banner.state, banner.word, banner.headline) == ("fail", "FAIL", "further came out")
+    assert (banner.state, banner.word, banner.headline) == ("fail", "FAIL", "2 of 3 results")
     assert banner.others == (
-        "FAIL: far came out.", "PASS: near came out.", "INGESTED: log came out.",
+        "FAIL: further came out.", "FAIL: far came out.", "PASS: near came out.", "INGESTED: log came out.",
     )  # fmt: skip
     assert [(fact.name, fact.value, fact.href) for fact in banner.facts] == [("Which", "further-1", "#r4-1")]
     assert page.title == "near, log, far, further"
@@ -75,8 +76,23 @@ def test_the_worst_result_leads_and_the_others_stand_below() -> None:
 
 def test_many_other_results_are_counted() -> None:
     page = lay_out([toy(f"t{k}", "pass" if k else "fail") for k in range(8)])
-    assert page.banner.others[:4] == tuple(f"PASS: t{k} came out." for k in range(1, 5))
-    assert page.banner.others[4:] == ("And 3 more: PASS.",)
+    told = ("FAIL: t0 came out.", *(f"PASS: t{k} came out." for k in range(1, 4)))
+    assert page.banner.others == (*told, "And 4 more: PASS.")
+
+
+def test_the_banner_counts_the_logs_of_all_recordings() -> None:
+    """Logs that fail, in how many recordings; results alone where a result fails for another reason."""
+
+    def recorded(name: str, verdict: Verdict, *logs: Verdict) -> Presentation:
+        lines = tuple({"Log": f"log {k}", "Verdict": Judged(one)} for k, one in enumerate(logs))
+        return toy(name, verdict, lines=lines, recording=f"{name}.rrd")
+
+    good, bad = recorded("good", "pass", "pass"), recorded("bad", "fail", "pass", "fail", "fail")
+    assert lay_out([good, bad]).banner.headline == "2 of 4 logs, in 1 of 2 recordings"
+    assert lay_out([good, good]).banner.headline == "all 2 logs, in all 2 recordings"
+    assert lay_out([good, bad, recorded("worse", "fail", "pass")]).banner.headline == "2 of 3 recordings"
+    assert lay_out([bad, toy("alone", "pass")]).banner.headline == "2 of 3 logs, in 1 of 2 results"
+    assert lay_out([bad, toy("read", None)]).banner.headline == "bad came out"
 
 
 def test_nothing_judged_is_no_verdict() -> None:
@@ -180,3 +196,7 @@ def test_results_of_one_title_are_told_apart_by_when_they_were_made() -> None:
         "Toy log (2026-10-22 05:06)", "Toy log (2026-11-22 05:06)",
     ]  # fmt: skip
     assert lay_out(made[:1]).parts[0].title == "Toy log"
+    named = [replace(one, recording=name) for one, name in zip(made, ("cell.rrd", "arm.rrd"), strict=True)]
+    assert [part.title for part in lay_out(named).parts] == ["Toy log (cell.rrd)", "Toy log (arm.rrd)"]
+    of_one_name = [replace(one, recording="log.rrd") for one in made]
+    assert lay_out(of_one_name).parts[0].title == "Toy log (2026-10-22 05:06)"
