@@ -94,6 +94,13 @@ class DrawnArm:
         return _largest_radius(body for body in self.bodies if body.joint == carrier)
 
     @property
+    def tip_radius(self) -> float:
+        """The largest radius of the round shapes on the outermost link that has some in [m], 0 of none."""
+        outwards = (joint.name for joint in reversed(self.chain.joints))
+        radii = (_largest_radius(body for body in self.bodies if body.joint == name) for name in outwards)
+        return next(filter(None, radii), 0.0)
+
+    @property
     def radius(self) -> float:
         """The largest radius of the round shapes on moving links in [m], 0 of none."""
         return _largest_radius(body for body in self.bodies if body.joint is not None)

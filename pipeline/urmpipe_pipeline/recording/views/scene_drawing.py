@@ -86,7 +86,9 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
     for key, path in zip(keys([one.path.name for one in paths]), paths, strict=True):
         _draw_path(stream, path, key, size)
     for number, spot in enumerate(spot for spot in scene.spots if spot.always):
-        _draw_spot(stream, spot, f"spot {number}", size)
+        # A place on the path of the tool is inside the outermost link when the arm is there.
+        radius = max(SPOT * size, AROUND * (arm.tip_radius if arm else 0.0))
+        _draw_spot(stream, spot, f"spot {number}", radius)
     if scene.arrows is not None:
         _draw_arrows(stream, scene.arrows, size)
     if scene.balls is not None:
@@ -220,11 +222,11 @@ def _draw_path(stream: RecordingStream, drawn: DrawnPath, key: str, size: float)
         _send_gone(stream, entity, drawn.moving, rr.Points3D.columns(positions=[]))
 
 
-def _draw_spot(stream: RecordingStream, spot: Spot, key: str, size: float) -> None:
-    """Draw a place that is there at all times, with its label."""
+def _draw_spot(stream: RecordingStream, spot: Spot, key: str, radius: float) -> None:
+    """Draw a place that is there at all times, as a ball of a radius in [m], with its label."""
     import rerun as rr
 
-    point = rr.Points3D([spot.position], colors=[rgb(spot.colour)], radii=[SPOT * size])
+    point = rr.Points3D([spot.position], colors=[rgb(spot.colour)], radii=[radius])
     stream.log(shown_path("scene", key), point, static=True)
     entity = shown_path("scene", key, "label")
     stream.log(entity, rr.Points3D.from_fields(positions=[spot.position]), static=True)
