@@ -20,6 +20,9 @@ SIGNIFICANT = 4
 DIGITS = 4
 """Digits after the point of a length in [mm] or an angle in [deg]: 0.1 micrometres, 2 microradians."""
 
+FEWEST = 18
+"""Digits after the point at most that tell a value from what it is held against."""
+
 FINEST = 1e-3
 """The least standard error of a time that is said, in [ms]: a fit may claim less, but no clock keeps it."""
 
@@ -44,8 +47,8 @@ def display_unit(unit: str, wanted: str) -> tuple[str, float]:
 def number(value: float | None, unit: str, against: float | None = None) -> str:
     """Return a length in [m] as [mm], or an angle in [rad] as [deg].
 
-    Four significant digits, or as many as tell it from what it is held against; below a thousandth in
-    exponent form.
+    Four significant digits, or as many as tell it from what it is held against. What is far below a
+    thousandth, or below what it is held against, ends at the same digit as that: 0.0000.
 
     Args:
         value: In [m] or [rad].
@@ -56,11 +59,12 @@ def number(value: float | None, unit: str, against: float | None = None) -> str:
         return NOTHING
     scale = SHOWN[unit][1]
     scaled = value * scale
-    digits, form = (3, "e") if 0.0 < abs(scaled) < 1e-3 else (decimals(scaled), "f")
+    finest = max(DIGITS, decimals(against * scale)) if against else DIGITS
+    digits = min(decimals(scaled), finest) if abs(scaled) < 1e-3 else decimals(scaled)
     if against is not None and abs(value) != against:
-        while digits < 12 and f"{abs(scaled):.{digits}{form}}" == f"{against * scale:.{digits}{form}}":
+        while digits < FEWEST and f"{abs(scaled):.{digits}f}" == f"{against * scale:.{digits}f}":
             digits += 1
-    return f"{scaled:.{digits}{form}}"
+    return f"{round(scaled, digits) + 0.0:.{digits}f}"  # + 0.0: no -0.0000
 
 
 def decimals(value: float) -> int:
@@ -112,7 +116,7 @@ def standard_error(value: float) -> str:
 
 
 def percent(share: float) -> str:
-    """Return a share in [%], never rounded to 0 or to 100 when it is not."""
+    """Return a share in [%], never rounded to 0 or to 100 when it is not, and without an exponent."""
     scaled = share * 100.0
     if scaled in (0.0, 100.0):
         return f"{scaled:.0f} %"
@@ -120,6 +124,8 @@ def percent(share: float) -> str:
         return f"{max(scaled, 100.01):.2f} %" if scaled < 101.0 else f"{scaled:.1f} %"
     if scaled > 99.0:
         return f"{min(scaled, 99.99):.2f} %"
+    if round(abs(scaled), 6) < 1e-4:
+        return "under 0.0001 %"
     return f"{scaled:.2g} %" if scaled < 1.0 else f"{scaled:.1f} %"
 
 

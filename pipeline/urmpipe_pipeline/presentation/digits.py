@@ -96,10 +96,14 @@ def _digits(value: Value, number: float) -> str:
     return f"{number:.6g}"
 
 
+def _said(percent: str) -> float:
+    return float(percent.removeprefix("under ").removesuffix("%"))
+
+
 def _percent(share: float, against: float | None) -> str:
     """Return a share in [%], with as many digits as tell it from what it is held against."""
     shown = text.percent(share)
-    if against is None or against == share or float(shown[:-1]) != float(text.percent(against)[:-1]):
+    if against is None or against == share or _said(shown) != _said(text.percent(against)):
         return shown
     digits = next((n for n in range(3, FINEST) if f"{share:.{n}g}" != f"{against:.{n}g}"), FINEST)
     return f"{100.0 * share:.{digits}g} %"

@@ -85,11 +85,11 @@ def inputs_table(title: str, files: Iterable[SourceFile]) -> Table:
     return table_of(title, heads, rows, folded=True)
 
 
-def provenance_table(provenance: Provenance) -> Table:
+def provenance_table(provenance: Provenance, title: str = "How it was made") -> Table:
     """Return how to repeat a result: command, options, versions, when."""
     rows = [("command", provenance.command), ("created", provenance.created)]
     rows += _named("option", provenance.options) + _named("version of", provenance.versions)
-    return table_of("How it was made", {"what": "What", "value": "Value"}, rows, folded=True)
+    return table_of(title, {"what": "What", "value": "Value"}, rows, folded=True)
 
 
 def _named(word: str, values: Mapping[str, Any]) -> list[tuple[str, str]]:

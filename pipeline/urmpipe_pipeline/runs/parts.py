@@ -137,7 +137,7 @@ def file_tables(run: Run) -> Iterator[Table]:
     columns = columns_of(run.log.columns, heads)
     yield Table(f"Columns ({len(run.log.columns)})", columns, brief=False, folded=True)
     yield inputs_table("Input files", run.log.files)
-    yield provenance_table(run.provenance)
+    yield provenance_table(run.provenance, "How the log was read")
 
 
 def log_events(run: Run) -> Iterator[Event]:

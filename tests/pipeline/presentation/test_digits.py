@@ -20,14 +20,17 @@ from urmpipe_pipeline.text import NOTHING
         (Value(0.0099996, "m"), "10.00 mm", "10.00"),  # rounded, then counted
         (Value(0.0, "m"), "0.0 mm", "0.0"),
         (Value(-0.4123456789, "m"), "-412.3 mm", "-412.3"),
-        (Value(8.5e-17, "m"), "8.500e-14 mm", "8.500e-14"),
-        (Value(1e-9, "rad"), "5.730e-08 deg", "5.730e-08"),
+        (Value(8.5e-17, "m"), "0.0000 mm", "0.0000"),
+        (Value(-3.887e-10, "m"), "0.0000 mm", "0.0000"),  # no -0.0000
+        (Value(9.166e-7, "m"), "0.0009 mm", "0.0009"),
+        (Value(9.166e-7, "m", 0.0035), "0.0009 mm", "0.0009"),
+        (Value(3e-10, "m", 5e-7), "0.0000003 mm", "0.0000003"),  # as fine as its limit has four digits
         (Value(0.0035, "m", given=True), "3.5 mm", "3.5"),
         (Value(0.00350000001, "m", 0.0035), "3.50000001 mm", "3.50000001"),  # it is out of its limit
         (Value(0.00349996, "m", 0.0035), "3.49996 mm", "3.49996"),
         (Value(0.0035, "m", 0.0035), "3.500 mm", "3.500"),
-        (Value(5.00001e-7, "m", 5e-7), "5.00001e-04 mm", "5.00001e-04"),
-        (Value(5e-7, "m", 5e-7), "5.000e-04 mm", "5.000e-04"),
+        (Value(5.00001e-7, "m", 5e-7), "0.000500001 mm", "0.000500001"),
+        (Value(5e-7, "m", 5e-7), "0.0005000 mm", "0.0005000"),
         (Value(math.radians(0.5000004), "rad", math.radians(0.5)), "0.5000004 deg", "0.5000004"),
         (Value(math.radians(0.5), "rad", math.radians(0.5)), "0.5000 deg", "0.5000"),
         (Value(-0.5, "rad", signed=True), "-28.65 deg", "-28.65"),
@@ -40,6 +43,7 @@ from urmpipe_pipeline.text import NOTHING
         (Value(0.0, "%"), "0 %", "0 %"),
         (Value(1.0, "%"), "100 %", "100 %"),
         (Value(1e-6, "%"), "0.0001 %", "0.0001 %"),
+        (Value(-2.1e-7, "%"), "under 0.0001 %", "under 0.0001 %"),
         (Value(0.0699, "%"), "7.0 %", "7.0 %"),
         (Value(0.99999, "%"), "99.99 %", "99.99 %"),  # never rounded to none or all
         (Value(0.125, "%"), "12.5 %", "12.5 %"),

@@ -45,7 +45,7 @@ def page_of(section: Section) -> Page:
     [
         (of(Value(0.0025, "m"), Value(None, "m")), ("Head [mm]", True), ["2.500", "–"]),
         (of(Value(0.0035, "m", given=True), None), ("Head [mm]", True), ["3.5", "–"]),
-        (of(Value(0.5, "rad"), Value(1e-9, "rad")), ("Head [deg]", True), ["28.65", "5.730e-08"]),
+        (of(Value(0.5, "rad"), Value(1e-9, "rad")), ("Head [deg]", True), ["28.65", "0.0000"]),
         (of(Value(0.001, "m"), Value(1.0, "rad")), ("Head", True), ["1.000 mm", "57.30 deg"]),
         (of(Value(0.258, "%"), Value(0.0, "%")), ("Head", True), ["25.8 %", "0 %"]),
         (of(Value(1.25, "s"), Value(0.0, "s")), ("Head [s]", True), ["1.250", "0.000"]),

@@ -117,7 +117,7 @@ def test_a_page_shows_the_playback(run: Run, shown: Presentation) -> None:
     space = cast(SpaceFigure, blocks["Path in space before and after repolarization"])
     np.testing.assert_array_equal(space.paths[0].position, played.position)
     assert space.spots[-1].position == tuple(played.position[there(played.worst)].tolist())
-    assert {"Path in space", "Input files", "How it was made"} < set(blocks)
+    assert {"Path in space", "Input files", "How the log was read"} < set(blocks)
 
 
 def test_the_scene_is_the_arm_and_its_path(run: Run, shown: Presentation) -> None:
