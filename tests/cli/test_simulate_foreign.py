@@ -22,7 +22,10 @@ ENDS = Foreign(name="ends", scalars=(Scalar("y", 0, unit="m"),))
 STOPS = replace(ENDS, name="stops", step="if (t > 0.25) { m->terminated = 1; return fmi2Discard; }")
 GLITCH = Foreign(
     name="glitch",
-    scalars=(*(Scalar(f"y[{i}]", i, unit="m") for i in (1, 2)), Scalar("z", 3, unit="m")),
+    scalars=(
+        *(Scalar(f"y[{i}]", i, unit="m") for i in (1, 2)),
+        Scalar("z", 3, unit="m", extra=' displayUnit="mm"'),
+    ),
     compute="v->r[1] = v->time > 0.15 && v->time < 0.35 ? NAN : 0.001; v->r[2] = v->r[1]; v->r[3] = 0.001;",
 )
 """y is nan at 0.2 s and 0.3 s."""
@@ -194,7 +197,10 @@ def test_strict_keeps_what_a_failed_run_recorded(urmpipe: RunCommand, tmp_path: 
     ran = urmpipe(*write(tmp_path, {"a": GLITCH}, {ACTUAL: "a.y[1]"}), "--strict", "--json")
     assert ran.code == 2
     assert json.loads(ran.out)["samples"] == 2
-    assert recorded(tmp_path).verdict == "fail"
+    found = recorded(tmp_path)
+    assert found.verdict == "fail"
+    shown = {one.name: one.display_unit for one in found.signals if one.block == "a"}
+    assert shown == {"a.y": "", "a.z": "mm"}
 
 
 def test_the_meter_that_is_in_doubt_decides_before_one_that_passes(tmp_path: Path) -> None:

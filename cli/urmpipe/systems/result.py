@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -65,10 +64,10 @@ def simulation_of(plan: Plan, recorded: Recorded, blocks: Blocks, svg: str) -> S
         description=system.description,
         t_ns=recorded.t_ns,
         step=plan.step,
-        signals=tuple(_signals(plan, recorded, blocks)),
+        signals=tuple(_signals(plan, recorded)),
         system_svg=svg,
         system_text=system.path.read_text(encoding="utf-8-sig"),
-        blocks=tuple(_block(plan, one, blocks) for one in system.blocks),
+        blocks=tuple(_block(plan, one) for one in system.blocks),
         failed=recorded.failed,
         warnings=(*blocks.warnings, *blocks.between_samples(plan.step, plan.count), *notes, *_told(odd)),
         provenance=provenance("simulate", given, _inputs([system.path, *blocks.files])),
@@ -110,7 +109,7 @@ def _told(odd: Mapping[Port, NotFinite]) -> Iterator[LogWarning]:
         yield LogWarning("not-finite", said, about=port.block, column=port.variable)
 
 
-def _signals(plan: Plan, recorded: Recorded, blocks: Blocks) -> Iterator[Signal]:
+def _signals(plan: Plan, recorded: Recorded) -> Iterator[Signal]:
     """Yield the signals: scalars, and arrays whose elements were all recorded."""
     places = {port: i for i, port in enumerate(recorded.names)}
     done: set[Port] = set()
@@ -126,7 +125,7 @@ def _signals(plan: Plan, recorded: Recorded, blocks: Blocks) -> Iterator[Signal]
             values=columns if name != port.variable else columns[:, 0],
             unit=recorded.units[places[port]],
             type=recorded.types[places[port]],  # type: ignore[arg-type]
-            **_described(blocks, port.block, name),
+            **_described(plan.interfaces[port.block], name),
         )
 
 
@@ -144,23 +143,22 @@ def _array(shown: Interface, port: Port, places: Mapping[Port, int]) -> tuple[li
     return (ports, match[1]) if len(kinds) == 1 else ([port], port.variable)
 
 
-def _described(blocks: Blocks, block: str, variable: str) -> dict[str, Any]:
-    """Return description and display unit of a variable of a unit; of another FMU nothing."""
-    unit = blocks.units.get(block)
-    found = next((one for one in unit.variables if one.name == variable), None) if unit else None
-    return {"description": found.description, "display_unit": found.display_unit} if found else {}
+def _described(shown: Interface, variable: str) -> dict[str, str]:
+    """Return description and display unit of a variable, or of an array by its first element."""
+    found = shown.elements(variable)[0]
+    return {"description": found.description, "display_unit": found.display_unit}
 
 
-def _block(plan: Plan, block: Block, blocks: Blocks) -> SimulatedBlock:
+def _block(plan: Plan, block: Block) -> SimulatedBlock:
     """Return what is to be known of a block."""
-    shown, unit = plan.interfaces[block.name], blocks.units.get(block.name)
+    shown = plan.interfaces[block.name]
     return SimulatedBlock(
         name=block.name,
         kind="fmu" if block.fmu else "file" if block.file else "unit",
         source=block.kind,
         content=shown.guid,
         settings=tuple(_settings(plan, block.name, shown)),
-        description=unit.description if unit else "",
+        description=shown.description,
     )
 
 

@@ -40,6 +40,8 @@ class Variable:
         maximum: The largest value allowed.
         nominal: The size of its values; 0 if the FMU does not tell.
         start: Its value at the start, as the FMU spells it; None if it has none.
+        description: One line for people; empty for none.
+        display_unit: The unit that people like to see, such as deg; empty for the unit itself.
     """
 
     name: str
@@ -55,6 +57,8 @@ class Variable:
     maximum: float
     nominal: float
     start: str | None
+    description: str = ""
+    display_unit: str = ""
 
     @property
     def settable(self) -> bool:
@@ -88,6 +92,7 @@ class Interface:
         can_save: Whether its state can be saved and restored.
         variable_step: Whether its communication step may change.
         alone: Whether it can be instantiated only once per process.
+        description: One line for people; empty for none.
     """
 
     path: Path
@@ -99,6 +104,7 @@ class Interface:
     can_save: bool
     variable_step: bool
     alone: bool
+    description: str = ""
 
     @cached_property
     def inputs(self) -> tuple[Variable, ...]:
@@ -185,6 +191,7 @@ def _interface(path: Path, described: Any) -> Interface | None:
         can_save=can.canGetAndSetFMUstate,
         variable_step=can.canHandleVariableCommunicationStepSize,
         alone=can.canBeInstantiatedOnlyOncePerProcess,
+        description=described.description or "",
     )
 
 
@@ -226,6 +233,8 @@ def _variables(described: Any) -> Iterator[Variable]:
             maximum=float(high) if high else math.inf,
             nominal=abs(float(one.nominal or (kind and kind.nominal) or 0.0)),
             start=one.start,
+            description=one.description or "",
+            display_unit=one.displayUnit or (kind and kind.displayUnit) or "",
         )
 
 

@@ -171,7 +171,7 @@ def _sections(simulation: Simulation) -> Iterator[Section]:
     answers, balance = answers_of(simulation), simulation.energy
     by_block = [(block, list(some)) for block, some in groupby(groups_of(simulation), lambda one: one.block)]
     worst = simulation.judged_worst
-    opened = worst.block if worst else by_block[-1][0] if by_block and not answers else ANSWERS
+    opened = worst.block if worst else by_block[0][0] if by_block and not answers else ANSWERS
     if answers:
         yield _section(simulation, ANSWERS, answers, None, opened=opened == ANSWERS)
     if balance is not None:

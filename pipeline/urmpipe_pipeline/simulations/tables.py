@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,6 +22,12 @@ FIRST = 12
 
 AT_ONCE = 5
 """As many as a delta meter has: x, y, z, norm, and whether they are tolerated."""
+
+PLACE = 3
+"""As many as the tip of an arm has: x, y, z."""
+
+POINT = re.compile(r"p(\d+)")
+"""The points of an arm, from its base outwards."""
 
 
 def meters_table(simulation: Simulation) -> Iterator[Table]:
@@ -118,8 +125,9 @@ def first_signals_table(simulation: Simulation) -> Iterator[Table]:
 class FirstSignals(Sequence[Scalar]):
     """The signals that are read first, chosen when they are shown: that looks at all values.
 
-    The blocks come first whose outputs no other block takes, which judge or end the system, with `AT_ONCE`
-    scalars a turn; of the others one a turn, first what another block takes of them.
+    Of each block the first scalar, of those whose outputs no other block takes, which end the system, the
+    first `PLACE`, of those which judge it `AT_ONCE`; then one more of each a turn. What another block takes
+    comes first, then the tip of an arm, its inner points last.
     """
 
     def __init__(self, simulation: Simulation) -> None:
@@ -150,12 +158,29 @@ class FirstSignals(Sequence[Scalar]):
         found = self._simulation
         taken = set(found.connections.values())
         inner = {source.partition(".")[0] for source in taken}
-        signals = sorted(found.signals, key=lambda one: taken.isdisjoint((one.name, *one.names)))
+        judges = {one.block for one in found.verdicts}
         for block in dict.fromkeys(one.block for one in found.signals):
-            some = _scalars(found, [one for one in signals if one.block == block])
-            own = sorted(some, key=lambda one: one.constant)
-            at_once = 1 if block in inner else AT_ONCE
-            yield from ((one.constant, k // at_once, block in inner, one) for k, one in enumerate(own))
+            signals = _outermost_first([one for one in found.signals if one.block == block])
+            signals.sort(key=lambda one: taken.isdisjoint((one.name, *one.names)))
+            own = sorted(_scalars(found, signals), key=lambda one: one.constant)
+            first = AT_ONCE if block in judges else 1 if block in inner else PLACE
+            turns = (max(k - first + 1, 0) for k in range(len(own)))
+            yield from (
+                (one.constant, turn, block in inner, one) for turn, one in zip(turns, own, strict=True)
+            )
+
+
+def _outermost_first(signals: Sequence[Signal]) -> list[Signal]:
+    """Return the signals of a block, the last point of an arm first, the others from the tip inwards last."""
+    numbers = {id(one): int(found[1]) for one in signals if (found := POINT.fullmatch(one.variable))}
+    tip = max(numbers.values(), default=0)
+
+    def place(one: Signal) -> tuple[int, int]:
+        """Return the rank of a signal."""
+        number = numbers.get(id(one))
+        return (1, 0) if number is None else (0 if number == tip else 2, -number)
+
+    return sorted(signals, key=place)
 
 
 def _scalars(simulation: Simulation, signals: Sequence[Signal]) -> Iterator[Scalar]:

@@ -62,11 +62,11 @@ def test_the_judged_block_is_opened_and_ranks_first(make_simulation: MakeSimulat
     assert min(shown.body.sections, key=lambda one: one.rank).title == "meter"
 
 
-def test_without_a_meter_the_last_block_is_opened(make_simulation: MakeSimulation) -> None:
+def test_without_a_meter_the_first_block_is_opened(make_simulation: MakeSimulation) -> None:
     simulation = replace(make_simulation(), verdicts=())
     shown = present(simulation)
     assert (shown.verdict, shown.word) == (None, "simulated")
-    assert [one.title for one in shown.body.sections if one.opened] == ["meter"]
+    assert [one.title for one in shown.body.sections if one.opened] == ["log"]
     assert all(one.verdict is None and not one.checks for one in shown.body.sections)
     answered = replace(
         simulation,
@@ -156,6 +156,20 @@ def test_a_failed_simulation_tells_why_and_opens_at_its_end(
     assert [bool(figures(section)) for section in shown.body.sections] == [bool(samples)] * 3
     list(shown.body.blocks())
     assert (there(shown.scene)() is None) == (not samples)
+
+
+def test_the_tip_of_an_arm_is_read_first_and_each_block_has_a_signal(make_simulation: MakeSimulation) -> None:
+    simulation = replace(make_simulation(), verdicts=(), connections={"arm.phi": "drive.Mk"})
+    ramp = np.linspace(0.0, 1.0, len(simulation.t_ns))
+    point, still = ramp[:, np.newaxis] * (1.0, 2.0, 3.0), np.zeros(len(ramp))
+    points = [Signal("arm", f"p{k}", point, "m") for k in range(1, 13)]
+    drive = [Signal("drive", name, ramp, "") for name in ("theta", "Mk")]
+    angles = [Signal("arm", "rz12", ramp, "rad"), Signal("arm", "rx12", still, "rad")]
+    shown = present(replace(simulation, signals=(*points, *angles, *drive)))
+    assert cells(shown.body.tables[0])["name"] == [
+        "arm.p12[1]", "arm.p12[2]", "arm.p12[3]", "arm.rz12", *(f"arm.p11[{i}]" for i in (1, 2, 3)),
+        *(f"arm.p10[{i}]" for i in (1, 2, 3)), "drive.Mk", "drive.theta",
+    ]  # fmt: skip
 
 
 def test_no_signal_is_looked_into_before_it_is_shown(make_simulation: MakeSimulation) -> None:
