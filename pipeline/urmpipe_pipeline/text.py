@@ -17,6 +17,9 @@ NOTHING = "–"
 SIGNIFICANT = 4
 """Digits of a length or an angle that people read; JSON, CSV and the tips of a report's cells have all."""
 
+LONGEST = 9
+"""Digits before the point of a number without an exponent."""
+
 DIGITS = 4
 """Digits after the point of a length in [mm] or an angle in [deg]: 0.1 micrometres, 2 microradians."""
 
@@ -89,7 +92,13 @@ def in_words(value: float, unit: str) -> str:
     """Return an angle, a length or a rate of one in [rad] or [m] for a sentence: "12.5 deg/s"."""
     base, slash, per = unit.partition("/")
     shown, scale = SHOWN[base]
-    return f"{value * scale:.4g} {shown}{slash}{per}"
+    return f"{significant(value * scale)} {shown}{slash}{per}"
+
+
+def significant(value: float) -> str:
+    """Return a number in any unit with `SIGNIFICANT` digits, with an exponent if very small or large."""
+    rounded = float(f"{value:.{SIGNIFICANT}g}")
+    return f"{rounded:.{LONGEST}g}" if abs(rounded) >= 1.0 else f"{rounded:.{SIGNIFICANT}g}"
 
 
 def allowed(value: float, unit: str = "m") -> str:

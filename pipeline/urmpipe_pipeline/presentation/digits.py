@@ -93,7 +93,7 @@ def _digits(value: Value, number: float) -> str:
         return text.seconds(number)
     if isinstance(value.number, int):
         return str(value.number)
-    return f"{number:.6g}"
+    return f"{number:.6g}" if value.given else text.significant(number)
 
 
 def _said(percent: str) -> float:

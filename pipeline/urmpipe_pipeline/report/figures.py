@@ -31,13 +31,12 @@ PANEL_PX = ((1, 112), (4, 150), (8, 220))
 SMALL_MULTIPLE_PX = 150
 """Height of a plot among many small ones."""
 
-BROKEN = " The axis has two scales: a larger one within the tolerance, a smaller one beyond it."
-CLOSE = " The axis has two scales: a larger one for the values, a smaller one from there to the tolerance."
+BROKEN = " The axis has two scales: a larger one within the {limit}, a smaller one beyond it."
+CLOSE = " The axis has two scales: a larger one for the values, a smaller one from there to the {limit}."
 """Said of a figure whose tolerance, or whose values, would vanish on one scale."""
 
-LEGEND_Y, OVER_LEGEND_Y = 1.025, 1.06
-"""Where the legend begins, in heights of the plot: above the words at the head of a line through it; in a
-figure over a quantity, which is lower."""
+WORDS_PX = 16
+"""Height of the words at the head of a line through a plot: the legend begins above them."""
 
 
 def time_span(figures: Iterable[Figure]) -> Span:
@@ -113,8 +112,9 @@ def _whole(figure: Figure, times: Span) -> Iterator[spec.Figure]:
 
 
 def _scales_of(panels: Sequence[Panel]) -> str:
-    close = {found.close for panel in panels if (found := two_scales(panel)) is not None}
-    return f"{BROKEN if False in close else ''}{CLOSE if True in close else ''}"
+    found = ((two_scales(panel), panel.limit_name) for panel in panels)
+    said = ((CLOSE if one.close else BROKEN).format(limit=limit) for one, limit in found if one is not None)
+    return "".join(dict.fromkeys(said))
 
 
 def _left_out(panels: Sequence[Panel]) -> str:
@@ -142,7 +142,7 @@ def _spec(figure: Figure, panels: Sequence[Panel], span: Span) -> Spec:
         through = list(_through(figure, panels[0], over)) if over.joined else []
         found = spec.stacked(drawn, _quantity_axis(over), through)
         found["layout"] |= {"hovermode": "closest"}
-        return _with_room(found, names, through, OVER_LEGEND_Y)
+        return _with_room(found, names, through, panels)
     timed = axis_of(panels[0]) == "t"
     axis = spec.time_axis if timed else spec.row_axis
     places = ((place_of(panels[0], at), words) for at, words in figure.instants.items())
@@ -150,13 +150,13 @@ def _spec(figure: Figure, panels: Sequence[Panel], span: Span) -> Spec:
     found = spec.stacked(drawn, axis(span.start, span.end), through)
     if any(one.stacked for panel in panels for one in panel.lines):  # the parts of all sums are too many
         found["layout"]["hoversubplots"] = "overlaying"
-    return _with_room(found, names, through, LEGEND_Y)
+    return _with_room(found, names, through, panels)
 
 
-def _with_room(found: Spec, names: Names, through: Sequence[Spec], height: float) -> Spec:
+def _with_room(found: Spec, names: Names, through: Sequence[Spec], panels: Sequence[Panel]) -> Spec:
     """Return a figure with its legend above the words at the head of lines through it."""
     if through and names.first:
-        found["layout"]["legend"] |= {"y": height}
+        found["layout"]["legend"] |= {"y": 1.0 + WORDS_PX / (_height(panels) - AROUND_PX)}
     return found
 
 

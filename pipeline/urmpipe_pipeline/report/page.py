@@ -178,11 +178,16 @@ def _summaries(shown: Sequence[tuple[Presentation, Anchors]]) -> Iterator[Summar
     for ranked, some in groupby(worst_first(shown), lambda pair: bool(_ranking(pair[0].body))):
         for group in [[pair] for pair in some] if ranked else [list(some)]:
             cards = () if ranked else cards_of(group)
-            ranked_by = ((table, anchors) for one, anchors in group for table in _ranking(one.body))
-            tables = tuple(grid(from_worst(table), anchors.href, folds=False) for table, anchors in ranked_by)
+            by = [(table, anchors) for one, anchors in group for table in _ranking(one.body)]
+            tables = tuple(grid(from_worst(table), anchors.href, folds=False) for table, anchors in by)
             if cards or tables:
                 which = f": {group[0][0].body.title}" if ranked and len(shown) > 1 else ""
-                yield Summary(f"Verdicts, the worst first{which}", cards, tables)
+                order = (
+                    ", the worst first"
+                    if cards or all(one.worst_first or one.page_title for one, _ in by)
+                    else ""
+                )
+                yield Summary(f"Verdicts{order}{which}", cards, tables)
 
 
 def _ranking(body: Section) -> list[Table]:
