@@ -182,11 +182,8 @@ def _summaries(shown: Sequence[tuple[Presentation, Anchors]]) -> Iterator[Summar
             tables = tuple(grid(from_worst(table), anchors.href, folds=False) for table, anchors in by)
             if cards or tables:
                 which = f": {group[0][0].body.title}" if ranked and len(shown) > 1 else ""
-                order = (
-                    ", the worst first"
-                    if cards or all(one.worst_first or one.page_title for one, _ in by)
-                    else ""
-                )
+                ordered = all(table.worst_first or table.page_title for table, _ in by)
+                order = ", the worst first" if ordered else ""
                 yield Summary(f"Verdicts{order}{which}", cards, tables)
 
 

@@ -52,6 +52,9 @@ from urmpipe_pipeline.text import NOTHING
         (Value(3), "3", "3"),
         (Value(1, signed=True), "+1", "+1"),
         (Value(0.25, "N.m"), "0.25 N.m", "0.25"),
+        (Value(-0.640943, "N.m"), "-0.6409 N.m", "-0.6409"),
+        (Value(33274.2, "N.m"), "33270 N.m", "33270"),  # no 3.327e+04
+        (Value(0.357143, "N.m", given=True), "0.357143 N.m", "0.357143"),
         (Value(None, "m"), NOTHING, NOTHING),
         (Value(math.nan, "m", given=True), NOTHING, NOTHING),
         (Place((0.1, -0.2, 0.30004)), "(0.1000, -0.2000, 0.3000) m", "(0.1000, -0.2000, 0.3000)"),

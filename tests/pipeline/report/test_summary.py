@@ -150,8 +150,10 @@ def test_tables_about_the_parts_stand_with_the_cards_and_others_in_the_part() ->
     assert [block.title for block in page.parts[0].blocks] == ["Signals"]
     both = lay_out([toy("read", None, word="ingested"), shown])
     assert [(one.title, len(one.cards)) for one in both.summaries] == [
-        ("Verdicts, the worst first: Toy one", 0),
+        ("Verdicts: Toy one", 0),
     ]  # fmt: skip
+    ordered = replace(shown, body=replace(shown.body, tables=(replace(ranking, worst_first=True),)))
+    assert [one.title for one in lay_out([ordered]).summaries] == ["Verdicts, the worst first"]
 
 
 def line(name: Cell, **cells: Cell) -> Mapping[str, Cell]:
