@@ -32,8 +32,8 @@ HEIGHTS = ((1, 8.5), (4, 11.0), (8, 15.0))
 AXIS, BETWEEN, WORDS = 3.6, 0.9, 1.5
 """Height of the axis below, of what is between two panels, and of a line of words above them."""
 
-HIGHEST, LEAST = 0.21, 6.0
-"""Height of all panels at most in [m], so that a page holds them; of each at least, in sizes of the font."""
+HIGHEST, LEAST = 0.195, 6.0
+"""Height of all panels at most in [m], so that a page holds them with legends; of each at least, in sizes of the font."""
 
 CELL = 14.5
 """Width of a small plot at least, in sizes of the font."""

@@ -91,12 +91,12 @@ def draw_panel(axes: Axes, panel: Panel, span: Span, *, legend: bool = True) -> 
 
 def in_unit(title: str, unit: str) -> str:
     """Return the words at an axis: its quantity and the unit, where it has one."""
-    return drawable(title if unit in ("", "1") else f"{title} in {unit}")
+    return drawable(title if unit in ("", "1") else f"{title} [{unit}]")
 
 
 def wrapped(words: str, letters: int) -> str:
-    """Return words on lines of at most so many letters; a unit stays with its "in"."""
-    together = words.replace(" in ", " in\N{NO-BREAK SPACE}")
+    """Return words on lines of at most so many letters; a unit stays with the word before it."""
+    together = words.replace(" [", "\N{NO-BREAK SPACE}[")
     return "\n".join(textwrap.wrap(together, max(letters, 4))).replace("\N{NO-BREAK SPACE}", " ")
 
 

@@ -121,7 +121,7 @@ def _name(axes: Axes3D, size: Size) -> None:
         axis.set_pane_color("white")
         axis.labelpad = LABEL_PAD * size.font
         axes.tick_params(name, pad=TICK_PAD * size.font)
-        getattr(axes, f"set_{name}label")(f"{name} in m")
+        getattr(axes, f"set_{name}label")(f"{name} [m]")
 
 
 def _place(made: Sheet, axes: Axes3D, size: Size, entries: dict[str, Artist], scales: list[Scale]) -> None:

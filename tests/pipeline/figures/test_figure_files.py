@@ -116,14 +116,14 @@ def test_text_is_text_in_pdf_and_svg(tmp_path: Path) -> None:
         pdf, svg, *_ = written(one, tmp_path, "pdf", "svg")
         said = PdfReader(pdf).pages[0].extract_text()
         texts = {element.text for element in ET.parse(svg).getroot().iter(f"{SVG}text")}
-        for words in ("$x_1$ ‖Δ‖", "_hidden & <b>", "t in s", "values in rad"):
+        for words in ("$x_1$ ‖Δ‖", "_hidden & <b>", "t [s]", "values [rad]"):
             assert words in said
             assert words in texts
 
 
 def test_the_font_is_as_large_as_it_is_asked_for(tmp_path: Path) -> None:
     (svg,) = written(waves(), tmp_path, "svg", font=10.0)
-    (label,) = (one for one in ET.parse(svg).getroot().iter(f"{SVG}text") if one.text == "t in s")
+    (label,) = (one for one in ET.parse(svg).getroot().iter(f"{SVG}text") if one.text == "t [s]")
     assert "10px" in label.attrib["style"]  # a px of an SVG of matplotlib's is a pt: its viewBox is its size
 
 

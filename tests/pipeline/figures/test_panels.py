@@ -73,7 +73,7 @@ def test_a_line_keeps_its_peaks_and_is_shown_in_mm() -> None:
     assert (np.min(y), np.max(y)) == (-700.0, 500.0)
     assert {T[1234], T[3217], T[2000]} <= set(x.tolist())
     np.testing.assert_array_equal(y, 1e3 * values[np.searchsorted(T, x)])
-    assert (line.get_color(), axes.get_ylabel(), axes.get_xlabel()) == (RED, "Δx in mm", "t in s")
+    assert (line.get_color(), axes.get_ylabel(), axes.get_xlabel()) == (RED, "Δx [mm]", "t [s]")
     assert axes.get_xlim() == (T[0], T[-1])
     assert peak.get_marker() == "D"
     assert points(peak) == [(T[2000], 1e3 * WAVE[2000])]
@@ -177,7 +177,7 @@ def test_a_quantity_as_axis_has_points_and_the_largest_is_among_them() -> None:
     (cloud,) = axes.lines
     assert (speed[1234], 1e3 * abs(WAVE[1234])) in points(cloud)
     assert np.isfinite(points(cloud)).all()
-    assert axes.get_xlabel() == "‖v‖ in m/s"
+    assert axes.get_xlabel() == "‖v‖ [m/s]"
 
 
 def test_set_points_and_answers_are_small_plots_a_pair_each() -> None:
@@ -190,14 +190,14 @@ def test_set_points_and_answers_are_small_plots_a_pair_each() -> None:
         f"{name} set (dashed), {name}" for name in names
     ]
     assert [one.get_linestyle() for axes in made.axes for one in axes.lines] == ["--", "-"] * 6
-    assert [one.get_xlabel() for one in made.axes] == ["", "", "", "", "t in s", "t in s"]
+    assert [one.get_xlabel() for one in made.axes] == ["", "", "", "", "t [s]", "t [s]"]
 
 
 def test_panels_of_other_axes_are_figures_of_their_own() -> None:
     cloud = panel(WAVE, "Δy", over=Over(np.cos(T), "v", "m/s"))
     both = shown(Figure("Both", "", "", (View("view", (panel(WAVE), cloud)),)))
-    assert plot(both, "Both", "column", 8.0).axes[0].get_xlabel() == "t in s"
-    assert plot(both, "both over *", "column", 8.0).axes[0].get_xlabel() == "v in m/s"
+    assert plot(both, "Both", "column", 8.0).axes[0].get_xlabel() == "t [s]"
+    assert plot(both, "both over *", "column", 8.0).axes[0].get_xlabel() == "v [m/s]"
 
 
 @pytest.mark.slow

@@ -45,7 +45,7 @@ def test_a_metre_is_as_long_on_all_axes_and_all_is_on_the_sheet() -> None:
         box = axis.get_tightbbox(made.renderer)
         assert min(box.x0, box.y0) >= -0.01  # in dots: it may touch the edge, as sums of floats do
         assert box.x1 <= made.bbox.width
-    assert (axes.get_xlabel(), axes.get_zlabel()) == ("x in m", "z in m")
+    assert (axes.get_xlabel(), axes.get_zlabel()) == ("x [m]", "z [m]")
     assert [one.get_text() for one in axes.get_legend().get_texts()] == ["tcp", "decides"]
 
 
@@ -61,7 +61,7 @@ def test_a_path_is_coloured_by_its_values_with_a_scale_in_mm() -> None:
     (lines,) = (one for one in axes.collections if isinstance(one, Line3DCollection))
     assert len(lines.get_segments()) == 59
     assert lines.get_colors()[-1][:3] == pytest.approx(_rgb(VALUE_SCALE[-1][1]))
-    assert scale.get_xlabel() == "‖Δ‖ in mm"
+    assert scale.get_xlabel() == "‖Δ‖ [mm]"
     assert scale.get_xlim() == pytest.approx((0.0, 59.0))
 
 
