@@ -54,9 +54,12 @@ def _panels(one: Deviation, found: Diagnosis) -> Iterator[Panel]:
         held = list(one.joint_statistics.values())
         looks = [(f"Δ {joint.quantity}", joint_colour(k)) for k, joint in enumerate(held)]
     mended = np.asarray(found.mended)
+    largest = np.nanmax(np.abs(mended), axis=0, initial=0.0)
     for k, ((name, colour), statistics) in enumerate(zip(looks, held, strict=True)):
+        unit = statistics.unit
         line = _line(one, found.sample, mended[:, k], f"{name} without the causes", colour)
-        yield Panel(name, statistics.unit, (line,), one.axis_ns, statistics.tolerance, small=True, close=True)
+        alike = [most for most, other in zip(largest.tolist(), held, strict=True) if other.unit == unit]
+        yield Panel(name, unit, (line,), one.axis_ns, statistics.tolerance, small=True, close=max(alike))
 
 
 def _line(one: Deviation, sample: IntArray, values: FloatArray, name: str, colour: str) -> Line:

@@ -30,10 +30,10 @@ def ranking_tables(result: Comparison) -> tuple[Table, ...]:
         "decided_by": ("Decided by", lambda one: size_of(one.decisive)),
         **_sizes(result),
     }
-    note = "The logs are ranked by the largest share of a tolerance that each uses. Covered: share of the"
-    note += " reference within the log's time."
+    note = "The logs are ranked by the largest share of a tolerance that each uses."
     left_out = "Left out: samples of the log without a counterpart or without a value."
     whole = min(map(result.covered, result.runs)) >= WHOLE
+    note += "" if whole else " Covered: share of the reference within the log's time."
     columns = (
         replace(one, brief=not (one.key == "covered" and whole), page=_leads(result, one.key, whole=whole))
         for one in columns_of(result.ranking, far)

@@ -33,7 +33,8 @@ AXIS, BETWEEN, WORDS = 3.6, 0.9, 1.5
 """Height of the axis below, of what is between two panels, and of a line of words above them."""
 
 HIGHEST, LEAST = 0.195, 6.0
-"""Height of all panels at most in [m], so that a page holds them with legends; of each at least, in sizes of the font."""
+"""Height of all panels at most in [m]: a page holds them and their legends; of each at least, in sizes of the
+font."""
 
 CELL = 14.5
 """Width of a small plot at least, in sizes of the font."""

@@ -117,7 +117,8 @@ class Panel:
         share: Height relative to other panels.
         display_unit: A unit that people prefer to `unit`, such as deg; empty for none.
         limit_name: What a legend calls the limit.
-        close: Whether values far within the limit are shown close up: the panel is about them.
+        close: Largest value of all panels of its kind, in `unit`: far within the limit, it is shown close up;
+            0 for a panel that is about the limit.
     """
 
     title: str
@@ -135,7 +136,7 @@ class Panel:
     share: float = 1.0
     display_unit: str = ""
     limit_name: str = "tolerance"
-    close: bool = False
+    close: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

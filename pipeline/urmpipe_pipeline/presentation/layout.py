@@ -87,8 +87,8 @@ def two_scales(panel: Panel) -> TwoScales | None:
     if not panel.limit or panel.logarithmic or panel.over is not None:
         return None
     largest = max((_largest(one) for one in panel.lines), default=0.0)
-    if panel.close and 0.0 < largest < panel.limit / FAINT:
-        return TwoScales(largest, panel.limit, CLOSE_SHARE)
+    if 0.0 < panel.close < panel.limit / FAINT:
+        return TwoScales(max(panel.close, largest), panel.limit, CLOSE_SHARE)
     return TwoScales(panel.limit, largest) if largest > FAINT * panel.limit else None
 
 

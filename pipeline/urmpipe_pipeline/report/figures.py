@@ -35,8 +35,9 @@ BROKEN = " The axis has two scales: a larger one within the {limit}, a smaller o
 CLOSE = " The axis has two scales: a larger one for the values, a smaller one from there to the {limit}."
 """Said of a figure whose tolerance, or whose values, would vanish on one scale."""
 
-WORDS_PX = 16
-"""Height of the words at the head of a line through a plot: the legend begins above them."""
+WORDS_PX = 30
+"""Height of the words at the head of a line through a plot: the legend begins above them. A legend of many
+lines, as in a narrow window, shrinks it with the plot."""
 
 
 def time_span(figures: Iterable[Figure]) -> Span:

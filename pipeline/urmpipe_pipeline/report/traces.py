@@ -169,7 +169,7 @@ def instant(at: float, words: str, start: float, end: float) -> Spec:
     """Return a line at one place of an axis through all panels, with words at its head that stay inside."""
     ends = {"xref": "x", "x0": at, "x1": at, "yref": "paper", "y0": 0, "y1": 1}
     share = (at - start) / ((end - start) or 1.0)
-    side = "left" if share < 0.1 else "right" if share > 0.9 else "center"
+    side = "left" if share < 0.25 else "right" if share > 0.75 else "center"  # also in a narrow window
     head = {"text": words, "textposition": "end", "textangle": 0, "xanchor": side}
     head |= {"font": {"color": FAULT, "size": 11}}
     return {"type": "line", "line": {"color": FAULT, "width": 1, "dash": "dot"}, "label": head} | ends

@@ -99,6 +99,7 @@ def test_each_axis_is_drawn_mended_with_its_tolerance(paths: Compared) -> None:
     assert figure.beside
     (view,) = figure.views
     assert [panel.limit for panel in view.panels] == [0.0035] * 3
+    assert [panel.close for panel in view.panels] == [np.abs(one.delta[::2, :3]).max() / 100.0] * 3
     for axis, panel in enumerate(view.panels):
         (mended,) = panel.lines
         assert mended.colours == (AXIS_COLOURS["xyz"[axis]],)

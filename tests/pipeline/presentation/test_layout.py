@@ -44,13 +44,13 @@ def test_without_a_band_nothing_vanishes(more: dict[str, object]) -> None:
 def test_values_far_within_the_tolerance_are_shown_close_up_where_they_are_the_subject() -> None:
     few = 0.5 * LIMIT / FAINT
     assert two_scales(panel(few)) is None
-    assert two_scales(panel(0.0, close=True)) is None
-    assert two_scales(panel(1.001 * LIMIT / FAINT, close=True)) is None
-    scales = two_scales(panel(few, close=True))
+    assert two_scales(panel(0.0, close=0.0)) is None
+    assert two_scales(panel(few, close=1.001 * LIMIT / FAINT)) is None
+    scales = two_scales(panel(1e-9, close=few))  # as its neighbours: a rounding does not fill an axis
     assert scales == TwoScales(few, LIMIT, CLOSE_SHARE)
     np.testing.assert_allclose(scales.height(np.array([few, -LIMIT])), [CLOSE_SHARE, -1.0])
     assert scales.ticks() == pytest.approx([0.0, 1e-4, LIMIT])  # in m: few is 0.146 mm
-    assert two_scales(panel(0.807, close=True)) == two_scales(panel(0.807))
+    assert two_scales(panel(0.807, close=0.9)) == two_scales(panel(0.807))
 
 
 @given(SIZES, st.floats(1e-3, 10.0), st.floats(12.0, 1e3))
