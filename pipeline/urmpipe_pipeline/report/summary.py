@@ -122,7 +122,8 @@ def _counted(judged: Sequence[Presentation]) -> str:
     if len(heads) != 1 or len(known) < len(failed):
         return said
     out = sum(verdict == Judged("fail") for _, verdict in lines)
-    return f"{_share(out, len(lines), f'{heads.pop().lower()}s')}, in {said}"
+    counted = _share(out, len(lines), f"{heads.pop().lower()}s")
+    return counted if all(len(one.lines) == 1 for one in judged) else f"{counted}, in {said}"
 
 
 def _share(count: int, total: int, noun: str) -> str:

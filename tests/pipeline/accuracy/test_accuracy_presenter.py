@@ -18,7 +18,7 @@ from urmpipe_pipeline.accuracy.figures import velocity_figure
 from urmpipe_pipeline.accuracy.published import FIG7
 from urmpipe_pipeline.accuracy.result import Accuracy
 from urmpipe_pipeline.palette import REFERENCE_COLOUR
-from urmpipe_pipeline.presentation.figure import Figure, Panel
+from urmpipe_pipeline.presentation.figure import Figure, Panel, SpaceFigure
 from urmpipe_pipeline.presentation.section import Value
 from urmpipe_pipeline.report.render import render_report
 from urmpipe_pipeline.results import present
@@ -45,6 +45,17 @@ def test_headline_with_a_limit(limited: Accuracy, accuracy: Make) -> None:
     none = present(accuracy(limit=1e-9, decides="path"))
     assert none.headline == "cube wall xy: irb60 runs at no velocity within 1e-06 mm (path)"
     assert facts(none.body)["Running speed"] == "none"
+
+
+@pytest.mark.parametrize("decides", ["time", "path"])
+def test_the_path_is_coloured_by_the_error_that_decides_with_its_limit(accuracy: Make, decides: str) -> None:
+    result = accuracy(0.5, limit=4e-4, decides=decides)
+    (motion,) = result.motions
+    (figure,) = (one for one in present(result).body.blocks() if isinstance(one, SpaceFigure))
+    (real,) = (path for path in figure.paths if path.values is not None)
+    values = motion.delta[:, 3] if decides == "time" else motion.from_path
+    np.testing.assert_array_equal(real.values, values)
+    assert real.limit == 4e-4
 
 
 @pytest.mark.slow

@@ -49,7 +49,8 @@ def page_of(*results: Simulation | Comparison) -> Page:
 def test_the_worst_meter_stands_first(make_simulation: MakeSimulation) -> None:
     page = page_of(make_simulation(tolerance=0.005), make_simulation(name="other"))
     assert (page.banner.state, page.banner.word) == ("fail", "FAIL")
-    assert page.banner.headline == "meter of other out of tolerance"
+    assert page.banner.headline == "1 of 2 systems"
+    assert page.banner.others[0] == "FAIL: meter of other out of tolerance."
     assert page.banner.facts[0].href.startswith("#r2")
     ranked = [table for summary in page.summaries[1:] for table in summary.tables]
     states = [[cell.state for row in table.rows for cell in row if cell.text.isupper()] for table in ranked]
@@ -60,7 +61,8 @@ def test_the_worst_meter_stands_first(make_simulation: MakeSimulation) -> None:
 def test_one_that_failed_says_so_before_all(make_simulation: MakeSimulation) -> None:
     failed = make_simulation(101, failed="chain: fmi2DoStep returned fmi2Error", name="broken")
     page = page_of(make_simulation(tolerance=0.005), failed)
-    assert (page.banner.state, page.banner.headline) == ("fail", "broken did not reach its end")
+    assert (page.banner.state, page.banner.headline) == ("fail", "1 of 2 systems")
+    assert page.banner.others[0] == "FAIL: broken did not reach its end."
     assert failed.failed in [fact.value for fact in page.banner.facts]
     assert page.parts[0].notice == "Failed: chain: fmi2DoStep returned fmi2Error"
     figure = next(figure for _, figure in page.figures if not figure.space)
@@ -77,11 +79,12 @@ def test_a_comparison_that_passes_does_not_hide_a_simulation_that_fails(
     passing = replace(comparison, runs=tuple(replace(run, verdict="pass") for run in comparison.runs))
     page = page_of(make_simulation(tolerance=tolerance), passing)
     assert page.banner.state == ends
-    assert [said.partition(":")[0] for said in page.banner.others] == ["PASS"]
+    assert [said.partition(":")[0] for said in page.banner.others] == [ends.upper(), "PASS"]
     failing = page_of(make_simulation(), comparison)
     assert (failing.banner.state, failing.banner.others) == (
-        "fail", ("FAIL: meter of log-to-delta out of tolerance.",),
-    )  # fmt: skip
+        "fail",
+        (f"FAIL: {present(comparison).headline}.", "FAIL: meter of log-to-delta out of tolerance."),
+    )
 
 
 def test_a_signal_that_starts_late_has_its_own_axis_of_time(make_simulation: MakeSimulation) -> None:
