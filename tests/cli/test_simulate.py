@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 
 import urmpipe
+from urmpipe.api.recordings import read_recording
 from urmpipe.api.simulate import simulate
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import UrmpipeError
@@ -126,6 +128,32 @@ def test_a_unit_of_ones_own_shows_its_energies_and_its_limit(urmpipe: RunCommand
     page = (tmp_path / "swinging.html").read_text(encoding="utf-8")
     assert "Sums over swing since the first sample: " in page
     assert "Dashed: the limit of |F|, 6 N; tinted: beyond it." in page
+
+
+@pytest.mark.slow
+def test_energy_that_the_coupling_takes_is_a_warning_everywhere(urmpipe: RunCommand, tmp_path: Path) -> None:
+    free = """
+        [system]
+        step = 0.001
+        duration = 0.1
+        [blocks.drive]
+        unit = "dc_drive"
+        start = { u = 24.0 }
+        [connections]
+        "drive.theta2" = "drive.theta1"
+        "drive.omega2" = "drive.omega1"
+        """
+    (tmp_path / "free.toml").write_text(free, encoding="utf-8")
+    ran = urmpipe("simulate", "free.toml", "--backend", "python", "--json")
+    (told,) = (one for one in json.loads(ran.out)["warnings"] if one["kind"] == "coarse-step")
+    said = re.sub(r"[\d.]+ J, [\d.]+ %", "E, S", told["message"])
+    assert said == (
+        "blocks see each other's values held over 1 ms: residual of the energy balance: found E, S of the"
+        " largest energy, allowed: 5 %; --step 0.0002 makes it smaller"
+    )
+    assert f"warning: {told['message']}\n" in ran.err
+    (kept,) = read_recording(tmp_path / "free.rrd").warnings
+    assert kept.kind == "coarse-step"
 
 
 @pytest.mark.slow

@@ -8,9 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from urmpipe_fmus.cosim import load_system
+from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.units import make_unit
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -51,6 +53,32 @@ def test_every_parameter_stands_with_its_unit_and_value() -> None:
 
 def test_the_systems_have_the_step_and_the_loads_of_the_page(figures: Mapping[str, Any]) -> None:
     for name in ("one-drive", "six-drives"):
-        assert load_system(name).step == 1e-3
+        assert f"`{name}`" in PAGE
+        assert re.search(rf"`{name}`[^,(]* {1e3 * load_system(name).step:g} ms", PAGE)
     loads = [block.start["J"] for block in load_system("six-drives").blocks if block.unit == "inertia"]
     assert tuple(loads) == figures["INERTIAS"]
+
+
+def steady_speed(step: float, voltage: float) -> float:
+    """Return omega1 at communication points of a drive without load, when it does not change any more.
+
+    A step from the unit vectors of omega1 and i_a, and from 0, gives the map whose fixed point it is.
+    """
+    drive = Instance(make_unit("dc_drive"))
+    omega, current = np.eye(3)[:2]
+    for name, value in (("omega1", omega), ("omega2", omega), ("i_a", current), ("u", voltage)):
+        drive.set([drive.reference(name)], [value])
+    drive.do_step(0.0, step)
+    after = np.array(drive.get([drive.reference(name) for name in ("omega1", "i_a")]))
+    rest = after[:, 2]
+    return float(np.linalg.solve(np.eye(2) - (after[:, :2] - rest[:, np.newaxis]), rest)[0])
+
+
+def test_the_speed_without_load_is_that_of_the_closed_form_with_its_step() -> None:
+    table = PAGE.split("| h | 1 ms |")[1].split("\n\n")[0].splitlines()
+    head, _, formulas, speeds = (re.findall(r"[\d.]+", line) for line in table)
+    for h, formula, speed in zip(("1", *head), formulas, (*speeds, None), strict=True):
+        expected = 24.0 / 5.0 / (1.0 + float(h) * 1e-3 * 2500.0 * 0.5 / (2.0 * 5.0**2))
+        assert float(formula) == pytest.approx(expected, abs=5e-4)  # as many digits
+        if speed is not None:
+            assert float(speed) == pytest.approx(steady_speed(float(h) * 1e-3, 24.0), abs=5e-4)

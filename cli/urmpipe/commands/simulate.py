@@ -91,7 +91,7 @@ def simulate(
       urmpipe simulate --list
       urmpipe simulate log-to-delta
       urmpipe simulate log-to-delta --set log=log.csv --set reference=path.csv
-      urmpipe simulate one-drive --step 0.5ms --draw one-drive.svg
+      urmpipe simulate one-drive --step 0.05ms --draw one-drive.svg
       urmpipe simulate one-drive --write-system my-drive.toml
       urmpipe simulate my-system.toml -o run.rrd --json
 

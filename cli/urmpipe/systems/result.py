@@ -18,6 +18,7 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict, delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.simulations.coupling import coupling_warnings
 from urmpipe_pipeline.simulations.simulation import Arm, Setting, Signal, SimulatedBlock, Simulation
 from urmpipe_pipeline.sources.tables.text import fingerprint
 
@@ -59,7 +60,7 @@ def simulation_of(plan: Plan, recorded: Recorded, blocks: Blocks, svg: str) -> S
         "step": plan.step,
         "duration": plan.count * plan.step,
     }
-    return Simulation(
+    made = Simulation(
         name=system.name,
         description=system.description,
         t_ns=recorded.t_ns,
@@ -75,6 +76,7 @@ def simulation_of(plan: Plan, recorded: Recorded, blocks: Blocks, svg: str) -> S
         arms=tuple(_arms(plan, recorded, blocks)),
         verdicts=tuple(_verdicts(plan, recorded, odd)),
     )
+    return replace(made, warnings=(*made.warnings, *coupling_warnings(made)))
 
 
 def _unjudged(system: System) -> Iterator[str]:

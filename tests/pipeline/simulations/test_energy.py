@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from asserting import there
 from presented import facts, figures
 from urmpipe_pipeline.results import present
+from urmpipe_pipeline.simulations.coupling import coupling_warnings
 from urmpipe_pipeline.simulations.energy import energy_balance
 from urmpipe_pipeline.simulations.signal_groups import groups_of
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
@@ -109,3 +110,33 @@ def test_values_that_are_not_finite_are_left_out(
     shown = present(simulation).body
     assert (facts(shown)["Energy balance"] is None) == (worst is None)
     assert len(figures(shown.sections[0])) == (len(values) > 0)
+
+
+def coupled(swinging: Simulation, **connections: str) -> Simulation:
+    """Return blocks that leave over 0.5 J of 10 J, with other connections."""
+    return replace(swinging, step=1e-3, connections={k.replace("_", "."): v for k, v in connections.items()})
+
+
+def test_a_residual_above_5_percent_of_blocks_that_act_on_each_other_is_a_warning(
+    swinging: Simulation,
+) -> None:
+    both = coupled(swinging, a_force="b.x", b_x="a.force")
+    assert list(coupling_warnings(both)) == []  # 5.0 %
+    kept = tuple(one for one in swinging.signals if one.block == "b" or one.variable != "energy_stored")
+    (warning,) = coupling_warnings(replace(both, signals=kept))
+    assert (warning.kind, str(warning)) == (
+        "coarse-step",
+        "blocks see each other's values held over 1 ms: residual of the energy balance: found 4 J, 40.0 %"
+        " of the largest energy, allowed: 5 %; step=0.0001 makes it smaller",
+    )
+
+
+def test_a_block_that_is_fed_from_itself_acts_on_itself_and_one_way_nothing_does(
+    swinging: Simulation,
+) -> None:
+    signals = (swinging.signals[0],)
+    itself = replace(coupled(swinging, a_x="a.force"), signals=signals)
+    (warning,) = coupling_warnings(itself)
+    assert there(warning.found) == "8 J, 100 % of the largest energy"
+    assert warning.hints[0].value == 5e-5
+    assert list(coupling_warnings(replace(coupled(swinging, b_x="a.force"), signals=signals))) == []
