@@ -13,6 +13,7 @@ from urmpipe_fmus.documentation import documentation
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.display import Shown, line_of
 from urmpipe_models.errors import Finding, FmuError
+from urmpipe_models.messages import Hint
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -85,7 +86,7 @@ def build_fmu(
     Args:
         unit: The unit.
         target: The file, or a folder that exists: then UNIT.fmu in it.
-        backend: Native or Python; None for native if it can be built here, else Python.
+        backend: Native or Python; None for native if it can be built here or `platforms` are named, else Python.
         platforms: FMI's names of platforms; by default native is for this one, Python for all it knows.
         told: Told what takes minutes: compiling for another platform.
 
@@ -113,7 +114,8 @@ def chosen_backend(backend: Backend | None, platforms: Sequence[str] = ()) -> tu
         platforms: FMI's names of platforms; by default this one.
 
     Raises:
-        FmuError: If native is asked for and cannot be built here.
+        FmuError: If native, or platforms without a backend, are asked for and cannot be built here: who names
+            a platform wants a file that runs there without Python.
     """
     from urmpipe_fmus.native import native_missing
 
@@ -121,6 +123,10 @@ def chosen_backend(backend: Backend | None, platforms: Sequence[str] = ()) -> tu
     if missing and backend == "native":
         found = f"native, which cannot be built here: {missing}"
         raise FmuError(Finding(parameter="backend", found=found, allowed="python"))
+    if missing and backend is None and platforms:
+        found = f"{', '.join(platforms)}, which cannot be compiled here: {missing}"
+        hint = Hint("backend", "python", "packages an FMU that needs Python with NumPy")
+        raise FmuError(Finding(parameter="platforms", found=found, hints=(hint,)))
     return backend or ("python" if missing else "native"), missing or ""
 
 

@@ -43,7 +43,7 @@ def build_fmu(
         options: Further options of the unit by name; see `urmpipe fmu list`.
         log_map: A map (TOML), or what `read_map` returned: how to read the log.
         backend: native (C) or python (needs Python with NumPy on the target); default: native if this
-            machine can build it, else python, with a `note` why.
+            machine can build it or `platforms` are named, else python, with a `note` why.
         platforms: linux64, win64; default: this one. Others than this one need the extra `cross`.
         output: The folder for UNIT.fmu, or a name that ends in .fmu; only an FMU of urmpipe's is replaced.
         told: Told what takes minutes: compiling for another platform.

@@ -28,10 +28,10 @@ LINES_OF_AN_ERROR = 12
 
 def native_missing(platforms: Sequence[str] = ()) -> str | None:
     """Return why no native FMU can be built here for some platforms (default: this one), None if it can."""
-    if find_spec("casadi") is None:
-        return "casadi is not installed (pip install 'urmpipe[native]')"
     wanted = list(platforms) or [this_platform()]
     local = wanted == [this_platform()]
+    if find_spec("casadi") is None:
+        return f"casadi is not installed (pip install 'urmpipe[{'native' if local else 'cross'}]')"
     if local and system_compiler():
         return None
     reasons = ["no C compiler is found (cc, or what the variable CC names)"] if local else []

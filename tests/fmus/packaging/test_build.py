@@ -111,6 +111,22 @@ def test_without_a_compiler_it_is_python_and_a_line_says_why(make: Make, tmp_pat
         build_fmu(make("arm"), tmp_path, backend="native")
 
 
+@pytest.mark.usefixtures("no_compiler")
+@pytest.mark.parametrize("platforms", [["win64"], ["linux64", "win64"]])
+def test_platforms_that_cannot_be_compiled_here_are_refused_unless_python_is_asked_for(
+    make: Make, tmp_path: Path, platforms: list[str]
+) -> None:
+    with pytest.raises(FmuError) as caught:
+        build_fmu(make("arm"), tmp_path, platforms=platforms)
+    assert str(caught.value) == (
+        f"platforms: found {', '.join(platforms)}, which cannot be compiled here: ziglang is not installed"
+        ' (pip install \'urmpipe[cross]\'); backend="python" packages an FMU that needs Python with NumPy'
+    )
+    assert list(tmp_path.iterdir()) == []
+    made = build_fmu(make("arm"), tmp_path, backend="python", platforms=platforms)
+    assert (made.backend, list(made.platforms)) == ("python", platforms)
+
+
 @pytest.mark.slow
 def test_a_failed_build_leaves_the_file_that_was_there(make: Make, tmp_path: Path) -> None:
     path = build_fmu(make("arm"), tmp_path, backend="python").path
