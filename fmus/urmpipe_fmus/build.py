@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from urmpipe_fmus.archive import content_guid, write_fmu
 from urmpipe_fmus.description import Backend, model_description
 from urmpipe_fmus.documentation import documentation
+from urmpipe_fmus.robot_entry import robot_file
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.display import Shown, line_of
 from urmpipe_models.errors import Finding, FmuError
@@ -86,7 +87,8 @@ def build_fmu(
     Args:
         unit: The unit.
         target: The file, or a folder that exists: then UNIT.fmu in it.
-        backend: Native or Python; None for native if it can be built here or `platforms` are named, else Python.
+        backend: Native or Python; None for native, or Python if native cannot be built here and no platform
+            is named.
         platforms: FMI's names of platforms; by default native is for this one, Python for all it knows.
         told: Told what takes minutes: compiling for another platform.
 
@@ -164,8 +166,8 @@ def _table(unit: Unit) -> dict[str, bytes]:
 def _described(
     unit: Unit, backend: Backend, files: dict[str, bytes], source_files: Sequence[str]
 ) -> tuple[dict[str, bytes], str]:
-    """Return files with their description and documentation, and the GUID of them all."""
-    files = files | {DOCUMENTATION: documentation(unit).encode()}
+    """Return files with their description, documentation and arm, and the GUID of them all."""
+    files = files | robot_file(unit) | {DOCUMENTATION: documentation(unit).encode()}
     without = model_description(unit, "", backend, source_files).encode()
     guid = content_guid({**files, DESCRIPTION: without})
     described = model_description(unit, guid, backend, source_files).encode()

@@ -13,7 +13,9 @@ from urmpipe_fmus.cosim.interface import ELEMENT, Interface
 from urmpipe_fmus.cosim.plan import NANOSECOND, Plan
 from urmpipe_fmus.cosim.simulation import NotFinite, Recorded
 from urmpipe_fmus.cosim.system import Block, Port, System
+from urmpipe_fmus.robot_entry import robot_in
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict, delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
@@ -187,17 +189,23 @@ def _value(plan: Plan, port: Port) -> float:
 
 
 def _arms(plan: Plan, recorded: Recorded, blocks: Blocks) -> Iterator[Arm]:
-    """Yield the arm of each block of kinematics, as its joints were."""
+    """Yield the arm of each block of kinematics, as its joints were: of a unit, or of an FMU of that unit."""
     for block in plan.system.blocks:
-        if block.unit == CHAIN and block.name in blocks.chains:
-            chain = blocks.chains[block.name]
-            counts = {"revolute": 0, "prismatic": 0}
-            columns = []
-            for joint in chain.moving:
-                counts[joint.kind] += 1
-                variable = f"{'phi' if joint.kind == 'revolute' else 's'}[{counts[joint.kind]}]"
-                columns.append(_over_time(plan, recorded, Port(block.name, variable)))
-            yield Arm(block.name, chain, np.column_stack(columns))
+        chain = robot_in(block.fmu) if block.fmu else blocks.chains.get(block.name)
+        if chain is None or not (block.fmu or block.unit == CHAIN):
+            continue
+        ports = [Port(block.name, one) for one in _joint_inputs(chain)]
+        inputs = {one.name for one in plan.interfaces[block.name].inputs}
+        if {one.variable for one in ports} <= inputs:  # an FMU of another unit computes its joints
+            yield Arm(block.name, chain, np.column_stack([_over_time(plan, recorded, one) for one in ports]))
+
+
+def _joint_inputs(chain: Chain) -> Iterator[str]:
+    """Yield the input of `kinematic_chain` for each joint of an arm."""
+    counts = {"revolute": 0, "prismatic": 0}
+    for joint in chain.moving:
+        counts[joint.kind] += 1
+        yield f"{'phi' if joint.kind == 'revolute' else 's'}[{counts[joint.kind]}]"
 
 
 def _over_time(plan: Plan, recorded: Recorded, destination: Port) -> FloatArray:

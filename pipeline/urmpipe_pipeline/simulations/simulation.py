@@ -171,7 +171,7 @@ class Simulation(Result):
         failed: Why it ended early; None if it did not. What was recorded until then stays.
         warnings: What a person should know.
         provenance: How to repeat it.
-        arms: The arms of blocks of kinematics; the first is drawn, of the others the way of the tip.
+        arms: The arms of blocks of kinematics; the first is drawn as solids, the others as lines.
         verdicts: One a delta meter.
         recording: Where it was written.
     """

@@ -131,12 +131,15 @@ def test_a_page_shows_the_system_and_the_path_of_the_tip(make_simulation: MakeSi
     np.testing.assert_array_equal(space.paths[0].position, positions_over_log(arm.chain, arm.q))
 
 
-def test_the_scene_is_the_first_arm_and_the_tips_of_all(make_simulation: MakeSimulation) -> None:
+def test_the_scene_is_every_arm_the_first_as_solids_and_their_tips(make_simulation: MakeSimulation) -> None:
     simulation = make_simulation()
     other = replace(simulation.arms[0], block="other")
     scene = scene_of(present(replace(simulation, arms=(*simulation.arms, other))))
-    (arm,) = scene.arms
-    assert (arm.q, arm.kept) == (simulation.arms[0].q, (250,))
+    assert [(arm.ghost, arm.q, arm.kept) for arm in scene.arms] == [
+        (False, simulation.arms[0].q, (250,)),
+        (True, other.q, (250,)),
+    ]
+    assert scene.title == "Arms of chain and other and paths [m]"
     assert [path.label for path in scene.paths] == ["chain", "other"]
 
 
