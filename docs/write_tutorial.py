@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import re
 import shlex
 import shutil
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from unittest.mock import patch
 
 from urmpipe.main import run
 from urmpipe_datasets import LOGS
@@ -45,13 +45,14 @@ def steps(text: str, folder: Path) -> Iterator[tuple[int, str]]:
 
 def printed(command: str) -> tuple[int, str]:
     """Run a command in the working folder; return its exit code and what it prints."""
-    output = io.StringIO()
-    with (
-        patch.dict("os.environ", {"COLUMNS": WIDTH}),
-        contextlib.redirect_stdout(output),
-        contextlib.redirect_stderr(io.StringIO()),
-    ):
-        code = run(shlex.split(command)[1:])
+    output, before = io.StringIO(), dict(os.environ)
+    os.environ["COLUMNS"] = WIDTH
+    try:
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(io.StringIO()):
+            code = run(shlex.split(command)[1:])
+    finally:
+        os.environ.clear()
+        os.environ.update(before)
     return code, output.getvalue()
 
 
