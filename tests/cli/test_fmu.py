@@ -251,6 +251,10 @@ def test_words_of_a_unit_are_joined_by_either_sign(urmpipe: RunCommand, tmp_path
     assert urmpipe("fmu", "list", "dc-drive", "--json").out == listed
     example = [urmpipe("fmu", "list", name).out for name in ("kinematic-chain", "kinematic_chain")]
     assert example[0] == example[1]
+    assert (
+        "These are the variables for urm6. Those for another arm: build it, then urmpipe fmu check"
+        in example[0]
+    )
     ran = urmpipe("fmu", "build", "delta-meter", "--backend", "python")
     assert (ran.code, [one.name for one in tmp_path.glob("*.fmu")]) == (0, ["delta_meter.fmu"])
 
@@ -287,7 +291,9 @@ def test_what_was_built_is_told_and_a_folder_gets_it(urmpipe: RunCommand, tmp_pa
 
 @pytest.mark.slow
 def test_an_array_is_a_row_of_the_check(urmpipe: RunCommand, meter: Path) -> None:
-    cells = [line.split() for line in urmpipe("fmu", "check", meter.name).out.splitlines()]
+    lines = urmpipe("fmu", "check", meter.name).out.splitlines()
+    assert lines[-1] == "Descriptions: in a terminal of 140 columns, or --json"  # its words would break here
+    cells = [line.split() for line in lines]
     arrays = [row[0] for row in cells if row and ".." in row[0]]
     assert arrays == ["reference[1..3]", "actual[1..3]", "delta[1..3]"]
 

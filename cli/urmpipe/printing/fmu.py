@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from urmpipe.printing.terminal import LISTED, new_console, new_table, say
-from urmpipe.systems.units import FROM_LOG, example_of
+from urmpipe.systems.units import FROM_LOG, example_of, example_robot
 from urmpipe_fmus.cosim.interface import ELEMENT
 from urmpipe_fmus.documentation import TITLES as VARIABLE_HEADS
 from urmpipe_fmus.documentation import variable_row
@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 
 FIGURES = 6
 """Significant digits of a number in a table; --json has all."""
+
+DESCRIBED_FROM = 140
+"""Width of a terminal from which on the variables of an FMU stand with their descriptions, whose words would
+break in a narrower one."""
 
 LOG_HELP = "what it plays: a log (CSV), or a folder of plots"
 COLUMNS_HELP = "columns of the log by name, such as u or u,i (default: its joints, or the x, y, z of a path)"
@@ -81,12 +85,15 @@ def print_unit(name: str) -> None:
     """Print the inputs, outputs and parameters of a unit, and its equations."""
     unit = example_of(name)
     table = new_table(*VARIABLE_HEADS, title=f"{unit.name}: {unit.description}")
+    robot = example_robot(name)
     rows = [variable_row(one, digits=FIGURES) for one in unit.variables]
     for row in sorted(rows, key=lambda row: _part_order(row[1])):
         table.add_row(*row)
     new_console().print(table)
     for line in unit.equations:
         say(line)
+    if robot:
+        say(f"These are the variables for {robot}. Those for another arm: build it, then urmpipe fmu check")
     say("A parameter is set where the unit runs: in a system by start, in another tool as its start value")
 
 
@@ -126,11 +133,14 @@ def print_checked(checked: Checked) -> None:
     if not checked.problems:
         say("No problem found.")
     heads = ("Variable", "Causality", "Type", "Unit", "Start", "Min", "Max", "Before", "After", "Description")
-    table = new_table(*heads, title=text.counted(len(checked.variables), "variable"))
+    shown = heads if console.width >= DESCRIBED_FROM else heads[:-1]
+    table = new_table(*shown, title=text.counted(len(checked.variables), "variable"))
     rows = sorted(_arrays(checked.variables), key=lambda row: _part_order(row[1][0].causality))
     for name, elements in rows[:LISTED]:
-        table.add_row(*_cells(name, elements))
+        table.add_row(*_cells(name, elements)[: len(shown)])
     console.print(table)
+    if shown is not heads:
+        say(f"Descriptions: in a terminal of {DESCRIBED_FROM} columns, or --json")
     if len(rows) > LISTED:
         console.print(f"... and {len(rows) - LISTED} more; --json has all")
 

@@ -35,6 +35,9 @@ EXAMPLES: Mapping[str, Mapping[str, Any]] = {
 }
 """What the units are given, where they need it, to show their variables."""
 
+DRIVEN = "ur3"
+"""The arm of the example of `driven_arm`, which needs drives."""
+
 FROM_LOG = ("table", "columns")
 """Options of a unit that come from a log."""
 
@@ -85,8 +88,14 @@ def example_of(unit: str) -> Unit:
         UrmpipeError: If there is no such unit, or with all that is wrong with a file.
     """
     if unit_name(unit) == "driven_arm":
-        return unit_of(unit, robot=_driven(load_robot("ur3")))
+        return unit_of(unit, robot=_driven(load_robot(DRIVEN)))
     return unit_of(unit, **EXAMPLES.get(unit_name(unit), {}))
+
+
+def example_robot(unit: str) -> str:
+    """Return the arm of a unit's example; empty if it has none."""
+    name = unit_name(unit)
+    return DRIVEN if name == "driven_arm" else EXAMPLES.get(name, {}).get("robot", "")
 
 
 def _driven(robot: Chain) -> Chain:

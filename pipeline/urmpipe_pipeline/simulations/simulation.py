@@ -261,7 +261,7 @@ class Simulation(Result):
         """
         found = {one.name: one for one in self.signals}
         if name not in found:
-            raise CosimulationError(f"{name}: found as a signal, allowed: {', '.join(found) or 'none'}")
+            raise CosimulationError(f"found no signal {name}, allowed: {', '.join(found) or 'none'}")
         return found[name]
 
     def _headline(self) -> str:
