@@ -123,7 +123,7 @@ class Variable(ABC):
         if not math.isfinite(value):
             yield f"found {value:g}, allowed: a finite number"
         elif not self.minimum <= value <= self.maximum:
-            yield f"found {value:.17g}, allowed: {self.minimum:.17g} to {self.maximum:.17g}"
+            yield f"found {value:.17g}, allowed: {self.minimum:.15g} to {self.maximum:.15g}"
         elif self.type == "Integer" and (value != round(value) or abs(value) > LARGEST_INTEGER):
             yield f"found {value:.17g}, allowed: an integer of 32 bits"
         elif self.type == "Boolean" and value not in (0.0, 1.0):

@@ -43,7 +43,7 @@ static int is_allowed(const Instance *me, const Variable *one, double value) {
     else if (!isfinite(value))
         report(me, "%s: found %g, allowed: a finite number", one->name, value);
     else if (!(one->min <= value && value <= one->max))
-        report(me, "%s: found %.17g, allowed: %.17g to %.17g", one->name, value, one->min, one->max);
+        report(me, "%s: found %.17g, allowed: %.15g to %.15g", one->name, value, one->min, one->max);
     else if (one->type == INTEGER && fabs(value) > LARGEST_INTEGER)
         report(me, "%s: found %.17g, allowed: an integer of 32 bits", one->name, value);
     else if (one->type == BOOLEAN && value != 0.0 && value != 1.0)
