@@ -120,7 +120,7 @@ def test_platforms_that_cannot_be_compiled_here_are_refused_unless_python_is_ask
         build_fmu(make("arm"), tmp_path, platforms=platforms)
     assert str(caught.value) == (
         f"platforms: found {', '.join(platforms)}, which cannot be compiled here: ziglang is not installed"
-        ' (pip install \'urmpipe[cross]\'); backend="python" packages an FMU that needs Python with NumPy'
+        " (pip install 'urmpipe[cross]'); backend=\"python\" packages an FMU that needs Python with NumPy"
     )
     assert list(tmp_path.iterdir()) == []
     made = build_fmu(make("arm"), tmp_path, backend="python", platforms=platforms)

@@ -111,9 +111,7 @@ def test_the_period_is_fixed_once_it_runs_and_cannot_be_0() -> None:
     instance = controller()
     with pytest.raises(UnitError) as error:
         put(instance, "period", 0.0)
-    assert str(error.value) == (
-        "unit drive_controller: period: found 0, allowed: 1e-06 to inf"
-    )
+    assert str(error.value) == ("unit drive_controller: period: found 0, allowed: 1e-06 to inf")
     instance.do_step(0.0, 5e-3)
     assert refusal(UnitError, put, instance, "period", 1e-3) == (
         "unit drive_controller: period: set while it runs, allowed: a fixed parameter before the first step"

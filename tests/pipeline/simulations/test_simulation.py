@@ -74,8 +74,7 @@ def test_a_signal_is_found_by_its_name(make_simulation: MakeSimulation) -> None:
     simulation = make_simulation(3)
     assert simulation.signal("chain.p7") is simulation.signals[1]
     assert refusal(CosimulationError, simulation.signal, "chain.p8") == (
-        "found no signal chain.p8, allowed: log.q, chain.p7, meter.delta, meter.norm,"
-        " meter.out_of_tolerance"
+        "found no signal chain.p8, allowed: log.q, chain.p7, meter.delta, meter.norm, meter.out_of_tolerance"
     )
 
 
