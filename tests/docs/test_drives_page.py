@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from asserting import there
 from urmpipe_fmus.cosim import load_system
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.units import make_unit
@@ -54,7 +55,7 @@ def test_every_parameter_stands_with_its_unit_and_value() -> None:
 def test_the_systems_have_the_step_and_the_loads_of_the_page(figures: Mapping[str, Any]) -> None:
     for name in ("one-drive", "six-drives"):
         assert f"`{name}`" in PAGE
-        assert re.search(rf"`{name}`[^,(]* {1e3 * load_system(name).step:g} ms", PAGE)
+        assert re.search(rf"`{name}`[^,(]* {1e3 * there(load_system(name).step):g} ms", PAGE)
     loads = [block.start["J"] for block in load_system("six-drives").blocks if block.unit == "inertia"]
     assert tuple(loads) == figures["INERTIAS"]
 
