@@ -145,7 +145,8 @@ def test_errors_and_verdict(folder: Path, capsys: Captured) -> None:
 
 @pytest.mark.slow
 def test_the_error_that_decides_is_chosen_and_a_cube_is_its_rows(capsys: Captured) -> None:
-    given = ("accuracy", "--robot", "irb60", *CUBE, "--velocities", "0.3", "--json")
+    small = "cube:wall,a=0.1,r=0.01,x=1.7,y=0,z=1"
+    given = ("accuracy", "--robot", "irb60", "--path", small, "--velocities", "0.3", "--json")
     assert run([*given]) == 0
     found = json.loads(capsys.readouterr().out)
     (error,), (path_error,) = found["errors"], found["path_errors"]
@@ -163,8 +164,10 @@ def test_the_error_that_decides_is_chosen_and_a_cube_is_its_rows(capsys: Capture
     assert held[speed]
     assert min(v for v, within in held.items() if not within and v > speed) <= 1.01 * speed * (1 + 1e-12)
     assert 0.3 in held
-    rows = urmpipe.accuracy(fig7_rows(), "irb60", velocities=[0.3])
-    assert [one.error for one in rows.errors] == [error]
+    of_rows, of_cube = (
+        urmpipe.accuracy(path, "irb60", velocities=[1.0]).errors for path in (fig7_rows(), CUBE[1])
+    )
+    assert of_rows == of_cube
 
 
 @pytest.mark.slow
