@@ -138,7 +138,10 @@ def test_no_tool_is_found_for_a_log_that_hardly_moves_or_needs_more_than_a_tool(
         " little to show why: perhaps a tool or a base is missing; --robot ur5e --tool"
         f" {shown} brings them within {1e3 * np.linalg.norm(np.round(up, 4) - up):.2f} mm here"
     )
-    assert warning.words("command line").endswith(" missing?; --tool X,Y,Z or --base X,Y,Z sets it")
+    few = still[:3]  # too few poses for a tool, and not one tool for all of them
+    scattered = positions_over_log(UR5E, few) + np.array([[0.15], [0.25], [0.2]])
+    (warning,) = lacking_tool(UR5E, log(few, scattered))
+    assert warning.words("command line").endswith("base is missing; --tool X,Y,Z or --base X,Y,Z sets it")
     tooled = UR5E.placed(tool=translation(0.0, 0.0, 0.1))
     (warning,) = lacking_tool(tooled, log(still, positions_over_log(UR5E, still)))
     assert warning.words("command line") == (
