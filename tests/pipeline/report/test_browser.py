@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import pytest
@@ -248,7 +248,8 @@ TWO_FRAMES = "new Promise(done => requestAnimationFrame(() => requestAnimationFr
 
 
 def test_a_dark_setting_is_followed_at_once(desk: Page) -> None:
-    for scheme, grounds in (("dark", DARK), ("light", LIGHT)):
+    settings: dict[Literal["dark", "light"], set[str]] = {"dark": DARK, "light": LIGHT}
+    for scheme, grounds in settings.items():
         desk.emulate_media(color_scheme=scheme)
         desk.evaluate(TWO_FRAMES)
         assert set(desk.evaluate(GROUNDS)) == grounds
