@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -86,7 +89,7 @@ PATHS: Mapping[str, Callable[[], tuple[Chain, PathRows]]] = {
     "urm6": lambda: between(
         load_robot("urm6"), [0.2, 2.5, 0.1, 3.3, -0.1, 3.2], [0.6, 2.2, 0.3, 3.6, -0.2, 3.3], oriented=False
     ),
-    "urm6, many turns": lambda: around(load_robot("urm6"), 5),
+    "urm6, many turns": lambda: around(load_robot("urm6"), 2),
     "level": lambda: between(absolute_angles(), [0.4, 0.2, 0.3, 0.0], [0.4, 0.5, 0.1, 0.0], oriented=True),
     "level, position only": lambda: between(
         absolute_angles(), [0.1, 0.2, 0.3, 0.0], [0.6, 0.5, 0.1, 0.0], oriented=False
@@ -99,11 +102,23 @@ PATHS: Mapping[str, Callable[[], tuple[Chain, PathRows]]] = {
 
 def planned(name: str, log: Path) -> PlannedPath:
     """Return the plan of a path for its arm, written as a log."""
-    arm, rows = PATHS[name]()
-    return urmpipe.plan(rows, arm, output=log)
+    plan, text = _made(name, alone=False)
+    log.write_bytes(text)
+    return replace(plan, log=log)
 
 
 def planned_alone(name: str, log: Path) -> PlannedPath:
     """Return the plan of the same path without an arm and an orientation, likewise."""
-    _, rows = PATHS[name]()
-    return urmpipe.plan(PathRows(rows.position, rows.radius, rows.corner), output=log)
+    plan, text = _made(name, alone=True)
+    log.write_bytes(text)
+    return replace(plan, log=log)
+
+
+@cache
+def _made(name: str, *, alone: bool) -> tuple[PlannedPath, bytes]:
+    """Return a plan, which is made once a session, and the log that was written of it."""
+    arm, rows = PATHS[name]()
+    given = (PathRows(rows.position, rows.radius, rows.corner), None) if alone else (rows, arm)
+    with TemporaryDirectory() as folder:
+        log = Path(folder) / "plan.csv"
+        return urmpipe.plan(*given, output=log), log.read_bytes()
