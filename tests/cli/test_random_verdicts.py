@@ -1,4 +1,4 @@
-"""Two thousand random logs, some of which lie about themselves: no verdict on a guess.
+"""Random logs, some of which lie about themselves: no verdict on a guess.
 
 A log is made from arrays that are known, so is the verdict on them. What is written may lie: a unit in a
 header is the other one, or there is none, or no header at all; clocks are uneven; joints wrap; rows are still
