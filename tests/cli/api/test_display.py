@@ -52,7 +52,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         urmpipe.equations(pendulum()),
         urmpipe.build_fmu("dc_drive", backend="python", output=folder),
         urmpipe.plan("cube:wall,a=0.2,r=0.02,x=0.5,y=0,z=0.3", "ur5e"),
-        urmpipe.accuracy("cube:wall,a=0.002,r=0,x=1.7,y=0,z=1", "irb60", velocities=[0.5], backend="python"),
+        urmpipe.accuracy("cube:wall,a=0.0001,r=0,x=1.7,y=0,z=1", "irb60", velocities=[0.5], backend="python"),
         urmpipe.load_network("four-bar"), urmpipe.network_check("four-bar"),
         urmpipe.export(run, folder / "log.csv"), urmpipe.report([run], folder / "report.html"),
     ]  # fmt: skip
