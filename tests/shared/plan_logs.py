@@ -114,11 +114,17 @@ def planned_alone(name: str, log: Path) -> PlannedPath:
     return replace(plan, log=log)
 
 
+def written_plan(name: str, log: Path, *, alone: bool = False) -> PlannedPath:
+    """Return one of these plans, made anew and written by `plan` itself."""
+    arm, rows = PATHS[name]()
+    if alone:
+        return urmpipe.plan(PathRows(rows.position, rows.radius, rows.corner), output=log)
+    return urmpipe.plan(rows, arm, output=log)
+
+
 @cache
 def _made(name: str, *, alone: bool) -> tuple[PlannedPath, bytes]:
     """Return a plan, which is made once a session, and the log that was written of it."""
-    arm, rows = PATHS[name]()
-    given = (PathRows(rows.position, rows.radius, rows.corner), None) if alone else (rows, arm)
     with TemporaryDirectory() as folder:
         log = Path(folder) / "plan.csv"
-        return urmpipe.plan(*given, output=log), log.read_bytes()
+        return written_plan(name, log, alone=alone), log.read_bytes()

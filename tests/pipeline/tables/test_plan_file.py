@@ -10,7 +10,7 @@ import pytest
 
 import urmpipe
 from asserting import there
-from plan_logs import PATHS, planned, planned_alone
+from plan_logs import PATHS, planned, planned_alone, written_plan
 from urmpipe_models.errors import OutputError
 from urmpipe_models.planning.rows import PathRows
 from urmpipe_models.robots.catalogue import load_robot
@@ -84,8 +84,8 @@ def test_the_last_column_holds_the_row_of_the_path(tmp_path: Path) -> None:
 
 def test_only_a_plan_is_replaced_by_a_plan_and_a_joint_log_by_a_joint_log(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
-    planned("sliding", path)
-    alone = planned_alone("sliding", path)
+    written_plan("sliding", path)
+    alone = written_plan("sliding", path, alone=True)
     assert header(path) == f"t (s),x (m),y (m),z (m),{PATH_ROW}"
     assert len(pd.read_csv(path)) == len(alone)
     other = tmp_path / "solved.csv"
@@ -93,7 +93,7 @@ def test_only_a_plan_is_replaced_by_a_plan_and_a_joint_log_by_a_joint_log(tmp_pa
         write_joint_log(part, other, joints=["q1"], units=["rad"], q=np.zeros((2, 1)), row=np.array([1, 2]))
     assert other.read_text(encoding="utf-8").startswith(f"q1 (rad),{TARGET_ROW}\n")
     with pytest.raises(OutputError, match="found a file that is not a plan of urmpipe, allowed: a new name"):
-        planned("sliding", other)
+        written_plan("sliding", other)
     with (
         pytest.raises(OutputError, match="found a file that is not a joint log of urmpipe"),
         guarded_output(path, [], "joints"),
