@@ -6,12 +6,13 @@ import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import urmpipe
 from urmpipe.driven_runs.running_speed import Within, running_speed
 from urmpipe.main import run
-from urmpipe_pipeline.accuracy.published import fig7_rows
+from urmpipe_models.planning.cube import cube_rows
 
 Captured = pytest.CaptureFixture[str]
 
@@ -120,7 +121,7 @@ def drive(joint: str, gain: float = 7.5) -> str:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a short path and an arm."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "path.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.497,0\n")
+    (tmp_path / "path.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.4995,0\n")
     (tmp_path / "arm.toml").write_text(ARM + MASSES + drive("a") + drive("b"))
     return tmp_path
 
@@ -130,23 +131,23 @@ GIVEN = ("accuracy", "--robot", "arm.toml", "--path", "path.csv", "--backend", "
 
 @pytest.mark.slow
 def test_errors_and_verdict(folder: Path, capsys: Captured) -> None:
-    codes = [run([*GIVEN, "--velocities", "0.1,0.05", *more]) for more in ((), ("--limit", "2mm"))]
+    codes = [run([*GIVEN, "--velocities", "0.05,0.025", *more]) for more in ((), ("--limit", "0.1mm"))]
     assert codes == [0, 1]
     slower = "note: the arm runs in NumPy, some hundred times slower than machine code\n"
     assert capsys.readouterr().err == 2 * slower
     result = urmpipe.accuracy(
-        "path.csv", "arm.toml", velocities=[0.1, 0.05, 0.1], limit=1.0, backend="python"
+        "path.csv", "arm.toml", velocities=[0.05, 0.025, 0.05], limit=1.0, backend="python"
     )
-    assert [one.velocity for one in result.errors] == [0.1, 0.05]
+    assert [one.velocity for one in result.errors] == [0.05, 0.025]
     assert result.verdict == "pass"
     rows = result.to_frame().set_index("velocity")
-    assert [rows.error[v] for v in (0.1, 0.05)] == result.to_dict()["errors"]
+    assert [rows.error[v] for v in (0.05, 0.025)] == result.to_dict()["errors"]
 
 
 @pytest.mark.slow
 def test_the_error_that_decides_is_chosen_and_a_cube_is_its_rows(capsys: Captured) -> None:
-    small = "cube:wall,a=0.1,r=0.01,x=1.7,y=0,z=1"
-    given = ("accuracy", "--robot", "irb60", "--path", small, "--velocities", "0.3", "--json")
+    cube = "cube:wall,a=0.1,r=0.01,x=1.7,y=0,z=1"  # as short a path as reaches 0.3 m/s
+    given = ("accuracy", "--robot", "irb60", "--path", cube, "--velocities", "0.3", "--json")
     assert run([*given]) == 0
     found = json.loads(capsys.readouterr().out)
     (error,), (path_error,) = found["errors"], found["path_errors"]
@@ -154,7 +155,7 @@ def test_the_error_that_decides_is_chosen_and_a_cube_is_its_rows(capsys: Capture
     between = f"{(error + path_error) / 2:.6f}"
     verdicts = []
     for which, code in (("time", 1), ("path", 0)):
-        assert run([*given, "--limit", between, "--error", which]) == code
+        assert run([*given, "--limit", between, "--error", which, "--velocities", "0.27,0.3"]) == code
         verdicts.append(json.loads(capsys.readouterr().out))
     assert [one["verdict"] for one in verdicts] == ["fail", "pass"]
     assert [one["decides"] for one in verdicts] == ["time", "path"]
@@ -164,16 +165,17 @@ def test_the_error_that_decides_is_chosen_and_a_cube_is_its_rows(capsys: Capture
     assert held[speed]
     assert min(v for v, within in held.items() if not within and v > speed) <= 1.01 * speed * (1 + 1e-12)
     assert 0.3 in held
-    of_rows, of_cube = (
-        urmpipe.accuracy(path, "irb60", velocities=[1.0]).errors for path in (fig7_rows(), CUBE[1])
+    rows = urmpipe.accuracy(
+        cube_rows("wall", 0.1, 0.01, np.array([1.7, 0.0, 1.0])), "irb60", velocities=[0.3]
     )
-    assert of_rows == of_cube
+    assert [one.error for one in rows.errors] == [error]
 
 
 @pytest.mark.slow
 def test_an_arm_that_diverges(folder: Path, capsys: Captured) -> None:
-    (folder / "path.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.49,0\n")
-    (folder / "arm.toml").write_text(ARM + MASSES + drive("a", -7500.0) + drive("b"))
+    (folder / "path.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.499,0\n")
+    strong = drive("a", -7500.0).replace("u_max = 48.0", "u_max = 4.8e6")  # it diverges at once
+    (folder / "arm.toml").write_text(ARM + MASSES + strong + drive("b"))
     assert run([*GIVEN, "--velocities", "0.01", "--limit", "1mm"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert found["errors"] == [None]
