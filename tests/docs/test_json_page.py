@@ -108,7 +108,8 @@ def test_each_key_of_a_simulation_is_named() -> None:
 
 
 CALLS = {
-    "accuracy accuracy": "accuracy --path cube:wall,a=0.01,r=0,x=1.7,y=0,z=1 --robot irb60 --velocities 0.5",
+    "accuracy accuracy": "accuracy --path cube:wall,a=1e-4,r=0,x=1.7,y=0,z=1 --robot irb60 --velocities 0.5"
+    " --backend python",
     "compare compare": "compare path.csv log.csv --robot urm6",
     "diagnose diagnose": "diagnose path.csv log.csv --robot urm6",
     "export export": "export log.rrd -o log.parquet",
