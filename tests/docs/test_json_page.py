@@ -121,7 +121,7 @@ CALLS = {
     "network check": "network check four-bar",
     "network list": "network list",
     "network solve": "network solve four-bar",
-    "plan plan": "plan cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1 --robot irb60",
+    "plan plan": "plan cube:wall,a=0.02,r=0.001,x=1.7,y=0,z=1 --robot irb60",
     "report report": "report log.rrd",
     "robot equations": "robot equations rod.toml",
     "robot export": "robot export urm6 -o urm6.toml",
