@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -10,6 +11,10 @@ from hypothesis import settings
 
 settings.register_profile("any-load", settings.default, deadline=None)  # a busy machine is no fault
 settings.load_profile("any-load")
+
+# Before numpy starts: the threads of BLAS wait for each other where two processes share two cores, which
+# took three times the time of the processor. The commands that tests start inherit it.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 SHARED = Path(__file__).resolve().parents[1].parent / "shared"
 
