@@ -172,7 +172,7 @@ def test_a_joint_that_stands_still_has_an_offset_and_no_scale_of_its_own() -> No
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("lasting", [0.05, 0.5, 2.0])
+@pytest.mark.parametrize("lasting", [0.5, 2.0])  # with less the samples, 0.07 s apart, are hardly correlated
 def test_correlated_noise_is_no_cause(lasting: float) -> None:
     def noise(rng: np.random.Generator, position: FloatArray) -> FloatArray:
         return drifting(rng, position, lasting)
