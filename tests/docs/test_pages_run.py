@@ -12,6 +12,7 @@ from pages import ROOT, command_lines, files_told, lay_files, pages, run_in_proc
 ELSEWHERE = {
     "urmpipe view ": "needs a display: tests/cli/test_view.py",
     "--block ": "needs a simulation, which is slow: tests/cli/test_compare_simulation.py",
+    "--limit ": "looks for the running speed, which is slow: tests/cli/test_accuracy.py",
     "--platforms": "takes minutes for its first build: tests/fmus/native/test_cross.py",
 }
 """What is run by tests of its own: a part of the line, and why."""
@@ -23,21 +24,29 @@ WRITTEN_BY_A_SCRIPT = ("docs/commands.md", "docs/tutorial.md")
 """Held by test_commands_page.py (examples of --help, with files of all kinds) and test_tutorial.py."""
 
 
+NAMED = [page for page in pages() if page not in WRITTEN_BY_A_SCRIPT]
+
+
 def shown(page: str, *, heavy: bool) -> list[str]:
-    """Return the commands of a page that are run here, the slow or the quick ones."""
+    """Return the commands of a page that are run here, the slow or the quick ones.
+
+    A slow one runs for the first page that shows it: each page has the same files.
+    """
+    before = {line for one in NAMED[: NAMED.index(page)] for line in command_lines(one)} if heavy else set()
     return [
         line
         for line in command_lines(page)
-        if line.startswith(HEAVY) == heavy and not any(part in line for part in ELSEWHERE)
+        if line.startswith(HEAVY) == heavy
+        and line not in before
+        and not any(part in line for part in ELSEWHERE)
     ]
 
 
 def cases() -> list[object]:
     """Return each page with its quick and with its slow commands."""
-    named = [page for page in pages() if page not in WRITTEN_BY_A_SCRIPT]
     return [
-        pytest.param(page, heavy, id=f"{page}{', slow' * heavy}", marks=[pytest.mark.slow] * heavy)
-        for page in named
+        pytest.param(page, heavy, id=f"{page}{', slow' * heavy}")
+        for page in NAMED
         for heavy in (False, True)
         if shown(page, heavy=heavy)
     ]
