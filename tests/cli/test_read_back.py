@@ -19,6 +19,7 @@ from urmpipe_models.errors import LogError, OptionError, RecordingError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.orientation import quaternions
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 ROWS = 120
 CUBE = "cube:wall,a=0.2,r=0.02,x=0.7,y=0,z=0.6"
@@ -182,11 +183,18 @@ SYSTEMS = {
 """The signals of each system that may be the joints of an arm; none where it has only one such array."""
 
 
+@pytest.fixture(scope="module", params=SYSTEMS)
+def simulated(request: pytest.FixtureRequest) -> tuple[str, Simulation]:
+    """A shipped system, and what a short simulation of it gave."""
+    return request.param, urmpipe.simulate(request.param, duration=0.02)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("to", ["csv", "parquet", "mat"])
-@pytest.mark.parametrize("system", SYSTEMS)
-def test_the_signals_of_a_simulation_come_back_or_are_asked_for(system: str, to: str, tmp_path: Path) -> None:
-    simulation, file = urmpipe.simulate(system, duration=0.05), tmp_path / f"a.{to}"
+def test_the_signals_of_a_simulation_come_back_or_are_asked_for(
+    simulated: tuple[str, Simulation], to: str, tmp_path: Path
+) -> None:
+    (system, simulation), file = simulated, tmp_path / f"a.{to}"
     urmpipe.export(simulation, output=file)
     frame, options = simulation.to_frame(), list[dict[str, Any]]()
     if SYSTEMS[system]:
@@ -194,7 +202,8 @@ def test_the_signals_of_a_simulation_come_back_or_are_asked_for(system: str, to:
             urmpipe.ingest(file)
         answers = [one.value for one in asked.value.findings[0].hints if one.value]
         assert answers == SYSTEMS[system]
-        options += [{"joints": answer} for answer in answers]
+        read = answers[-1:] if to == "mat" else answers  # a .mat file is read in a process of its own
+        options += [{"joints": answer} for answer in read]
     for given in options or [{}]:
         log = urmpipe.ingest(file, **given).log
         assert list(log.joints) == (given.get("joints") or [f"arm.phi[{k}]" for k in range(1, 7)])
