@@ -19,7 +19,7 @@ from urmpipe_fmus.run import run
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.arrays import FloatArray
 
-STEPS, FEW = 61, 21
+STEPS, FEW = 61, 9
 """Steps, and those of an arm with masses, which takes Python some tenths of a second each."""
 
 MASTERS: dict[str, tuple[str, Callable[[System, float, int], Trace]]] = {
