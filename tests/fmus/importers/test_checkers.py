@@ -12,25 +12,28 @@ from pathlib import Path
 import pytest
 
 from peers import need
-from shipped_units import shipped
+from shipped_units import EVERY_PART, shipped
+from urmpipe_fmus.description import Backend
 
-BACKENDS = ("native", "python")
+CASES: list[tuple[str, Backend]] = [
+    *((name, "native") for name in shipped()),
+    *((name, "python") for name in EVERY_PART),
+]
+"""Both backends describe a unit by the same template, and package Python alike for every unit."""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped())
-@pytest.mark.parametrize("backend", BACKENDS)
-def test_fmpy_validate_finds_nothing(name: str, backend: str, fmu_of: Callable[..., Path]) -> None:
+def test_fmpy_validate_finds_nothing(name: str, fmu_of: Callable[..., Path]) -> None:
     from fmpy.validation import validate_fmu
 
-    assert validate_fmu(str(fmu_of(name, backend))) == []
+    assert validate_fmu(str(fmu_of(name))) == []  # of Python FMUs: packaging/test_build.py
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", shipped())
-@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize(("name", "backend"), CASES)
 def test_the_fmu_manipulation_toolbox_finds_nothing(
-    name: str, backend: str, fmu_of: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+    name: str, backend: Backend, fmu_of: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     need("fmu_manipulation_toolbox")
     fmutool = import_module("fmu_manipulation_toolbox.cli.fmutool").fmutool  # it publishes no types

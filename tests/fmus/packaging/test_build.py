@@ -147,9 +147,9 @@ OPTIONS: dict[str, dict[str, Any]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in unit_names() if name != "log_source"])
-def test_every_shipped_unit_is_a_valid_python_fmu_that_starts_as_it_says(name: str, tmp_path: Path) -> None:
+def test_every_shipped_unit_is_a_valid_python_fmu_that_starts_as_it_says(name: str) -> None:
     unit = make_unit(name, **OPTIONS.get(name, {}))
-    path = build_fmu(unit, tmp_path, backend="python").path
+    path = cached_fmu(unit, "python")
     assert validate_fmu(str(path)) == []
     fmu = Loaded(path)
     starts = {
