@@ -94,8 +94,9 @@ def lay_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
     named = {"coppelia": "coppeliasim", "path": "path", **dict.fromkeys(("log", "a", "b", "other"), "matlab")}
     for name, source in named.items():
-        head, *rows = (LOGS / f"{source}.csv").read_text(encoding="utf-8").splitlines(keepends=True)
-        (folder / f"{name}.csv").write_text("".join([head, *rows[::EVERY]]), encoding="utf-8")
+        lines = (LOGS / f"{source}.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+        head = next(i for i, line in enumerate(lines) if line[0].isdigit())
+        (folder / f"{name}.csv").write_text("".join([*lines[:head], *lines[head::EVERY]]), encoding="utf-8")
     (folder / "targets.csv").write_text("x,y,z,rz,ry,rx\n0.1,0.05,0.25,0.3,0.4,0.1\n0,0,0.3,0,0,0\n")
     (folder / "contour.csv").write_text("x,y,z,corner_r\n0.4,0.1,0.3,\n0.5,0.1,0.3,0.02\n0.5,-0.1,0.3,\n")
     (folder / "poses.csv").write_text("x,y,z,qx,qy,qz,qw\n0.4,0.1,0.3,1,0,0,0\n")

@@ -34,7 +34,7 @@ def exchanged(state: State, c: int, d: int, gram: FloatArray) -> State:
         state: The explanation.
         c: Place of the number that goes.
         d: Place of the number that comes.
-        gram: J^T J of all numbers, in the weights of the rows, shape (p, p).
+        gram: J^T J [-] of all numbers, in the weights of the rows, shape (p, p).
     """
     values = state.values.copy()
     values[d] += values[c] * gram[c, d] / max(gram[d, d], np.finfo(float).tiny)

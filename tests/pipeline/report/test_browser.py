@@ -166,9 +166,12 @@ def scroll_through(page: Page) -> None:
         plot.locator(".main-svg").first.wait_for()
 
 
+SIDEWAYS = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+
+
 def sideways(page: Page) -> int:
     """By how many px the page is wider than the window."""
-    return int(page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth"))
+    return int(page.evaluate(SIDEWAYS))
 
 
 @pytest.fixture(scope="module")
@@ -422,7 +425,7 @@ def test_paper_is_light_shows_what_passed_and_cuts_nothing_and_the_screen_is_as_
         assert set(page.evaluate(GROUNDS)) == DARK
         assert page.locator("details:not([open])").count() == folded
         assert page.evaluate("[...document.querySelectorAll('.plot')].map(p => p.style.height)") == heights
-        assert sideways(page) == 0
+        page.wait_for_function(f"{SIDEWAYS} === 0")  # figures take their width again one after the other
 
 
 def printed_pages(page: Page) -> list[tuple[float, float]]:
