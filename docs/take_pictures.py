@@ -101,7 +101,7 @@ def of_branches(folder: Path, target: Path, settle: float = SETTLE) -> list[str]
     pose.write_text("x,y,z,rz,ry,rx\n0.15,0.05,0.2,0.3,0.9,0.1\n", encoding="utf-8")
     solved = ["ik", str(pose), "--robot", "arm6", "--all", "-q", "-o", str(branches)]
     subprocess.run([sys.executable, "-m", "urmpipe", *solved], check=True)
-    return of_recording(branches, target, 0.0, settle)
+    return of_recording(branches, target, None, settle)
 
 
 def of_tutorial(folder: Path) -> list[str]:

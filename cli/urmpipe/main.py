@@ -125,13 +125,18 @@ def cli() -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit: errors become lines on standard error and the exit code 2."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    gc.set_threshold(COLLECT_AT)
-    open_streams()
-    for number in (signal.SIGINT, signal.SIGTERM):  # what ends us asks for order, as Ctrl-C does
-        signal.signal(number, _stop)
-    sys.unraisablehook = _stop_again
-    code = run(given)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done: there is nothing left to stop
+    try:
+        gc.set_threshold(COLLECT_AT)
+        open_streams()
+        for number in (signal.SIGINT, signal.SIGTERM):  # what ends us asks for order, as Ctrl-C does
+            signal.signal(number, _stop)
+        sys.unraisablehook = _stop_again
+        code = run(given)
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # all is done: there is nothing left to stop
+    except KeyboardInterrupt as stop:  # just before or after what `run` answers for
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        print_findings(findings_of(stop), "--json" in given)
+        code = 2
     close_streams()
     gc.freeze()  # else Python looks for cycles among all modules before it exits
     sys.exit(code)

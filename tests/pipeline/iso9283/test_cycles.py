@@ -71,8 +71,7 @@ def rows(result: Comparison) -> list[tuple[int, int]]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2))
-@pytest.mark.parametrize("way", list(WAYS))
+@pytest.mark.parametrize(("seed", "way"), list(enumerate(WAYS)))
 def test_29_of_30_are_found_with_noise_and_a_cut_one(way: str, seed: int, tmp_path: Path) -> None:
     path, back = WAYS[way]()
     every, rests = repeated(path, 30, seed, back=back)
