@@ -120,6 +120,14 @@ def watched(page: Page) -> list[str]:
     return complaints
 
 
+def until(page: Page, condition: str) -> None:
+    """Wait for a condition of a page, whose own policy forbids what `wait_for_function` does: to evaluate text."""
+    page.evaluate(f"""new Promise(met => {{
+        const look = () => ({condition}) ? met() : requestAnimationFrame(look);
+        look();
+    }})""")
+
+
 @contextmanager
 def opened(
     browser: Browser, path: Path, *, phone: bool = False, script: bool = True, dark: bool = False
@@ -315,9 +323,7 @@ def test_time_axes_of_a_log_are_linked(desk: Page) -> None:
     siblings = desk.locator(own).count()
     assert siblings > 1
     desk.evaluate(f"Plotly.relayout(document.querySelector('{own}'), {{'xaxis.range': [5, 9]}})")
-    desk.wait_for_function(
-        f"[...document.querySelectorAll('{own}')].every(p => p.layout.xaxis.range[0] === 5)"
-    )
+    until(desk, f"[...document.querySelectorAll('{own}')].every(p => p.layout.xaxis.range[0] === 5)")
     after = desk.evaluate(ranges)
     assert [one for one in after if one[0] == "r1-1"] == [["r1-1", [5, 9]]] * siblings
     assert [one for one in after if one[0] != "r1-1"] == [one for one in before if one[0] != "r1-1"]
@@ -425,7 +431,7 @@ def test_paper_is_light_shows_what_passed_and_cuts_nothing_and_the_screen_is_as_
         assert set(page.evaluate(GROUNDS)) == DARK
         assert page.locator("details:not([open])").count() == folded
         assert page.evaluate("[...document.querySelectorAll('.plot')].map(p => p.style.height)") == heights
-        page.wait_for_function(f"{SIDEWAYS} === 0")  # figures take their width again one after the other
+        until(page, f"{SIDEWAYS} === 0")  # figures take their width again one after the other
 
 
 def printed_pages(page: Page) -> list[tuple[float, float]]:
