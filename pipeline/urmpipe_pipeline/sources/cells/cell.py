@@ -22,6 +22,10 @@ COARSE_DIGITS = 6
 """A format of this many significant digits or fewer is worth telling: its steps show in derivatives."""
 
 
+_CELLS = 1 << 14
+"""What so many cells are is kept: each of a file's head is looked at again and again."""
+
+
 @lru_cache
 def _number_pattern(decimal: str) -> re.Pattern[str]:
     point = re.escape(decimal)
@@ -70,6 +74,7 @@ def is_missing(cell: str) -> bool:
     return cell.lower() in vocabulary().missing
 
 
+@lru_cache(_CELLS)
 def is_number(cell: str, decimal: str) -> bool:
     """Return whether a cell is a number with this decimal sign (infinities included)."""
     return bool(_number_pattern(decimal).match(cell) or _INFINITE.match(cell))
@@ -85,6 +90,7 @@ def plain(cell: str, decimal: str) -> str:
     return cell.replace(decimal, ".").replace("d", "e").replace("D", "e")
 
 
+@lru_cache(_CELLS)
 def to_float(cell: str, decimal: str) -> float | None:
     """Return a cell's value, NaN for a missing sample, None for text."""
     if _number_pattern(decimal).match(cell):

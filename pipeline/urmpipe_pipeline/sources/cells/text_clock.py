@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import IntArray
-from urmpipe_pipeline.sources.cells.cell import LONGEST_NS
+from urmpipe_pipeline.sources.cells.cell import DECIMALS, LONGEST_NS, is_number
 from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
@@ -295,7 +295,9 @@ def in_digits(cell: str) -> str:
 
 
 def looks_like_a_clock(cell: str) -> bool:
-    """Return whether the text of a cell may be a time."""
+    """Return whether the text of a cell may be a time; a number without a unit is none."""
     if len(cell) >= LONGEST_CELL or cell[:1] not in "+-0123456789":
+        return False
+    if any(is_number(cell, decimal) for decimal in DECIMALS):
         return False
     return any(form.pattern.match(cell) for form in FORMS)

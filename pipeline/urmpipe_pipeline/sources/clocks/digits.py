@@ -31,8 +31,8 @@ def dates_in_digits(columns: Sequence[Column], layout: Layout) -> Chosen | None:
     if len(dates) == 1:
         return Chosen((dates[0],), "its numbers are dates, YYYYMMDDhhmmss", forms=(DENSE_DATE,))
     days = [column for column in numeric if all_are(DENSE_DAY, column, layout)]
-    times = [column for column in numeric if _tells_hours(column, layout)]
-    if len(days) == len(times) == 1:
+    times = [column for column in numeric if _tells_hours(column, layout)] if len(days) == 1 else []
+    if len(times) == 1:
         both = (DENSE_DAY, DENSE_TIME)
         return Chosen((days[0], times[0]), "a date and a time of day in digits", forms=both)
     return None
@@ -40,12 +40,13 @@ def dates_in_digits(columns: Sequence[Column], layout: Layout) -> Chosen | None:
 
 def all_are(form: Form, column: Column, layout: Layout) -> bool:
     """Return whether all sampled cells of a column, and one at least, are times of a form."""
-    written = [cell for cell in layout.cells(column.index) if not is_missing(cell)]
+    written = (cell for cell in layout.cells(column.index) if not is_missing(cell))
     if form in IN_DIGITS and not column.text:
-        written = [in_digits(cell) for cell in layout.number_texts(column.index)]
-    if not written or not form.pattern.match(written[0]):
+        written = map(in_digits, layout.number_texts(column.index))
+    first = next(written, None)
+    if first is None or not form.pattern.match(first):
         return False
-    return bool((read_cells(TextCells.of(written), form) > UNREADABLE).all())
+    return bool((read_cells(TextCells.of([first, *written]), form) > UNREADABLE).all())
 
 
 def _tells_hours(column: Column, layout: Layout) -> bool:

@@ -41,7 +41,7 @@ def sniff_arrays(segment: Segment, delimiter: str | None = None, decimal: str | 
         LogError: As `sniff`, or if the arrays have decimal commas.
         OptionError: As `sniff`.
     """
-    lines = head_lines(segment)
+    lines = list(head_lines(segment)) if any(sign in segment.head for sign in CLOSING) else []
     opening = next((sign for sign in CLOSING if _begin_cells(lines, sign)), None)
     if opening is None:
         return None
@@ -66,7 +66,7 @@ def _begin_cells(lines: Sequence[HeadLine], opening: str) -> bool:
 
     Lines that begin with a blank may go on with an array that began above.
     """
-    count = sum(bool(_STARTS[opening].search(line.text)) for line in lines)
+    count = sum(opening in line.text and bool(_STARTS[opening].search(line.text)) for line in lines)
     rows = sum(not line.text.startswith((" ", "\t")) for line in lines[1:])
     return count > 0 and 2 * count >= rows
 

@@ -174,7 +174,7 @@ def _scale(layout: Layout, part: ClockColumn, exact: bool) -> int:
     As many as reach [ns] if the sampled cells have no more: then the parsed integers are [ns]. Else as
     many as fit beside the digits before the point (and two more, since the clock goes on).
     """
-    cells = layout.number_texts(part.column)
+    cells = list(layout.number_texts(part.column))
     decimals = max((len(cell.partition("e")[0].partition(".")[2]) for cell in cells), default=0)
     if not exact and decimals <= part.exponent:
         return part.exponent

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import is_number
@@ -36,7 +37,7 @@ FEWEST_LABELS = 2
 
 def sniff_labels(segment: Segment) -> Layout | None:
     """Return how a log with labels in its rows is written, as rows of plain cells; None if it has none."""
-    lines = head_lines(segment)[:SAMPLED_LINES]
+    lines = list(islice(head_lines(segment), SAMPLED_LINES))
     alike: dict[tuple[tuple[str, ...], str], list[HeadLine]] = {}
     for line in lines:
         if (found := _labels(line.text)) is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
@@ -109,9 +109,9 @@ class Layout:
         """Return the sampled cells of a column."""
         return [row[column] for row in self.sample if column < len(row)]
 
-    def number_texts(self, column: int) -> list[str]:
-        """Return the sampled numbers of a column, as Python spells them."""
-        return [plain(cell, self.decimal) for cell in self.cells(column) if is_number(cell, self.decimal)]
+    def number_texts(self, column: int) -> Iterator[str]:
+        """Yield the sampled numbers of a column, as Python spells them."""
+        return (plain(cell, self.decimal) for cell in self.cells(column) if is_number(cell, self.decimal))
 
     def numbers(self, column: int) -> list[float]:
         """Return the sampled numbers of a column, without those that are infinite."""
@@ -147,7 +147,7 @@ def sniff(
         LogError: If it holds no numbers, no rows, or a header that does not fit its rows.
         OptionError: If delimiter or decimal is none that is allowed.
     """
-    lines = head_lines(segment) if lines is None else lines
+    lines = list(head_lines(segment)) if lines is None else lines
     told, lines = _told_delimiter(lines)
     delimiters = _choices("delimiter", delimiter or told, DELIMITERS)
     decimals = _choices("decimal", decimal, DECIMALS)

@@ -110,15 +110,13 @@ class HeadLine:
         return self.text.lstrip().startswith(COMMENTS)
 
 
-def head_lines(segment: Segment) -> list[HeadLine]:
-    """Return the lines of the head that are not blank."""
-    result = []
-    offset = segment.start
-    for number, line in enumerate(segment.head.split(segment.newline), start=segment.first_line):
+def head_lines(segment: Segment) -> Iterator[HeadLine]:
+    """Yield the lines of the head that are not blank."""
+    offset, newline, errors = segment.start, segment.newline, _errors(segment.encoding)
+    for number, line in enumerate(segment.head.split(newline), start=segment.first_line):
         if line.strip():
-            result.append(HeadLine(number, offset, line.strip("\r")))
-        offset += len((line + segment.newline).encode(segment.encoding, _errors(segment.encoding)))
-    return result
+            yield HeadLine(number, offset, line.strip("\r"))
+        offset += len((line + newline).encode(segment.encoding, errors))
 
 
 def open_text(path: Path, *, any_suffix: bool = False) -> Segment:

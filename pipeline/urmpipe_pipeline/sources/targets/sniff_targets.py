@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 from urmpipe_pipeline.sources.cells.cell import DECIMALS, DELIMITERS, count_up, is_number, split_line
 from urmpipe_pipeline.sources.tables.sniff import SAMPLED_LINES, Layout, sniff
@@ -28,7 +29,7 @@ def sniff_targets(
             fit its rows.
         OptionError: As `sniff`.
     """
-    lines = head_lines(segment)[:SAMPLED_LINES]
+    lines = list(islice(head_lines(segment), SAMPLED_LINES))
     for place, line in enumerate(lines):
         below = [other for other in lines[place + 1 :] if not other.is_comment]
         whole = _soundest(below, _headers(line.text, position))
