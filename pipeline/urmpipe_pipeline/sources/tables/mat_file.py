@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
+from urmpipe_pipeline import mat_variables
 from urmpipe_pipeline.isolated import AbortError, read_apart
 from urmpipe_pipeline.outputs import EXPORT_HEADER
 from urmpipe_pipeline.sources.tables import numpy_columns
@@ -73,23 +74,13 @@ def _loaded(path: Path) -> dict[str, Any]:
     """Return the variables of a file, structs as dictionaries: damaged bytes can end SciPy's process."""
     refuse_unpacked(path, _unpacked(path))
     try:
-        found, reason = read_apart(path, __name__)
+        found, reason = read_apart(path, mat_variables.__name__)
     except AbortError as error:
         found, reason = {}, str(error)
     if reason:
         found_out = f"found a MAT file that cannot be read ({reason}), allowed: a whole one"
         raise LogError(Finding(found_out, str(path)))
     return {name: value for name, value in found.items() if not name.startswith("__")}
-
-
-def read_through(path: str) -> tuple[dict[str, Any], str]:
-    """Return the variables of a file, or why there are none; in a process of its own, see `read_apart`."""
-    from scipy.io import loadmat
-
-    try:
-        return loadmat(path, appendmat=False, simplify_cells=True), ""
-    except Exception as error:  # of damaged bytes SciPy's reader raises anything, an UnboundLocalError too
-        return {}, str(error).partition("\n")[0].strip(" .") or type(error).__name__
 
 
 def _unpacked(path: Path) -> int:
