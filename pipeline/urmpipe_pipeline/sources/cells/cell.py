@@ -69,6 +69,7 @@ def printable(text: str) -> str:
     return "".join(sign if sign.isprintable() else "?" for sign in text)
 
 
+@lru_cache(_CELLS)
 def is_missing(cell: str) -> bool:
     """Return whether a cell says that there is no sample: empty, Null, NaN, ..."""
     return cell.lower() in vocabulary().missing
@@ -82,7 +83,7 @@ def is_number(cell: str, decimal: str) -> bool:
 
 def is_text(cell: str, decimal: str) -> bool:
     """Return whether a cell is neither a number nor a missing sample."""
-    return not is_missing(cell) and not is_number(cell, decimal)
+    return not is_number(cell, decimal) and not is_missing(cell)
 
 
 def plain(cell: str, decimal: str) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_models.messages import Hint
-from urmpipe_pipeline.sources.cells.cell import is_missing, is_text
+from urmpipe_pipeline.sources.cells.cell import is_missing, is_number
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.limits import refuse_wide
 from urmpipe_pipeline.sources.tables.numbers import capped
@@ -258,4 +258,4 @@ def _alike(one: Column, other: Column) -> bool:
 def _holds_text(cells: Sequence[str], decimal: str) -> bool:
     """Return whether most cells with content are neither numbers nor missing."""
     cells = [cell for cell in cells if not is_missing(cell)]
-    return 2 * sum(is_text(cell, decimal) for cell in cells) > len(cells)
+    return 2 * sum(not is_number(cell, decimal) for cell in cells) > len(cells)

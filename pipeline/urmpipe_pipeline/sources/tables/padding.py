@@ -25,6 +25,9 @@ from urmpipe_pipeline.sources.tables.sniff import Layout
 MARKS = (0.0, -1.0, 9999.0, -9999.0)
 """What stands in every column of such a row."""
 
+FEWEST_MARKS = 2
+"""A mark in one column alone may be a sample."""
+
 JUMP = 3.0
 """Padding is away from the last sample by more than so many of the largest steps: a motion that goes on makes
 one of them, and one that is resumed behind two lost samples three."""
@@ -54,7 +57,7 @@ def end_rows(values: FloatArray) -> int:
 
 def _marked(own: FloatArray) -> int:
     """Return how many rows at the end are all one mark, and away from the motion, shape (n, columns)."""
-    if own.shape[1] < 2 or not _alike(own[-1]):
+    if own.shape[1] < FEWEST_MARKS or not _alike(own[-1]):
         return 0
     others = np.flatnonzero((own != own[-1]).any(axis=1))
     if len(others) < LEAST_ROWS:
@@ -80,6 +83,8 @@ def without_end_rows(layout: Layout) -> Layout:
     if len(layout.sample) <= LEAST_ROWS:
         return layout
     width = min(map(len, layout.sample))
+    if sum(to_float(cell, layout.decimal) in MARKS for cell in layout.sample[-1][:width]) < FEWEST_MARKS:
+        return layout
     cells = [[to_float(cell, layout.decimal) for cell in row[:width]] for row in layout.sample]
     columns = [column for column in zip(*cells, strict=True) if None not in column]
     count = end_rows(np.array(columns, dtype=np.float64).T) if columns else 0
