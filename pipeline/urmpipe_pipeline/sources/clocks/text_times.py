@@ -219,8 +219,12 @@ def known_forms(texts: Sequence[str]) -> tuple[Form, ...]:
     cells = TextCells.of([text for text in texts if not is_missing(text)])
     if not len(cells):
         return ()
-    counts = [np.count_nonzero(read_cells(cells, form) != UNREADABLE) for form in FORMS]
-    return tuple(form for form, count in zip(FORMS, counts, strict=True) if 2 * count >= len(cells))
+    alike = [block[same] for _, block in cells.blocks() for same in _shapes(block)]
+
+    def count(form: Form) -> int:
+        return sum(np.count_nonzero(_read_shape(some, form) != UNREADABLE) for some in alike)
+
+    return tuple(form for form in FORMS if 2 * count(form) >= len(cells))
 
 
 def _shapes(block: Bytes) -> Iterator[IntArray | slice]:
