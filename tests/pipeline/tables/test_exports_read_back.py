@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,8 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.tables import Format
+
+Made: TypeAlias = Callable[[str], Run]
 
 FORMATS: Sequence[Format] = ("csv", "parquet", "mat")
 
@@ -92,11 +95,18 @@ KEPT_BY_CSV = set(CASES) - {"named by hand"}
 """A CSV has the names of the file and no more: what these did not tell is asked again."""
 
 
-def made(tmp_path: Path, case: str) -> Run:
-    """Return the run of a case."""
-    frame, options = CASES[case]
-    frame.to_csv(tmp_path / "log.csv", index=False)
-    return urmpipe.ingest(tmp_path / "log.csv", **options)
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    """Return the run of a case, read once."""
+
+    @cache
+    def made(case: str) -> Run:
+        frame, options = CASES[case]
+        path = tmp_path_factory.mktemp("case") / "log.csv"
+        frame.to_csv(path, index=False)
+        return urmpipe.ingest(path, **options)
+
+    return made
 
 
 def again(tmp_path: Path, run: Run, rows: Any, to: Format) -> Run:
@@ -116,10 +126,10 @@ def same(found: Any, wanted: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("to", FORMATS)
 @pytest.mark.parametrize("case", CASES)
-def test_the_rows_of_the_file_come_back(tmp_path: Path, case: str, to: Format) -> None:
+def test_the_rows_of_the_file_come_back(made: Made, tmp_path: Path, case: str, to: Format) -> None:
     if to == "csv" and case not in KEPT_BY_CSV:
         pytest.skip("a CSV does not tell it")
-    run = made(tmp_path, case)
+    run = made(case)
     found = again(tmp_path, run, "file", to)
     one, other = found.log, run.log
     for name in ("q", "t_ns", "qd", "qdd", "tcp_position", "tcp_rotation"):
@@ -132,8 +142,8 @@ def test_the_rows_of_the_file_come_back(tmp_path: Path, case: str, to: Format) -
 @pytest.mark.slow
 @pytest.mark.parametrize("to", FORMATS)
 @pytest.mark.parametrize("case", CASES)
-def test_the_grid_comes_back(tmp_path: Path, case: str, to: Format) -> None:
-    run = made(tmp_path, case)
+def test_the_grid_comes_back(made: Made, tmp_path: Path, case: str, to: Format) -> None:
+    run = made(case)
     found = again(tmp_path, run, "grid", to)
     for name in ("q", "t_ns", "tcp_recorded"):
         same(getattr(found, name), getattr(run, name))
@@ -149,8 +159,8 @@ def test_the_grid_comes_back(tmp_path: Path, case: str, to: Format) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
-def test_tables_of_results_come_back(tmp_path: Path, case: str) -> None:
-    run = made(tmp_path, case)
+def test_tables_of_results_come_back(made: Made, tmp_path: Path, case: str) -> None:
+    run = made(case)
     log = urmpipe.ingest(run.log.to_frame(), run.robot)
     same(log.log.q, run.log.q)
     same(log.log.t_ns, run.log.t_ns)
@@ -195,8 +205,8 @@ def test_logs_of_other_programs_come_back(tmp_path: Path, name: str, to: Format)
     same(log.tcp_rotation, run.log.tcp_rotation)
 
 
-def test_a_grid_with_another_column_is_read_by_what_is_ours(tmp_path: Path) -> None:
-    run = made(tmp_path, "pose")
+def test_a_grid_with_another_column_is_read_by_what_is_ours(made: Made, tmp_path: Path) -> None:
+    run = made("pose")
     urmpipe.export(run, tmp_path / "grid.csv")
     frame = pd.read_csv(tmp_path / "grid.csv").assign(load=1.0)
     found = urmpipe.ingest(frame, "ur5e")
