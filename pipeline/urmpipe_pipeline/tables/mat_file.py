@@ -10,6 +10,7 @@ import numpy as np
 
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_models.messages import Hint
+from urmpipe_pipeline.isolated import believe
 from urmpipe_pipeline.outputs import EXPORT_HEADER
 
 DESCRIPTION = 116
@@ -36,7 +37,9 @@ def write_mat(name: str, fields: Mapping[str, Any], path: Path, target: Path) ->
     savemat(path, {name: struct}, appendmat=False, oned_as="column", long_field_names=True)
     with path.open("r+b") as file:
         file.write(f"MATLAB 5.0 MAT-file, {EXPORT_HEADER}".encode().ljust(DESCRIPTION))
-    return differences(name, struct, path)
+    found = differences(name, struct, path)
+    believe(path)
+    return found
 
 
 def cells(items: Sequence[Any]) -> np.ndarray[tuple[int, int], np.dtype[np.object_]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
@@ -175,6 +176,17 @@ def test_tables_of_results_come_back(made: Made, tmp_path: Path, case: str) -> N
         ):
             for name in ("q", "qd", "qdd", "t_ns"):
                 same(getattr(found, name), getattr(run, name))
+
+
+@pytest.mark.slow
+def test_a_mat_file_of_another_process_is_the_same(made: Made, tmp_path: Path) -> None:
+    written = tmp_path / "log.mat"
+    urmpipe.export(made("dates"), written, rows="file")
+    copy = shutil.copy(written, tmp_path / "copy.mat")  # read in a process of its own
+    one, other = urmpipe.ingest(copy).log, urmpipe.ingest(written).log
+    same(one.q, other.q)
+    same(one.t_ns, other.t_ns)
+    assert (one.clock_start_ns, one.joints) == (other.clock_start_ns, other.joints)
 
 
 @pytest.mark.slow
