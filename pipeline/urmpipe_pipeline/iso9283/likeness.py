@@ -55,14 +55,15 @@ def apart(first: FloatArray, second: FloatArray) -> float:
     n, m = len(first), len(second)
     square = (first**2).sum(axis=1)[:, np.newaxis] + (second**2).sum(axis=1) - 2.0 * first @ second.T
     distance = np.sqrt(np.maximum(square, 0.0))
+    backwards = distance[:, ::-1]
     before = np.full(n + 1, np.inf)  # of the diagonal i + j - 2, by i + 1
     last = np.full(n + 1, np.inf)
     last[1] = distance[0, 0]
     for diagonal in range(1, n + m - 1):
-        i = np.arange(max(0, diagonal - m + 1), min(n, diagonal + 1))
-        reach = np.minimum(np.minimum(before[i], last[i]), last[i + 1])
+        low, end = max(0, diagonal - m + 1), min(n, diagonal + 1)
+        reach = np.minimum(np.minimum(before[low:end], last[low:end]), last[low + 1 : end + 1])
         now = np.full(n + 1, np.inf)
-        now[i + 1] = np.maximum(distance[i, diagonal - i], reach)
+        now[low + 1 : end + 1] = np.maximum(backwards.diagonal(m - 1 - diagonal), reach)
         before, last = last, now
     return float(last[n])
 
