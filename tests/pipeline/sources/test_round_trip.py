@@ -82,7 +82,7 @@ def tables(draw: st.DrawFn) -> Written:
 
 
 @pytest.mark.slow
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(tables())
 def test_tables_come_back_as_they_were(table: Written) -> None:
     with tempfile.TemporaryDirectory() as folder:
