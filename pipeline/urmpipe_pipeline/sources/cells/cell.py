@@ -9,6 +9,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from decimal import ROUND_HALF_EVEN, Decimal, DecimalException
 from functools import lru_cache
+from itertools import repeat
 
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
@@ -79,6 +80,11 @@ def is_missing(cell: str) -> bool:
 def is_number(cell: str, decimal: str) -> bool:
     """Return whether a cell is a number with this decimal sign (infinities included)."""
     return bool(_number_pattern(decimal).match(cell) or _INFINITE.match(cell))
+
+
+def count_numbers(cells: Iterable[str], decimal: str) -> int:
+    """Return how many cells are numbers with this decimal sign."""
+    return sum(map(is_number, cells, repeat(decimal)))
 
 
 def is_text(cell: str, decimal: str) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_models.messages import Hint
-from urmpipe_pipeline.sources.cells.cell import is_missing, is_number
+from urmpipe_pipeline.sources.cells.cell import count_numbers, is_missing
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.limits import refuse_wide
 from urmpipe_pipeline.sources.tables.numbers import capped
@@ -256,6 +256,6 @@ def _alike(one: Column, other: Column) -> bool:
 
 
 def _holds_text(cells: Sequence[str], decimal: str) -> bool:
-    """Return whether most cells with content are neither numbers nor missing."""
+    """Return whether less than half of the cells with content are numbers."""
     cells = [cell for cell in cells if not is_missing(cell)]
-    return 2 * sum(not is_number(cell, decimal) for cell in cells) > len(cells)
+    return 2 * count_numbers(cells, decimal) < len(cells)

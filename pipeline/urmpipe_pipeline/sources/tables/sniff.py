@@ -17,6 +17,7 @@ from urmpipe_pipeline.sources.cells.cell import (
     DECIMALS,
     DELIMITERS,
     SPACE,
+    count_numbers,
     count_up,
     is_missing,
     is_number,
@@ -111,7 +112,8 @@ class Layout:
 
     def number_texts(self, column: int) -> Iterator[str]:
         """Yield the sampled numbers of a column, as Python spells them."""
-        return (plain(cell, self.decimal) for cell in self.cells(column) if is_number(cell, self.decimal))
+        cells = (row[column] for row in self.sample if column < len(row))
+        return (plain(cell, self.decimal) for cell in cells if is_number(cell, self.decimal))
 
     def numbers(self, column: int) -> list[float]:
         """Return the sampled numbers of a column, without those that are infinite."""
@@ -246,7 +248,7 @@ def _parts_words(lines: Sequence[str], best: _Style, style: _Style) -> bool:
     if (best.delimiter, style.delimiter) != ("\t", SPACE) or not _credit(best)[0]:
         return False
     with_tabs, with_spaces = (
-        sum(is_number(cell, one.decimal) for line in lines for cell in split_line(line, one.delimiter))
+        sum(count_numbers(split_line(line, one.delimiter), one.decimal) for line in lines)
         for one in (best, style)
     )
     return with_spaces <= with_tabs
@@ -257,7 +259,7 @@ def _fit(rows: Sequence[Row], width: int, decimal: str) -> float:
 
     A date or a time counts as a number: 0.005 sec and 2021-04-11 22:27:21 are one cell.
     """
-    full = [row for row in rows if len(row) == width and any(is_number(cell, decimal) for cell in row)]
+    full = [row for row in rows if len(row) == width and count_numbers(row, decimal)]
     cells = [cell for row in full for cell in row if not is_missing(cell)]
     numbers = sum(len(cell) for cell in cells if is_number(cell, decimal) or looks_like_a_clock(cell))
     return len(full) / len(rows) * numbers / sum(map(len, cells)) if full else 0.0
@@ -283,7 +285,7 @@ def _common_width(rows: Sequence[Row], decimal: str) -> int:
     """Return the width of most rows, each counted as often as it has numbers."""
     widths: Counter[int] = Counter()
     for row in rows:
-        widths[len(row)] += sum(is_number(cell, decimal) for cell in row)
+        widths[len(row)] += count_numbers(row, decimal)
     return widths.most_common(1)[0][0] if widths else 0
 
 
@@ -291,7 +293,7 @@ def _numeric_columns(rows: Sequence[Row], width: int, decimal: str) -> list[int]
     """Return the columns in which at least half of the cells with content are numbers."""
     full = [row for row in rows if len(row) == width]
     columns = ([row[column] for row in full if not is_missing(row[column])] for column in range(width))
-    numbers = [(sum(is_number(cell, decimal) for cell in cells), len(cells)) for cells in columns]
+    numbers = [(count_numbers(cells, decimal), len(cells)) for cells in columns]
     return [column for column, (count, of) in enumerate(numbers) if count and 2 * count >= of]
 
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray
-from urmpipe_pipeline.sources.cells.cell import is_missing, is_number
+from urmpipe_pipeline.sources.cells.cell import count_numbers, is_missing
 from urmpipe_pipeline.sources.tables.numbers import ClockColumn, Numbers
 from urmpipe_pipeline.sources.tables.padding import end_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -33,7 +33,7 @@ class Whole:
 
         def holds(column: int) -> bool:
             cells = [cell for cell in layout.cells(column) if not is_missing(cell)]
-            return 2 * sum(is_number(cell, layout.decimal) for cell in cells) >= len(cells) > 0
+            return 2 * count_numbers(cells, layout.decimal) >= len(cells) > 0
 
         return tuple(column for column in range(len(layout.names)) if holds(column))
 
