@@ -40,9 +40,10 @@ def dates_in_digits(columns: Sequence[Column], layout: Layout) -> Chosen | None:
 
 def all_are(form: Form, column: Column, layout: Layout) -> bool:
     """Return whether all sampled cells of a column, and one at least, are times of a form."""
-    written = (cell for cell in layout.cells(column.index) if not is_missing(cell))
     if form in IN_DIGITS and not column.text:
-        written = map(in_digits, layout.number_texts(column.index))
+        written = (in_digits(cell) for cell in layout.number_texts(column.index))
+    else:
+        written = (cell for cell in layout.cells(column.index) if not is_missing(cell))
     first = next(written, None)
     if first is None or not form.pattern.match(first):
         return False
