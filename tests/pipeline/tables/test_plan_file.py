@@ -44,22 +44,21 @@ def test_joints_called_as_the_tool_keep_their_names(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PATHS)
-@pytest.mark.parametrize("robot", [True, False])
-def test_ingest_reads_it_bit_by_bit_without_a_warning(name: str, robot: bool, tmp_path: Path) -> None:
+def test_ingest_reads_it_bit_by_bit_without_a_warning(name: str, tmp_path: Path) -> None:
     plan = planned(name, tmp_path / "plan.csv")
     arm = there(plan.robot)
-    run = ingest_log([there(plan.log)], robot=arm if robot else None)
-    assert [str(warning) for warning in run.warnings] == []
-    assert run.log.joints == arm.coordinates
-    assert run.log.q.tolist() == there(plan.joints).q.tolist()
-    assert run.log.t_ns.tolist() == plan.t_ns.tolist() == (np.arange(len(plan)) * 5_000_000).tolist()
-    assert there(run.log.tcp_position).tolist() == plan.position.tolist()
-    assert (run.log.tcp_rotation is None) == (plan.quat_xyzw is None)
-    if plan.quat_xyzw is not None:
-        # A norm of 1 is rounded once more.
-        np.testing.assert_allclose(there(run.log.tcp_quat_xyzw), plan.quat_xyzw, rtol=0, atol=1e-15)
-    known = arm if robot else load_robot(arm.name) if arm.name in INFERRED else None
-    assert run.robot == known
+    for given, known in ((arm, arm), (None, load_robot(arm.name) if arm.name in INFERRED else None)):
+        run = ingest_log([there(plan.log)], robot=given)
+        assert [str(warning) for warning in run.warnings] == []
+        assert run.log.joints == arm.coordinates
+        assert run.log.q.tolist() == there(plan.joints).q.tolist()
+        assert run.log.t_ns.tolist() == plan.t_ns.tolist() == (np.arange(len(plan)) * 5_000_000).tolist()
+        assert there(run.log.tcp_position).tolist() == plan.position.tolist()
+        assert (run.log.tcp_rotation is None) == (plan.quat_xyzw is None)
+        if plan.quat_xyzw is not None:
+            # A norm of 1 is rounded once more.
+            np.testing.assert_allclose(there(run.log.tcp_quat_xyzw), plan.quat_xyzw, rtol=0, atol=1e-15)
+        assert run.robot == known
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 100.0])
