@@ -243,6 +243,8 @@ def _compiled(pattern: str) -> re.Pattern[str]:
 FORMS: Sequence[Form] = (*_dates(), *_times())
 """All forms, the usual ones first."""
 
+_PATTERNS = tuple(dict.fromkeys(form.pattern for form in FORMS))  # some forms differ in what they mean alone
+
 
 _DENSE_TAIL = r"(?:[.,](?P<decimals>\d{1,9})|(?P<count>\d{3}|\d{6}))?"
 
@@ -300,4 +302,4 @@ def looks_like_a_clock(cell: str) -> bool:
         return False
     if any(is_number(cell, decimal) for decimal in DECIMALS):
         return False
-    return any(form.pattern.match(cell) for form in FORMS)
+    return any(pattern.match(cell) for pattern in _PATTERNS)
