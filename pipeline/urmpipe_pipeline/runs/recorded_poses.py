@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -98,7 +99,13 @@ class RecordedPoses:
             robot: The arm.
             q: Other joint values in [rad] or [m], shape (n, joints).
         """
-        return tool_fit(*poses_over_log(robot, self.q if q is None else q), self.position)
+        return self.fits(robot, [self.q if q is None else q])[0]
+
+    def fits(self, robot: Chain, every: Sequence[FloatArray]) -> list[Fit]:
+        """Return the same of several joint values, shape (n, joints) each, all of them computed at once."""
+        position, rotation = poses_over_log(robot, np.concatenate(every))
+        parts = zip(np.split(position, len(every)), np.split(rotation, len(every)), strict=True)
+        return [tool_fit(*part, self.position) for part in parts]
 
     def apart(self, robot: Chain, q: FloatArray | None = None, *, tool: bool) -> Apart:
         """Return how far an arm stays from the poses, perhaps but for the constant tool that fits best.

@@ -174,11 +174,13 @@ def _clearly_nearer(robot: Chain, log: JointLog, poses: RecordedPoses, own: Apar
     moves = np.isfinite(poses.fit(robot).with_tool)
     most = EXPLAINED * extent(poses.position) if moves else CLOSE_WITH_TOOL
     count = len(log.joints)
-    edits = [*robot_edits(robot), *sign_edits(count, most=1), *swap_edits(count)]
-    every = [_with(edit, robot, log, poses) for (edit,) in edits]
+    others = [_with(edit, robot, log, poses) for (edit,) in robot_edits(robot)]
     if moves and own.distance > FAR:  # less of it a base explains by chance
-        every.append(_other_base(robot, poses))
-    near = [one for one in every if _distance(poses.fit(one.robot, one.q)) <= most]
+        others.append(_other_base(robot, poses))
+    edits = (*sign_edits(count, most=1), *swap_edits(count))
+    edited = [_with(edit, robot, log, poses) for (edit,) in edits]
+    fits = [poses.fit(one.robot) for one in others] + poses.fits(robot, [one.q for one in edited])
+    near = [one for one, fit in zip(others + edited, fits, strict=True) if _distance(fit) <= most]
     found = [one._replace(apart=poses.apart(one.robot, one.q, tool=True)) for one in near]
     found = sorted((o for o in found if o.apart.clearly_nearer(own)), key=lambda o: o.apart.distance)
     like_best = [one for one in found if not found[0].apart.clearly_nearer(one.apart)]
