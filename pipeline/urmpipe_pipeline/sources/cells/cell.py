@@ -24,7 +24,7 @@ COARSE_DIGITS = 6
 
 
 _CELLS = 1 << 14
-"""What so many cells are is kept: each of a file's head is looked at again and again."""
+"""Of so many is kept whether they are numbers: each of a file's head is asked about again and again."""
 
 
 @lru_cache
@@ -70,7 +70,6 @@ def printable(text: str) -> str:
     return "".join(sign if sign.isprintable() else "?" for sign in text)
 
 
-@lru_cache(_CELLS)
 def is_missing(cell: str) -> bool:
     """Return whether a cell says that there is no sample: empty, Null, NaN, ..."""
     return cell.lower() in vocabulary().missing
@@ -97,7 +96,6 @@ def plain(cell: str, decimal: str) -> str:
     return cell.replace(decimal, ".").replace("d", "e").replace("D", "e")
 
 
-@lru_cache(_CELLS)
 def to_float(cell: str, decimal: str) -> float | None:
     """Return a cell's value, NaN for a missing sample, None for text."""
     if _number_pattern(decimal).match(cell):

@@ -10,6 +10,7 @@ from typing import TypeAlias
 from urmpipe_models.errors import Finding, OptionError, for_each, shown
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import OWN, Inference
+from urmpipe_pipeline.sources.cells.cell import is_number
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables import coppeliasim
 from urmpipe_pipeline.sources.tables.arrays import sniff_arrays
@@ -79,6 +80,7 @@ def open_tables(files: Sequence[Path | Held], options: ReadOptions, sniff_plain:
     if options.source is not None and options.source not in source_names():
         found, allowed = shown(options.source), ", ".join(source_names())
         raise OptionError(Finding(parameter="source", found=found, allowed=allowed))
+    is_number.cache_clear()  # cells of other logs, which may be long
     opened = for_each(lambda one: _opened(one, options), files)
     texts = [one for one in opened if isinstance(one, Segment)]
     markers = for_each(refuse_conflict, texts)
