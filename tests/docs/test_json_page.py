@@ -15,7 +15,7 @@ import pytest
 
 import urmpipe
 from diagnoses import diagnosis_of
-from pages import lay_repeated
+from pages import lay, repeated_files
 from urmpipe.main import COMMANDS, cli, run
 from urmpipe_datasets import LOGS
 from urmpipe_models.inverse.targets import targets_of
@@ -84,7 +84,7 @@ def test_each_key_of_a_diagnosis_is_named() -> None:
 
 @pytest.mark.slow
 def test_each_key_of_a_test_after_iso_9283_is_named(tmp_path: Path) -> None:
-    lay_repeated(tmp_path)
+    lay(tmp_path, repeated_files())
     before = urmpipe.compare(tmp_path / "square.csv", tmp_path / "test.csv", iso=True)
     result = urmpipe.compare(tmp_path / "square.csv", tmp_path / "test.csv", iso=True, baseline=before)
     found = result.to_dict()

@@ -8,6 +8,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
+from functools import cache
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
@@ -85,33 +86,49 @@ def _while_indented(lines: list[str]) -> Iterator[str]:
         yield line[4:]
 
 
-EVERY = 4
-"""Of so many rows of a bundled log one is laid: of 7400, 1800 go through a command as well, and sooner."""
+EVERY = 8
+"""Of so many rows of a bundled log one is laid: of 7400, 900 go through a command as well, and sooner."""
 
 
 def lay_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Make a folder the working one, with the files that pages name."""
     monkeypatch.chdir(folder)
+    lay(folder, files_of_pages() | repeated_files())
+
+
+def lay(folder: Path, files: dict[str, str]) -> None:
+    """Write files into a folder."""
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+@cache
+def files_of_pages() -> dict[str, str]:
+    """Return the files that pages name, other than those of repeated motion, by their names."""
     named = {"coppelia": "coppeliasim", "path": "path", **dict.fromkeys(("log", "a", "b", "other"), "matlab")}
-    for name, source in named.items():
-        lines = (LOGS / f"{source}.csv").read_text(encoding="utf-8").splitlines(keepends=True)
-        head = next(i for i, line in enumerate(lines) if line[0].isdigit())
-        (folder / f"{name}.csv").write_text("".join([*lines[:head], *lines[head::EVERY]]), encoding="utf-8")
-    (folder / "targets.csv").write_text("x,y,z,rz,ry,rx\n0.1,0.05,0.25,0.3,0.4,0.1\n0,0,0.3,0,0,0\n")
-    (folder / "contour.csv").write_text("x,y,z,corner_r\n0.4,0.1,0.3,\n0.5,0.1,0.3,0.02\n0.5,-0.1,0.3,\n")
-    (folder / "poses.csv").write_text("x,y,z,qx,qy,qz,qw\n0.4,0.1,0.3,1,0,0,0\n")
-    (folder / "other.toml").write_text('robot = "urm6"\n')
-    for name in ("robot_data", "monday", "tracker"):
-        (folder / f"{name}.csv").write_text(rtde_log(), encoding="utf-8")
-    (folder / "my_unit.py").write_bytes((DOCS / "examples" / "low_pass.py").read_bytes())
-    (folder / "arm.urdf").write_text("\n".join(snippets("docs/robots.md", "xml")), encoding="utf-8")
-    (folder / "my-arm.toml").write_text(snippets("docs/robots.md", "toml")[0], encoding="utf-8")
-    (folder / "planar.toml").write_text(snippets("docs/dynamics.md", "toml")[0], encoding="utf-8")
-    for name, text in zip(("boom", "five-bar", "door"), snippets("docs/networks.md", "toml"), strict=True):
-        (folder / f"{name}.toml").write_text(text, encoding="utf-8")
-    system = next(one for one in snippets("docs/simulate.md", "toml") if one.startswith("[system]"))
-    (folder / "my-system.toml").write_text(system, encoding="utf-8")
-    lay_repeated(folder)
+    networks = zip(("boom", "five-bar", "door"), snippets("docs/networks.md", "toml"), strict=True)
+    systems = snippets("docs/simulate.md", "toml")
+    return {
+        **{f"{name}.csv": _thinned(LOGS / f"{source}.csv") for name, source in named.items()},
+        **dict.fromkeys(("robot_data.csv", "monday.csv", "tracker.csv"), rtde_log()),
+        "targets.csv": "x,y,z,rz,ry,rx\n0.1,0.05,0.25,0.3,0.4,0.1\n0,0,0.3,0,0,0\n",
+        "contour.csv": "x,y,z,corner_r\n0.4,0.1,0.3,\n0.5,0.1,0.3,0.02\n0.5,-0.1,0.3,\n",
+        "poses.csv": "x,y,z,qx,qy,qz,qw\n0.4,0.1,0.3,1,0,0,0\n",
+        "other.toml": 'robot = "urm6"\n',
+        "my_unit.py": text_of("docs/examples/low_pass.py"),
+        "arm.urdf": "\n".join(snippets("docs/robots.md", "xml")),
+        "my-arm.toml": snippets("docs/robots.md", "toml")[0],
+        "planar.toml": snippets("docs/dynamics.md", "toml")[0],
+        **{f"{name}.toml": text for name, text in networks},
+        "my-system.toml": next(one for one in systems if one.startswith("[system]")),
+    }
+
+
+def _thinned(log: Path) -> str:
+    """Return the header of a log, and some of its rows."""
+    lines = log.read_text(encoding="utf-8").splitlines(keepends=True)
+    head = next(i for i, line in enumerate(lines) if line[0].isdigit())
+    return "".join([*lines[:head], *lines[head::EVERY]])
 
 
 SQUARE = np.array([[0.4, -0.1, 0.3], [0.6, -0.1, 0.3], [0.6, 0.1, 0.3], [0.4, 0.1, 0.3], [0.4, -0.1, 0.3]])
@@ -124,15 +141,18 @@ SPAN = 0.4
 """Length of the path from rest to rest in [m]."""
 
 
-def lay_repeated(folder: Path) -> None:
-    """Write a path round a square, logs in which it is repeated, and poses that were measured 30 times."""
-    (folder / "square.csv").write_text(table_of(around(1, 150)[1], timed=True), encoding="utf-8")
-    (folder / "square-rows.csv").write_text(snippets("docs/iso.md", "csv")[0], encoding="utf-8")
-    for name, cycles, seed in (("test", 10, 0), ("run1", 1, 1), ("run2", 1, 2), ("run3", 1, 3)):
-        (folder / f"{name}.csv").write_text(table_of(repeated(cycles, seed), timed=True), encoding="utf-8")
+@cache
+def repeated_files() -> dict[str, str]:
+    """Return a path round a square, logs in which it is repeated, and poses that were measured 30 times."""
     visits = np.tile(MARKS, (30, 1)) + np.random.default_rng(4).normal([2e-4, -1e-4, 5e-5], 3e-5, (150, 3))
-    (folder / "marks.csv").write_text(table_of(MARKS), encoding="utf-8")
-    (folder / "visits.csv").write_text(table_of(visits), encoding="utf-8")
+    runs = (("test", 10, 0), ("run1", 1, 1), ("run2", 1, 2), ("run3", 1, 3))
+    return {
+        "square.csv": table_of(around(1, 150)[1], timed=True),
+        "square-rows.csv": snippets("docs/iso.md", "csv")[0],
+        **{f"{name}.csv": table_of(repeated(cycles, seed), timed=True) for name, cycles, seed in runs},
+        "marks.csv": table_of(MARKS),
+        "visits.csv": table_of(visits),
+    }
 
 
 def around(cycles: int, steady: int) -> tuple[FloatArray, FloatArray]:
