@@ -166,4 +166,4 @@ def test_arguments_of_a_system_may_be_paths_and_numbers() -> None:
     with pytest.raises(
         urmpipe.UrmpipeError, match=r"^log-to-delta\.toml:\d+: blocks\.log: missing\.csv: found no"
     ):
-        urmpipe.simulate("log-to-delta", arguments=given)
+        urmpipe.simulate("log-to-delta", arguments=given, backend="python")
