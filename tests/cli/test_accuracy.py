@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import urmpipe
+from flat_arm import ARM, MASSES, drive, lay_flat_arm
 from urmpipe.driven_runs.running_speed import Within, running_speed
 from urmpipe.main import run
 from urmpipe_models.planning.cube import cube_rows
@@ -82,51 +83,15 @@ def test_the_log_of_a_plan_is_no_path(
     assert capsys.readouterr().err == said
 
 
-ARM = """
-name = "flat"
-kind = "joints"
-start = [0.5, 1.0]
-tip = { steps = [{ along = "x", value = 0.4 }] }
-
-[[joints]]
-name = "a"
-
-[[joints]]
-name = "b"
-origin = { steps = [{ along = "x", value = 0.5 }] }
-"""
-
-MASSES = "".join(
-    f"""
-[[inertials]]
-joint = "{joint}"
-mass = 2.0
-centre = [0.2, 0, 0]
-inertia = [0.01, 0.05, 0.05, 0, 0, 0]
-source = "made up"
-"""
-    for joint in "ab"
-)
-
-
-def drive(joint: str, gain: float = 7.5) -> str:
-    """Return the drive of a joint."""
-    return (
-        f"\n[drives.{joint}]\nk = 2500.0\nl = 5.0\ni_p = 100\nC = 0.05\nR = 0.5\nL = 0.001\nI1 = 0.5\n"
-        f"period = 0.005\nKphi = {gain}\nKw = 0.75\nKeps = 0.01\nu_max = 48.0\n"
-    )
-
-
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a short path and an arm."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "path.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.4995,0\n")
-    (tmp_path / "arm.toml").write_text(ARM + MASSES + drive("a") + drive("b"))
+    lay_flat_arm(tmp_path)
     return tmp_path
 
 
-GIVEN = ("accuracy", "--robot", "arm.toml", "--path", "path.csv", "--backend", "python", "--json")
+GIVEN = ("accuracy", "--robot", "arm.toml", "--path", "short.csv", "--backend", "python", "--json")
 
 
 @pytest.mark.slow
@@ -134,7 +99,7 @@ def test_errors_of_the_command_and_of_the_call(folder: Path, capsys: Captured) -
     assert run([*GIVEN, "--velocities", "0.05,0.025"]) == 0
     printed = capsys.readouterr()
     assert printed.err == "note: the arm runs in NumPy, some hundred times slower than machine code\n"
-    result = urmpipe.accuracy("path.csv", "arm.toml", velocities=[0.05, 0.025, 0.05], backend="python")
+    result = urmpipe.accuracy("short.csv", "arm.toml", velocities=[0.05, 0.025, 0.05], backend="python")
     assert [one.velocity for one in result.errors] == [0.05, 0.025]
     assert result.verdict is None
     errors = result.to_dict()["errors"]
@@ -172,7 +137,7 @@ def test_the_error_that_decides_is_chosen_and_a_cube_is_its_rows(capsys: Capture
 
 @pytest.mark.slow
 def test_an_arm_that_diverges(folder: Path, capsys: Captured) -> None:
-    (folder / "path.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.499,0\n")
+    (folder / "short.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.499,0\n")
     strong = drive("a", -7500.0).replace("u_max = 48.0", "u_max = 4.8e6")  # it diverges at once
     (folder / "arm.toml").write_text(ARM + MASSES + strong + drive("b"))
     assert run([*GIVEN, "--velocities", "0.01", "--limit", "1mm"]) == 1
@@ -206,10 +171,10 @@ def test_each_joint_needs_a_drive_or_a_spring_and_one_a_drive(folder: Path, caps
 
 
 def test_a_path_out_of_reach_and_a_recording_are_refused(folder: Path, capsys: Captured) -> None:
-    (folder / "path.csv").write_text("x,y,z\n0.5,0.5,0\n1.5,0.5,0\n")
+    (folder / "short.csv").write_text("x,y,z\n0.5,0.5,0\n1.5,0.5,0\n")
     assert run([*GIVEN[:-1]]) == 2
     (far,) = capsys.readouterr().err.splitlines()
-    assert far.startswith("error: path.csv:3: found (1.5, 0.5, 0) m, 0.681 m out of reach of flat,")
+    assert far.startswith("error: short.csv:3: found (1.5, 0.5, 0) m, 0.681 m out of reach of flat,")
     (folder / "path.csv").write_text("x,y,z\n0.5,0.5,0\n0.5,0.4,0\n")
     assert run(["plan", "path.csv", "-o", "plan.rrd", "-q"]) == 0
     capsys.readouterr()

@@ -15,6 +15,7 @@ import pytest
 
 import urmpipe
 from diagnoses import diagnosis_of
+from flat_arm import lay_flat_arm
 from pages import lay, repeated_files
 from urmpipe.main import COMMANDS, cli, run
 from urmpipe_datasets import LOGS
@@ -108,8 +109,7 @@ def test_each_key_of_a_simulation_is_named() -> None:
 
 
 CALLS = {
-    "accuracy accuracy": "accuracy --path cube:wall,a=1e-4,r=0,x=1.7,y=0,z=1 --robot irb60 --velocities 0.5"
-    " --backend python",
+    "accuracy accuracy": "accuracy --path short.csv --robot arm.toml --velocities 0.05 --backend python",
     "compare compare": "compare path.csv log.csv --robot urm6",
     "diagnose diagnose": "diagnose path.csv log.csv --robot urm6",
     "export export": "export log.rrd -o log.parquet",
@@ -140,6 +140,7 @@ def test_each_key_of_each_command_is_named(
     for name, source in (("log", "matlab"), ("path", "path")):
         head = (LOGS / f"{source}.csv").read_text(encoding="utf-8").splitlines()[:31]
         (tmp_path / f"{name}.csv").write_text("\n".join(head) + "\n", encoding="utf-8")
+    lay_flat_arm(tmp_path)
     rod = 'kind = "joints"\njoints = [{ name = "a" }]\ninertials = [{ joint = "a", mass = 1 }]\n'
     (tmp_path / "rod.toml").write_text(rod, encoding="utf-8")
     for call in sorted(CALLS.values(), key=lambda one: not one.startswith(("ingest", "fmu build"))):

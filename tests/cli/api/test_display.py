@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 
 import urmpipe
 from diagnoses import diagnosis_of
+from flat_arm import lay_flat_arm
 from urmpipe_datasets import LOGS
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.chains.inertial import Inertial
@@ -39,6 +40,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     for name in ("matlab", "path"):
         head = (LOGS / f"{name}.csv").read_text(encoding="utf-8").splitlines()[:101]
         (folder / f"{name}.csv").write_text("\n".join(head) + "\n", encoding="utf-8")
+    lay_flat_arm(folder)
     run = replace(urmpipe.ingest(folder / "matlab.csv", "urm6"), name="<b>&log")
     comparison = urmpipe.compare(folder / "path.csv", run)
     simulation = Simulation(
@@ -52,7 +54,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         urmpipe.equations(pendulum()),
         urmpipe.build_fmu("dc_drive", backend="python", output=folder),
         urmpipe.plan("cube:wall,a=0.2,r=0.02,x=0.5,y=0,z=0.3", "ur5e"),
-        urmpipe.accuracy("cube:wall,a=0.0001,r=0,x=1.7,y=0,z=1", "irb60", velocities=[0.5], backend="python"),
+        urmpipe.accuracy(folder / "short.csv", folder / "arm.toml", velocities=[0.05], backend="python"),
         urmpipe.load_network("four-bar"), urmpipe.network_check("four-bar"),
         urmpipe.export(run, folder / "log.csv"), urmpipe.report([run], folder / "report.html"),
     ]  # fmt: skip
