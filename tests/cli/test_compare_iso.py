@@ -361,9 +361,8 @@ def test_a_plan_gives_its_corners_stops_and_speed() -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(bool(native_missing(())), reason=f"runs native FMUs: {native_missing(())}")
 def test_repeated_logs_of_simulate_come_through() -> None:
-    found = [urmpipe.simulate("driven-arm", step=5e-4) for _ in range(3)]
-    arm, values = load_robot("ur3"), [one.signal("arm.phi").values for one in found]
-    many = [joint_log(Path(f"s{k}.csv"), arm, one) for k, one in enumerate(values)]
+    arm, values = load_robot("ur3"), urmpipe.simulate("driven-arm", step=5e-4).signal("arm.phi").values
+    many = [joint_log(Path(f"s{k}.csv"), arm, values) for k in range(3)]
     test = told_by(many[0], many, robot="ur3")
     told = overall(test)
     assert len(test.cycles) == 3
