@@ -1,4 +1,4 @@
-"""ingest, compare, report and demo as a user runs them."""
+"""ingest, compare and report as a user runs them."""
 
 from __future__ import annotations
 
@@ -207,41 +207,6 @@ def test_bad_input_is_named_by_line_and_column_and_outputs_stay(
     error = json.loads(ran.out)["errors"][0]
     assert (error["row"], error["column"]) == (5, column)
     assert (tmp_path / "run.rrd").read_bytes() == before
-
-
-@pytest.mark.slow
-def test_the_demo_goes_the_whole_way(urmpipe: RunCommand, tmp_path: Path) -> None:
-    ran = urmpipe("demo", "--json")
-    assert ran.code == 0, ran.err
-    answer = json.loads(ran.out)
-    assert answer["as_expected"] is True
-    verdicts = {run["name"]: run["verdict"] for run in answer["runs"]}
-    assert verdicts == {
-        "coppeliasim": "pass",
-        "matlab": "pass",
-        "solidworks": "pass",
-        "counter_rotating": "fail",
-    }
-    folder = tmp_path / "urmpipe-demo"
-    assert files_in(folder) == [
-        "coppeliasim.rrd", "counter_rotating.rrd", "demo.rrd", "matlab.rrd", "report.html", "solidworks.rrd",
-    ]  # fmt: skip
-    assert (folder / "report.html").stat().st_size < 15e6
-    again = urmpipe("demo")
-    assert again.code == 0
-    assert again.out.startswith("Four logs of one motion. Three should pass. ")
-    *_, as_expected, more, first, second, third, fourth, logs, report, recording = again.out.splitlines()
-    assert as_expected.startswith("All verdicts are as expected: ")
-    assert more == "counter-rotating module does not. Why each log deviates:"
-    assert [one.split(":")[0].strip() for one in (first, second, third)] == [
-        "coppeliasim",
-        "matlab",
-        "solidworks",
-    ]
-    assert fourth == "  counter_rotating: module 3 (phi3) counter-rotates: rms 416.57 mm -> 0.0001 mm"
-    assert logs == f"Logs:      {LOGS}  (try the commands with them)"
-    assert report == f"Report:    {Path('urmpipe-demo', 'report.html')}  (open it in any browser)"
-    assert recording.startswith(f"Recording: {Path('urmpipe-demo', 'demo.rrd')}  (open it: ")
 
 
 @pytest.mark.slow

@@ -109,7 +109,7 @@ def files_of_pages() -> dict[str, str]:
     networks = zip(("boom", "five-bar", "door"), snippets("docs/networks.md", "toml"), strict=True)
     systems = snippets("docs/simulate.md", "toml")
     return {
-        **{f"{name}.csv": _thinned(LOGS / f"{source}.csv") for name, source in named.items()},
+        **{f"{name}.csv": thinned(LOGS / f"{source}.csv") for name, source in named.items()},
         **dict.fromkeys(("robot_data.csv", "monday.csv", "tracker.csv"), rtde_log()),
         "targets.csv": "x,y,z,rz,ry,rx\n0.1,0.05,0.25,0.3,0.4,0.1\n0,0,0.3,0,0,0\n",
         "contour.csv": "x,y,z,corner_r\n0.4,0.1,0.3,\n0.5,0.1,0.3,0.02\n0.5,-0.1,0.3,\n",
@@ -124,7 +124,7 @@ def files_of_pages() -> dict[str, str]:
     }
 
 
-def _thinned(log: Path) -> str:
+def thinned(log: Path) -> str:
     """Return the header of a log, and some of its rows."""
     lines = log.read_text(encoding="utf-8").splitlines(keepends=True)
     head = next(i for i, line in enumerate(lines) if line[0].isdigit())
