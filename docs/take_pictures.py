@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,16 +34,25 @@ SETTLE = 12.0
 """Time in [s] that the viewer has to load and to draw: no event tells when it has."""
 
 
-def of_recording(source: Path, target: Path, at: float | None, settle: float = SETTLE) -> list[str]:
-    """Picture a recording without a window, at a time in [s] or where `view` opens it; return complaints."""
+def of_recording(
+    source: Path, target: Path, at: float | None, done: Callable[[], bool] = lambda: False
+) -> list[str]:
+    """Picture a recording without a window, at a time in [s] or where `view` opens it; return complaints.
+
+    It pictures it every second, until a function finds the picture done or the viewer has had its time.
+    """
     from urmpipe_pipeline.recording.store import TIME, Opening
     from urmpipe_pipeline.recording.viewer import open_window, openings
 
     draw_in_software()
     opening = openings([source])[source] if at is None else Opening(TIME, round(at * 1e9))
     with open_window(source, opening, headless=True) as (_, viewer):
-        time.sleep(settle)
-        viewer.save_screenshot(str(target))
+        end = time.monotonic() + SETTLE
+        while True:
+            time.sleep(1.0)
+            viewer.save_screenshot(str(target))
+            if done() or time.monotonic() > end:
+                break
         return complaints_of(viewer)
 
 
@@ -95,13 +105,13 @@ def of_readme() -> list[str]:
         ]
 
 
-def of_branches(folder: Path, target: Path, settle: float = SETTLE) -> list[str]:
+def of_branches(folder: Path, target: Path, done: Callable[[], bool] = lambda: False) -> list[str]:
     """Solve one target for all branches in a folder, and picture them; return complaints."""
     pose, branches = folder / "one.csv", folder / "one.rrd"
     pose.write_text("x,y,z,rz,ry,rx\n0.15,0.05,0.2,0.3,0.9,0.1\n", encoding="utf-8")
     solved = ["ik", str(pose), "--robot", "arm6", "--all", "-q", "-o", str(branches)]
     subprocess.run([sys.executable, "-m", "urmpipe", *solved], check=True)
-    return of_recording(branches, target, None, settle)
+    return of_recording(branches, target, None, done)
 
 
 def of_tutorial(folder: Path) -> list[str]:
