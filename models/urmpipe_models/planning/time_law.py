@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ellipj, ellipkinc
 
 from urmpipe_models.arrays import FloatArray, IndexArray
 
@@ -142,6 +141,8 @@ def swing_at(speed: FloatArray | float, a: float, radius: float) -> FloatArray:
 
     Source: [Dlmf]_ 22.15 (inverse of cn).
     """
+    from scipy.special import ellipkinc  # a tenth of a second, which every command would wait for
+
     return np.asarray(-ellipkinc(np.arccos(np.minimum(speed / np.sqrt(a * radius), 1.0)), HALF))
 
 
@@ -152,6 +153,8 @@ def _swing(
 
     v = sqrt(a r) cn, its derivative -2 k a sn dn, and that one's -2 a cn^2 v / r.
     """
+    from scipy.special import ellipj  # a tenth of a second, which every command would wait for
+
     k = math.sqrt(HALF)
     sn, cn, dn, _ = ellipj(w + np.sqrt(2.0 * a / radius) * t, HALF)
     way = radius * (np.arcsin(k * sn) - np.arcsin(k * ellipj(w, HALF)[0]))
