@@ -7,6 +7,7 @@ import hashlib
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -98,8 +99,12 @@ def _render(page: Page) -> str:
     )
 
 
+@cache
 def environment() -> Environment:
-    """Return the template engine: it escapes everything but what passes the filters raw and json."""
+    """Return the template engine: it escapes everything but what passes the filters raw and json.
+
+    The one that there is keeps the templates that it has compiled.
+    """
     engine = Environment(
         loader=PackageLoader(__package__, "assets"),
         autoescape=True,
