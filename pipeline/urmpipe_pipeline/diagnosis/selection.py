@@ -129,9 +129,12 @@ class Selection:
 
     def left(self, subsets: Sequence[Subset]) -> FloatArray:
         """Return the mean square [-] that each of some subsets leaves, shape (len(subsets),)."""
+        return self._left_by([self.columns(subset) for subset in subsets])
+
+    def _left_by(self, columns: list[list[int]]) -> FloatArray:
+        """Return the mean square [-] that each of some choices of columns leaves, shape (len(columns),)."""
         gram, moment, _ = self._scaled
-        explained = np.zeros(len(subsets))
-        columns = [self.columns(subset) for subset in subsets]
+        explained = np.zeros(len(columns))
         sizes = np.array([len(one) for one in columns])
         for size in np.unique(sizes[sizes > 0]):
             at = np.flatnonzero(sizes == size)
@@ -169,8 +172,9 @@ class Selection:
 
     def scores(self, subsets: Sequence[Subset]) -> FloatArray:
         """Return the score [-] of each of some subsets, shape (len(subsets),)."""
-        left = self.left(subsets)
-        penalty = [self.penalty(sum(len(self._columns[g]) for g in one), len(one)) for one in subsets]
+        columns = [self.columns(subset) for subset in subsets]
+        left = self._left_by(columns)
+        penalty = [self.penalty(len(at), len(one)) for at, one in zip(columns, subsets, strict=True)]
         return np.asarray(self.independent * np.log(np.maximum(left, self.floor)) + np.array(penalty))
 
     def score(self, left: float, subset: Subset) -> float:
