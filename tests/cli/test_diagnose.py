@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
 import warnings
 import xml.etree.ElementTree as ET
+from contextlib import redirect_stdout
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
@@ -43,10 +46,39 @@ CAUSE_KEYS = [
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Enter a folder with nothing but a path and two logs."""
     monkeypatch.chdir(tmp_path)
+    lay_logs(tmp_path)
+    return tmp_path
+
+
+def lay_logs(folder: Path) -> None:
+    """Write a path and two logs."""
     for name in NAMES:
         head, *rows = (LOGS / name).read_text(encoding="utf-8").splitlines(keepends=True)
-        Path(name).write_text("".join([head, *rows[::EVERY]]), encoding="utf-8")
-    return tmp_path
+        (folder / name).write_text("".join([head, *rows[::EVERY]]), encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class Both:
+    """What `diagnose` and `compare --diagnose` of the same logs print as JSON, and where they write."""
+
+    folder: Path
+    diagnosed: dict[str, Any]
+    compared: dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> Both:
+    """Both commands, run once."""
+    folder, printed = tmp_path_factory.mktemp("both"), []
+    lay_logs(folder)
+    compare = ["compare", PATH, WRONG, *ARM, "--diagnose", "-o", "compared.rrd", "--junit", "verdict.xml"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        for line in (["diagnose", PATH, WRONG, *ARM], compare):
+            with redirect_stdout(io.StringIO()) as out:
+                assert run([*line, "--json"]) == 1
+            printed.append(json.loads(out.getvalue()))
+    return Both(folder, *printed)
 
 
 def told(capsys: Captured) -> dict[str, Any]:
@@ -68,21 +100,19 @@ def test_the_first_line_is_verdict_and_answer(capsys: Captured) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_written_is_the_comparison_with_its_diagnosis() -> None:
-    run(["diagnose", PATH, WRONG, *ARM, "-q"])
-    run(["compare", PATH, WRONG, *ARM, "--diagnose", "-q", "-o", "compared.rrd"])
-    found, compared = map(urmpipe.read_recording, ("counter_rotating-diagnosed.rrd", "compared.rrd"))
+def test_what_is_written_is_the_comparison_with_its_diagnosis(both: Both) -> None:
+    names = ("counter_rotating-diagnosed.rrd", "compared.rrd")
+    found, compared = (urmpipe.read_recording(both.folder / name) for name in names)
     assert isinstance(found, Comparison) and isinstance(compared, Comparison)
     assert there(found.runs[0].diagnosis).sentence == ANSWER
     assert_same(found.runs[0].diagnosis, compared.runs[0].diagnosis)
-    assert run(["report", "counter_rotating-diagnosed.rrd", "-q"]) == 0
-    assert "module 3 (phi3) counter-rotates" in Path("counter_rotating-diagnosed.html").read_text("utf-8")
+    assert run(["report", str(both.folder / names[0]), "-o", "page.html", "-q"]) == 0
+    assert "module 3 (phi3) counter-rotates" in Path("page.html").read_text("utf-8")
 
 
 @pytest.mark.slow
-def test_json_has_the_keys_that_are_promised(capsys: Captured) -> None:
-    assert run(["diagnose", PATH, WRONG, *ARM, "--json"]) == 1
-    found = told(capsys)
+def test_json_has_the_keys_that_are_promised(both: Both, capsys: Captured) -> None:
+    found = both.diagnosed
     assert list(found) == KEYS
     assert (found["name"], found["verdict"], found["unit"]) == ("counter_rotating", "fail", "m")
     assert found["recording"] == "counter_rotating-diagnosed.rrd"
@@ -91,8 +121,7 @@ def test_json_has_the_keys_that_are_promised(capsys: Captured) -> None:
     assert (cause["kind"], cause["name"], cause["joint"]) == ("joint_sign", "phi3", "q3")
     assert cause["value"] is None
     assert [one["message"] for one in found["warnings"]][-1].startswith("no unit is given for x, y, z")
-    assert run(["compare", PATH, WRONG, *ARM, "--diagnose", "--json"]) == 1
-    (compared,) = told(capsys)["runs"]
+    (compared,) = both.compared["runs"]
     same = [key for key in KEYS if key not in ("warnings", "recording")]
     assert {key: compared["diagnosis"][key] for key in same} == {key: found[key] for key in same}
     assert run(["compare", PATH, WRONG, *ARM, "--json"]) == 1
@@ -112,9 +141,8 @@ def test_a_quiet_failure_says_why_and_nothing_else(capsys: Captured) -> None:
 
 
 @pytest.mark.slow
-def test_junit_has_the_answer_as_a_property() -> None:
-    run(["compare", PATH, WRONG, *ARM, "--diagnose", "-q", "--junit", "verdict.xml"])
-    suite = there(ET.parse("verdict.xml").getroot().find("testsuite"))
+def test_junit_has_the_answer_as_a_property(both: Both) -> None:
+    suite = there(ET.parse(both.folder / "verdict.xml").getroot().find("testsuite"))
     assert there(suite.find("properties/property[@name='cause']")).get("value") == ANSWER
 
 
