@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 from urllib.parse import unquote, urlsplit
@@ -33,6 +34,10 @@ class Links(HTMLParser):
             self.loaded.append(given["src"])
 
 
+links_of = cache(Links)
+"""The links of a page, which is parsed once."""
+
+
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The site, built with warnings as errors."""
@@ -45,7 +50,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def missing(folder: Path) -> list[str]:
     """Return the links and files of a site's pages that lead nowhere in it."""
-    pages = {page: Links(page) for page in folder.rglob("*.html") if page.name != "404.html"}
+    pages = {page: links_of(page) for page in folder.rglob("*.html") if page.name != "404.html"}
     found = []
     for page, links in pages.items():
         for link in [*links.links, *links.loaded]:
@@ -66,7 +71,7 @@ def test_every_link_of_the_site_leads_somewhere(site: Path) -> None:
 
 @pytest.mark.slow
 def test_no_page_loads_anything_from_a_network(site: Path) -> None:
-    loaded = {link for page in site.rglob("*.html") for link in Links(page).loaded}
+    loaded = {link for page in site.rglob("*.html") for link in links_of(page).loaded}
     assert [link for link in loaded if urlsplit(link).netloc] == []
 
 
