@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray
+from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.inverse.targets import Targets, misses
 from urmpipe_models.kinematics.forward import bias_over_log, jacobian_over_log
@@ -22,7 +23,13 @@ STEPS = 4
 """Newton steps at most: three square an error of 1e-2 down to rounding."""
 
 SINGULAR = 1e-9
-"""Singular values of a Jacobian below this share of the largest are 0: rounding."""
+"""Singular values of a Jacobian below this share of the largest are 0 for a step onto the path: rounding."""
+
+ROUNDING = 1e-15
+"""Below this share they are 0 for slopes, which shall grow near a singular pose."""
+
+PLAIN = 1e-5
+"""A Jacobian whose pivots are all above this share of the largest is far from singular."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,9 +86,8 @@ def joint_slopes(
         second = np.hstack((second, np.zeros_like(second)))
     dq, ddq = np.full(q.shape, np.nan), np.full(q.shape, np.nan)
     known = np.isfinite(q).all(axis=1)
-    for pattern in np.unique(moves[known], axis=0):
-        rows = np.flatnonzero(known & (moves == pattern).all(axis=1))
-        dq[rows], ddq[rows] = _slopes(chain, q[rows], first[rows], second[rows], pattern)
+    for rows in _alike(moves, np.flatnonzero(known)):
+        dq[rows], ddq[rows] = _slopes(chain, q[rows], first[rows], second[rows], moves[rows[0]])
     return JointSlopes(q, dq, ddq)
 
 
@@ -107,12 +113,10 @@ def polished(chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray, move
         miss = miss[:, : 3 if path.turning is None else 6]
         far = np.abs(miss).max(axis=1) > NEAR
         off, miss = off[far], miss[far]
-        for pattern in np.unique(moves[off], axis=0):
-            chosen = (moves[off] == pattern).all(axis=1)
-            rows = off[chosen]
+        for chosen in _alike(moves[off], np.arange(len(off))):
+            rows, pattern = off[chosen], moves[off[chosen[0]]]
             J = jacobian_over_log(chain, better[rows])[:, : miss.shape[1], pattern]
-            inverse = np.asarray(np.linalg.pinv(J, rcond=SINGULAR), dtype=float)
-            better[np.ix_(rows, pattern)] += _times(inverse, miss[chosen])
+            better[np.ix_(rows, pattern)] += _times(_inverses(J, SINGULAR), miss[chosen])
     return better
 
 
@@ -123,7 +127,7 @@ def _slopes(
     rows = first.shape[1]
     dq, ddq = np.zeros_like(q), np.zeros_like(q)
     J = jacobian_over_log(chain, q)[:, :rows, moves]
-    inverse: FloatArray = np.asarray(np.linalg.pinv(J), dtype=float)
+    inverse = _inverses(J, ROUNDING)
     dq[:, moves] = _times(inverse, first)
     ddq[:, moves] = _times(inverse, second - bias_over_log(chain, q, dq)[:, :rows])
     if J.shape[2] > rows:
@@ -131,6 +135,34 @@ def _slopes(
         pull = _times(changed.transpose(0, 2, 1), _times(inverse.transpose(0, 2, 1), dq[:, moves]))
         ddq[:, moves] += pull - _times(inverse, _times(J, pull))
     return dq, ddq
+
+
+def _alike(moves: BoolArray, rows: IndexArray) -> Iterator[IndexArray]:
+    """Yield the rows, of some, in which the same joints move."""
+    while len(rows):
+        same = (moves[rows] == moves[rows[0]]).all(axis=1)
+        yield rows[same]
+        rows = rows[~same]
+
+
+def _inverses(J: FloatArray, cutoff: float) -> FloatArray:
+    """Return pseudo-inverses, shape (n, k, j), of matrices, shape (n, j, k).
+
+    A tall matrix is Q R, and its pseudo-inverse R^-1 Q^T. Only those that are nearly singular, as the
+    pivots of R show, need their singular values, which cost three times as much.
+
+    Args:
+        J: In any unit.
+        cutoff: Singular values below this share of the largest count as 0.
+    """
+    tall = J if J.shape[1] > J.shape[2] else J.transpose(0, 2, 1)
+    Q, R = np.linalg.qr(tall)
+    pivots = np.abs(np.diagonal(R, axis1=1, axis2=2))
+    regular = pivots.min(axis=1) > PLAIN * pivots.max(axis=1)
+    inverse = np.empty(tall.shape)
+    inverse[regular] = Q[regular] @ np.linalg.inv(R[regular]).transpose(0, 2, 1)
+    inverse[~regular] = np.linalg.pinv(tall[~regular], rcond=cutoff).transpose(0, 2, 1)
+    return inverse if tall is not J else inverse.transpose(0, 2, 1)
 
 
 def _times(matrix: FloatArray, vector: FloatArray) -> FloatArray:

@@ -166,11 +166,22 @@ def _followed(
     """Return the joints on a grid of arc lengths in [m], shape (n + 1,)."""
     grid = follow(chain, targets_at(path, s), np.arange(len(s)), start=start, progress=progress)
     moves, touches = _moving(chain, grid.q)
-    after, before = (
-        joint_slopes(chain, path, grid.q[rows], s[rows], moves, before=ends)
-        for rows, ends in ((slice(None, -1), False), (slice(1, None), True))
+    after = joint_slopes(chain, path, grid.q[:-1], s[:-1], moves)
+    return PathJoints(
+        chain, path, s, grid, moves, touches, after, _before(chain, path, s, grid.q, moves, after)
     )
-    return PathJoints(chain, path, s, grid, moves, touches, after, before)
+
+
+def _before(
+    chain: Chain, path: LineArcPath, s: FloatArray, q: FloatArray, moves: BoolArray, after: JointSlopes
+) -> JointSlopes:
+    """Return the slopes where each interval ends: those after it, unless they may step there."""
+    steps = np.append((moves[1:] != moves[:-1]).any(axis=1), True)
+    steps |= np.isin(s[1:], np.append(path.bounds, path.at))
+    own = joint_slopes(chain, path, q[1:][steps], s[1:][steps], moves[steps], before=True)
+    dq, ddq = np.roll(after.dq, -1, axis=0), np.roll(after.ddq, -1, axis=0)
+    dq[steps], ddq[steps] = own.dq, own.ddq
+    return JointSlopes(q[1:], dq, ddq)
 
 
 def rests_of(path: LineArcPath) -> FloatArray:
@@ -197,8 +208,9 @@ def _grid(path: LineArcPath) -> FloatArray:
 
 def _divided(places: FloatArray, counts: IndexArray) -> FloatArray:
     """Return places, shape (n + 1,), and between each and the next what makes as many parts, shape (n,)."""
-    parts = zip(places[:-1], places[1:], counts.tolist(), strict=True)
-    return np.append(np.concatenate([np.linspace(a, b, n, endpoint=False) for a, b, n in parts]), places[-1])
+    k = np.repeat(np.arange(len(counts)), counts)
+    part = np.arange(len(k)) - (np.cumsum(counts) - counts)[k]
+    return np.append(places[k] + part * (np.diff(places) / counts)[k], places[-1])
 
 
 def _moving(chain: Chain, q: FloatArray) -> tuple[BoolArray, BoolArray]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IndexArray
+from urmpipe_models.arrays import FloatArray
 
 HALF = 0.5
 """m = k^2 of the elliptic functions of a swing [-]: let go a quarter turn above rest, k = sin(pi / 4)."""
@@ -93,7 +93,7 @@ class TimeLaw:
         """Return the motion at times in [s], shape (n,), 0 to the duration; of two phases the later."""
         k = np.minimum(np.searchsorted(self.ends, t, side="right"), len(self.phases) - 1)
         since = t - (self.ends[k] - self._table[k, 0])
-        return self._within(k, since)
+        return _within(self._table[k].T, since)
 
     def time_at(self, s: FloatArray) -> FloatArray:
         """Return when the motion is at arc lengths in [m], shape (n,), in [s], shape (n,); the first time.
@@ -102,12 +102,13 @@ class TimeLaw:
         """
         begin = self._table[:, 1]
         k = np.clip(np.searchsorted(begin, s, side="left") - 1, 0, None)
-        whole = self._within(np.array([-1]), self._table[-1:, 0]).s
+        whole = _within(self._table[-1:].T, self._table[-1:, 0]).s
         last = np.append(begin[1:], whole)[k]
-        low, high = np.zeros(len(s)), self._table[k, 0].copy()
+        phases = np.ascontiguousarray(self._table[k].T)
+        low, high = np.zeros(len(s)), phases[0]
         for _ in range(60):  # halves of a phase down to the last bit: s(t) rises
             middle = 0.5 * (low + high)
-            before = self._within(k, middle).s < s
+            before = _within(phases, middle).s < s
             low, high = np.where(before, middle, low), np.where(before, high, middle)
         found = np.where(s >= last - MET * whole, self.ends[k], self.ends[k] - self._table[k, 0] + high)
         return np.where(s <= begin[0], 0.0, found)
@@ -116,19 +117,6 @@ class TimeLaw:
         """Return the same law with all speeds multiplied by a factor: t / f, f v, f^2 a, f^3 j."""
         scale = np.array([1.0 / factor, 1.0, factor, factor**2, factor**3, 1.0, 1.0])
         return TimeLaw([Phase(*row) for row in (self._table * scale).tolist()])
-
-    def _within(self, k: IndexArray, t: FloatArray) -> PathMotion:
-        """Return the motion at times in [s], shape (n,), since the phases k, shape (n,), began."""
-        _, s, v, a, j, radius, w = self._table[k].T
-        found = PathMotion(
-            s + t * (v + t * (0.5 * a + t * j / 6.0)), v + t * (a + 0.5 * t * j), a + t * j, j.copy()
-        )
-        swings = radius > 0.0
-        if swings.any():
-            swung = _swing(t[swings], s[swings], a[swings], radius[swings], w[swings])
-            for values, own in zip((found.s, found.v, found.a, found.j), swung, strict=True):
-                values[swings] = own
-        return found
 
 
 def swing_at(speed: FloatArray | float, a: float, radius: float) -> FloatArray:
@@ -144,6 +132,20 @@ def swing_at(speed: FloatArray | float, a: float, radius: float) -> FloatArray:
     from scipy.special import ellipkinc  # a tenth of a second, which every command would wait for
 
     return np.asarray(-ellipkinc(np.arccos(np.minimum(speed / np.sqrt(a * radius), 1.0)), HALF))
+
+
+def _within(phases: FloatArray, t: FloatArray) -> PathMotion:
+    """Return the motion at times in [s], shape (n,), since their phases, shape (7, n), began."""
+    _, s, v, a, j, radius, w = phases
+    found = PathMotion(
+        s + t * (v + t * (0.5 * a + t * j / 6.0)), v + t * (a + 0.5 * t * j), a + t * j, j.copy()
+    )
+    swings = radius > 0.0
+    if swings.any():
+        swung = _swing(t[swings], s[swings], a[swings], radius[swings], w[swings])
+        for values, own in zip((found.s, found.v, found.a, found.j), swung, strict=True):
+            values[swings] = own
+    return found
 
 
 def _swing(
