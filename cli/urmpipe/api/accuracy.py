@@ -34,7 +34,7 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import HEAD, PATH_ROW
 from urmpipe_pipeline.planned_paths.given_path import given_path
 from urmpipe_pipeline.planned_paths.path_file import GivenPath
-from urmpipe_pipeline.planned_paths.planning import plan_path
+from urmpipe_pipeline.planned_paths.planning import joints_of, plan_path
 from urmpipe_pipeline.planned_paths.request import Law, Request, Timing, checked_timing, refuse_unlimited
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.provenance import provenance
@@ -228,11 +228,12 @@ def _runs(
     period = (
         np.gcd.reduce([round(one.period * 1e9) for one in arm.drives if isinstance(one, DrivenJoint)]) / 1e9
     )
+    along = joints_of(given, request)
 
     def plan(velocity: float) -> PlannedPath:
         """Return the path at a velocity; raise a `PathError` if the arm cannot move so."""
         timing = replace(request.timing, velocity=velocity, tsp=float(period))
-        found = plan_path(given, replace(request, timing=timing))
+        found = plan_path(given, replace(request, timing=timing), joints=along)
         if found.obstacles:
             one = found.obstacles[0]
             raise PathError(given.finding(one.row, one.words, "a path that the arm can follow"))

@@ -48,13 +48,34 @@ MOST = 1_000_000
 Progress = Callable[[float], None] | None
 
 
-def plan_path(given: GivenPath, request: Request, progress: Progress = None) -> PlannedPath:
+def joints_of(given: GivenPath, request: Request, progress: Progress = None) -> PathJoints | None:
+    """Return the joints along a path, whatever its timing; None without an arm.
+
+    Args:
+        given: Its rows.
+        request: Which arm moves along it, and from where.
+        progress: Called with the share that is done, 0..1.
+
+    Raises:
+        PathError: With every row that the arm does not reach, and by how much.
+    """
+    if request.arm is None:
+        return None
+    path = path_of(given.rows)
+    _refuse_out_of_reach(given, path, request.arm, request.start)
+    return joints_along(request.arm, path, request.start, progress)
+
+
+def plan_path(
+    given: GivenPath, request: Request, progress: Progress = None, joints: PathJoints | None = None
+) -> PlannedPath:
     """Return the plan of a path.
 
     Args:
         given: Its rows.
         request: What is to be planned; `request` has checked it.
         progress: Called with the share that is done, 0..1.
+        joints: The joints along it, if they are known: they take the most time, and are those of any timing.
 
     Raises:
         PathError: With every row that the arm does not reach, and by how much.
@@ -63,10 +84,7 @@ def plan_path(given: GivenPath, request: Request, progress: Progress = None) -> 
     Source: [Iso9283]_ section 4, steps 7 to 18.
     """
     path, arm, timing = path_of(given.rows), request.arm, request.timing
-    joints = None
-    if arm is not None:
-        _refuse_out_of_reach(given, path, arm, request.start)
-        joints = joints_along(arm, path, request.start, progress)
+    joints = joints or joints_of(given, request, progress)
     timed, samples = _within_limits(path, joints, _timed(path, joints, timing))
     law = timed.law
     options = timing.options | {"robot": arm.name if arm else None}
