@@ -28,7 +28,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.arrays import FloatArray, IndexArray
 from urmpipe_models.orientation import best_rotation, matrices, quaternions
 
 TURN_LENGTH = 0.01
@@ -196,7 +196,7 @@ class _Rows(NamedTuple):
 
 
 class _Frames(NamedTuple):
-    """R_Z, d and R_X."""
+    """R_Z, d and R_X, or those of several starts along a first axis."""
 
     base: FloatArray
     offset: FloatArray
@@ -204,8 +204,12 @@ class _Frames(NamedTuple):
 
     def stepped(self, step: FloatArray) -> _Frames:
         """Return frames after a turn of the base, an offset and, of nine numbers, a turn of the tool."""
-        tool = self.tool @ _turned(step[6:]) if len(step) > 6 else self.tool
-        return _Frames(_turned(step[:3]) @ self.base, self.offset + step[3:6], tool)
+        tool = self.tool @ _turned(step[..., 6:]) if step.shape[-1] > 6 else self.tool
+        return _Frames(_turned(step[..., :3]) @ self.base, self.offset + step[..., 3:6], tool)
+
+    def of(self, start: IndexArray | int) -> _Frames:
+        """Return those of some of several starts, or of one."""
+        return _Frames(self.base[start], self.offset[start], self.tool[start])
 
 
 _ALL_AROUND = [
@@ -218,8 +222,9 @@ _ALL_AROUND = [
 
 
 def _turned(vector: FloatArray) -> FloatArray:
-    """Return the matrix of a rotation vector."""
-    return np.asarray(matrices(quaternions(vector[np.newaxis], "vector"))[0])
+    """Return the matrices of rotation vectors, shape (..., 3)."""
+    turned = matrices(quaternions(vector.reshape(-1, 3), "vector"))
+    return turned.reshape(*vector.shape, 3)
 
 
 def _vector(rotation: FloatArray) -> FloatArray:
@@ -249,24 +254,32 @@ def _condensed(sides: Sequence[FloatArray]) -> list[FloatArray]:
 
 
 def _misses(rows: _Rows, frames: _Frames, length: float) -> tuple[FloatArray, FloatArray]:
-    """Return all misses in [m] and their Jacobian of a step; |R_M - R|^2 / 2 is the squared angle."""
-    moved = (rows.position + rows.rotation @ frames.offset) @ frames.base.T
-    jacobian = np.concatenate(
-        (-np.einsum("kij,nj->nik", _CROSS, moved), -frames.base @ rows.rotation), axis=2
-    ).reshape(-1, 6)
-    miss = (rows.measured - moved).ravel()
+    """Return all misses in [m] and their Jacobian of a step; |R_M - R|^2 / 2 is the squared angle.
+
+    Shapes (..., misses) and (..., misses, 6 or 9), with the first axis of the frames if they have one.
+    """
+    base, tool = (each[..., np.newaxis, :, :] for each in (frames.base, frames.tool))
+    starts = frames.offset.shape[:-1]
+    computed = rows.position + np.einsum("nij,...j->...ni", rows.rotation, frames.offset)
+    moved = computed @ frames.base.swapaxes(-1, -2)
+    of_base = -np.einsum("kij,...nj->...nik", _CROSS, moved)
+    jacobian = np.concatenate((of_base, -base @ rows.rotation), axis=-1).reshape(*starts, -1, 6)
+    miss = (rows.measured - moved).reshape(*starts, -1)
     if not len(rows.turn):
         return miss, jacobian
     weight = length / np.sqrt(2.0)
-    turned = frames.base @ rows.turn @ frames.tool
-    of_base, of_tool = (
-        -weight * np.moveaxis(change, 0, -1).reshape(-1, 3)
-        for change in (_CROSS[:, np.newaxis] @ turned, turned @ _CROSS[:, np.newaxis])
-    )
-    turning = np.hstack((of_base, np.zeros_like(of_base), of_tool))
-    standing = np.hstack((jacobian, np.zeros((len(jacobian), 3))))
-    apart = weight * (rows.measured_turn - turned).ravel()
-    return np.concatenate((miss, apart)), np.vstack((standing, turning))
+    turned = base @ rows.turn @ tool
+    turning = np.zeros((*starts, rows.turn.size, 9))
+    turning[..., :3] = -weight * _last(np.einsum("kij,...njl->...nilk", _CROSS, turned))
+    turning[..., 6:] = -weight * _last(np.einsum("...nij,kjl->...nilk", turned, _CROSS))
+    standing = np.concatenate((jacobian, np.zeros((*jacobian.shape[:-1], 3))), axis=-1)
+    apart = weight * (rows.measured_turn - turned).reshape(*starts, -1)
+    return np.concatenate((miss, apart), axis=-1), np.concatenate((standing, turning), axis=-2)
+
+
+def _last(changes: FloatArray) -> FloatArray:
+    """Return changes of matrices, shape (..., n, 3, 3, k), a row an entry, shape (..., 9 n, k)."""
+    return changes.reshape(*changes.shape[:-4], -1, changes.shape[-1])
 
 
 def _by_orientations(rows: _Rows) -> Iterator[FloatArray]:
@@ -287,52 +300,65 @@ def _rigid(rows: _Rows) -> FloatArray:
 
 def _with_tool_turn(rows: _Rows, frames: _Frames) -> _Frames:
     """Return frames with the R_X of the least squared angles."""
-    crossed = np.einsum("nji,njk->ik", frames.base @ rows.turn, rows.measured_turn)
+    turned = frames.base[..., np.newaxis, :, :] @ rows.turn
+    crossed = np.einsum("...nji,njk->...ik", turned, rows.measured_turn)
     return frames._replace(tool=best_rotation(crossed)[0]) if len(rows.turn) else frames
 
 
 def _best(rows: _Rows, length: float, bases: Iterable[FloatArray]) -> _Frames:
     """Return the frames with the least misses that a descent from any of some R_Z reaches."""
-    (best, left), *others = (_descended(rows, _start(rows, base), length, ROUGH) for base in bases)
-    for found, miss in others:
-        if miss < BETTER * left - NOTHING:
-            best, left = found, miss
-    return _descended(rows, best, length)[0]
+    found, left = _descended(rows, _starts(rows, np.array([*bases])), length, ROUGH)
+    best = 0
+    for k, miss in enumerate(left):
+        if miss < BETTER * left[best] - NOTHING:
+            best = k
+    return _descended(rows, found.of(np.array([best])), length)[0].of(0)
 
 
-def _start(rows: _Rows, base: FloatArray) -> _Frames:
-    """Return the frames with a given R_Z; d is linear."""
-    frames = _with_tool_turn(rows, _Frames(base, np.zeros(3), np.eye(3)))
-    columns = (base @ rows.rotation).reshape(-1, 3)
-    right = (rows.measured - rows.position @ base.T).ravel()
-    return frames._replace(offset=_damped(columns, right, OPEN**2))
+def _starts(rows: _Rows, bases: FloatArray) -> _Frames:
+    """Return the frames with given R_Z, shape (starts, 3, 3); d is linear."""
+    count = len(bases)
+    alone = _Frames(bases, np.zeros((count, 3)), np.tile(np.eye(3), (count, 1, 1)))
+    columns = (bases[:, np.newaxis] @ rows.rotation).reshape(count, -1, 3)
+    right = (rows.measured - rows.position @ bases.transpose(0, 2, 1)).reshape(count, -1)
+    offset = _damped(columns, right, np.full(count, OPEN**2))
+    return _with_tool_turn(rows, alone)._replace(offset=offset)
 
 
-def _damped(columns: FloatArray, right: FloatArray, damping: float) -> FloatArray:
-    """Return the x of the least |columns x - right|^2 + damping |x|^2."""
-    count = columns.shape[1]
-    whole = np.vstack((columns, np.sqrt(damping) * np.eye(count)))
-    return np.asarray(np.linalg.lstsq(whole, np.concatenate((right, np.zeros(count))))[0])
+def _damped(columns: FloatArray, right: FloatArray, damping: FloatArray) -> FloatArray:
+    """Return the x of the least |columns x - right|^2 + damping |x|^2 of several starts, (starts, k)."""
+    starts, _, count = columns.shape
+    least = np.sqrt(damping)[:, np.newaxis, np.newaxis] * np.eye(count)
+    Q, R = np.linalg.qr(np.concatenate((columns, least), axis=1))
+    whole = np.concatenate((right, np.zeros((starts, count))), axis=1)[:, :, np.newaxis]
+    return np.asarray(np.linalg.solve(R, Q.transpose(0, 2, 1) @ whole)[:, :, 0])
 
 
 def _descended(
-    rows: _Rows, frames: _Frames, length: float, least_share: float = 0.0
-) -> tuple[_Frames, float]:
-    """Return frames at the foot of a descent, and their root mean square miss (Levenberg-Marquardt)."""
-    damping = 1e-6
-    miss, jacobian = _misses(rows, frames, length)
+    rows: _Rows, starts: _Frames, length: float, least_share: float = 0.0
+) -> tuple[_Frames, FloatArray]:
+    """Return frames at the foot of a descent from each start, and their root mean square misses.
+
+    All descend side by side (Levenberg-Marquardt); misses of shape (starts,).
+    """
+    found = starts.of(np.arange(len(starts.base)))
+    damping, going = np.full(len(found.base), 1e-6), np.arange(len(found.base))
+    miss, jacobian = _misses(rows, found, length)
     for _ in range(STEPS):
-        step = _damped(jacobian, -miss, damping)
-        there = frames.stepped(step)
+        step = _damped(jacobian[going], -miss[going], damping[going])
+        there = found.of(going).stepped(step)
         miss_there, jacobian_there = _misses(rows, there, length)
-        before, after = miss @ miss, miss_there @ miss_there
+        before, after = (np.square(each).sum(axis=1) for each in (miss[going], miss_there))
         better = after < before
-        damping = max(damping / 10, LEAST_DAMPING) if better else damping * 10
-        if better:
-            frames, miss, jacobian = there, miss_there, jacobian_there
-        if np.linalg.norm(step) < SHORT or (better and before - after < least_share * before):
+        damping[going] = np.where(better, np.maximum(damping[going] / 10, LEAST_DAMPING), damping[going] * 10)
+        taken = going[better]
+        for part, own in zip((*found, miss, jacobian), (*there, miss_there, jacobian_there), strict=True):
+            part[taken] = own[better]
+        ends = better & (before - after < least_share * before)
+        going = going[~ends & (np.linalg.norm(step, axis=1) >= SHORT)]
+        if not len(going):
             break
-    return frames, float(np.linalg.norm(miss))
+    return found, np.linalg.norm(miss, axis=1)
 
 
 def _seen(rows: _Rows, frames: _Frames) -> tuple[FloatArray, FloatArray]:

@@ -193,16 +193,18 @@ def best_rotation(crossed: FloatArray) -> tuple[FloatArray, FloatArray]:
     are returned beside it add up to more than 0.
 
     Args:
-        crossed: H = sum(a b^T), in the units of both, shape (3, 3).
+        crossed: H = sum(a b^T), in the units of both, shape (..., 3, 3).
 
     Returns:
-        R [-], shape (3, 3), and s1, s2, det(U V^T) s3, whose sum is that of the products, shape (3,).
+        R [-], shape (..., 3, 3), and s1, s2, det(U V^T) s3, which add up to that of the products,
+        shape (..., 3).
 
     Source: Kabsch 1976; Umeyama 1991, eq. 39-43, without scale.
     """
     u, sizes, vt = np.linalg.svd(crossed)
-    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt))])
-    return np.asarray(u * signs @ vt), np.asarray(sizes * signs)
+    signs = np.ones_like(sizes)
+    signs[..., 2] = np.sign(np.linalg.det(u) * np.linalg.det(vt))
+    return np.asarray(u * signs[..., np.newaxis, :] @ vt), np.asarray(sizes * signs)
 
 
 def _of_matrix(r: FloatArray) -> FloatArray:
