@@ -22,6 +22,9 @@ from urmpipe_pipeline.planned_paths.result import PlannedPath
 
 Y = (0.0, 1.0, 0.0)
 
+FAST = 2.0
+"""The speed of the plans in [m/s]: their logs are short."""
+
 
 def absolute_angles() -> Chain:
     """Return an arm with angles of upper arm and forearm to the ground, and a wrist that stays level."""
@@ -118,8 +121,8 @@ def written_plan(name: str, log: Path, *, alone: bool = False) -> PlannedPath:
     """Return one of these plans, made anew and written by `plan` itself."""
     arm, rows = PATHS[name]()
     if alone:
-        return urmpipe.plan(PathRows(rows.position, rows.radius, rows.corner), output=log)
-    return urmpipe.plan(rows, arm, output=log)
+        return urmpipe.plan(PathRows(rows.position, rows.radius, rows.corner), velocity=FAST, output=log)
+    return urmpipe.plan(rows, arm, velocity=FAST, output=log)
 
 
 @cache
