@@ -101,8 +101,8 @@ def graph_layout(names: Sequence[str], edges: Sequence[Edge]) -> GraphLayout:
     )
     wanted = _ways(sizes, ends, edges)
     tried = slice(FEW if len(names) > MANY else None)
-    settled = (_settled(start, wanted) for start in [*_starts(len(names), ends)][tried])
-    best = min(settled, key=lambda one: round(_tangle(one, ends, wanted), 2))
+    starts = np.array([*_starts(len(names), ends)][tried])
+    best = min(_settled(starts, wanted), key=lambda one: round(_tangle(one, ends, wanted), 2))
     turned = (_apart(_facing(one), sizes) for one in [*_turned(best)][tried])
     layouts = (_laid_out(names, one, sizes, edges, ends) for one in turned)
     return min(layouts, key=lambda one: round(_cost(one), 1))
@@ -149,18 +149,15 @@ def _in_depth(n: int, ends: IntArray) -> list[int]:
 
 
 def _settled(places: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Return places in pixels, shape (n, 2), moved so that their distances are nearly as wanted."""
-    n = len(places)
-    if n < 2:
+    """Return places in pixels, shape (starts, n, 2), moved until their distances are nearly as wanted."""
+    if len(wanted) < 2:
         return places
     weights = np.where(wanted > 0.0, 1.0 / np.where(wanted > 0.0, wanted, 1.0) ** 2, 0.0)
-    laplacian = np.diag(weights.sum(axis=1)) - weights
-    inverse = np.linalg.pinv(laplacian)
+    inverse = np.linalg.pinv(np.diag(weights.sum(axis=1)) - weights)
     for _ in range(STEPS):
-        apart = np.linalg.norm(places[:, np.newaxis] - places, axis=2)
+        apart = np.linalg.norm(places[:, :, np.newaxis] - places[:, np.newaxis], axis=3)
         pull = weights * wanted / np.maximum(apart, 1e-9)
-        np.fill_diagonal(pull, 0.0)
-        places = inverse @ ((np.diag(pull.sum(axis=1)) - pull) @ places)
+        places = inverse @ (pull.sum(axis=2)[:, :, np.newaxis] * places - pull @ places)
     return places
 
 
@@ -268,9 +265,19 @@ def _curves(
             bow = step * (alike.index(k) - (len(alike) - 1) / 2.0)
         else:
             others = [box for m, box in enumerate(nodes) if m not in (i, j)]
-            bow = min(BOWS, key=lambda one: (_hits(_bowed(low, high, one * normal), others), abs(one)))
+            bow = _least_bow(low, high, normal, others)
         curve = _bowed(low, high, bow * normal)
         yield curve if i <= j else curve[::-1]
+
+
+def _least_bow(low: FloatArray, high: FloatArray, normal: FloatArray, boxes: Sequence[Box]) -> float:
+    """Return the least bow in pixels that goes through no box, else through the fewest."""
+    hits: list[int] = []
+    for bow in BOWS:
+        hits.append(_hits(_bowed(low, high, bow * normal), boxes))
+        if not hits[-1]:
+            return bow
+    return BOWS[int(np.argmin(hits))]
 
 
 def _bowed(low: FloatArray, high: FloatArray, bow: FloatArray) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -82,12 +83,14 @@ def box(centre: FloatArray, axes: FloatArray, size: tuple[float, float, float]) 
 
 def ball(centre: FloatArray, radius: float, sides: int = SIDES) -> FloatArray:
     """Return the triangles of a ball in [m] about a centre, shape (n, 3, 3)."""
-    rings = sides // 2
-    height = np.linspace(-0.5 * np.pi, 0.5 * np.pi, rings + 1)
-    layers = [
-        circle(centre + radius * np.sin(one) * np.array([0.0, 0.0, 1.0]), _UP, radius * np.cos(one), sides)
-        for one in height
-    ]
+    return np.asarray(centre + radius * _unit_ball(sides))
+
+
+@cache
+def _unit_ball(sides: int) -> FloatArray:
+    """Return the triangles of a ball of radius 1 about 0, 0, 0 [-], shape (n, 3, 3)."""
+    height = np.linspace(-0.5 * np.pi, 0.5 * np.pi, sides // 2 + 1)
+    layers = [circle(np.sin(one) * _UP, _UP, float(np.cos(one)), sides) for one in height]
     parts = []
     for lower, upper in pairwise(layers):
         ahead, above = np.roll(lower, -1, axis=0), np.roll(upper, -1, axis=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from itertools import combinations, product
 
 import numpy as np
@@ -19,14 +20,22 @@ from urmpipe_pipeline.networks.drives import caption, is_driven, ties
 from urmpipe_pipeline.networks.graph_drawing import graph_svg
 from urmpipe_pipeline.networks.graph_layout import GAP_PX, Edge, GraphLayout, graph_layout
 from urmpipe_pipeline.networks.parts_in_space import CONTROL_COLOUR
-from urmpipe_pipeline.networks.result import NetworkResult
 
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-def layout_of(result: NetworkResult) -> GraphLayout:
+@cache
+def layout_of(name: str) -> GraphLayout:
+    """Return the layout of a network's graph, made once a session."""
+    result = found(name)
     edges = [Edge(name, caption(one), one.bodies) for name, one in ties(result.network).items()]
     return graph_layout(result.network.body_names, edges)
+
+
+@cache
+def drawn(name: str) -> str:
+    """Return the drawing of a network's graph, made once a session."""
+    return graph_svg(found(name))
 
 
 def words(svg: str, kind: str) -> list[str]:
@@ -40,7 +49,7 @@ def words(svg: str, kind: str) -> list[str]:
 @pytest.mark.parametrize("name", NAMES)
 def test_every_name_is_in_it(name: str) -> None:
     result = found(name)
-    svg, network = graph_svg(result), result.network
+    svg, network = drawn(name), result.network
     assert words(svg, "body") == list(network.body_names)
     assert words(svg, "tie") == [caption(one) for one in ties(network).values()]
     key = " ".join(one.text or "" for one in ET.fromstring(svg).iter(f"{SVG}text"))
@@ -54,7 +63,7 @@ def test_every_name_is_in_it(name: str) -> None:
 def test_what_controls_drive_is_in_their_colour(name: str) -> None:
     result = found(name)
     driven = [caption(one) for one in ties(result.network).values() if is_driven(one)]
-    texts = [one for one in ET.fromstring(graph_svg(result)).iter(f"{SVG}text") if one.get("class") == "tie"]
+    texts = [one for one in ET.fromstring(drawn(name)).iter(f"{SVG}text") if one.get("class") == "tie"]
     assert ["".join(one.itertext()) for one in texts if one.get("fill") == CONTROL_COLOUR] == driven
 
 
@@ -62,7 +71,7 @@ def test_what_controls_drive_is_in_their_colour(name: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_elements_are_dashed_and_loops_and_clusters_stand_behind(name: str) -> None:
     result = found(name)
-    svg = ET.fromstring(graph_svg(result))
+    svg = ET.fromstring(drawn(name))
     dashed = [one for one in svg.iter(f"{SVG}polyline") if one.get("stroke-dasharray")]
     assert len(dashed) == len(result.network.elements)
     polygons = [one.get("class") for one in svg.iter(f"{SVG}polygon")]
@@ -73,13 +82,13 @@ def test_elements_are_dashed_and_loops_and_clusters_stand_behind(name: str) -> N
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_words_hide_neither_bodies_nor_words(name: str) -> None:
-    layout = layout_of(found(name))
+    layout = layout_of(name)
     bodies, labels = list(layout.nodes.values()), [one.words for one in layout.lines]
     assert sum(a.shared(b) for a, b in combinations([*bodies, *labels], 2)) == 0.0
 
 
 def test_edges_between_the_same_bodies_bow_apart() -> None:
-    layout = layout_of(found("stewart-gough"))
+    layout = layout_of("stewart-gough")
     middles = np.array([one.curve[len(one.curve) // 2] for one in layout.lines])
     apart = np.linalg.norm(middles[:, np.newaxis] - middles, axis=2)[np.triu_indices(6, 1)]
     assert apart.min() > 15.0  # a line of text and more
@@ -89,7 +98,7 @@ def test_edges_between_the_same_bodies_bow_apart() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_loop_goes_round_its_bodies(name: str) -> None:
     result = found(name)
-    layout, owners = layout_of(result), ties(result.network)
+    layout, owners = layout_of(name), ties(result.network)
     for loop in result.loops:
         way = layout.loop(loop)
         np.testing.assert_allclose(way[0], way[-1], rtol=0, atol=1e-9)  # it closes, in px
@@ -101,7 +110,7 @@ def test_a_loop_goes_round_its_bodies(name: str) -> None:
 
 @pytest.mark.slow
 def test_the_same_graph_gives_the_same_drawing() -> None:
-    assert graph_svg(found("chain")) == graph_svg(replace(found("chain")))
+    assert graph_svg(replace(found("chain"))) == drawn("chain")
 
 
 def test_names_of_a_stranger_are_drawn_letter_by_letter() -> None:
