@@ -11,7 +11,7 @@ from urmpipe_models.arrays import FloatArray, IndexArray
 from urmpipe_models.elementwise import Element, add, cross
 from urmpipe_models.networks.element_measures import MEASURES, measure
 from urmpipe_models.networks.joint_motion import Screws, forbidden, joint_frame, joint_screws
-from urmpipe_models.networks.mechanism import Given, Mechanism, Pose, of_controls
+from urmpipe_models.networks.mechanism import Given, Mechanism, Pose, Posed, of_controls
 from urmpipe_models.networks.rotations import turning_of, untwisted
 from urmpipe_models.orientation import quaternions, rotation_vectors
 from urmpipe_models.transform import Transform
@@ -105,7 +105,7 @@ def released(mechanism: Mechanism, x: FloatArray) -> Iterator[tuple[str, str, Fl
     equations = list(_equations(mechanism, at, posed, controls))
     for joint in mechanism.network.joints:
         values = [one.value for one in mechanism.values(joint, at, controls)]
-        frame = posed[joint.bodies[0]].frame @ joint.frames[0]
+        frame = posed.joints[joint.name]
         for constraint, unit, (w, v) in forbidden(joint, values, frame):
             twist = _stacked((*w, *v), 1)[:, 0] * (mechanism.length if unit == "m" else 1.0)
             column = np.zeros(mechanism.rows)
@@ -117,29 +117,29 @@ def released(mechanism: Mechanism, x: FloatArray) -> Iterator[tuple[str, str, Fl
 
 
 def _equations(
-    mechanism: Mechanism, x: FloatArray, posed: dict[str, Pose], controls: dict[str, Given]
+    mechanism: Mechanism, x: FloatArray, posed: Posed, controls: dict[str, Given]
 ) -> Iterator[_Equation]:
     """Yield what closes each loop, and what holds each element."""
     n = x.shape[1]
     for k, cut in enumerate(mechanism.graph.cuts):
         joint = mechanism.network.joints[cut]
         moved = joint_frame(joint, [one.value for one in mechanism.values(joint, x, controls)])
-        here = posed[joint.bodies[0]].frame @ joint.frames[0] @ moved
-        gap = gap_of(here.inverse() @ posed[joint.bodies[1]].frame @ joint.frames[1], n)
-        movers = _between(posed, joint.bodies, joint.name)
+        here = posed.joints[joint.name] @ moved
+        gap = gap_of(here.inverse() @ posed.bodies[joint.bodies[1]].frame @ joint.frames[1], n)
+        movers = _between(posed.bodies, joint.bodies, joint.name)
         yield _Equation(slice(6 * k, 6 * k + 6), gap, _carrier(here, gap), movers, {})
     first = 6 * len(mechanism.graph.cuts)
     for row, element in enumerate(mechanism.network.elements, first):
         length = of_controls(element.length, controls)
-        measured = measure(element, *(posed[name].frame for name in element.bodies))
+        measured = measure(element, *(posed.bodies[name].frame for name in element.bodies))
         wrench = _stacked((*measured.moment, *measured.force), n)[np.newaxis]
         excess = _stacked((measured.distance - length.value,), n)
-        movers = _between(posed, element.bodies)
+        movers = _between(posed.bodies, element.bodies)
         yield _Equation(slice(row, row + 1), excess, wrench, movers, length.slopes)
 
 
 def _screws(
-    mechanism: Mechanism, x: FloatArray, posed: dict[str, Pose], controls: dict[str, Given]
+    mechanism: Mechanism, x: FloatArray, posed: Posed, controls: dict[str, Given]
 ) -> dict[str, tuple[IndexArray, FloatArray]]:
     """Return of each mover the numbers of variables that move it, and their twists.
 
@@ -150,13 +150,13 @@ def _screws(
     found = {}
     for joint in mechanism.network.joints:
         values = mechanism.values(joint, x, controls)
-        at = posed[joint.bodies[0]].frame @ joint.frames[0]
-        found[joint.name] = _combined(joint_screws(joint, [one.value for one in values], at), values, n)
+        twists = joint_screws(joint, [one.value for one in values], posed.joints[joint.name])
+        found[joint.name] = _combined(twists, values, n)
     for name in mechanism.graph.roots[1:]:
         first = mechanism.places[name, 0]
         values = [Given(None, {first + k: 1.0}) for k in range(6)]
         vector = (x[first + 3], x[first + 4], x[first + 5])
-        p = posed[name].frame.translation
+        p = posed.bodies[name].frame.translation
         turning = [(axis, cross(p, axis)) for axis in turning_of(vector)]
         found[name] = _combined([*_SLIDING, *turning], values, n)
     return found

@@ -63,6 +63,7 @@ def descend(mechanism: Mechanism, x: FloatArray, free: IndexArray, *, patient: b
     rows = np.arange(found.shape[1])
     gain = np.full(len(rows), FIRST_GAIN)
     now = _scaled(mechanism, found, free)
+    error = np.array(now.error)
     for _ in range(STEPS):
         going = _going(now, gain, patient)
         if not going.any():
@@ -82,10 +83,9 @@ def descend(mechanism: Mechanism, x: FloatArray, free: IndexArray, *, patient: b
         taken = (gained > LEAST_RATIO * foreseen) & (gained > 0.0)
         good, poor = taken & (gained > 0.75 * foreseen), ~taken | (gained < 0.25 * foreseen)
         gain = np.clip(gain * np.where(good, 0.125, np.where(poor, 4.0, 1.0)), *GAINS)
-        found[:, rows[taken]] = moved[:, taken]
+        found[:, rows[taken]], error[:, rows[taken]] = moved[:, taken], new.error[:, taken]
         now = new.or_else(taken, now)
-    left_over = np.abs(scaled_closure(mechanism, found).residual)
-    return Reached(found, left_over.max(axis=0, initial=0.0))
+    return Reached(found, np.abs(error).max(axis=0, initial=0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

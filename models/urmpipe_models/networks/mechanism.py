@@ -13,7 +13,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IndexArray
 from urmpipe_models.elementwise import Element, Vector, subtract
 from urmpipe_models.networks.expressions import Expression, Slopes
-from urmpipe_models.networks.graph import Branch, Graph, graph_of
+from urmpipe_models.networks.graph import Graph, graph_of
 from urmpipe_models.networks.joint_motion import joint_frame
 from urmpipe_models.networks.parts import POSE_UNITS, Joint, Parts, ordered_controls, ranged
 from urmpipe_models.networks.rotations import rotation_of
@@ -66,6 +66,18 @@ class Pose(NamedTuple):
 
     frame: Transform
     movers: dict[str, int]
+
+
+class Posed(NamedTuple):
+    """Where everything is.
+
+    Attributes:
+        bodies: The pose of each body.
+        joints: Of each joint the frame a of its first body, in the ground.
+    """
+
+    bodies: dict[str, Pose]
+    joints: dict[str, Transform]
 
 
 @dataclass(frozen=True)
@@ -259,26 +271,39 @@ class Mechanism:
         Args:
             x: The variables, one element each: floats, arrays of shape (n,), or symbols.
         """
-        return {name: one.frame for name, one in self.posed(x).items()}
+        return {name: one.frame for name, one in self.posed(x).bodies.items()}
 
-    def posed(self, x: Configuration) -> dict[str, Pose]:
-        """Return the pose of each body, and what moves it."""
-        controls = self.control_slopes(x)
-        posed = {self.network.ground: Pose(Transform(), {})}
+    def posed(self, x: Configuration) -> Posed:
+        """Return the pose of each body, what moves it, and where the joints are."""
+        controls, joints = self.control_slopes(x), {}
+        bodies = {self.network.ground: Pose(Transform(), {})}
         for name in self.graph.roots[1:]:
             first = self.places[name, 0]
             position, vector = (
                 (x[first], x[first + 1], x[first + 2]),
                 (x[first + 3], x[first + 4], x[first + 5]),
             )
-            posed[name] = Pose(Transform(rotation_of(vector).rotation, position), {name: 1})
-        for branch in self.graph.branches:
-            joint, parent = self.network.joints[branch.joint], posed[branch.parent]
+            bodies[name] = Pose(Transform(rotation_of(vector).rotation, position), {name: 1})
+        for branch, back in zip(self.graph.branches, self._backs, strict=True):
+            joint, parent = self.network.joints[branch.joint], bodies[branch.parent]
             moved = joint_frame(joint, [one.value for one in self.values(joint, x, controls)])
-            posed[branch.child] = Pose(
-                _across(parent.frame, joint, moved, branch), {**parent.movers, joint.name: branch.sign}
-            )
-        return posed
+            if branch.sign > 0:
+                at = parent.frame @ joint.frames[0]
+                child = at @ moved @ back
+            else:
+                at = parent.frame @ joint.frames[1] @ moved.inverse()
+                child = at @ back
+            joints[joint.name] = at
+            bodies[branch.child] = Pose(child, {**parent.movers, joint.name: branch.sign})
+        for joint in (self.network.joints[cut] for cut in self.graph.cuts):
+            joints[joint.name] = bodies[joint.bodies[0]].frame @ joint.frames[0]
+        return Posed(bodies, joints)
+
+    @cached_property
+    def _backs(self) -> list[Transform]:
+        """Of each branch the child's frame in that of its joint."""
+        frames = [self.network.joints[one.joint].frames for one in self.graph.branches]
+        return [pair[one.sign > 0].inverse() for pair, one in zip(frames, self.graph.branches, strict=True)]
 
 
 def mechanism_of(network: Parts) -> Mechanism:
@@ -299,11 +324,3 @@ def _chained(slopes: Slopes, controls: dict[str, Given]) -> dict[int, Element]:
         for k, inner in controls[name].slopes.items():
             found[k] = found.get(k, 0.0) + slope * inner
     return found
-
-
-def _across(parent: Transform, joint: Joint, moved: Transform, branch: Branch) -> Transform:
-    """Return the child's frame: that of the second body from the first, or of the first from the second."""
-    first, second = joint.frames
-    if branch.sign > 0:
-        return parent @ first @ moved @ second.inverse()
-    return parent @ second @ moved.inverse() @ first.inverse()
