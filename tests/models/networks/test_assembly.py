@@ -498,10 +498,9 @@ def test_a_length_that_is_no_number_at_a_control_is_refused() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(2))
-def test_forty_assemblies_of_the_stewart_gough_platform_for_any_seed(seed: int) -> None:
-    """Dietmaier's geometry has 40, which is the most that there can be."""
-    found = assemble(mechanism_of(load_network("stewart-gough")), every=True, seed=seed)
+def test_forty_assemblies_of_the_stewart_gough_platform_for_another_seed() -> None:
+    """Dietmaier's geometry has 40, which is the most that there can be; test_shipped.py has seed 0."""
+    found = assemble(mechanism_of(load_network("stewart-gough")), every=True, seed=1)
     assert len(found.assemblies) == 40
     assert max(one.residual for one in found.assemblies) < 1e-9
 

@@ -1,4 +1,4 @@
-"""Shipped networks against closed forms: printed answers, then ten perturbed mechanisms each."""
+"""Shipped networks against closed forms: printed answers, then four perturbed mechanisms each."""
 
 from __future__ import annotations
 
@@ -372,8 +372,8 @@ PERTURBATIONS: dict[str, Perturb] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PERTURBATIONS)
-def test_ten_perturbed_mechanisms_have_the_answers_of_the_closed_form(name: str) -> None:
-    assert_perturbed(name, 10, seed=7)
+def test_four_perturbed_mechanisms_have_the_answers_of_the_closed_form(name: str) -> None:
+    assert_perturbed(name, 4, seed=7)
 
 
 # --- helpers
