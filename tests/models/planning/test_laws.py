@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from ruckig import InputParameter, Ruckig, Trajectory
 
@@ -28,6 +28,7 @@ KEPT = 1.0 + 1e-9
 
 speeds, rises, jerks = st.floats(0.05, 2.0), st.floats(0.2, 20.0), st.floats(1.0, 300.0)
 arcs = st.sampled_from(ARCS)
+some = settings(max_examples=40)
 places = st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5)
 
 
@@ -89,6 +90,7 @@ def test_the_contour_by_ruckig_without_a_limit_of_jerk() -> None:
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows(), speeds, rises, st.none() | jerks, arcs)
 def test_a_law_runs_the_whole_path_from_rest_to_rest(
     rows: PathRows, v: float, a: float, j: float | None, held: Arcs
@@ -104,6 +106,7 @@ def test_a_law_runs_the_whole_path_from_rest_to_rest(
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows(), speeds, rises, st.none() | jerks, arcs)
 def test_a_law_keeps_its_limits(rows: PathRows, v: float, a: float, j: float | None, held: Arcs) -> None:
     path = path_of(rows)
@@ -124,6 +127,7 @@ def test_a_law_keeps_its_limits(rows: PathRows, v: float, a: float, j: float | N
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows(), speeds, rises, st.none() | jerks, arcs)
 def test_derivatives_belong_together(rows: PathRows, v: float, a: float, j: float | None, held: Arcs) -> None:
     """By central differences inside each phase; speed is continuous, with a jerk the acceleration, too."""
@@ -164,6 +168,7 @@ def test_a_swing_keeps_the_total_acceleration(entry: float, a: float, radius: fl
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows(), speeds, rises, st.none() | jerks, arcs, st.floats(0.01, 1.0))
 def test_a_slower_law_is_the_same_in_slower_time(
     rows: PathRows, v: float, a: float, j: float | None, held: Arcs, factor: float
@@ -180,6 +185,7 @@ def test_a_slower_law_is_the_same_in_slower_time(
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows(), speeds, rises, st.none() | jerks, arcs, places)
 def test_times_of_places_lead_back(
     rows: PathRows, v: float, a: float, j: float | None, held: Arcs, shares: list[float]

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from random_paths import by_first_points, corner_rows
@@ -18,6 +18,8 @@ from urmpipe_models.planning.from_rows import path_of
 from urmpipe_models.planning.line_arc import LineArcPath
 from urmpipe_models.planning.rows import PathRows
 from urmpipe_models.transform import from_offset
+
+some = settings(max_examples=40)
 
 ROUNDING = 1e-12
 """Of coordinates of up to 1 m through some tens of operations, and of unit vectors, in [m] and [-]."""
@@ -45,6 +47,7 @@ def test_the_papers_contour() -> None:
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows(variants=True))
 def test_the_direction_goes_on_where_segments_meet(rows: PathRows) -> None:
     path = path_of(rows)
@@ -57,6 +60,7 @@ def test_the_direction_goes_on_where_segments_meet(rows: PathRows) -> None:
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows(variants=True))
 def test_points_are_on_their_arc_at_unit_speed(rows: PathRows) -> None:
     path = path_of(rows)
@@ -73,6 +77,7 @@ def test_points_are_on_their_arc_at_unit_speed(rows: PathRows) -> None:
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows(variants=True), st.floats(0.01, 0.99))
 def test_derivatives_are_those_of_the_place(rows: PathRows, share: float) -> None:
     """By central differences inside every segment, whose error is h^2 / (6 r^2) and h^2 / (6 r^3)."""
@@ -89,6 +94,7 @@ def test_derivatives_are_those_of_the_place(rows: PathRows, share: float) -> Non
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows())
 def test_the_length_is_that_of_a_fine_polygon(rows: PathRows) -> None:
     """A polygon through all bounds is shorter by less than (step / r)^2 / 24 of each arc."""
@@ -103,6 +109,7 @@ def test_the_length_is_that_of_a_fine_polygon(rows: PathRows) -> None:
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows(variants=True))
 def test_both_meanings_of_a_radius_give_one_curve(rows: PathRows) -> None:
     one, other = path_of(rows), path_of(by_first_points(rows))
@@ -113,6 +120,7 @@ def test_both_meanings_of_a_radius_give_one_curve(rows: PathRows) -> None:
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows(variants=True))
 def test_reversed_rows_give_the_reversed_curve(rows: PathRows) -> None:
     path = path_of(rows)
@@ -125,6 +133,7 @@ def test_reversed_rows_give_the_reversed_curve(rows: PathRows) -> None:
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows())
 def test_reversed_first_points_are_the_last_points(rows: PathRows) -> None:
     """Told by the paper's meaning, the way back begins its arcs where the way there ends them."""
@@ -139,6 +148,7 @@ def test_reversed_first_points_are_the_last_points(rows: PathRows) -> None:
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows(variants=True), st.lists(st.floats(-3.0, 3.0), min_size=6, max_size=6))
 def test_a_rigid_motion_of_the_rows_moves_the_curve(rows: PathRows, motion: list[float]) -> None:
     frame = from_offset(motion)
@@ -153,6 +163,7 @@ def test_a_rigid_motion_of_the_rows_moves_the_curve(rows: PathRows, motion: list
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows())
 def test_rows_stand_where_they_say(rows: PathRows) -> None:
     """Stops at their own points, corners at the middle of their arcs, first points where these begin."""
@@ -203,6 +214,7 @@ def test_arcs_touch_in_a_plane_of_any_place(corner: bool) -> None:
 
 
 @pytest.mark.slow
+@some
 @given(corner_rows(), st.lists(st.floats(-2.0, 2.0), min_size=60, max_size=60))
 def test_the_tool_turns_evenly_from_row_to_row(rows: PathRows, angles: list[float]) -> None:
     turned = np.array(angles).reshape(20, 3)[: len(rows)]
