@@ -26,7 +26,7 @@ from urmpipe_models.lagrange.open_form import OpenForm, open_form
 from urmpipe_models.lagrange.text import equations_text
 from urmpipe_models.transform import from_offset
 
-QUICK = {1: (2, 11, 14), 2: (2, 8), 3: (2, 10, 19), 4: (3,)}
+QUICK = {1: (2, 11, 14), 2: (2, 8), 3: (2, 8, 19), 4: (19,)}
 """Seeds of arms by their number of coordinates."""
 
 CASES = [(count, seed) for count, seeds in QUICK.items() for seed in seeds]
@@ -92,7 +92,7 @@ def test_each_term_is_that_of_the_numeric_dynamics_in_text_and_in_c(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("count", "seed"), [(1, 2), (1, 11), (2, 8), (3, 19), (4, 3)])
+@pytest.mark.parametrize(("count", "seed"), [(1, 2), (1, 11), (2, 8), (3, 19), (4, 19)])
 def test_the_work_of_the_drives_is_the_change_of_energy(count: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     chain = random_arm(rng, count)
