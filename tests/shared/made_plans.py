@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.planning.cube import cube_rows
+from urmpipe_models.planning.path_joints import PathJoints
 from urmpipe_models.planning.rows import PathRows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.planned_paths.given_path import given_path
 from urmpipe_pipeline.planned_paths.obstacles import ObstacleKind
-from urmpipe_pipeline.planned_paths.planning import plan_path
+from urmpipe_pipeline.planned_paths.planning import joints_of, plan_path
 from urmpipe_pipeline.planned_paths.request import Request, Timing, checked_timing
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 
@@ -37,7 +39,14 @@ def limited(name: str, **limits: float | list[float]) -> Chain:
 
 def planned(arm: Chain | None, rows: PathRows, **timing: Any) -> PlannedPath:
     """Return the plan of rows."""
-    return plan_path(given_path(rows), Request(arm, None, checked_timing(Timing(**timing))))
+    request = Request(arm, None, checked_timing(Timing(**timing)))
+    return plan_path(given_path(rows), request, joints=followed(arm, rows))
+
+
+@lru_cache(maxsize=16)
+def followed(arm: Chain | None, rows: PathRows) -> PathJoints | None:
+    """Return the joints along rows, which are those of any timing."""
+    return joints_of(given_path(rows), Request(arm, None, Timing()))
 
 
 def across_the_base() -> PlannedPath:

@@ -173,7 +173,7 @@ def test_less_than_a_hundredth_of_the_speed_is_no_plan() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("y", [1e-3, 1.6e-3, 2e-3])
+@pytest.mark.parametrize("y", [1e-3, 2e-3])
 def test_past_the_axis_the_first_joint_takes_the_speed(y: float) -> None:
     """At a distance y from it the joint turns at v / y: with v = 0.5 m/s, and 6 rad/s allowed."""
     points = np.array([[0.8, y, 1.5], [-0.8, y, 1.5]])
@@ -189,7 +189,7 @@ def test_past_the_axis_the_first_joint_takes_the_speed(y: float) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("y", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("y", [1e-2, 1e-4])
 def test_the_law_of_limits_turns_the_arm_near_its_axis(y: float) -> None:
     """However near it passes, half a turn of the first joint takes what its limits allow, and hardly more."""
     points = np.array([[0.8, y, 1.5], [-0.8, y, 1.5]])
