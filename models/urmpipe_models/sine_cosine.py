@@ -80,9 +80,9 @@ def cosine_sine_into(x: FloatArray, c: FloatArray, s: FloatArray, *work: FloatAr
         s: Another one, of the same shape.
         work: `WORK` more.
     """
-    if not (x.min(initial=0.0) >= -_MOST and x.max(initial=0.0) <= _MOST):
-        x = _less_turns(x)
     steps, r, sine, other = work
+    if not np.abs(x, steps).max(initial=0.0) <= _MOST:
+        x = _less_turns(x)
     np.multiply(x, _PER_STEP, steps)
     steps += _SHIFT
     at = np.bitwise_and(steps.view(np.int64), _STEPS - 1, r.view(np.int64))
