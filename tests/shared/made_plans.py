@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -49,12 +49,14 @@ def followed(arm: Chain | None, rows: PathRows) -> PathJoints | None:
     return joints_of(given_path(rows), Request(arm, None, Timing()))
 
 
+@cache
 def across_the_base() -> PlannedPath:
     """Return a plan between rows that are reached, across the column of the arm."""
     points = np.array([[0.3, 0.3, 0.3], [-0.3, -0.3, 0.3]])
     return planned(load_robot("ur5e"), PathRows(points, rotation=DOWN))
 
 
+@cache
 def behind_the_arm() -> PlannedPath:
     """Return a plan past the limit of the first joint, of an arm that cannot bend over back."""
     points = np.array([[-1.5, 0.3, 1.0], [-1.5, -0.3, 1.0]])
@@ -62,12 +64,14 @@ def behind_the_arm() -> PlannedPath:
     return planned(arm, PathRows(points))
 
 
+@cache
 def over_its_axis() -> PlannedPath:
     """Return a plan over the axis of theta1, along which the joints go on without a jump."""
     points = np.array([[0.6, 0.0, 1.6], [0.3, 0.0, 1.6], [-0.3, 0.0, 1.6]])
     return planned(load_robot("irb60"), PathRows(points))
 
 
+@cache
 def by_a_slow_joint() -> PlannedPath:
     """Return a plan by an arm whose first joint allows less than 1 % of the speed."""
     return planned(limited("ur5e", velocity=[0.005, *[math.inf] * 5]), SMALL)
