@@ -259,10 +259,10 @@ def test_a_joint_without_room_gives_no_freedom() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_the_largest_usage_is_that_of_many_places(case: str) -> None:
-    """Also where s'' steps, in the middle of an interval: by ten times as many places as the grid has."""
+    """Also where s'' steps, in the middle of an interval: by five times as many places as the grid has."""
     joints = limited(case, 1.0, 2.0)
     law = trapezoid_law(joints.path, 0.5, 6.0)
-    found = law.at(np.linspace(0.0, law.duration, 40_000)[1:-1])
+    found = law.at(np.linspace(0.0, law.duration, 20_000)[1:-1])
     rates, accelerations = joints.at(found.s).rates(found.v, found.a)
     wanted = max(np.abs(rates).max() / 1.0, np.sqrt(np.abs(accelerations).max() / 2.0))
     usage = largest_usage(joints, law)
