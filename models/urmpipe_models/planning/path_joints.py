@@ -138,7 +138,8 @@ def joints_along(
 ) -> PathJoints:
     """Return the joints that lead the tool of an arm along a path.
 
-    Intervals are divided, and the path followed anew, until the joints are known along each of them.
+    Intervals are divided, and the path followed anew from where it began, until the joints are known along
+    each of them.
 
     Args:
         chain: The arm.
@@ -152,7 +153,7 @@ def joints_along(
         if not found.reached or found.parts.max() == 1:
             break
         s = _divided(s, found.parts)
-        found = _followed(chain, path, s, start, None)
+        found = _followed(chain, path, s, found.grid.q[0], None)
     return found
 
 

@@ -176,9 +176,12 @@ def _back(task: Task, q: FloatArray, free: BoolArray, settings: Settings) -> tup
     """Return q back on the target by steps of its free joints, and where it is met."""
     for _ in range(CORRECTIONS):
         miss = task.miss(q)
+        exact = miss.within(EXACT, EXACT)
         J = np.where(free, miss.jacobian, 0.0)
         step = damped_step(J, miss.error, RANK_DAMPING * _trace(miss.jacobian))
-        q = settings.within(q + np.where(miss.within(EXACT, EXACT), 0.0, step))
+        q = settings.within(q + np.where(exact, 0.0, step))
+        if exact.all():
+            break
     return q, task.miss(q).within(settings.metres, settings.radians)
 
 
