@@ -24,7 +24,6 @@ from known_mechanisms import (
     driven,
     four_bar,
     nine_revolutes,
-    rccc,
     ring,
     rod,
     rssr,
@@ -235,8 +234,6 @@ def orientations(of: Plane) -> list[float]:
         (merlet(), 6),
         (plane((1.0, 1.1, 0.9)), None),
         (plane((1.6, 1.2, 1.4)), None),
-        (plane((1.2, 1.7, 1.1)), None),
-        (plane((0.7, 1.3, 1.5)), None),
     ],
 )
 def test_a_plane_platform_has_as_many_modes_as_its_coupler_curve_meets_a_circle(
@@ -294,7 +291,7 @@ def test_sarrus_has_both_sides_of_each_leg() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("build", [four_bar, rssr, rccc, coupled_loops, nine_revolutes, sarrus])
+@pytest.mark.parametrize("build", [four_bar, rssr, nine_revolutes])
 def test_one_seed_gives_the_same_bits_another_the_same_set(build: Callable[..., Network]) -> None:
     network = build(drive="s")
     first, again, other = (every(network, {"s": 0.1}, seed) for seed in (0, 0, 1))
