@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -117,6 +117,7 @@ def assert_poses(targets: TargetFile, written: Written, kept: Sequence[int]) -> 
 
 
 @pytest.mark.slow
+@settings(max_examples=50)
 @given(written=poses())
 def test_poses_come_back_whatever_the_spelling(written: Written) -> None:
     targets = written.read(written.rows())
@@ -152,6 +153,7 @@ def damaged(draw: st.DrawFn) -> tuple[Written, list[list[str]], dict[int, str]]:
 
 
 @pytest.mark.slow
+@settings(max_examples=50)
 @given(case=damaged())
 def test_damage_to_a_row_is_its_fault_alone(case: tuple[Written, list[list[str]], dict[int, str]]) -> None:
     written, rows, reasons = case
@@ -165,6 +167,7 @@ def test_damage_to_a_row_is_its_fault_alone(case: tuple[Written, list[list[str]]
 
 
 @pytest.mark.slow
+@settings(max_examples=50)
 @given(written=poses(least=6), rows=st.permutations(range(6)))
 def test_the_order_of_the_rows_is_that_of_the_file(written: Written, rows: list[int]) -> None:
     """Each row stands for itself: no row's pose depends on the others'."""
