@@ -121,7 +121,7 @@ def watched(page: Page) -> list[str]:
 
 
 def until(page: Page, condition: str) -> None:
-    """Wait for a condition of a page, whose own policy forbids what `wait_for_function` does: to evaluate text."""
+    """Wait for a condition. The page's own policy forbids `wait_for_function`, which evaluates text there."""
     page.evaluate(f"""new Promise(met => {{
         const look = () => ({condition}) ? met() : requestAnimationFrame(look);
         look();
