@@ -37,11 +37,12 @@ from urmpipe_models.dynamics.driven_arm import (
     ArmState,
     Motor,
     Spring,
+    arm_energy,
     at_rest,
-    energies,
     joint_accelerations,
     joint_torques,
     motor_rates,
+    powers,
     shaft_torques,
 )
 from urmpipe_models.dynamics.inverse import inverse_dynamics
@@ -118,14 +119,14 @@ class OneSystem:
     def rates(self, _t: float, x: FloatArray) -> FloatArray:
         state = self.state(x)
         motors = np.array([*motor_rates(state).values()]).T
-        flows = energies(self.chain, state, self.wrench)
+        flows = powers(self.chain, state, self.wrench)
         pushed = wrench_power(self.chain, state.q, state.qd, self.wrench)
         damped = sum(
             one.damping * rate**2
             for one, rate in zip(state.actuators, state.qd, strict=True)
             if isinstance(one, Spring)
         )
-        heat = [flows.power_in, flows.power_lost, pushed, damped]
+        heat = [flows.given, flows.lost, pushed, damped]
         return np.concatenate((state.qd, self.accelerations(state), *motors, heat))
 
     def sample(self, wanted: FloatArray) -> None:
@@ -143,7 +144,7 @@ class OneSystem:
         self.x = solve_ivp(self.rates, span, self.x, "DOP853", rtol=1e-10, atol=1e-12).y[:, -1]
 
     def stored(self) -> float:
-        return float(energies(self.chain, self.state(self.x), self.wrench).stored)
+        return float(arm_energy(self.chain, self.state(self.x)))
 
 
 def moves(chain: Chain, targets: FloatArray) -> Callable[[float], FloatArray]:
@@ -504,7 +505,7 @@ def test_the_torque_of_a_spring_is_what_its_energy_changes_by() -> None:
         """What the spring adds to the energy of the arm."""
         bare = [actuators[1], *actuators[1:]]
         with_it, without = (
-            energies(chain, ArmState([q, 0.1, 0.3], still, each), None).stored for each in (actuators, bare)
+            arm_energy(chain, ArmState([q, 0.1, 0.3], still, each)) for each in (actuators, bare)
         )
         return float(with_it - without)
 

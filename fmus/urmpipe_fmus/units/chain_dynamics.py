@@ -57,13 +57,14 @@ def chain_dynamics(robot: Chain) -> Unit:
     def accelerations(v: Values) -> list[Element]:
         """Return q''."""
         torques = gathered(robot, v, {one: one.effort for one in KINDS})
+        arm, links = masses.arm_at(v)
         return forward_dynamics(
-            masses.chain_at(v), values_of(robot, v), values_of(robot, v, "d"), torques, wrench_at(v)
+            arm, values_of(robot, v), values_of(robot, v, "d"), torques, wrench_at(v), links
         )
 
     def outputs(v: Values) -> Mapping[str, Any]:
         """Return the accelerations and the energy."""
-        arm, q, qd = masses.chain_at(v), values_of(robot, v), values_of(robot, v, "d")
+        arm, q, qd = masses.arm_at(v).chain, values_of(robot, v), values_of(robot, v, "d")
         energy = kinetic_energy(arm, q, qd) + potential_energy(arm, q)
         return {**scattered(robot, accelerations(v), "dd"), "energy_stored": energy}
 

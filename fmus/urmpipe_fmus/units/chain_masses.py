@@ -4,13 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from itertools import chain as joined
+from typing import Any, NamedTuple
 
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Parameter
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.drives.joint_drives import SMALLEST
+from urmpipe_models.dynamics.links import Links, links_of
 from urmpipe_models.dynamics.wrench import Wrench
+
+
+class Arm(NamedTuple):
+    """An arm of some masses.
+
+    Attributes:
+        chain: The arm.
+        links: Its moving parts.
+    """
+
+    chain: Chain
+    links: Links
 
 
 class Masses(NamedTuple):
@@ -18,11 +32,11 @@ class Masses(NamedTuple):
 
     Attributes:
         parameters: Tunable; they start at the masses of the robot's description.
-        chain_at: Returns the arm of some values of the parameters.
+        arm_at: Returns the arm of some values of the parameters.
     """
 
     parameters: tuple[Parameter, ...]
-    chain_at: Callable[[Values], Chain]
+    arm_at: Callable[[Values], Arm]
 
 
 def masses_of(robot: Chain) -> Masses:
@@ -36,13 +50,22 @@ def masses_of(robot: Chain) -> Masses:
     arm = replace(robot, inertials=moving, visuals=())
     centres = [f"centre{k}" for k in range(1, len(moving) + 1)]
 
-    def chain_at(v: Values) -> Chain:
-        """Return the arm of some masses."""
-        inertials = (
-            replace(one, mass=mass, centre=getattr(v, name))
-            for one, mass, name in zip(moving, v.masses, centres, strict=True)
-        )
-        return replace(arm, inertials=tuple(inertials), gravity=v.gravity)
+    last: tuple[list[Any], Arm] | None = None
+
+    def arm_at(v: Values) -> Arm:
+        """Return the arm of some masses: the last one as long as they are the same objects."""
+        nonlocal last
+        given = [v.masses, v.gravity, *(getattr(v, name) for name in centres)]
+        elements = [*joined.from_iterable(given)]
+        found = last
+        if found is None or [*map(id, elements)] != [*map(id, found[0])]:
+            inertials = (
+                replace(one, mass=mass, centre=centre)
+                for one, mass, centre in zip(moving, given[0], given[2:], strict=True)
+            )
+            chain = replace(arm, inertials=tuple(inertials), gravity=v.gravity)
+            found = last = elements, Arm(chain, links_of(chain))
+        return found[1]
 
     masses = Parameter(
         name="masses",
@@ -70,7 +93,7 @@ def masses_of(robot: Chain) -> Masses:
         start=tuple(map(float, robot.gravity)),
         size=3,
     )
-    return Masses((masses, *places, gravity), chain_at)
+    return Masses((masses, *places, gravity), arm_at)
 
 
 def tool_inputs() -> tuple[Input, Input]:

@@ -24,11 +24,11 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.dynamics.driven_arm import (
     Actuator,
     ArmState,
-    Energies,
+    arm_energy,
     at_rest,
-    energies,
     joint_accelerations,
     motor_rates,
+    powers,
     stable_step,
 )
 from urmpipe_models.dynamics.wrench import Wrench
@@ -122,7 +122,7 @@ class _Model:
         found: dict[str, Any] = dict(scattered(self.robot, self._accelerations(v), "dd"))
         for group in self.groups:
             found |= group.outputs(self._state(v), self._voltages(group, v))
-        return {**found, "energy_stored": self._energies(v).stored}
+        return {**found, "energy_stored": arm_energy(self.masses.arm_at(v).chain, self._state(v))}
 
     def derivatives(self, v: Values) -> Mapping[str, Any]:
         """Return how the states change."""
@@ -131,8 +131,8 @@ class _Model:
         found |= scattered(self.robot, self._accelerations(v), "d")
         for group in self.groups:
             found |= group.derivatives(motor_rates(state))
-        flows = self._energies(v)
-        return {**found, "energy_in": flows.power_in, "energy_lost": flows.power_lost}
+        flows = powers(self.robot, state, wrench_at(v))
+        return {**found, "energy_in": flows.given, "energy_lost": flows.lost}
 
     def update(self, v: Values) -> Mapping[str, Any]:
         """Take the samples that are due."""
@@ -151,11 +151,8 @@ class _Model:
 
     def _accelerations(self, v: Values) -> list[Element]:
         """Return q''; no voltage goes into them at once."""
-        return joint_accelerations(self.masses.chain_at(v), self._state(v), wrench_at(v))
-
-    def _energies(self, v: Values) -> Energies:
-        """Return powers and energy."""
-        return energies(self.masses.chain_at(v), self._state(v), wrench_at(v))
+        chain, links = self.masses.arm_at(v)
+        return joint_accelerations(chain, self._state(v), wrench_at(v), links)
 
     def _voltages(self, group: DriveGroup, v: Values) -> list[Element]:
         """Return the voltages of a group from the communication point on."""

@@ -34,6 +34,7 @@ from urmpipe_models.drives.joint_drives import (
 from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
 from urmpipe_models.dynamics.forward import check_motion, forward_dynamics
 from urmpipe_models.dynamics.inverse import inverse_dynamics
+from urmpipe_models.dynamics.links import Links
 from urmpipe_models.dynamics.mass_matrix import mass_matrix
 from urmpipe_models.dynamics.wrench import Wrench, wrench_power
 from urmpipe_models.elementwise import Element
@@ -110,18 +111,16 @@ class MotorRates(NamedTuple):
     current: Element
 
 
-class Energies(NamedTuple):
-    """What goes into an arm with drives, what it holds, and what becomes heat.
+class Powers(NamedTuple):
+    """What goes into an arm with drives, and what becomes heat.
 
     Attributes:
-        power_in: Of the voltages and of the wrench, in [W].
-        power_lost: Of armatures, shafts and dampers, in [W].
-        stored: Kinetic, potential, elastic and magnetic, in [J].
+        given: By the voltages and the wrench, in [W].
+        lost: In armatures, shafts and dampers, in [W].
     """
 
-    power_in: Element
-    power_lost: Element
-    stored: Element
+    given: Element
+    lost: Element
 
 
 class Rest(NamedTuple):
@@ -178,15 +177,18 @@ def _relief(one: Motor, q: Element) -> Element:
     return one.spring.stiffness * (one.spring.rest - q)
 
 
-def joint_accelerations(chain: Chain, state: ArmState, wrench: Wrench | None = None) -> list[Element]:
+def joint_accelerations(
+    chain: Chain, state: ArmState, wrench: Wrench | None = None, arm: Links | None = None
+) -> list[Element]:
     """Return q'' of eq. 19 in [rad/s2] or [m/s2], one element per coordinate.
 
     Args:
         chain: The arm, with masses.
         state: The arm and what turns it.
         wrench: What acts on the tool centre point from outside.
+        arm: Its moving parts, where they are known.
     """
-    return forward_dynamics(chain, state.q, state.qd, joint_torques(state), wrench)
+    return forward_dynamics(chain, state.q, state.qd, joint_torques(state), wrench, arm)
 
 
 def motor_rates(state: ArmState) -> dict[int, MotorRates]:
@@ -206,27 +208,40 @@ def motor_rates(state: ArmState) -> dict[int, MotorRates]:
     }
 
 
-def energies(chain: Chain, state: ArmState, wrench: Wrench | None = None) -> Energies:
-    """Return the powers and the energy of an arm with its drives: stored' = power_in - power_lost.
+def powers(chain: Chain, state: ArmState, wrench: Wrench | None = None) -> Powers:
+    """Return the powers of an arm with its drives, of which `arm_energy` changes: given - lost.
+
+    Args:
+        chain: The arm.
+        state: The arm and what turns it.
+        wrench: What acts on the tool centre point from outside.
+    """
+    given = 0.0 if wrench is None else wrench_power(chain, state.q, state.qd, wrench)
+    lost = 0.0
+    for one, qd in zip(state.actuators, state.qd, strict=True):
+        if isinstance(one, Motor):
+            given = given + one.voltage * one.current
+            lost = lost + lost_power(one.drive, one.rate, one.current, qd)
+        else:
+            lost = lost + one.damping * qd * qd
+    return Powers(given, lost)
+
+
+def arm_energy(chain: Chain, state: ArmState) -> Element:
+    """Return the kinetic, potential, elastic and magnetic energy of an arm with its drives, in [J].
 
     Args:
         chain: The arm, with masses.
         state: The arm and what turns it.
-        wrench: What acts on the tool centre point from outside.
     """
-    stored = kinetic_energy(chain, state.q, state.qd) + potential_energy(chain, state.q)
-    power_in = 0.0 if wrench is None else wrench_power(chain, state.q, state.qd, wrench)
-    power_lost = 0.0
-    for one, q, qd in zip(state.actuators, state.q, state.qd, strict=True):
+    energy = kinetic_energy(chain, state.q, state.qd) + potential_energy(chain, state.q)
+    for one, q in zip(state.actuators, state.q, strict=True):
         if isinstance(one, Motor):
-            power_in = power_in + one.voltage * one.current
-            power_lost = power_lost + lost_power(one.drive, one.rate, one.current, qd)
-            stored = stored + stored_energy(one.drive, one.angle, one.rate, one.current, q)
-            stored = stored + 0.5 * _relief(one, q) * (one.spring.rest - q)
+            energy = energy + stored_energy(one.drive, one.angle, one.rate, one.current, q)
+            energy = energy + 0.5 * _relief(one, q) * (one.spring.rest - q)
         else:
-            power_lost = power_lost + one.damping * qd * qd
-            stored = stored + 0.5 * one.stiffness * (one.rest - q) * (one.rest - q)
-    return Energies(power_in, power_lost, stored)
+            energy = energy + 0.5 * one.stiffness * (one.rest - q) * (one.rest - q)
+    return energy
 
 
 def at_rest(chain: Chain, wrench: Wrench | None = None) -> list[Rest]:

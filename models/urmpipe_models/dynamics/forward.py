@@ -8,8 +8,9 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.dynamics.inverse import inverse_dynamics
-from urmpipe_models.dynamics.mass_matrix import coordinate_sizes, mass_matrix
+from urmpipe_models.dynamics.inverse import needed_torques, posed_links
+from urmpipe_models.dynamics.links import Links
+from urmpipe_models.dynamics.mass_matrix import coordinate_sizes, mass_matrix, posed_matrix
 from urmpipe_models.dynamics.wrench import Wrench
 from urmpipe_models.elementwise import Element, minus, times
 from urmpipe_models.errors import RobotError
@@ -27,6 +28,7 @@ def forward_dynamics(
     qd: Sequence[Element],
     tau: Sequence[Element],
     wrench: Wrench | None = None,
+    arm: Links | None = None,
 ) -> list[Element]:
     """Return q'' = M^-1 (tau - tau_0), tau_0 being what the motion needs without q''.
 
@@ -36,6 +38,7 @@ def forward_dynamics(
         qd: Their rates, in [rad/s] or [m/s].
         tau: Torques of the joints in [N.m], forces of those that slide in [N].
         wrench: What acts on the tool centre point from outside.
+        arm: Its moving parts, where they are known.
 
     Returns:
         One element per coordinate, in [rad/s2] or [m/s2].
@@ -45,9 +48,10 @@ def forward_dynamics(
 
     Source: [Iso9283]_ eq. 19, solved for the accelerations.
     """
-    needed = inverse_dynamics(chain, q, qd, [0.0] * len(q), wrench)
+    posed = posed_links(chain, q, arm)
+    needed = needed_torques(posed, qd, [0.0] * len(q), wrench)
     left = [minus(given, other) for given, other in zip(tau, needed, strict=True)]
-    return solved(mass_matrix(chain, q), left)
+    return solved(posed_matrix(posed), left)
 
 
 def solved(matrix: Sequence[Sequence[Element]], right: Sequence[Element]) -> list[Element]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.dynamics.links import Link, Links, links_of
@@ -10,6 +11,20 @@ from urmpipe_models.dynamics.wrench import Wrench
 from urmpipe_models.elementwise import ZERO, Element, Vector, add, cross, dot, plus, scale, subtract, times
 from urmpipe_models.kinematics.frames import joint_values, moved
 from urmpipe_models.transform import Transform
+
+
+class PosedLinks(NamedTuple):
+    """The moving parts of an arm in a pose.
+
+    Attributes:
+        chain: The arm.
+        arm: Its moving parts.
+        frames: The moving frame of each link in that of the link before it, the first one's in the base.
+    """
+
+    chain: Chain
+    arm: Links
+    frames: Sequence[Transform]
 
 
 def inverse_dynamics(
@@ -41,11 +56,17 @@ def inverse_dynamics(
 
     Source: [Iso9283]_ eq. 13, by the algorithm of [Luh1980]_.
     """
-    arm = links_of(chain)
-    frames = link_frames(chain, arm, q)
-    forces = _link_forces(chain, arm, frames, qd, qdd)
+    return needed_torques(posed_links(chain, q), qd, qdd, wrench)
+
+
+def needed_torques(
+    posed: PosedLinks, qd: Sequence[Element], qdd: Sequence[Element], wrench: Wrench | None = None
+) -> list[Element]:
+    """Return `inverse_dynamics` of an arm in a pose."""
+    chain, arm, frames = posed
+    forces = _link_forces(posed, qd, qdd)
     if wrench is not None:
-        forces[-1] = _less_tool(chain, arm, frames, forces[-1], wrench)
+        forces[-1] = _less_tool(posed, forces[-1], wrench)
     torques: list[Element] = [0.0] * len(chain.coordinates)
     force, moment = ZERO, ZERO
     for link, frame, (own_force, own_moment) in zip(
@@ -60,16 +81,28 @@ def inverse_dynamics(
     return torques
 
 
-def link_frames(chain: Chain, arm: Links, q: Sequence[Element]) -> list[Transform]:
-    """Return the moving frame of each link in that of the link before it, the first one's in the base."""
+def posed_links(chain: Chain, q: Sequence[Element], arm: Links | None = None) -> PosedLinks:
+    """Return the moving parts of an arm in a pose.
+
+    Args:
+        chain: The arm, with masses.
+        q: One element per coordinate, in [rad] or [m].
+        arm: Its moving parts, where they are known.
+
+    Raises:
+        RobotError: If the arm has no masses.
+    """
+    arm = arm or links_of(chain)
     values = dict(zip((joint.name for joint in chain.joints), joint_values(chain, q), strict=True))
-    return [moved(link.joint.origin, link.joint, values[link.joint.name]) for link in arm.links]
+    frames = [moved(link.joint.origin, link.joint, values[link.joint.name]) for link in arm.links]
+    return PosedLinks(chain, arm, frames)
 
 
 def _link_forces(
-    chain: Chain, arm: Links, frames: Sequence[Transform], qd: Sequence[Element], qdd: Sequence[Element]
+    posed: PosedLinks, qd: Sequence[Element], qdd: Sequence[Element]
 ) -> list[tuple[Vector, Vector]]:
     """Return the force on each link and its moment about the origin of the link's frame."""
+    chain, arm, frames = posed
     omega, alpha = ZERO, ZERO
     a = Transform(chain.base.columns).rotate(scale(-1.0, chain.gravity))
     found = []
@@ -101,10 +134,9 @@ def _needed(link: Link, omega: Vector, alpha: Vector, a: Vector) -> tuple[Vector
     return force, add(spin, cross(link.moment, a))
 
 
-def _less_tool(
-    chain: Chain, arm: Links, frames: Sequence[Transform], needed: tuple[Vector, Vector], wrench: Wrench
-) -> tuple[Vector, Vector]:
+def _less_tool(posed: PosedLinks, needed: tuple[Vector, Vector], wrench: Wrench) -> tuple[Vector, Vector]:
     """Return what the last link still needs where a wrench acts on the tool."""
+    chain, arm, frames = posed
     force, moment = wrench
     for frame in (chain.base, *frames):
         back = Transform(frame.columns)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.dynamics.inverse import PosedLinks, posed_links
 from urmpipe_models.dynamics.screws import Body, inertial_force, moving_links
 from urmpipe_models.elementwise import Element, dot, plus, times
 
@@ -28,8 +29,13 @@ def mass_matrix(chain: Chain, q: Sequence[Element]) -> list[list[Element]]:
 
     Source: [Iso9283]_ eq. 13, D_1, by the composite bodies of [Walker1982]_.
     """
-    links, _ = moving_links(chain, q)
-    count = len(chain.coordinates)
+    return posed_matrix(posed_links(chain, q))
+
+
+def posed_matrix(posed: PosedLinks) -> list[list[Element]]:
+    """Return `mass_matrix` of an arm in a pose."""
+    links, _ = moving_links(posed)
+    count = len(posed.chain.coordinates)
     matrix: list[list[Element]] = [[0.0] * count for _ in range(count)]
     beyond = Body()
     for j in reversed(range(len(links))):
@@ -56,7 +62,7 @@ def coordinate_sizes(chain: Chain, q: Sequence[Element]) -> list[Element]:
     Returns:
         One element per coordinate, in [kg.m2] or [kg].
     """
-    links, _ = moving_links(chain, q)
+    links, _ = moving_links(posed_links(chain, q))
     sizes: list[Element] = [0.0] * len(chain.coordinates)
     beyond = Body()
     for link in reversed(links):

@@ -8,12 +8,10 @@ a(r) = G r + b with forces that its mass, its moment h and its second moments S 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.dynamics.inverse import link_frames
-from urmpipe_models.dynamics.links import Symmetric, links_of, summed, turned
+from urmpipe_models.dynamics.inverse import PosedLinks
+from urmpipe_models.dynamics.links import Symmetric, summed, turned
 from urmpipe_models.elementwise import ZERO, Element, Vector, add, cross, dot, minus, plus, scale, times
 from urmpipe_models.transform import Transform
 
@@ -109,18 +107,9 @@ class MovingLink:
         return plus(dot(self.axis, force.moment), dot(self.slide, force.force))
 
 
-def moving_links(chain: Chain, q: Sequence[Element]) -> tuple[list[MovingLink], Vector]:
-    """Return the moving joints and bodies of an arm from the base outwards, and where its tool is [m].
-
-    Args:
-        chain: The arm, with masses.
-        q: One element per coordinate, in [rad] or [m].
-
-    Raises:
-        RobotError: If the arm has no masses.
-    """
-    arm = links_of(chain)
-    first, *others = link_frames(chain, arm, q)
+def moving_links(posed: PosedLinks) -> tuple[list[MovingLink], Vector]:
+    """Return the moving joints and bodies of an arm from the base outwards, and where its tool is [m]."""
+    chain, arm, (first, *others) = posed
     found, pose = [], Transform(chain.base.rotation)
     for link, frame in zip(arm.links, (Transform(first.rotation), *others), strict=True):
         pose = pose @ frame

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.dynamics.inverse import posed_links
 from urmpipe_models.dynamics.screws import Field, Force, MovingLink, inertial_force, moving_links
 from urmpipe_models.dynamics.wrench import Wrench
 from urmpipe_models.elementwise import Element, Vector, add, cross, plus, scale
@@ -54,7 +55,7 @@ def torque_terms(
 
     Source: [Iso9283]_ eq. 13: D_1, D_2, D_(1+k), E and J^T F, the last with the sign of a force from outside.
     """
-    links, place = moving_links(chain, q)
+    links, place = moving_links(posed_links(chain, q))
     inertia, centrifugal, coriolis = Field(), Field(), Field()
     rates = [Field() for _ in chain.coordinates]
     weight = Field(offset=scale(-1.0, chain.gravity))

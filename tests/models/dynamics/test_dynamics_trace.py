@@ -19,9 +19,10 @@ from urmpipe_models.dynamics.driven_arm import (
     ArmState,
     Motor,
     Spring,
-    energies,
+    arm_energy,
     joint_accelerations,
     motor_rates,
+    powers,
 )
 from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
 from urmpipe_models.dynamics.forward import forward_dynamics
@@ -118,7 +119,8 @@ def test_a_driven_arm_traces_with_its_drives_as_parameters() -> None:
         state = state_of(*values)
         wrench = Wrench((1.0, 2.0, 3.0))
         rates = [list(one) for one in motor_rates(state).values()]
-        return [joint_accelerations(chain, state, wrench), rates, list(energies(chain, state, wrench))]
+        flows = [*powers(chain, state, wrench), arm_energy(chain, state)]
+        return [joint_accelerations(chain, state, wrench), rates, flows]
 
     sizes = [6, 6, 20, 7]
     assert_traced(lambda q, qd, motors, c: everything(q, qd, motors, [1.5 + x * x for x in c]), sizes)
