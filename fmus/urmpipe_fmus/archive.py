@@ -39,7 +39,7 @@ def write_fmu(path: Path, files: Mapping[str, bytes]) -> None:
     try:
         with zipfile.ZipFile(part, "x") as archive:
             for name in sorted(files):
-                archive.writestr(_entry(name), files[name], compresslevel=9)
+                archive.writestr(_entry(name), files[name])
         part.replace(path)
     finally:
         with suppress(OSError):  # why it cannot be written is told
