@@ -98,11 +98,7 @@ def _masses(chain: Chain, q: FloatArray) -> FloatArray:
 
 def _weight_stiffness(chain: Chain, q: FloatArray) -> FloatArray:
     """Return how the torques of gravity change with the joints, d g / d q, shape (n, n)."""
-    still, count = [0.0] * len(q), len(q)
-
-    def weight(at: FloatArray) -> FloatArray:
-        """Return the torques of gravity in [N.m] or [N], shape (n,)."""
-        return np.array(inverse_dynamics(chain, at.tolist(), still, still), dtype=np.float64)
-
-    moved = STEP * np.eye(count)
-    return np.column_stack([(weight(q + one) - weight(q - one)) / (2.0 * STEP) for one in moved])
+    still, moved = [0.0] * len(q), STEP * np.eye(len(q))
+    weights = inverse_dynamics(chain, list(q[:, np.newaxis] + np.hstack((moved, -moved))), still, still)
+    more, less = np.hsplit(np.array([np.broadcast_to(one, 2 * len(q)) for one in weights]), 2)
+    return np.asarray((more - less) / (2.0 * STEP))
