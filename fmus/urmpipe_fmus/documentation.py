@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from functools import partial
+from functools import cache, partial
 from importlib.metadata import version
+from typing import Any
 
 from urmpipe_fmus.description import markup_text
 from urmpipe_fmus.si_units import display_conversion
@@ -17,6 +18,20 @@ NUMBERS = ("Start", "Min", "Max")
 
 def documentation(unit: Unit) -> str:
     """Return a page of HTML that needs nothing else: variables, equations, source, and what a step does."""
+    page = _template().render(
+        unit=unit,
+        version=version("urmpipe"),
+        titles=TITLES,
+        numbers=NUMBERS,
+        rows=[list(zip(TITLES, variable_row(one), strict=True)) for one in unit.variables],
+        steps=_steps(unit),
+    )
+    return markup_text(page)
+
+
+@cache
+def _template() -> Any:
+    """Return the page's template."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
@@ -27,15 +42,7 @@ def documentation(unit: Unit) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    page = environment.get_template("documentation.html.jinja").render(
-        unit=unit,
-        version=version("urmpipe"),
-        titles=TITLES,
-        numbers=NUMBERS,
-        rows=[list(zip(TITLES, variable_row(one), strict=True)) for one in unit.variables],
-        steps=_steps(unit),
-    )
-    return markup_text(page)
+    return environment.get_template("documentation.html.jinja")
 
 
 def variable_row(one: Variable, digits: int | None = None) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ import ast
 import re
 import sys
 from collections.abc import Iterable, Iterator
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -74,14 +75,16 @@ def _imported(source: str) -> Iterator[str]:
             yield name
 
 
-def _names(source: str) -> Iterator[str]:
-    """Yield what a text imports: modules, and for `from a import b` both a and a.b."""
+@cache
+def _names(source: str) -> tuple[str, ...]:
+    """Return what a text imports: modules, and for `from a import b` both a and a.b."""
+    found: list[str] = []
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            found += (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            yield node.module
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            found += (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))
+    return tuple(found)
 
 
 def _is_module(name: str) -> bool:
