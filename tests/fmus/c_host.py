@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -62,12 +62,22 @@ def write(folder: Path, unit: Unit, platforms: Sequence[str]) -> None:
         (folder / name).write_bytes(content)
 
 
-def ran(command: Sequence[str], folder: Path, given: str, resources: str = "") -> list[str]:
+def ran(
+    command: Sequence[str],
+    folder: Path,
+    given: str,
+    resources: str = "",
+    environment: Mapping[str, str] = os.environ,
+) -> list[str]:
     """What the host prints."""
-    environment = {**os.environ, "WINEDEBUG": "-all", "ASAN_OPTIONS": "detect_leaks=1"}
     place = resources or (folder / "resources").as_uri()
     done = subprocess.run(
-        [*command, GUID, place], input=given, capture_output=True, text=True, env=environment, check=False
+        [*command, GUID, place],
+        input=given,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**environment, "ASAN_OPTIONS": "detect_leaks=1"},
     )
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
     return done.stdout.splitlines()

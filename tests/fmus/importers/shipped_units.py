@@ -21,7 +21,7 @@ FARTHEST = 2.0
 """Inputs without bounds are drawn from -FARTHEST to FARTHEST: angles, rates and volts for a small drive."""
 
 
-CROSS_BUILT = ("kinematic_chain", "repolarizer", "delta_meter", "log_source", "dc_drive")
+CROSS_BUILT = ("kinematic_chain", "repolarizer", "log_source", "dc_drive")
 """Units that are built for Linux and Windows: with integers, truths, a table, states."""
 
 

@@ -7,10 +7,8 @@ the bits are those of Linux, the tests of the native backend show with a host of
 from __future__ import annotations
 
 import csv
-import os
 import shutil
 import subprocess
-import sys
 import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -31,15 +29,6 @@ TAGS = {"Real": "real", "Integer": "integer", "Boolean": "boolean"}
 
 TAR = "@xcopy /E /I /Y /Q unpacked %4\r\n"
 """Ecos unpacks by Windows' own tar, which wine has not: this one copies what Python has unpacked."""
-
-
-@pytest.fixture(scope="module")
-def wine(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The environment of a wine of its own, with nothing of the user's in it and no windows opened."""
-    if sys.platform == "win32" or not shutil.which("wine"):
-        pytest.skip("needs wine (Debian: wine, wine64)")
-    kept = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "SHELL")}
-    return kept | {"WINEPREFIX": str(tmp_path_factory.mktemp("wine") / "prefix"), "WINEDEBUG": "-all"}
 
 
 def ecos_program() -> Path:

@@ -6,7 +6,7 @@ import shutil
 import struct
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -100,10 +100,8 @@ def test_what_is_missing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.slow
 @needs_zig
 def test_windows_and_linux_give_the_same_bits(
-    elementary: Unit, oscillator: Unit, player: Unit, tmp_path: Path
+    elementary: Unit, oscillator: Unit, player: Unit, wine: Mapping[str, str], tmp_path: Path
 ) -> None:
-    if shutil.which("wine") is None or sys.platform != "linux":
-        pytest.skip("needs wine")
     zig = [sys.executable, "-m", "ziglang", "cc", "-target"]
     linux = host(tmp_path, [*zig, TARGETS["linux64"]])
     windows = host(tmp_path, [*zig, TARGETS["win64"]], "host.exe")
@@ -118,7 +116,7 @@ def test_windows_and_linux_give_the_same_bits(
         local = resources.replace("file:///", "file:///Z:/")
         library = folder / f"binaries/win64/{unit.name}.dll"
         (tmp_path / "unit.dll").write_bytes(library.read_bytes())
-        on_windows = ran(["wine", windows, str(tmp_path / "unit.dll")], folder, given, local)
+        on_windows = ran(["wine", windows, str(tmp_path / "unit.dll")], folder, given, local, wine)
         assert len(on_linux) == 3100
         assert [a for a, b in zip(on_linux, on_windows, strict=True) if a != b] == []
 

@@ -13,6 +13,7 @@ from fmpy.validation import validate_fmu
 
 from loaded_fmu import Loaded
 from urmpipe_fmus.build import build_fmu
+from urmpipe_fmus.cache import cached_fmu
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.user_unit import unit_of_source
@@ -25,10 +26,6 @@ REFUSED = "Fatal py exception encountered: [{}] PyObject_CallMethod\n{}"
 """How pythonfmu's binary logs the message of a refused call."""
 
 
-def built(unit: Unit, folder: Path) -> Path:
-    return build_fmu(unit, folder, backend="python").path
-
-
 def random_value(one: Input | Parameter, random: np.random.Generator) -> float:
     """A value that the variable takes, near its start or in its range."""
     if one.type == "Boolean":
@@ -39,20 +36,20 @@ def random_value(one: Input | Parameter, random: np.random.Generator) -> float:
 
 
 @pytest.mark.slow
-def test_fmpy_finds_nothing_wrong(unit: Unit, tmp_path: Path) -> None:
-    assert validate_fmu(str(built(unit, tmp_path))) == []
+def test_fmpy_finds_nothing_wrong(unit: Unit) -> None:
+    assert validate_fmu(str(cached_fmu(unit, "python"))) == []
 
 
 @pytest.mark.slow
 def test_the_same_unit_is_the_same_bytes(unit: Unit, tmp_path: Path) -> None:
-    first = built(unit, tmp_path).read_bytes()
-    assert built(unit, tmp_path).read_bytes() == first
+    first = build_fmu(unit, tmp_path, backend="python").path.read_bytes()
+    assert build_fmu(unit, tmp_path, backend="python").path.read_bytes() == first
 
 
 @pytest.mark.slow
-def test_it_computes_what_an_instance_does_bit_by_bit(unit: Unit, tmp_path: Path) -> None:
+def test_it_computes_what_an_instance_does_bit_by_bit(unit: Unit) -> None:
     random = np.random.default_rng(5)
-    fmu, instance = Loaded(built(unit, tmp_path), start=0.02), Instance(unit)
+    fmu, instance = Loaded(cached_fmu(unit, "python"), start=0.02), Instance(unit)
     instance.begin(0.02)
     names = [name for name, _ in unit.scalars]
     everything = range(len(names))
@@ -69,8 +66,8 @@ def test_it_computes_what_an_instance_does_bit_by_bit(unit: Unit, tmp_path: Path
     fmu.free()
 
 
-def test_outputs_are_fresh_after_set_without_a_step(make: Make, tmp_path: Path) -> None:
-    fmu = Loaded(built(make("arm"), tmp_path))
+def test_outputs_are_fresh_after_set_without_a_step(make: Make) -> None:
+    fmu = Loaded(cached_fmu(make("arm"), "python"))
     for angle in (0.0, 1.0, -2.5):
         fmu.set("phi[1]", angle)
         assert fmu.get(["first"]) == [0.5 * np.cos(angle)]
@@ -79,9 +76,9 @@ def test_outputs_are_fresh_after_set_without_a_step(make: Make, tmp_path: Path) 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("serialized", [False, True])
-def test_a_state_that_is_restored_goes_on_bit_by_bit(unit: Unit, tmp_path: Path, serialized: bool) -> None:
+def test_a_state_that_is_restored_goes_on_bit_by_bit(unit: Unit, serialized: bool) -> None:
     names = [name for name, _ in unit.scalars]
-    path = built(unit, tmp_path)
+    path = cached_fmu(unit, "python")
     fmu = Loaded(path)
     for k in range(5):
         fmu.do_step(k * 0.011, 0.011)
@@ -108,8 +105,8 @@ def test_a_state_that_is_restored_goes_on_bit_by_bit(unit: Unit, tmp_path: Path,
     fmu.free()
 
 
-def test_no_step_goes_past_the_stop_time(make: Make, tmp_path: Path) -> None:
-    fmu = Loaded(built(make("counter"), tmp_path))
+def test_no_step_goes_past_the_stop_time(make: Make) -> None:
+    fmu = Loaded(cached_fmu(make("counter"), "python"))
     fmu.fmu.reset()
     fmu.fmu.setupExperiment(startTime=0.0, stopTime=0.5)
     fmu.fmu.enterInitializationMode()
@@ -122,8 +119,8 @@ def test_no_step_goes_past_the_stop_time(make: Make, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("serialized", [False, True])
-def test_a_restored_state_knows_that_it_runs(make: Make, tmp_path: Path, serialized: bool) -> None:
-    fmu = Loaded(built(make("spring"), tmp_path))
+def test_a_restored_state_knows_that_it_runs(make: Make, serialized: bool) -> None:
+    fmu = Loaded(cached_fmu(make("spring"), "python"))
     fmu.do_step(0.0, 0.01)
     state = fmu.fmu.getFMUstate()
     if serialized:
@@ -140,8 +137,8 @@ def test_a_restored_state_knows_that_it_runs(make: Make, tmp_path: Path, seriali
     fmu.free()
 
 
-def test_bytes_that_are_no_state_are_refused(make: Make, tmp_path: Path) -> None:
-    fmu = Loaded(built(make("spring"), tmp_path))
+def test_bytes_that_are_no_state_are_refused(make: Make) -> None:
+    fmu = Loaded(cached_fmu(make("spring"), "python"))
     said = "unit spring: serializedState: found other bytes, allowed: those of a state of this FMU"
     for content in (b"", b"nonsense", b'["arm", true, [1.0]]', b'["spring", true, [NaN]]', b"[]", b"1"):
         state = fmu.fmu.deSerializeFMUstate(content)
@@ -170,9 +167,9 @@ REFUSALS = [
 @pytest.mark.slow
 @pytest.mark.parametrize(("function", "references", "values", "said"), REFUSALS)
 def test_what_is_refused_is_told_and_changes_nothing(
-    make: Make, tmp_path: Path, function: str, references: list[int], values: Any, said: str
+    make: Make, function: str, references: list[int], values: Any, said: str
 ) -> None:
-    fmu = Loaded(built(make("spring"), tmp_path))
+    fmu = Loaded(cached_fmu(make("spring"), "python"))
     names = list(fmu.references)
     before = fmu.get(names)
     arguments = (references,) if values is None else (references, values)
@@ -183,16 +180,16 @@ def test_what_is_refused_is_told_and_changes_nothing(
     fmu.free()
 
 
-def test_refused_values_leave_all_of_a_call_unset(make: Make, tmp_path: Path) -> None:
-    fmu = Loaded(built(make("spring"), tmp_path))
+def test_refused_values_leave_all_of_a_call_unset(make: Make) -> None:
+    fmu = Loaded(cached_fmu(make("spring"), "python"))
     assert fmu.status_of("setReal", [1, 0], [60.0, -1.0]) == FATAL
     assert fmu.get(["c", "m"]) == [50.0, 2.0]
     fmu.free()
 
 
 @pytest.mark.slow
-def test_an_instance_lives_on_after_many_refused_calls(make: Make, tmp_path: Path) -> None:
-    fmu, instance = Loaded(built(make("spring"), tmp_path)), Instance(make("spring"))
+def test_an_instance_lives_on_after_many_refused_calls(make: Make) -> None:
+    fmu, instance = Loaded(cached_fmu(make("spring"), "python")), Instance(make("spring"))
     for _ in range(2000):
         assert fmu.status_of("setReal", [0], [float("nan")]) == FATAL
         assert fmu.status_of("getReal", [77]) == FATAL
@@ -203,8 +200,8 @@ def test_an_instance_lives_on_after_many_refused_calls(make: Make, tmp_path: Pat
     fmu.free()
 
 
-def test_a_step_that_fails_is_undone_and_told(make: Make, tmp_path: Path) -> None:
-    fmu = Loaded(built(make("spring"), tmp_path))
+def test_a_step_that_fails_is_undone_and_told(make: Make) -> None:
+    fmu = Loaded(cached_fmu(make("spring"), "python"))
     fmu.set("m", 1e-6)
     fmu.set("c", 1e300)
     names = list(fmu.references)
@@ -239,8 +236,8 @@ def from_text(source: str, file: str) -> Unit:
     return replace(made, recipe=Recipe(file, source=source))
 
 
-def test_exceptions_of_a_users_functions_are_told_with_their_type(tmp_path: Path) -> None:
-    fmu = Loaded(built(from_text(RAISING, "raising.py"), tmp_path))
+def test_exceptions_of_a_users_functions_are_told_with_their_type() -> None:
+    fmu = Loaded(cached_fmu(from_text(RAISING, "raising.py"), "python"))
     fmu.set("u", 3.0)
     assert fmu.status_of("getReal", [2]) == FATAL
     assert fmu.log[-1][2] == REFUSED.format("getReal", "raising.py:7: unit raising: outputs: KeyError: 3.0")
@@ -259,8 +256,8 @@ def test_exceptions_of_a_users_functions_are_told_with_their_type(tmp_path: Path
     fmu.free()
 
 
-def test_reset_is_the_start_again(make: Make, tmp_path: Path) -> None:
-    fmu = Loaded(built(make("spring"), tmp_path))
+def test_reset_is_the_start_again(make: Make) -> None:
+    fmu = Loaded(cached_fmu(make("spring"), "python"))
     names = list(fmu.references)
     before = fmu.get(names)
     fmu.set("F", 4.0)
