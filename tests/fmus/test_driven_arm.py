@@ -46,6 +46,7 @@ from urmpipe_models.dynamics.driven_arm import (
     shaft_torques,
 )
 from urmpipe_models.dynamics.inverse import inverse_dynamics
+from urmpipe_models.dynamics.links import links_of
 from urmpipe_models.dynamics.sampled_loop import spectral_radius
 from urmpipe_models.dynamics.wrench import Wrench, wrench_power
 from urmpipe_models.errors import RobotError, UnitError, UrmpipeError
@@ -93,6 +94,7 @@ class OneSystem:
 
     def __init__(self, chain: Chain, wrench: Wrench) -> None:
         self.chain, self.wrench, self.n = chain, wrench, len(chain.coordinates)
+        self.links = links_of(chain)
         self.rests = at_rest(chain)
         by_joint = {one.joint: one for one in chain.drives}
         self.joints = [by_joint[name] for name in chain.coordinates]
@@ -114,7 +116,7 @@ class OneSystem:
         return ArmState(list(x[: self.n]), list(x[self.n : 2 * self.n]), actuators)
 
     def accelerations(self, state: ArmState) -> list[Any]:
-        return joint_accelerations(self.chain, state, self.wrench)
+        return joint_accelerations(self.chain, state, self.wrench, self.links)
 
     def rates(self, _t: float, x: FloatArray) -> FloatArray:
         state = self.state(x)

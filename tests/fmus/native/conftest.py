@@ -60,13 +60,13 @@ class Native:
 
 
 @pytest.fixture(scope="session")
-def compiled() -> dict[Any, dict[str, bytes]]:
-    """Binaries that were compiled before, by what they were compiled from."""
+def compiled() -> dict[int, tuple[Unit, dict[str, bytes]]]:
+    """Units that were compiled before, each by its identity, and the files of its FMU."""
     return {}
 
 
 @pytest.fixture
-def built(tmp_path: Path, compiled: dict[Any, dict[str, bytes]]) -> Callable[..., Path]:
+def built(tmp_path: Path, compiled: dict[int, tuple[Unit, dict[str, bytes]]]) -> Callable[..., Path]:
     """Build a unit in an FMU's folder, without the description."""
     missing = native_missing()
     if missing:
@@ -79,15 +79,14 @@ def built(tmp_path: Path, compiled: dict[Any, dict[str, bytes]]) -> Callable[...
         if place in done:  # a library that is loaded must not be written again
             return place
         done.add(place)
-        sources = native_sources(unit)
-        key = (unit.name, *sources.values())
-        if key not in compiled:
-            compiled[key] = native_binaries(unit, sources, GUID, [this_platform()])
-        files = {**sources, **compiled[key]}
-        files["sources/guid.h"] = guid_header(GUID)
-        if unit.table is not None:
-            files[TABLE_FILE] = table_bytes(unit.table)
-        for name, content in files.items():
+        if id(unit) not in compiled:
+            sources = native_sources(unit)
+            files = {**sources, **native_binaries(unit, sources, GUID, [this_platform()])}
+            files["sources/guid.h"] = guid_header(GUID)
+            if unit.table is not None:
+                files[TABLE_FILE] = table_bytes(unit.table)
+            compiled[id(unit)] = unit, files
+        for name, content in compiled[id(unit)][1].items():
             path = place / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
@@ -110,7 +109,7 @@ def native(built: Callable[..., Path]) -> Iterator[Callable[..., Native]]:
         one.close()
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def oscillator() -> Unit:
     """A unit with something of every kind and type."""
 
@@ -153,7 +152,7 @@ def oscillator() -> Unit:
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def player() -> Unit:
     """A unit that plays a table."""
 
@@ -174,7 +173,7 @@ def player() -> Unit:
     )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def elementary() -> Unit:
     """A unit with the elementary functions that a C library computes in its own way."""
     ones = ("sin", "cos", "tan", "arctan", "tanh", "arcsinh")

@@ -120,7 +120,7 @@ def test_the_tests_of_the_runtime_pass_with_sanitizers() -> None:
     tests = [str(HERE / f"test_{name}.py") for name in ("states", "refusals")]
     environment = {
         **os.environ,
-        "CC": " ".join(SANITIZED),
+        "CC": " ".join(["env", "-u", "LD_PRELOAD", *SANITIZED]),  # the compiler itself runs without
         "LD_PRELOAD": library,
         "ASAN_OPTIONS": "detect_leaks=0",  # Python's own; those of the runtime the host would show
     }
