@@ -116,7 +116,7 @@ def test_blocks_near_accuracy_with_the_first_order_of_the_communication_step(tmp
     set_points_log(tmp_path / "points.csv", plan, [*range(6)])
     (motion,) = urmpipe.accuracy(path, arm, velocities=[0.2]).motions
     distances, errors = [], []
-    for steps in (5, 10, 20):
+    for steps in (5, 10):  # and a third step: test_driven_arm.py
         (tmp_path / "blocks.toml").write_text(system_of_blocks(begins, steps), encoding="utf-8")
         found = urmpipe.simulate(tmp_path / "blocks.toml")
         assert found.failed is None
@@ -125,7 +125,7 @@ def test_blocks_near_accuracy_with_the_first_order_of_the_communication_step(tmp
         distances.append(float(np.abs(run.delta[:, :3] - motion.delta[:, :3]).max()))
         errors.append(abs(run.statistics["norm"].max - float(motion.delta[:, 3].max())))
     assert distances[0] < 0.5 * motion.delta[:, 3].max()  # it is about the same motion
-    # Values held over a step are off by its length, so half of it by half; measured: orders 0.996 and 0.998.
+    # Values held over a step are off by its length, so half of it by half; measured: order 0.996.
     # What is left is the term of its square, which halves, too.
     assert -np.diff(np.log2(distances)) == pytest.approx(1.0, abs=0.02), distances
-    assert errors[2] < errors[1] < errors[0]
+    assert errors[1] < errors[0]
