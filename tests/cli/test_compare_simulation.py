@@ -20,6 +20,9 @@ PATH, LOG = LOGS / "path.csv", LOGS / "coppeliasim.csv"
 
 BACKENDS = ("native", "python")
 
+of_one_backend = pytest.mark.parametrize("recorded", BACKENDS[:1], indirect=True, scope="module")
+"""Where a recording is a recording: no number is held against another."""
+
 
 @pytest.fixture(scope="module", params=BACKENDS)
 def recorded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Simulation:
@@ -83,6 +86,7 @@ def test_its_own_tip_agrees_with_its_joints(recorded: Simulation) -> None:
 
 
 @pytest.mark.slow
+@of_one_backend
 def test_the_block_is_asked_for_and_its_answers_work(
     recorded: Simulation, urmpipe: Callable[..., Any]
 ) -> None:
@@ -109,6 +113,7 @@ def test_a_block_without_a_simulation_is_refused(urmpipe: Callable[..., Any]) ->
 
 
 @pytest.mark.slow
+@of_one_backend
 def test_such_a_comparison_is_reported_and_diagnosed(
     recorded: Simulation, urmpipe: Callable[..., Any], tmp_path: Path
 ) -> None:
