@@ -1,9 +1,11 @@
-"""What all tests share: a cache of FMUs of the session's own, and the files beside the repository."""
+"""What all tests share: a cache of FMUs and a wine of the session, and the files beside the repository."""
 
 from __future__ import annotations
 
 import gc
 import os
+import shutil
+import sys
 from collections.abc import Generator, Iterator
 from pathlib import Path
 
@@ -46,6 +48,15 @@ def fmu_cache(session_folder: Path) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("URMPIPE_CACHE", str(session_folder / "cache"))
         yield
+
+
+@pytest.fixture(scope="session")
+def wine(session_folder: Path) -> dict[str, str]:
+    """The environment of a wine of the session's own: nothing of the user's is in it, and no window opens."""
+    if sys.platform != "linux" or not shutil.which("wine"):
+        pytest.skip("needs wine (Debian: wine, wine64)")
+    kept = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "SHELL")}
+    return kept | {"WINEPREFIX": str(session_folder / "wine"), "WINEDEBUG": "-all"}
 
 
 @pytest.fixture(scope="session")
