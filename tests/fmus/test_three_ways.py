@@ -252,7 +252,7 @@ def test_a_random_unit_gives_stepped_what_a_run_gives(case: tuple[Unit, tuple[An
 
 @pytest.mark.slow
 @pytest.mark.parametrize("backend", [pytest.param("native", marks=needs_native), "python"])
-@settings(max_examples=6, **PATIENT)
+@settings(max_examples=4, **PATIENT)  # of functions one by one: native/test_functions.py
 @given(case=CASES)
 def test_a_random_unit_exported_is_valid_and_gives_what_a_run_gives(
     case: tuple[Unit, tuple[Any, Any]], backend: Backend, tmp_path_factory: pytest.TempPathFactory
