@@ -84,7 +84,7 @@ def plan_path(
     Source: [Iso9283]_ section 4, steps 7 to 18.
     """
     path, arm, timing = path_of(given.rows), request.arm, request.timing
-    joints = joints or joints_of(given, request, progress)
+    joints = joints_of(given, request, progress) if joints is None else joints
     timed, samples = _within_limits(path, joints, _timed(path, joints, timing))
     law = timed.law
     options = timing.options | {"robot": arm.name if arm else None}
