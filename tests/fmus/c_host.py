@@ -42,11 +42,12 @@ def headers() -> str:
 
 
 def host(folder: Path, command: Sequence[str], name: str = "host") -> str:
-    """Compile the host."""
+    """Compile the host, from its folder: seen from above its own, zig builds its C libraries a second time."""
     program = str(folder / name)
     subprocess.run(
-        [*command, "-O1", "-I", headers(), str(HOST), "-o", program], check=True, capture_output=True
-    )
+        [*command, "-O1", "-I", headers(), str(HOST), "-o", program],
+        cwd=folder, check=True, capture_output=True,
+    )  # fmt: skip
     return program
 
 
