@@ -60,11 +60,13 @@ class Forks:
 
     Attributes:
         written: What commands wrote undisturbed, by the command's name and the output's.
+        seconds: How long they took in [s], by the command's name.
     """
 
     def __init__(self, process: subprocess.Popen[str]) -> None:
         self._process = process
         self.written: dict[str, dict[str, bytes]] = {}
+        self.seconds: dict[str, float] = {}
 
     def run(
         self,
