@@ -42,7 +42,7 @@ def headers() -> str:
 
 
 def host(folder: Path, command: Sequence[str], name: str = "host") -> str:
-    """Compile the host, from its folder: seen from above its own, zig builds its C libraries a second time."""
+    """Compile the host, from its folder: seen from above its own, zig builds its C libraries anew."""
     program = str(folder / name)
     subprocess.run(
         [*command, "-O1", "-I", headers(), str(HOST), "-o", program],

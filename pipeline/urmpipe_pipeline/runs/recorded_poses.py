@@ -102,7 +102,7 @@ class RecordedPoses:
         return self.fits(robot, [self.q if q is None else q])[0]
 
     def fits(self, robot: Chain, every: Sequence[FloatArray]) -> list[Fit]:
-        """Return the same of several joint values in [rad] or [m], shape (n, joints) each, computed at once."""
+        """Return the fits of several joint values in [rad] or [m], shape (n, joints) each, all at once."""
         position, rotation = poses_over_log(robot, np.concatenate(every))
         parts = zip(np.split(position, len(every)), np.split(rotation, len(every)), strict=True)
         return [tool_fit(*part, self.position) for part in parts]
