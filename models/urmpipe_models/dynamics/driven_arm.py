@@ -209,7 +209,7 @@ def motor_rates(state: ArmState) -> dict[int, MotorRates]:
 
 
 def powers(chain: Chain, state: ArmState, wrench: Wrench | None = None) -> Powers:
-    """Return the powers of an arm with its drives, of which `arm_energy` changes: given - lost.
+    """Return the powers that an arm with its drives is given and loses: `arm_energy` changes by given - lost.
 
     Args:
         chain: The arm.

@@ -24,7 +24,7 @@ COARSE_DIGITS = 6
 
 
 _CELLS = 1 << 14
-"""Of so many is kept whether they are numbers: each of a file's head is asked about again and again."""
+"""Cells that are remembered as numbers or not: those of a file's head are looked at many times."""
 
 
 @lru_cache

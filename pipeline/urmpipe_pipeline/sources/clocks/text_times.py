@@ -222,6 +222,7 @@ def known_forms(texts: Sequence[str]) -> tuple[Form, ...]:
     alike = [block[same] for _, block in cells.blocks() for same in _shapes(block)]
 
     def count(form: Form) -> int:
+        """Return how many cells are times of a form."""
         return sum(int(np.count_nonzero(_read_shape(some, form) != UNREADABLE)) for some in alike)
 
     return tuple(form for form in FORMS if 2 * count(form) >= len(cells))

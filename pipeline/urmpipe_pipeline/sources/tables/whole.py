@@ -32,6 +32,7 @@ class Whole:
         layout = self.layout
 
         def holds(column: int) -> bool:
+            """Return whether at least half of the cells with content are numbers."""
             cells = [cell for cell in layout.cells(column) if not is_missing(cell)]
             return 2 * count_numbers(cells, layout.decimal) >= len(cells) > 0
 
