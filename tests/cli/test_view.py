@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -126,7 +127,10 @@ def family(pid: int) -> list[int]:
 
 def listening(pid: int) -> set[tuple[str, int]]:
     """Return the addresses, as the kernel writes them, and the ports that a process listens on."""
-    links = [str(one.readlink()) for one in Path(f"/proc/{pid}/fd").iterdir()]
+    links = set[str]()
+    for one in Path(f"/proc/{pid}/fd").iterdir():
+        with suppress(FileNotFoundError):  # closed since it was listed
+            links.add(str(one.readlink()))
     lines = [
         line.split()
         for table in ("tcp", "tcp6")
