@@ -5,6 +5,7 @@ A fork starts at once, so that moments fall into the work of a command and not i
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import resource
@@ -114,6 +115,7 @@ def _answer_orders() -> None:
     libraries = ("fmpy", "pandas", "plotly.graph_objects", "pyarrow.parquet", "rerun.blueprint", "scipy.io")
     for name in (*libraries, *_modules()):
         import_module(name)
+    gc.freeze()  # the collector of a fork would copy all the pages that it looks at
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # of a fork that is not the command yet
     while line := sys.stdin.readline():
         print(json.dumps(asdict(_ended(json.loads(line)))), flush=True)

@@ -20,8 +20,14 @@ from urmpipe_models.errors import FmuError
 TARGETS = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu"}
 """zig's name of the platforms, by FMI's."""
 
-FLAGS = ("-shared", "-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-Wall", "-Wextra", "-s")
+FLAGS = (
+    "-shared", "-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-s",
+    "-Wall", "-Wextra", "-Wfatal-errors",
+)  # fmt: skip
 """No fused multiply-add: a product is rounded before it is added, as NumPy does. No symbols but FMI's."""
+
+ALONE = "sources/resources.c"
+"""Of the sources this one alone reads the headers of Windows, whose names must not meet those of a model."""
 
 LINES_OF_AN_ERROR = 12
 
@@ -109,10 +115,12 @@ def _compiled(unit: Unit, files: Mapping[str, bytes], target: str, command: Sequ
             path = Path(folder, name)
             path.parent.mkdir(exist_ok=True)
             path.write_bytes(content)
-        c_files = sorted(name for name in files if name.endswith(".c"))
+        # As one text, so that a compiler starts once and reads the headers once: a third less of its time.
+        together = sorted(name for name in files if name.endswith(".c") and name != ALONE)
+        Path(folder, "together.c").write_text("".join(f'#include "{name}"\n' for name in together))
         binary = f"binary{suffix_of(target)}"
         libraries = [] if is_windows(target) else ["-lm"]
-        _run(unit, target, [*command, "-o", binary, *c_files, *libraries], folder)
+        _run(unit, target, [*command, "-o", binary, "together.c", ALONE, *libraries], folder)
         return Path(folder, binary).read_bytes()
 
 

@@ -63,7 +63,8 @@ def test_the_error_of_a_compiler_is_told(oscillator: Unit, monkeypatch: pytest.M
         native_binaries(oscillator, sources, GUID, [this_platform()])
     said = [str(one) for one in error.value.findings]
     assert said[0] == f"unit oscillator: the C compiler failed for {this_platform()} (exit code 1)"
-    assert "model.c:1:14: error" in said[1]
+    assert said[2].startswith("sources/model.c:1:14: error")
+    assert "-Wfatal-errors" in said[-1]  # one error, not what follows from it
     monkeypatch.setenv("CC", "no-such-compiler")
     only_casadi(monkeypatch)
     with pytest.raises(FmuError) as error:
