@@ -168,7 +168,7 @@ def _described(
 ) -> tuple[dict[str, bytes], str]:
     """Return files with their description, documentation and arm, and the GUID of them all."""
     files = files | robot_file(unit) | {DOCUMENTATION: documentation(unit).encode()}
-    without = model_description(unit, "", backend, source_files).encode()
-    guid = content_guid({**files, DESCRIPTION: without})
-    described = model_description(unit, guid, backend, source_files).encode()
-    return {**files, DESCRIPTION: described}, guid
+    without = model_description(unit, "", backend, source_files)
+    guid = content_guid({**files, DESCRIPTION: without.encode()})
+    described = without.replace(' guid=""', f' guid="{guid}"', 1)  # the root's: values hold no quotes
+    return {**files, DESCRIPTION: described.encode()}, guid
