@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from made_masses import driven, with_masses
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
+from urmpipe_models.drives.controller import Gains
+from urmpipe_models.drives.joint_drives import HeldJoint, ReliefSpring
 from urmpipe_models.transform import from_offset
 
 
@@ -23,3 +28,11 @@ def sliding_arm() -> Chain:
         tool=from_offset((0.0, 0.0, 0.15, 0.1, 0.0, 0.0)),
         start=(0.3, 0.2, -0.4),
     )
+
+
+def sprung_arm() -> Chain:
+    """Return it with masses and drives: springs beside the drives, two periods, and a wrist that is held."""
+    calm = Gains(3.75, 0.375, 0.005)
+    turn = replace(driven("turn"), gains=calm, spring=ReliefSpring(1000.0, 0.315))
+    slide = replace(driven("slide"), gains=calm, spring=ReliefSpring(2000.0, 0.195), period=7.5e-3)
+    return replace(with_masses(sliding_arm()), drives=(turn, slide, HeldJoint("wrist", 2500.0, 5.0)))
