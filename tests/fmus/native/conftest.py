@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -9,13 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from c_host import GUID, host
 from urmpipe_fmus.native import guid_header, native_binaries, native_missing, native_sources, this_platform
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.table_file import TABLE_FILE, table_bytes
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State
-
-GUID = "{12345678-0000-0000-0000-000000000000}"
 
 
 class Native:
@@ -57,6 +57,14 @@ class Native:
 
     def close(self) -> None:
         self.fmu.freeInstance()
+
+
+@pytest.fixture(scope="session")
+def c_host(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Return the host in C, compiled for this platform."""
+    if shutil.which("cc") is None:
+        pytest.skip("needs a C compiler: cc")
+    return host(tmp_path_factory.mktemp("host"), ["cc", "-O1"])
 
 
 @pytest.fixture(scope="session")
