@@ -21,12 +21,8 @@ FARTHEST = 2.0
 """Inputs without bounds are drawn from -FARTHEST to FARTHEST: angles, rates and volts for a small drive."""
 
 
-CROSS_BUILT = ("kinematic_chain", "repolarizer", "log_source", "dc_drive")
-"""Units that are built for Linux and Windows: with integers, truths, a table, states."""
-
-
-EVERY_PART = ("kinematic_chain", "repolarizer", "log_source", "dc_drive", "driven_arm")
-"""Units that have all parts of the runtime between them: memories, integers, a table, states, both."""
+CROSS_BUILT = ("delta_meter", "repolarizer", "log_source")
+"""Units that are built for Linux and Windows: truths, integers, a table; states: native/."""
 
 
 def swinging_joints(rows: int, joints: int = 6, period: float = STEP) -> Table:

@@ -13,7 +13,7 @@ from libcosim_master import run_libcosim
 from peers import need, need_builds_for
 from shipped_units import STEP, sample_times, shipped_unit
 from systems import Block, Scalar, System, Trace, empty_trace
-from urmpipe_fmus.build import build_fmu
+from urmpipe_fmus.cache import cached_fmu
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import this_platform
 from urmpipe_fmus.table import Table
@@ -46,14 +46,12 @@ def wrapped_joints() -> tuple[Table, FloatArray]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("master", MASTERS)
-def test_log_repolarizer_and_chain_give_the_tool_of_the_log(
-    master: str, fmu_of: Callable[..., Path], tmp_path: Path
-) -> None:
+def test_log_repolarizer_and_chain_give_the_tool_of_the_log(master: str, fmu_of: Callable[..., Path]) -> None:
     need(master)
     table, q = wrapped_joints()
     source = make_unit("log_source", table=table, columns=[("q", "rad", 6)])
     need_builds_for(this_platform())
-    played = build_fmu(source, tmp_path / "log_source.fmu", backend="native").path
+    played = cached_fmu(source, "native")
     names = ("repolarizer", "kinematic_chain")
     blocks = {"log": Block(played, source)}
     blocks |= {name: Block(fmu_of(name), shipped_unit(name)) for name in names}
