@@ -26,7 +26,6 @@ FAILURES = {
     1: f"ended the process: Segmentation fault (SIGSEGV); {SAID} | fmi2Warning: about to break",
     2: f"ended the process: Aborted (SIGABRT); {SAID}",
     3: f"ended the process with the exit code 7; {SAID}",
-    10: f"ended the process with the exit code 0; {SAID}",
     4: f"returned fmi2Error; {SAID} | fmi2Error: the motor is hot",
     5: f"returned fmi2Discard, it cannot step by 0.01 s from there: a smaller system.step may help; {SAID}",
     8: f"returned fmi2Fatal; {SAID}",
@@ -219,12 +218,6 @@ def test_the_process_that_runs_the_fmus_imports_little() -> None:
 
 
 @pytest.mark.slow
-def test_a_plan_is_made_once_and_holds_no_process() -> None:
-    plan = planned({"bad": TROUBLE}, None, {"bad": {"kind": 1}}, step=0.01)
-    assert simulate(plan).failed == simulate(plan).failed
-
-
-@pytest.mark.slow
 def test_a_crash_at_the_end_does_not_hide_why_the_run_ended() -> None:
     rude = Foreign(
         name="rude",
@@ -256,27 +249,3 @@ def test_a_process_that_ended_before_its_job_tells_by_its_exit_code() -> None:
         worker._process.kill()
         worker._process.wait()
         assert worker.work(str) == "ended the process: Killed (SIGKILL)"
-
-
-ENDING = "ended the process with the exit code 0; it logged nothing"
-
-ENDS_AT_ONCE = {
-    "instantiate": Foreign(name="at_start", scalars=(Scalar("y", 0),), start="exit(0);"),
-    "terminate": Foreign(name="at_end", scalars=(Scalar("y", 0),), terminate="exit(0);"),
-    "free": Foreign(name="when_freed", scalars=(Scalar("y", 0),), free="_exit(0);"),
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("when", "rows", "said"),
-    [
-        ("instantiate", 0, "block bad: fmi2Instantiate at t = 0 s"),
-        ("terminate", 11, "block bad: fmi2Terminate at t = 1 s"),
-        ("free", 11, "block bad: fmi2FreeInstance at t = 1 s"),
-    ],
-)
-def test_a_process_that_ends_well_but_early_is_a_failure(when: str, rows: int, said: str) -> None:
-    recorded = ran({"good": gain(), "bad": ENDS_AT_ONCE[when]}, {"good.u": "bad.y"})
-    assert recorded.failed == f"{said}: {ENDING}"
-    assert len(recorded.t_ns) == rows
