@@ -12,7 +12,6 @@ import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -173,31 +172,6 @@ def test_files_of_the_working_folder_are_no_modules(
     (tmp_path / "json.py").write_text("raise SystemExit(9)", encoding="ascii")
     monkeypatch.chdir(tmp_path)
     assert check_fmu(path).problems == ()
-
-
-@pytest.mark.slow
-def test_an_fmu_that_hangs_is_ended(tmp_path: Path) -> None:
-    found = check_fmu(built(failing("time.sleep(1000)"), tmp_path), timeout=3.0)
-    assert found.problems == ("fmi2DoStep at 0.015 s did not return within 3 s",)
-
-
-@pytest.mark.slow
-def test_an_fmu_that_ends_well_but_early_is_no_good_one(tmp_path: Path) -> None:
-    found = check_fmu(built(failing("os._exit(0)"), tmp_path))
-    assert found.problems == ("fmi2DoStep at 0.015 s ended the process with the exit code 0",)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("place", "when"),
-    [("start", "fmi2Instantiate"), ("terminate", "fmi2Terminate"), ("free", "fmi2FreeInstance")],
-)
-def test_an_fmu_that_ends_its_process_well_is_no_good_one_whenever_it_does(place: str, when: str) -> None:
-    ends = Foreign(name=place, scalars=(Scalar("y", 0),), variable_step=False)
-    given: dict[str, Any] = {place: "exit(0);"}
-    found = check_fmu(fmu(replace(ends, **given)))
-    assert found.problems[-1] == f"{when} ended the process with the exit code 0"
-    assert not found.ran
 
 
 def test_outputs_that_are_not_finite_are_a_problem_with_their_time() -> None:

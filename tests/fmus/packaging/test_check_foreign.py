@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from foreign_fmus import HANGS, NAN_OUTPUT, OVERFLOWS, STAIR, TAKES_MEMORY, fmu, trouble_in
+from foreign_fmus import HANGS, NAN_OUTPUT, STAIR, TAKES_MEMORY, fmu, trouble_in
 from urmpipe_fmus.check import Checked, check_fmu
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs signals and /proc")
@@ -65,29 +65,28 @@ def test_an_fmu_that_ends_its_process_in_any_call_is_told_with_the_call() -> Non
     ("code", "ending"),
     [
         ("exit(1);", " with the exit code 1"),
-        ("abort();", ": Aborted (SIGABRT)"),
-        (OVERFLOWS, ": Segmentation fault (SIGSEGV)"),
         (TAKES_MEMORY, ": Segmentation fault (SIGSEGV)"),
     ],
 )
-def test_each_way_to_end_a_process_is_told(code: str, ending: str) -> None:
+def test_how_a_process_ended_is_told(code: str, ending: str) -> None:
     found = check_fmu(breaking("step", code))
     assert (of_run(found), found.ran) == ((f"fmi2DoStep at 0.025 s ended the process{ending}",), False)
     assert (found.variables[0].before, found.variables[0].after) == (0.0, None)
 
 
 @pytest.mark.slow
-def test_an_fmu_that_hangs_in_any_call_is_ended_and_told_with_the_call() -> None:
-    paths = [breaking(call, HANGS) for call in CALLS]
-    for call, found in zip(CALLS, checked(paths, timeout=2.0), strict=True):
+def test_an_fmu_that_hangs_is_ended_and_told_with_the_call() -> None:
+    calls = ("load", "enter", "step", "free")  # which call it is, is noted as for one that ends the process
+    paths = [breaking(call, HANGS) for call in calls]
+    for call, found in zip(calls, checked(paths, timeout=2.0), strict=True):
         assert (of_run(found), found.ran) == ((f"{CALLS[call]} did not return within 2 s",), False)
 
 
 @pytest.mark.slow
 def test_neither_logging_without_end_nor_a_stopped_process_is_waited_for() -> None:
     ways = ('for (;;) LOG(m, fmi2OK, "round and round");', "raise(SIGSTOP);")
-    spins, stops = checked([breaking("step", way) for way in ways], timeout=2.0)
-    hung = "fmi2DoStep at 0.025 s did not return within 2 s"
+    spins, stops = checked([breaking("step", way) for way in ways], timeout=1.0)
+    hung = "fmi2DoStep at 0.025 s did not return within 1 s"
     assert of_run(spins) == (hung, *["its log: round and round"] * 5)
     assert of_run(stops) == (hung,)
 
@@ -111,8 +110,8 @@ def test_a_run_that_the_fmu_ends_early_is_no_pass_and_its_values_are_those_of_it
     said = "fmi2DoStep at 0.025 s ended the run (fmi2Discard, terminated) after 5 of 20 steps"
     assert (of_run(found), found.ran) == ((said,), False)
     assert found.variables[1].after == 0.0275
-    found = check_fmu(breaking("step", "return fmi2Discard;"))
-    assert of_run(found) == ("fmi2DoStep at 0.025 s: fmi2DoStep failed with status 2 (discard).",)
+    (said,) = of_run(check_fmu(breaking("step", "return fmi2Discard;")))
+    assert said == "fmi2DoStep at 0.025 s: fmi2DoStep failed with status 2 (discard)."
 
 
 @pytest.mark.slow
