@@ -118,7 +118,7 @@ from loaded_fmu import Loaded
 fmu = Loaded(Path(sys.argv[2]))
 def cycle():
     fmu.begin(0.0)
-    fmu.do_step(0.0, 0.01)
+    fmu.do_step(0.0, 0.001)
     fmu.get(list(fmu.references))
     fmu.free()
 def resident():
