@@ -150,7 +150,7 @@ def test_the_functions_that_are_allowed_are_those_that_become_c() -> None:
 
 
 @pytest.mark.slow
-@settings(**PATIENT)
+@settings(max_examples=40, **PATIENT)
 @given(random_units())
 def test_what_an_expression_of_casadi_depends_on_is_remembered_and_nothing_else(unit: Unit) -> None:
     casadi = pytest.importorskip("casadi")

@@ -253,7 +253,7 @@ def test_a_step_is_divided_into_equal_internal_steps() -> None:
 
 
 @pytest.mark.slow
-@settings(**PATIENT)
+@settings(max_examples=40, **PATIENT)
 @given(
     random_units().flatmap(
         lambda unit: st.tuples(st.just(unit), random_starts(unit), random_columns(unit, 6))

@@ -97,7 +97,7 @@ def test_a_memory_makes_each_sample_wait_for_the_one_before() -> None:
 
 
 @pytest.mark.slow
-@settings(**PATIENT)
+@settings(max_examples=40, **PATIENT)
 @given(
     random_units(remembers=False).flatmap(
         lambda unit: st.tuples(st.just(unit), random_starts(unit), random_columns(unit, 5))

@@ -46,7 +46,7 @@ def test_it_gives_what_the_repolarizer_gives_over_a_regular_log_bit_by_bit(
 
 
 @pytest.mark.slow
-@settings(max_examples=20, **PATIENT)
+@settings(max_examples=10, **PATIENT)
 @given(st.integers(0, 10_000), st.floats(0.001, 1.5), st.floats(-3.0, 3.0))
 def test_a_joint_that_goes_round_and_round_goes_on_where_it_was(
     seed: int, speed: float, first: float
