@@ -28,12 +28,12 @@ PERIOD = 5e-3
 CONTOUR = "cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1"
 """The contour of [Iso9283] section 5."""
 
-SHORT = "x,y,z,r\n1.7,0.3,1.0,0\n1.71,0.3,1.0,0.003\n1.713,0.29,1.0,0\n"
+SHORT = "x,y,z,r\n1.7,0.3,1.0,0\n1.703,0.3,1.0,0.001\n1.704,0.297,1.0,0\n"
 """The start of the contour, and a corner after it."""
 
 
 def short_path(folder: Path) -> Path:
-    """Return a file of a path along which irb60 runs for an eighth of a second."""
+    """Return a file of a path along which irb60 runs for a fifteenth of a second."""
     path = folder / "short.csv"
     path.write_text(SHORT, encoding="utf-8")
     return path
