@@ -16,6 +16,7 @@ import pytest
 import urmpipe
 from asserting import there
 from made_plans import FAILED, SMALL, limited, planned
+from pages import thinned
 from urmpipe_datasets import LOGS
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -38,6 +39,8 @@ FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 DESK: ViewportSize = {"width": 1280, "height": 900}
 PHONE: ViewportSize = {"width": 390, "height": 900}
 
+OPEN = "[...document.querySelectorAll('details')].map(folded => folded.open)"
+SET_OPEN = "was => document.querySelectorAll('details').forEach((folded, k) => { folded.open = was[k]; })"
 NOTE_FIRST = """window.atFirst = {
     scroll: scrollY,
     drawn: document.querySelectorAll(".plot[data-drawn]").length,
@@ -203,23 +206,15 @@ def others(make_simulation: Callable[..., Simulation]) -> list[Presentation]:
     return [present(replace(sound, system_svg=svg)), *map(present, plans), toy]
 
 
-def drawings_and_scenes_are_there(page: Page) -> None:
-    """Hold the page to no sideways scrolling, to a scene for each plan, and to its drawings."""
-    assert sideways(page) == 0
-    assert page.locator(".plot.space canvas").count() >= 2
-    assert page.locator(".drawing img").count() >= 3
-    for image in page.locator(".drawing img").all():
-        assert image.evaluate("image => image.complete && image.naturalWidth > 300")
-
-
 def test_drawings_run_no_script_and_small_figures_stand_side_by_side(
     browser: Browser, others: list[Presentation], tmp_path: Path
 ) -> None:
+    simulated, *_, toy = others
     path = tmp_path / "others.html"
-    path.write_text(render_report(others), encoding="utf-8")
+    path.write_text(render_report([simulated, toy]), encoding="utf-8")
     with opened(browser, path) as page:
         scroll_through(page)
-        drawings_and_scenes_are_there(page)
+        assert sideways(page) == 0
         image = page.locator("#r1 .drawing img")
         assert image.evaluate("image => [image.complete, image.naturalWidth]") == [True, 640]
         image.click()
@@ -350,7 +345,11 @@ def test_a_phone_shows_it_without_sideways_scroll(
         open_all(page)
         scroll_through(page)
         assert set(page.evaluate(GROUNDS)) == DARK
-        drawings_and_scenes_are_there(page)
+        assert sideways(page) == 0
+        assert page.locator(".plot.space canvas").count() >= 2  # a scene for each plan
+        assert page.locator(".drawing img").count() >= 3
+        for image in page.locator(".drawing img").all():
+            assert image.evaluate("image => image.complete && image.naturalWidth > 300")
         sides = page.evaluate("""
             [...document.querySelectorAll(".scroll, .card, .verdict, .facts, .plot")]
                 .map(box => box.getBoundingClientRect()).map(box => [box.left, box.right])""")
@@ -408,36 +407,32 @@ def test_what_failed_is_open_and_first_and_what_passed_opens_by_its_link(
     assert 0 <= there(desk.locator("#r1-1").bounding_box())["y"] < 200
 
 
-def test_paper_is_light_shows_what_passed_and_cuts_nothing_and_the_screen_is_as_before(
-    browser: Browser, report: Path
-) -> None:
-    with opened(browser, report, dark=True) as page:
-        page.set_viewport_size({**DESK, "width": 688})  # what an A4 page holds between margins of 14 mm
-        scroll_through(page)
-        assert set(page.evaluate(GROUNDS)) == DARK
-        folded = page.locator("details:not([open])").count()
-        passed = page.locator("details.passed").count()
-        heights = page.evaluate("[...document.querySelectorAll('.plot')].map(p => p.style.height)")
-        assert passed > 0
-        page.emulate_media(media="print")
-        page.evaluate(TWO_FRAMES)
-        assert set(page.evaluate(GROUNDS)) == LIGHT
-        assert page.locator("details:not([open])").count() == folded - passed
-        assert page.locator(".plot[data-drawn]").count() >= page.locator(".plot:visible").count() > 5
-        page.evaluate(NOTE_FIRST)
-        open_all(page)
-        cut = page.evaluate(
-            "[...document.querySelectorAll('.scroll')].map(s => s.scrollWidth - s.clientWidth)"
-        )
-        assert max(cut) == 0
-        assert sideways(page) == 0
-        page.evaluate(BACK_TO_FIRST)
-        page.emulate_media(media="screen")
-        page.evaluate(TWO_FRAMES)
-        assert set(page.evaluate(GROUNDS)) == DARK
-        assert page.locator("details:not([open])").count() == folded
-        assert page.evaluate("[...document.querySelectorAll('.plot')].map(p => p.style.height)") == heights
-        until(page, f"{SIDEWAYS} === 0")  # figures take their width again one after the other
+def test_paper_is_light_shows_what_passed_and_cuts_nothing_and_the_screen_is_as_before(desk: Page) -> None:
+    desk.emulate_media(color_scheme="dark")
+    desk.set_viewport_size({**DESK, "width": 688})  # what an A4 page holds between margins of 14 mm
+    scroll_through(desk)
+    assert set(desk.evaluate(GROUNDS)) == DARK
+    folded = desk.locator("details:not([open])").count()
+    passed = desk.locator("details.passed").count()
+    heights = desk.evaluate("[...document.querySelectorAll('.plot')].map(p => p.style.height)")
+    assert passed > 0
+    desk.emulate_media(media="print")
+    desk.evaluate(TWO_FRAMES)
+    assert set(desk.evaluate(GROUNDS)) == LIGHT
+    assert desk.locator("details:not([open])").count() == folded - passed
+    assert desk.locator(".plot[data-drawn]").count() >= desk.locator(".plot:visible").count() > 5
+    opened_for_print = desk.evaluate(OPEN)
+    open_all(desk)
+    cut = desk.evaluate("[...document.querySelectorAll('.scroll')].map(s => s.scrollWidth - s.clientWidth)")
+    assert max(cut) == 0
+    assert sideways(desk) == 0
+    desk.evaluate(SET_OPEN, opened_for_print)
+    desk.emulate_media(media="screen")
+    desk.evaluate(TWO_FRAMES)
+    assert set(desk.evaluate(GROUNDS)) == DARK
+    assert desk.locator("details:not([open])").count() == folded
+    assert desk.evaluate("[...document.querySelectorAll('.plot')].map(p => p.style.height)") == heights
+    until(desk, f"{SIDEWAYS} === 0")  # figures take their width again one after the other
 
 
 def printed_pages(page: Page) -> list[tuple[float, float]]:
@@ -448,12 +443,14 @@ def printed_pages(page: Page) -> list[tuple[float, float]]:
 
 
 def test_four_logs_take_a_page_each_and_three_for_the_rest(browser: Browser, tmp_path: Path) -> None:
-    """The report that `urmpipe demo` writes: of the same logs, with the same options."""
-    logs = [
-        LOGS / "solidworks",
-        *(LOGS / f"{name}.csv" for name in ("coppeliasim", "matlab", "counter_rotating")),
-    ]
-    compared = urmpipe.compare(LOGS / "path.csv", logs, robot="urm6", diagnose=True)
+    """The report that `urmpipe demo` writes, with the same options, of some rows of the same logs."""
+    for log in LOGS.rglob("*.csv"):
+        few = tmp_path / log.relative_to(LOGS)
+        few.parent.mkdir(exist_ok=True)
+        few.write_text(thinned(log), encoding="utf-8")
+    names = ("solidworks", "coppeliasim.csv", "matlab.csv", "counter_rotating.csv")
+    logs = [tmp_path / name for name in names]
+    compared = urmpipe.compare(tmp_path / "path.csv", logs, robot="urm6", diagnose=True)
     path = tmp_path / "demo.html"
     path.write_text(render_report([present(compared)]), encoding="utf-8")
     with opened(browser, path) as page:
