@@ -80,12 +80,18 @@ def connected(process: subprocess.Popen[bytes], url: str) -> Any:
     raise AssertionError("the viewer does not listen")
 
 
-def pixels(picture: Picture, colour: str) -> int:
-    """Return how many pixels have a colour, whatever its brightness: balls are shaded, lines are smoothed."""
-    bright = picture[picture.max(axis=2) >= 60].astype(float)
+def counts(picture: Picture, colours: Sequence[str]) -> list[int]:
+    """Return how many pixels have each colour, whatever its brightness: balls are shaded, lines smoothed."""
+    red, green, blue = np.moveaxis(picture, 2, 0)
+    bright = picture[np.maximum(np.maximum(red, green), blue) >= 60].astype(float)
     hues = bright / bright.max(axis=1, keepdims=True)
-    wanted = np.array(rgb(colour)) / max(rgb(colour))
-    return int((np.abs(hues - wanted).max(axis=1) <= 0.06).sum())
+    wanted = (np.array(rgb(colour)) / max(rgb(colour)) for colour in colours)
+    return [int((np.abs(hues - one).max(axis=1) <= 0.06).sum()) for one in wanted]
+
+
+def pixels(picture: Picture, colour: str) -> int:
+    """Return how many pixels have a colour."""
+    return counts(picture, [colour])[0]
 
 
 def look(viewer: Any, recording: Path, at: float, right: Sequence[str]) -> Picture:
@@ -105,7 +111,7 @@ def look(viewer: Any, recording: Path, at: float, right: Sequence[str]) -> Pictu
         viewer.save_screenshot(str(target))
         picture = np.asarray(Image.open(target).convert("RGB"))
         half = picture[:, picture.shape[1] // 2 :]
-        if all(pixels(half, colour) for colour in right) or time.monotonic() > end:
+        if all(counts(half, right)) or time.monotonic() > end:
             return picture
 
 
@@ -160,7 +166,8 @@ def assert_drawn(picture: Picture, left: Sequence[str], right: Sequence[str]) ->
     """Hold a picture against the colours that it must have in its halves."""
     middle = picture.shape[1] // 2
     for name, half, colours in (("left", picture[:, :middle], left), ("right", picture[:, middle:], right)):
-        few = {colour: pixels(half, colour) for colour in colours if pixels(half, colour) < 20}
+        found = zip(colours, counts(half, colours), strict=True)
+        few = {colour: count for colour, count in found if count < 20}
         assert not few, f"hardly to be seen in the {name} half: {few}"
 
 
@@ -202,7 +209,7 @@ def test_a_branch_in_the_viewer_is_there_only_where_there_is_such_a_solution(
     ghosts = [ghost_colour(0), ghost_colour(1)]
 
     def seen(picture: Picture) -> list[bool]:
-        return [pixels(picture, colour) >= 50 for colour in ghosts]
+        return [count >= 50 for count in counts(picture, ghosts)]
 
     def shows(wanted: list[bool], picture: Picture) -> bool:
         return seen(picture) == wanted
@@ -313,7 +320,7 @@ def test_a_long_log_is_seen_whole(viewer: Any, make_run: MakeRun, tmp_path: Path
     assert complaints(viewer) == []
     width = picture.shape[1]
     late = picture[:, round(0.85 * width) : round(0.93 * width)]
-    assert all(pixels(late, colour) >= 20 for colour in (JOINT_COLOURS[0], JOINT_COLOURS[5]))
+    assert min(counts(late, [JOINT_COLOURS[0], JOINT_COLOURS[5]])) >= 20
     assert "Joints in the file [rad], every peak of 120,000 rows" in view_names(viewer)
 
 
@@ -342,8 +349,8 @@ def test_a_simulation_shows_its_arm_its_verdict_and_its_signals(
         "meter: out_of_tolerance [-]",
     }  # fmt: skip
     right = picture[:, picture.shape[1] // 2 :]
-    for colour in (AXIS_COLOURS["y"], AXIS_COLOURS["norm"], JOINT_COLOURS[0]):
-        assert pixels(right, colour) > 50, colour  # lines of a pixel or two over some hundred pixels
+    lines = [AXIS_COLOURS["y"], AXIS_COLOURS["norm"], JOINT_COLOURS[0]]
+    assert min(counts(right, lines)) > 50  # of a pixel or two over some hundred pixels
     left = picture[:, : picture.shape[1] // 2]
     assert pixels(left, run_colour(0)) > 50  # the way of the tip, and its ball
     assert complaints(viewer) == []
