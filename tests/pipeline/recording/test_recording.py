@@ -243,7 +243,7 @@ OPTIONS = st.recursive(
 
 
 @pytest.mark.slow
-@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     texts=st.lists(ODD, min_size=10, max_size=10),
     joints=st.lists(ODD, min_size=6, max_size=6, unique=True),

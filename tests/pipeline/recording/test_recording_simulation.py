@@ -179,7 +179,7 @@ def simulations(draw: st.DrawFn) -> Simulation:
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(simulation=simulations())
 def test_any_simulation_comes_back_as_it_was(simulation: Simulation, tmp_path: Path) -> None:
     path = tmp_path / "any.rrd"

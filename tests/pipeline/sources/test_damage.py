@@ -79,7 +79,7 @@ def damaged(draw: st.DrawFn) -> bytes:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("error")
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(damaged(), st.sampled_from(OPTIONS), st.sampled_from(ROBOTS))
 @example(LABELLED.replace(b"q values", b"q\r values", 1), ReadOptions(), None)
 @example(b'connected\nTime:"]" values: [1, 3] Type: 0\n', ReadOptions(), None)
@@ -115,7 +115,7 @@ def outcome(path: Path, options: ReadOptions) -> tuple[object, ...]:
 
 
 @pytest.mark.slow
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(damaged(), st.sampled_from(OPTIONS), st.sampled_from([8, 30, 200]))
 def test_a_file_reads_the_same_in_blocks_of_any_size(content: bytes, options: ReadOptions, size: int) -> None:
     assume(b"\r" not in content)  # alone it ends a row for the parser, and no line of the file
@@ -270,7 +270,7 @@ def test_many_rows_left_out_are_counted(read: Read) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=8, deadline=None, phases=[Phase.generate])
+@settings(max_examples=5, deadline=None, phases=[Phase.generate])
 @given(
     st.sets(st.integers(0, 79_999), min_size=1, max_size=12), st.sampled_from(["torn", "x,1,2", "1,2", "# a"])
 )

@@ -159,7 +159,7 @@ def test_a_damaged_clock_of_a_motion_is_still_an_error(wrong: Wrong) -> None:
 
 
 @pytest.mark.slow
-@settings(deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**32), rows=st.integers(3, 300), shortest=st.floats(10.0, 400.0))
 @example(seed=0, rows=300, shortest=10.0)
 def test_smooth_motions_are_never_poses(
@@ -172,7 +172,7 @@ def test_smooth_motions_are_never_poses(
 
 
 @pytest.mark.slow
-@settings(deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(seed=st.integers(0, 2**32), rows=st.integers(LEAST, 300), reach=st.floats(0.5, 6.2))
 def test_random_configurations_always_are(
     tmp_path_factory: pytest.TempPathFactory, seed: int, rows: int, reach: float

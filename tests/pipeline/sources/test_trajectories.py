@@ -158,7 +158,7 @@ def test_joints_that_the_user_names_come_first(read: Read) -> None:
 
 
 @pytest.mark.slow
-@settings(deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.integers(2, 60), st.integers(0, 2**31), st.sampled_from([7, 8, 12, 13, 16]))
 def test_random_joints_are_no_trajectory(
     tmp_path_factory: pytest.TempPathFactory, rows: int, seed: int, count: int
