@@ -233,6 +233,8 @@ def _best_style(lines: Sequence[str], delimiters: Sequence[str], decimals: Seque
     best = _Style(delimiters[0], decimals[0])
     for delimiter in delimiters:
         rows = [split_line(line, delimiter) for line in lines]
+        if _credit(best)[0] and all(len(row) < 2 for row in rows):
+            continue
         for decimal in decimals:
             width = _common_width(rows, decimal)
             style = _Style(delimiter, decimal, width, _fit(rows, width, decimal))
