@@ -7,7 +7,7 @@ or less, in 20,000 poses at most, and a path has as many vertices at most.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -155,14 +155,21 @@ def dashed(strips: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
     extent = np.linalg.norm(np.ptp(np.concatenate(strips), axis=0)) / 2
     dash = max(sum(float(length[-1]) for length in lengths) / (2 * DASHES), LEAST_DASH * float(extent))
     return tuple(
-        _piece(strip, length, start, start + dash)
+        piece
         for strip, length in zip(strips, lengths, strict=True)
-        for start in (np.arange(0.0, length[-1], 2 * dash) if dash > 0.0 else ())
+        for piece in (_pieces(strip, length, dash) if dash > 0.0 else ())
     )
 
 
-def _piece(strip: FloatArray, length: FloatArray, start: float, end: float) -> FloatArray:
-    """Return a line from one arc length to another."""
-    inner = strip[(length > start) & (length < end)]
-    first, last = (np.array([np.interp(at, length, column) for column in strip.T]) for at in (start, end))
-    return np.vstack((first, inner, last))
+def _pieces(strip: FloatArray, length: FloatArray, dash: float) -> Iterator[FloatArray]:
+    """Yield every second piece of a line with these arc lengths."""
+    starts = np.arange(0.0, length[-1], 2 * dash)
+    ends = starts + dash
+    firsts, lasts = (
+        np.column_stack([np.interp(at, length, one) for one in strip.T]) for at in (starts, ends)
+    )
+    inner = zip(
+        length.searchsorted(starts, "right").tolist(), length.searchsorted(ends).tolist(), strict=True
+    )
+    for first, (begin, end), last in zip(firsts, inner, lasts, strict=True):
+        yield np.vstack((first, strip[begin:end], last))
