@@ -8,16 +8,8 @@ import numpy as np
 import pytest
 
 import urmpipe
-from driven_paths import (
-    CONTOUR,
-    PERIOD,
-    begun,
-    driven_ur3,
-    joint_log,
-    planned,
-    set_points_log,
-    written,
-)
+from driven_paths import CONTOUR, PERIOD, begun, joint_log, planned, set_points_log, written
+from flat_arm import ARM, MASSES, drive
 from urmpipe_fmus.native import native_missing
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
@@ -106,14 +98,15 @@ def system_of_blocks(arm: Chain, steps: int) -> str:
 
 
 def test_blocks_near_accuracy_with_the_first_order_of_the_communication_step(tmp_path: Path) -> None:
-    arm = driven_ur3()
+    (tmp_path / "arm.toml").write_text(ARM + MASSES + drive("a") + drive("b"), encoding="utf-8")
+    arm = load_robot(tmp_path / "arm.toml")
     tip = np.array(forward(arm, list(arm.start))[-1].translation)
-    ends = np.array([tip, np.add(tip, (0.04, 0.02, 0.03))])
+    ends = np.array([tip, np.add(tip, (-0.04, -0.03, 0.0))])
     path = written(tmp_path / "path.csv", {**dict(zip("xyz", ends.T, strict=True)), "r": np.zeros(2)})
     plan = planned(path, arm, 0.2, tmp_path / "plan.csv")
     begins = begun(arm, plan)
     (tmp_path / "arm.toml").write_text(robot_toml(begins), encoding="utf-8")
-    set_points_log(tmp_path / "points.csv", plan, [*range(6)])
+    set_points_log(tmp_path / "points.csv", plan, [0, 1])
     (motion,) = urmpipe.accuracy(path, arm, velocities=[0.2]).motions
     distances, errors = [], []
     for steps in (5, 10):  # and a third step: test_driven_arm.py

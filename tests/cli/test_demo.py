@@ -15,7 +15,7 @@ import pytest
 
 import urmpipe
 from asserting import there
-from pages import thinned
+from thinned_logs import lay_thinned_logs
 from urmpipe.main import run
 from urmpipe_datasets import LOGS
 from urmpipe_pipeline.diagnosis.result import Diagnosis
@@ -70,11 +70,8 @@ def test_the_demo_goes_the_whole_way(demo: Demo) -> None:
 def test_the_demo_answers_in_json(
     urmpipe: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for log in LOGS.rglob("*.csv"):
-        few = tmp_path / "few" / log.relative_to(LOGS)
-        few.parent.mkdir(parents=True, exist_ok=True)
-        few.write_text(thinned(log), encoding="utf-8")
-    monkeypatch.setattr("urmpipe_datasets.LOGS", tmp_path / "few")  # the same motion, in fewer rows
+    few = lay_thinned_logs(tmp_path / "few")
+    monkeypatch.setattr("urmpipe_datasets.LOGS", few)  # the same motion, in fewer rows
     (tmp_path / "urmpipe-demo").mkdir()
     ran = urmpipe("demo", "--json")
     assert ran.code == 0, ran.err

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import urmpipe
+from thinned_logs import lay_thinned_logs
 from urmpipe.api.simulate import simulate
 from urmpipe_datasets import LOGS
 from urmpipe_models.arrays import FloatArray
@@ -16,14 +17,20 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.sources.tables.text import fingerprint
 
 
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of the bundled logs, in fewer rows."""
+    return lay_thinned_logs(tmp_path_factory.mktemp("logs"))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("log", ["coppeliasim.csv", "matlab.csv", "solidworks", "counter_rotating.csv"])
-def test_log_to_delta_is_what_compare_says(log: str) -> None:
+def test_log_to_delta_is_what_compare_says(log: str, logs: Path) -> None:
     result = simulate(
         "log-to-delta",
-        arguments={"log": str(LOGS / log), "reference": str(LOGS / "path.csv"), "robot": "urm6"},
+        arguments={"log": str(logs / log), "reference": str(logs / "path.csv"), "robot": "urm6"},
     )
-    compared = urmpipe.compare(LOGS / "path.csv", [LOGS / log], robot="urm6")
+    compared = urmpipe.compare(logs / "path.csv", [logs / log], robot="urm6")
     (run,), (judged,) = compared.runs, result.verdicts
     np.testing.assert_array_equal(result.t_ns, run.run.t_ns[run.sample])
     # The same formulas on the same doubles; a compiler may round products that it fuses, 1e-16 m each.

@@ -11,15 +11,10 @@ import numpy as np
 
 import urmpipe
 from fmu_run import FmuRun
-from made_masses import driven
 from urmpipe.driven_runs.arm_unit import ArmUnit
 from urmpipe_fmus.cache import cached_fmu
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.drives.controller import Gains
-from urmpipe_models.drives.drive import Drive
-from urmpipe_models.drives.joint_drives import DrivenJoint
-from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 
 PERIOD = 5e-3
@@ -103,15 +98,3 @@ def set_points_log(path: Path, plan: PlannedPath, joints: list[int]) -> Path:
             ("theta", "omega", "alpha"), joints_of(plan)[:, :, joint], strict=True
         )}  # fmt: skip
     return written(path, columns)
-
-
-POSE = (0.0, -1.2, 1.4, -1.8, -1.5, 0.0)
-SMALL = Drive(50.0, 0.1, 100.0, 0.01, 2.0, 2e-3, 5e-3)
-"""The drive of a wrist in the system driven-arm."""
-
-
-def driven_ur3() -> Chain:
-    """Return the arm of the system driven-arm, with its drives, in its pose."""
-    arm = load_robot("ur3")
-    wrist = [DrivenJoint(name, SMALL, PERIOD, Gains(1.5, 0.15, 2e-3), 48.0) for name in arm.coordinates[3:]]
-    return replace(arm, start=POSE, drives=(*map(driven, arm.coordinates[:3]), *wrist))

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from asserting import there
 from exported import export_result
 from made_runs import path_run
+from thinned_logs import lay_thinned_logs
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
@@ -33,8 +34,6 @@ METRES = 1e-12
 
 RADIANS = 1e-13
 """evo turns matrices into rotation vectors: some hundreds of rounding errors of 1e-16, from 0 to pi alike."""
-
-LOGS = Path(__file__).parents[3] / "datasets" / "urmpipe_datasets" / "logs"
 
 
 def evo_errors(
@@ -137,7 +136,8 @@ def test_errors_of_a_motion_turned_and_moved_are_those_of_evo(align: AlignMode) 
 def exported(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Run], list[Path]]:
     """Two logs of one motion, ingested, and the TUM files that `urmpipe export` writes of them."""
     robot, read, folder = load_robot("urm6"), ReadOptions(unit={"": "rad"}), tmp_path_factory.mktemp("tum")
-    runs = [ingest_log([LOGS / f"{name}.csv"], robot=robot, read=read) for name in ("coppeliasim", "matlab")]
+    logs = lay_thinned_logs(folder)
+    runs = [ingest_log([logs / f"{name}.csv"], robot=robot, read=read) for name in ("coppeliasim", "matlab")]
     files = [folder / f"{run.name}.tum" for run in runs]
     for run, file in zip(runs, files, strict=True):
         export_result(run, file, ExportOptions("tum"))
