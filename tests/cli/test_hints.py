@@ -30,6 +30,9 @@ ROBOTS = (None, "ur5e")
 TRUTH = 0.4 + np.arange(6) * 0.3 + 0.5 * np.sin(np.linspace(0, 1, 60)[:, None] * (1 + 0.4 * np.arange(6)))
 """Joint values of a UR5e in [rad], shape (60, 6)."""
 
+MOST_USUAL = "--unit deg"
+"""What 70 specimens are advised, typed for one of them: it is followed as a keyword for each."""
+
 
 def ingested(name: str, robot: str | None, **given: Any) -> list[Message]:
     """Return all that is wrong or worth knowing of a specimen."""
@@ -93,10 +96,11 @@ def test_hints_that_are_followed_help(name: str, capfd: pytest.CaptureFixture[st
             told = ingested(name, given.pop("robot"), **given)
             assert of_message(message) not in map(of_message, told)
 
-            if hint in typed:
+            spelled = hint.spelled("command line")
+            if hint in typed or (spelled == MOST_USUAL and name != "pandas_default"):
                 continue
             typed.add(hint)
-            words = [*(["--robot", robot] if robot else []), *shlex.split(hint.spelled("command line"))]
+            words = [*(["--robot", robot] if robot else []), *shlex.split(spelled)]
             run(["ingest", *files, *words, "--explain", "--json", "-q"])
             answer = json.loads(capfd.readouterr().out)
             printed = answer.get("errors", answer.get("warnings", []))

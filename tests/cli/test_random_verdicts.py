@@ -258,7 +258,7 @@ def made(seed: int, folder: Path) -> tuple[Case, dict[str, Any], bool]:
 
 
 @pytest.mark.slow
-@settings(max_examples=70, deadline=None)
+@settings(max_examples=45, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_no_verdict_on_a_guess(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:
     folder = tmp_path_factory.mktemp("case")

@@ -320,7 +320,7 @@ LOW = "log.csv: sync: auto: found low similarity of the "
 @pytest.mark.slow
 def test_random_motions_are_not_taken_for_each_other() -> None:
     t = times(0.0, 20.0, 0.01)
-    for seed in range(20):
+    for seed in range(10):
         make = (smooth, moves)[seed % 2]
         for side, channels in ((joints, 6), (path, 3)):
             one, other = (side(make(1000 + 2 * seed + k, channels)(t), t) for k in (0, 1))

@@ -19,7 +19,7 @@ from urmpipe_pipeline.iso9283.result import IsoTest
 from urmpipe_pipeline.iso9283.spread import repeatability
 
 QUAT = (*PLACE, "qx", "qy", "qz", "qw")
-CORNERS = ((0.0, 0.0, 0.3), (0.3, 0.0, 0.3), (0.3, 0.2, 0.3), (0.0, 0.2, 0.35), (0.1, 0.1, 0.3))
+CORNERS = ((0.0, 0.0, 0.3), (0.15, 0.0, 0.3), (0.15, 0.1, 0.3), (0.0, 0.1, 0.325), (0.05, 0.05, 0.3))
 WAY_IN = (0.8, -0.6, -0.1)
 """About the direction of the last leg."""
 
@@ -204,23 +204,30 @@ def test_a_gaussian_cloud_has_the_repeatability_of_chi(seed: int) -> None:
 def test_a_gaussian_cloud_of_visits_has_it_too(tmp_path: Path) -> None:
     rng = np.random.default_rng(4)
     reference = still(tmp_path / "command.csv", np.array([[0.5, 0.2, 0.1]]))
-    done = still(tmp_path / "visits.csv", np.array([0.5, 0.2, 0.1]) + rng.normal(0.0, SIGMA, (2000, 3)))
+    done = still(tmp_path / "visits.csv", np.array([0.5, 0.2, 0.1]) + rng.normal(0.0, SIGMA, (1000, 3)))
     iso = told(reference, done, poses=True)
-    # Of 2000 visits chance makes 1.1 % (one standard deviation, as above).
+    # Of 1000 visits chance makes 1.6 % (one standard deviation, as above).
     assert value(iso, "RP") == pytest.approx(FACTOR * SIGMA, rel=0.05)
-    assert value(iso, "AP") < 6.0 * SIGMA / np.sqrt(2000.0)  # chance: chi with 3 degrees, 1e-7 beyond 6
+    assert value(iso, "AP") < 6.0 * SIGMA / np.sqrt(1000.0)  # chance: chi with 3 degrees, 1e-7 beyond 6
+
+
+@pytest.fixture(scope="module")
+def ordered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Path], IsoTest]:
+    """Command and cycles without a rotation, and their test."""
+    folder = tmp_path_factory.mktemp("ordered")
+    reference = written(folder / "command.csv", command())
+    done = logs(folder, [place for place, _ in cycles()])
+    return reference, done, told(reference, done, planes=20)
 
 
 @pytest.mark.slow
 @SOME
 @given(st.permutations(range(4)))
-def test_the_order_of_cycles_does_not_matter(order: list[int]) -> None:
-    every = [place for place, _ in cycles()]
-    with TemporaryDirectory() as name:
-        folder = Path(name)
-        reference, done = written(folder / "command.csv", command()), logs(folder, every)
-        first = told(reference, done, planes=20)
-        second = told(reference, [done[k] for k in order], planes=20)
+def test_the_order_of_cycles_does_not_matter(
+    ordered: tuple[Path, list[Path], IsoTest], order: list[int]
+) -> None:
+    reference, done, first = ordered
+    second = told(reference, [done[k] for k in order], planes=20)
     same(first, second, set(UNITS) - {"dAP", "dRP"})
 
 
