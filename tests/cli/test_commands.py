@@ -13,14 +13,23 @@ from typing import Any
 import numpy as np
 import pytest
 
+from thinned_logs import lay_thinned_logs
 from urmpipe_datasets import LOGS
 from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.runs.results import Run
 
 PATH, COPPELIA, MATLAB = LOGS / "path.csv", LOGS / "coppeliasim.csv", LOGS / "matlab.csv"
+FEW = pytest.mark.usefixtures("few")
+COMPARE_FEW = ("compare", "path.csv", "matlab.csv", "--robot", "urm6")
 
 RunCommand = Callable[..., Any]
 """What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""
+
+
+@pytest.fixture
+def few(tmp_path: Path) -> None:
+    """The bundled logs in fewer rows, in the working folder."""
+    lay_thinned_logs(tmp_path)
 
 
 def files_in(folder: Path) -> list[str]:
@@ -107,15 +116,14 @@ def test_an_output_that_is_not_ours_or_is_an_input_is_never_replaced(
     assert files_in(tmp_path) == ["log.csv", "thesis.txt"]
 
 
+@FEW
 @pytest.mark.slow
 def test_compare_passes_and_its_exit_code_is_the_verdict(urmpipe: RunCommand, tmp_path: Path) -> None:
-    ran = urmpipe(
-        "compare", PATH, COPPELIA, MATLAB, LOGS / "solidworks", "--robot", "urm6", "--json", "-o", "a.rrd"
-    )
+    ran = urmpipe(*COMPARE_FEW, "coppeliasim.csv", "solidworks", "--json", "-o", "a.rrd")
     assert ran.code == 0, ran.err
     answer = json.loads(ran.out)
     assert answer["verdict"] == "pass"
-    assert [run["name"] for run in answer["runs"]] == ["coppeliasim", "matlab", "solidworks"]
+    assert [run["name"] for run in answer["runs"]] == ["matlab", "coppeliasim", "solidworks"]
     stored = read_recording(tmp_path / "a.rrd")
     assert json.loads(json.dumps(stored.to_dict("command line")["runs"])) == answer["runs"]
     shifted = answer["runs"][2]["delta"]["norm"]
@@ -133,16 +141,17 @@ def test_compare_of_the_counter_rotating_module_fails(urmpipe: RunCommand, tmp_p
     assert files_in(tmp_path) == ["counter_rotating-against-path.rrd"]
 
 
+@FEW
 @pytest.mark.slow
 def test_recordings_are_operands_too(urmpipe: RunCommand) -> None:
-    assert urmpipe("ingest", MATLAB, "--robot", "urm6", "-o", "m.rrd").code == 0
-    direct = json.loads(urmpipe("compare", PATH, MATLAB, "--robot", "urm6", "--json", "-o", "a.rrd").out)
-    recorded = json.loads(urmpipe("compare", PATH, "m.rrd", "--json", "-o", "b.rrd").out)
+    assert urmpipe("ingest", "matlab.csv", "--robot", "urm6", "-o", "m.rrd").code == 0
+    direct = json.loads(urmpipe(*COMPARE_FEW, "--json", "-o", "a.rrd").out)
+    recorded = json.loads(urmpipe("compare", "path.csv", "m.rrd", "--json", "-o", "b.rrd").out)
     assert direct["runs"][0]["delta"] == recorded["runs"][0]["delta"]
     own = urmpipe("compare", "m.rrd", "m.rrd", "--json", "-o", "c.rrd")
     assert own.code == 0
     assert json.loads(own.out)["runs"][0]["delta"]["norm"]["max"] == 0.0
-    ran = urmpipe("compare", PATH, "a.rrd")
+    ran = urmpipe("compare", "path.csv", "a.rrd")
     assert ran.code == 2
     assert "found the recording of a comparison, allowed: one that ingest wrote" in ran.err
 
@@ -156,9 +165,10 @@ def test_a_path_without_time_goes_by_sample_index(urmpipe: RunCommand, tmp_path:
     assert json.loads(ran.out)["runs"][0]["samples"] == 7383
 
 
+@FEW
 @pytest.mark.slow
 def test_report_is_written_beside_and_named_after_the_recording(urmpipe: RunCommand, tmp_path: Path) -> None:
-    assert urmpipe("compare", PATH, MATLAB, "--robot", "urm6", "-q", "-o", "run.rrd").code == 0
+    assert urmpipe(*COMPARE_FEW, "-q", "-o", "run.rrd").code == 0
     ran = urmpipe("report", "run.rrd")
     assert ran.code == 0, ran.err
     assert ran.out.startswith("Report: run.html")
@@ -209,17 +219,14 @@ def test_bad_input_is_named_by_line_and_column_and_outputs_stay(
     assert (tmp_path / "run.rrd").read_bytes() == before
 
 
+@FEW
 @pytest.mark.slow
 def test_a_tolerance_may_have_its_unit_and_decides(urmpipe: RunCommand) -> None:
-    passing = urmpipe(
-        "compare", PATH, MATLAB, "--robot", "urm6", "--tolerance", "2.4mm", "--json", "-o", "a.rrd"
-    )
+    passing = urmpipe(*COMPARE_FEW, "--tolerance", "2.4mm", "--json", "-o", "a.rrd")
     assert passing.code == 0
     assert json.loads(passing.out)["tolerance"] == {"axis": 0.0024}
-    assert (
-        urmpipe("compare", PATH, MATLAB, "--robot", "urm6", "--tolerance", "0.0023", "-o", "b.rrd").code == 1
-    )
-    wrong = urmpipe("compare", PATH, MATLAB, "--robot", "urm6", "--tolerance", "3 inch")
+    assert urmpipe(*COMPARE_FEW, "--tolerance", "0.0023", "-o", "b.rrd").code == 1
+    wrong = urmpipe(*COMPARE_FEW, "--tolerance", "3 inch")
     assert wrong.code == 2
     assert "error: --tolerance: found '3 inch', allowed: a length in m, or axis=, x=, y=, z=" in wrong.err
 
@@ -232,10 +239,11 @@ def test_a_path_alone_is_nothing_to_judge(urmpipe: RunCommand) -> None:
     )
 
 
+@FEW
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no closed pipes of this kind")
 def test_a_reader_that_leaves_does_not_turn_a_pass_into_a_fail(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "urmpipe", "compare", str(PATH), str(MATLAB), "--robot", "urm6"]
+    command = [sys.executable, "-m", "urmpipe", *COMPARE_FEW]
     process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     assert process.stdout is not None and process.stderr is not None
     process.stdout.close()

@@ -10,22 +10,20 @@ from typing import Any
 
 import pytest
 
-from urmpipe_datasets import LOGS
+from thinned_logs import lay_thinned_logs
 from urmpipe_pipeline.results import present, read_recording
 
 RunCommand = Callable[..., Any]
-MATLAB = LOGS / "matlab.csv"
+COMPARE = ("compare", "matlab.csv", "coppeliasim.csv", "--robot", "urm6", "--tolerance")
+TOLERANCE = "axis=1mm,path=1mm,angle=0.5deg,joint=0.2deg"
 
 
 @pytest.fixture
 def recording(urmpipe: RunCommand, tmp_path: Path) -> Path:
     """The recording of one log against another one."""
     path = tmp_path / "run.rrd"
-    tolerance = "axis=1mm,path=1mm,angle=0.5deg,joint=0.2deg"
-    ran = urmpipe(
-        "compare", MATLAB, LOGS / "coppeliasim.csv", "--robot", "urm6", "-o", path, "--tolerance", tolerance
-    )
-    assert ran.code == 1
+    lay_thinned_logs(tmp_path)
+    assert urmpipe(*COMPARE, TOLERANCE, "-o", path).code == 1
     return path
 
 
@@ -66,11 +64,7 @@ def test_ik_its_recording_and_the_report_of_it_say_one_verdict(
 def test_the_numbers_of_compare_stand_in_the_report_of_its_recording(
     urmpipe: RunCommand, recording: Path, tmp_path: Path
 ) -> None:
-    tolerance = "axis=1mm,path=1mm,angle=0.5deg,joint=0.2deg"
-    logs = (MATLAB, LOGS / "coppeliasim.csv")
-    ran = urmpipe(
-        "compare", *logs, "--robot", "urm6", "--json", "--tolerance", tolerance, "-o", tmp_path / "b.rrd"
-    )
+    ran = urmpipe(*COMPARE, TOLERANCE, "--json", "-o", tmp_path / "b.rrd")
     (run,) = json.loads(ran.out)["runs"]
     assert urmpipe("report", recording).code == 0
     page = recording.with_suffix(".html").read_text(encoding="utf-8")

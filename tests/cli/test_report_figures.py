@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from pypdf import PdfReader
 
+from thinned_logs import thinned
 from urmpipe_datasets import LOGS
 
 RunCommand = Callable[..., Any]
@@ -18,8 +19,10 @@ RunCommand = Callable[..., Any]
 @pytest.fixture
 def recording(urmpipe: RunCommand, tmp_path: Path) -> Path:
     """The recording of one log."""
-    path = tmp_path / "run.rrd"
-    assert urmpipe("ingest", LOGS / "matlab.csv", "--robot", "urm6", "-o", path).code == 0
+    path, log = tmp_path / "run.rrd", tmp_path / "matlab.csv"
+    log.write_text(thinned(LOGS / "matlab.csv"), encoding="utf-8")
+    assert urmpipe("ingest", log, "--robot", "urm6", "-o", path).code == 0
+    log.unlink()
     return path
 
 
