@@ -52,10 +52,8 @@ def one_block(folder: Path, arm: Chain, plan: PlannedPath, driven: list[int]) ->
     return found.signal("arm.phi").values
 
 
-@pytest.mark.parametrize("velocity", [0.2, 1.0])
-def test_one_block_from_a_log_compared_with_the_plan_has_the_errors_of_accuracy(
-    velocity: float, tmp_path: Path
-) -> None:
+def test_one_block_from_a_log_compared_with_the_plan_has_the_errors_of_accuracy(tmp_path: Path) -> None:
+    velocity = 1.0  # m/s: on the way voltages are at their limits and below
     arm = load_robot("irb60")
     plan = planned(CONTOUR, arm, velocity, tmp_path / "plan.csv")
     log = joint_log(tmp_path / "log.csv", arm, one_block(tmp_path, arm, plan, [0, 1, 2]))

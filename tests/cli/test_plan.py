@@ -41,6 +41,9 @@ CONTOUR = """x,y,z,r
 SINGULAR = "x,y,z\n0.6,0,1.6\n0.3,0,1.6\n-0.3,0,1.6\n"
 """Rows over the axis of theta1 of irb60."""
 
+ACROSS = "x,y,z,rz,ry,rx\n0.3,0.3,0.3,0,0,3.141593\n-0.3,-0.3,0.3,0,0,3.141593\n"
+"""Rows on either side of the column of ur5e."""
+
 SHORT = "x,y,z,r\n0,0,0,0\n0.1,0,0,0\n"
 
 
@@ -51,6 +54,7 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "short.csv").write_text(SHORT)
     (tmp_path / "load.csv").write_text("x,y,z,load\n0,0,0,3\n0.1,0,0,4\n")
     (tmp_path / "singular.csv").write_text(SINGULAR)
+    (tmp_path / "across.csv").write_text(ACROSS)
     return tmp_path
 
 
@@ -151,7 +155,7 @@ def test_a_plan_that_fails_is_exit_1(urmpipe: RunCommand) -> None:
 
 @pytest.mark.slow
 def test_quiet_prints_nothing(urmpipe: RunCommand) -> None:
-    for arguments, code in ((("path.csv",), 0), (("singular.csv", "--robot", "irb60"), 1)):
+    for arguments, code in ((("path.csv",), 0), (("across.csv", "--robot", "ur5e"), 1)):
         ran = urmpipe("plan", *arguments, "-q")
         assert (ran.code, ran.out, ran.err) == (code, "", "")
 
@@ -265,15 +269,16 @@ def test_a_csv_is_replaced_by_another_plan_alone(urmpipe: RunCommand, folder: Pa
 
 @pytest.mark.slow
 def test_a_plan_that_fails_writes_no_csv_but_a_recording(urmpipe: RunCommand, folder: Path) -> None:
-    ran = urmpipe("plan", "singular.csv", "--robot", "irb60", "-o", "plan.csv")
+    across = ("across.csv", "--robot", "ur5e", "-o")
+    ran = urmpipe("plan", *across, "plan.csv")
     assert (ran.code, ran.err) == (
         1, "warning: plan.csv is not written: the arm cannot follow the plan\n",
     )  # fmt: skip
     assert not (folder / "plan.csv").exists()
-    found = answer(urmpipe, 1, "singular.csv", "--robot", "irb60", "-o", "plan.csv")
+    found = answer(urmpipe, 1, *across, "plan.csv")
     assert found["output"] is None
     assert [one["kind"] for one in found["warnings"]] == ["not-written"]
-    assert urmpipe("plan", "singular.csv", "--robot", "irb60", "-o", "plan.rrd", "-q").code == 1
+    assert urmpipe("plan", *across, "plan.rrd", "-q").code == 1
     back = read_recording(folder / "plan.rrd")
     assert isinstance(back, PlannedPath)
     assert back.verdict == "fail"

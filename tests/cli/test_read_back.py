@@ -22,7 +22,7 @@ from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 
 ROWS = 120
-CUBE = "cube:wall,a=0.2,r=0.02,x=0.7,y=0,z=0.6"
+CUBE = "cube:wall,a=0.2,r=0.02,x=1.7,y=0,z=1"
 
 ROBOTS = [None, "ur5e", "iiwa14"]
 """Robots that a path is read with, of 6 and 7 joints: it has none, whatever is given."""
@@ -115,6 +115,7 @@ def test_options_of_reading_are_refused_with_a_recording(run: Run, urmpipe: Call
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("run", ["even"], indirect=True)
 def test_a_recording_among_files_or_without_a_run_is_refused(run: Run, tmp_path: Path) -> None:
     path, log = there(run.recording), there(run.recording).with_suffix(".csv")
     assert refusal(RecordingError, urmpipe.ingest, [path, log]) == (
@@ -151,7 +152,7 @@ def test_solved_targets_come_back(timed: bool, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", [None, "urm6"])
+@pytest.mark.parametrize("robot", [None, "irb60"])
 def test_a_plan_comes_back(robot: str | None, tmp_path: Path) -> None:
     made = {"velocity": 0.2, "acceleration": 1.0}
     plan = urmpipe.plan(CUBE, robot, output=tmp_path / "a.rrd", **made)  # type: ignore[arg-type]

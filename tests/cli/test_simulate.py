@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import urmpipe
+from thinned_logs import lay_thinned_logs
 from urmpipe.api.recordings import read_recording
 from urmpipe.api.simulate import simulate
 from urmpipe_datasets import LOGS
@@ -221,20 +222,10 @@ def test_signals_that_stand_still_come_last(urmpipe: RunCommand, tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_out_of_tolerance_is_exit_code_1_and_json_tells(urmpipe: RunCommand) -> None:
-    log = LOGS / "counter_rotating.csv"
-    ran = urmpipe(
-        "simulate",
-        "log-to-delta",
-        "--set",
-        f"log={log}",
-        "--set",
-        f"reference={LOGS / 'path.csv'}",
-        "--duration",
-        "10s",
-        "--json",
-        "-q",
-    )
+def test_out_of_tolerance_is_exit_code_1_and_json_tells(urmpipe: RunCommand, tmp_path: Path) -> None:
+    lay_thinned_logs(tmp_path)
+    logs = ("--set", "log=counter_rotating.csv", "--set", "reference=path.csv")
+    ran = urmpipe("simulate", "log-to-delta", *logs, "--duration", "10s", "--json", "-q")
     result = json.loads(ran.out)
     assert (ran.code, ran.err) == (1, "")
     assert (result["verdict"], result["verdicts"][0]["block"]) == ("fail", "delta")
@@ -336,7 +327,7 @@ def test_a_bundled_log_is_not_held_against_a_file_that_is_called_as_another_one(
     monkeypatch.chdir(tmp_path)
     named = {"log": "coppeliasim.csv", "reference": "path.csv"}
     with pytest.raises(UrmpipeError, match=r"blocks\.log: coppeliasim\.csv: found no such file"):
-        simulate("log-to-delta", arguments=named, duration=0.02)
+        simulate("log-to-delta", arguments=named, duration=0.02, backend="python")
 
 
 def refusal(system: Path, **options: Any) -> list[str]:
@@ -410,7 +401,7 @@ def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:
     system = tmp_path / "system.toml"
     block = '[blocks.log]\nunit = "log_source"\nlog = "log.csv"\nmap = "lab.toml"\n'
     system.write_text(block, encoding="utf-8")
-    q = simulate(system, step=0.01).signal("log.q").values
+    q = simulate(system, step=0.01, backend="python").signal("log.q").values
     # one product of two doubles: a unit in the last place
     np.testing.assert_allclose(q, np.radians([[180.0, 90.0], [170.0, 80.0]]), rtol=2.3e-16)
     system.write_text('[blocks.meter]\nunit = "delta_meter"\nmap = "lab.toml"\n', encoding="utf-8")
@@ -428,9 +419,9 @@ def test_a_step_and_a_duration_are_positive(following: Path) -> None:
 def test_a_cold_build_is_told(following: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("URMPIPE_CACHE", str(tmp_path / "cache"))
     lines: list[str] = []
-    simulate(following, told=lines.append)
+    simulate(following, told=lines.append, backend="python")
     assert lines == ["building follower for block lag ..."]
-    simulate(following, told=lines.append)
+    simulate(following, told=lines.append, backend="python")
     assert lines == ["building follower for block lag ..."]
 
 
@@ -449,7 +440,16 @@ def test_no_meter_judges_positions_of_which_nothing_tells_the_unit(
     table = np.column_stack((t, 1e3 * x, 1e3 * y, 1e3 * z))
     np.savetxt(tmp_path / "path.csv", table, "%.9g", ",", header="t,x,y,z", comments="")
     (tmp_path / "matlab.csv").write_bytes((LOGS / "matlab.csv").read_bytes())
-    given = ("--set", "log=matlab.csv", "--set", "reference=path.csv", "--duration", "0.1")
+    given = (
+        "--set",
+        "log=matlab.csv",
+        "--set",
+        "reference=path.csv",
+        "--duration",
+        "0.1",
+        "--backend",
+        "python",
+    )
     ran = urmpipe("simulate", "log-to-delta", *given)
     assert ran.code == 2
     assert "no unit is given for x, y, z" in ran.err
