@@ -16,7 +16,7 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.simulations.simulation import Simulation
 
-PATH, LOG = LOGS / "path.csv", LOGS / "coppeliasim.csv"
+PATH, LOG = "path.csv", "coppeliasim.csv"
 
 BACKENDS = ("native", "python")
 
@@ -29,6 +29,15 @@ def recorded(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     """The bundled log through repolarizer and arm, and its recording."""
     path = tmp_path_factory.mktemp("simulated") / f"{request.param}.rrd"
     return urmpipe.simulate("log-to-delta", duration=0.5, backend=request.param, output=path)
+
+
+@pytest.fixture(autouse=True)
+def begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Path and log in the working folder, for somewhat longer than the simulation."""
+    for name in (PATH, LOG):
+        rows = (LOGS / name).read_text(encoding="utf-8").splitlines(keepends=True)
+        (tmp_path / name).write_text("".join(rows[:150]), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
 
 
 def operands(simulation: Simulation) -> tuple[Simulation, Path]:

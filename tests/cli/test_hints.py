@@ -89,9 +89,12 @@ def test_the_specimens_provoke_hints_of_many_kinds(specimen: str, parameter: str
 @pytest.mark.parametrize("name", SPECIMENS)
 def test_hints_that_are_followed_help(name: str, capfd: pytest.CaptureFixture[str]) -> None:
     files = [*map(str, paths(SPECIMENS[name]))]
-    typed: set[Hint] = set()
+    followed, typed = set[tuple[Any, ...]](), set[Hint]()
     for robot in ROBOTS:
         for message, hint in offers(name, robot):
+            if (of_message(message), hint) in followed:
+                continue
+            followed.add((of_message(message), hint))
             given: Any = {"robot": robot} | given_by(hint)
             told = ingested(name, given.pop("robot"), **given)
             assert of_message(message) not in map(of_message, told)

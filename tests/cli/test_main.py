@@ -194,7 +194,7 @@ def test_a_shell_completes_whatever_the_lab_says(
 @pytest.mark.parametrize("arguments", [(), ("--json",)])
 def test_an_output_that_is_full_is_one_line(arguments: tuple[str, ...]) -> None:
     with Path("/dev/full").open("w") as full:
-        command = [sys.executable, "-m", "urmpipe", "fmu", "list", *arguments]
+        command = [sys.executable, "-m", "urmpipe", "simulate", "--list", *arguments]
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert (done.returncode, done.stderr) == (2, "error: No space left on device\n")
 
@@ -203,14 +203,14 @@ def test_an_output_that_is_full_is_one_line(arguments: tuple[str, ...]) -> None:
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is full")
 def test_a_standard_error_that_is_full_is_no_verdict() -> None:
     with Path("/dev/full").open("w") as full:
-        command = [sys.executable, "-m", "urmpipe", "ingest", "missing.csv"]
+        command = [sys.executable, "-m", "urmpipe", "simulate"]
         assert subprocess.run(command, stderr=full, check=False).returncode == 2
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="closes an output as a shell of Unix does")
 def test_outputs_that_are_closed_are_no_fault() -> None:
-    command = [sys.executable, "-m", "urmpipe", "robot", "list"]
+    command = [sys.executable, "-m", "urmpipe", "simulate", "--list"]
     for closed in (">&-", "2>&-"):
         done = subprocess.run(
             ["sh", "-c", f'"$@" {closed}', "sh", *command], capture_output=True, check=False
