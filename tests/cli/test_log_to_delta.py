@@ -14,6 +14,7 @@ from urmpipe_datasets import LOGS
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.sources.tables.text import fingerprint
 
 
@@ -93,35 +94,37 @@ def test_a_step_between_the_samples_of_a_log_is_told(slow_motion: dict[str, str]
     )]  # fmt: skip
 
 
-@pytest.mark.slow
-def test_the_bundled_logs_are_those_of_a_shipped_system(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "path.csv").write_text("t,x,y,z\n0,0,0,9\n1,0,0,9\n")  # of the user's, for something else
-    monkeypatch.chdir(tmp_path)
-    result = simulate("log-to-delta", duration=0.5)
-    assert result.verdict == "pass"
-    assert fingerprint(LOGS / "path.csv") in result.provenance.inputs
+@pytest.fixture(scope="module")
+def shipped(tmp_path_factory: pytest.TempPathFactory) -> Simulation:
+    """The shipped system with its own logs, where the user has a path for something else."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("shipped"))
+        Path("path.csv").write_text("t,x,y,z\n0,0,0,9\n1,0,0,9\n")
+        return simulate("log-to-delta", duration=0.5)
 
 
 @pytest.mark.slow
-def test_the_arm_of_a_kinematic_chain_is_that_of_its_joints() -> None:
-    result = simulate("log-to-delta", duration=0.5)
-    (arm,) = result.arms
+def test_the_bundled_logs_are_those_of_a_shipped_system(shipped: Simulation) -> None:
+    assert shipped.verdict == "pass"
+    assert fingerprint(LOGS / "path.csv") in shipped.provenance.inputs
+
+
+@pytest.mark.slow
+def test_the_arm_of_a_kinematic_chain_is_that_of_its_joints(shipped: Simulation) -> None:
+    (arm,) = shipped.arms
     assert (arm.block, arm.chain.name) == ("chain", "urm6")
-    np.testing.assert_array_equal(arm.q, result.signal("repolarizer.q").values)
-    assert result.t[-1] == 0.5
+    np.testing.assert_array_equal(arm.q, shipped.signal("repolarizer.q").values)
+    assert shipped.t[-1] == 0.5
 
 
 @pytest.mark.slow
-def test_every_file_is_traced_and_every_log_warns() -> None:
-    result = simulate("log-to-delta", duration=0.02)
-    assert [one.name for one in result.provenance.inputs] == [
+def test_every_file_is_traced_and_every_log_warns(shipped: Simulation) -> None:
+    assert [one.name for one in shipped.provenance.inputs] == [
         "log-to-delta.toml", "coppeliasim.csv", "path.csv",
     ]  # fmt: skip
-    assert [one.kind for one in result.warnings] == ["assumed-unit"]
-    assert result.provenance.options["arguments"]["robot"] == "urm6"
-    blocks = {one.name: one for one in result.blocks}
+    assert [one.kind for one in shipped.warnings] == ["assumed-unit"]
+    assert shipped.provenance.options["arguments"]["robot"] == "urm6"
+    blocks = {one.name: one for one in shipped.blocks}
     assert [(one.variable, one.value, one.given) for one in blocks["delta"].settings] == [
         ("tolerance", 0.0035, False)
     ]

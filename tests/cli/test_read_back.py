@@ -167,12 +167,6 @@ def test_a_plan_comes_back(robot: str | None, tmp_path: Path) -> None:
         assert_path(tmp_path / "a.tum", *written(tmp_path / "a.tum"))
 
 
-@pytest.mark.slow
-def test_the_tip_of_a_simulated_arm_comes_back(tmp_path: Path) -> None:
-    urmpipe.export(urmpipe.simulate("six-drives", duration=0.1), output=tmp_path / "a.tum")
-    assert_path(tmp_path / "a.tum", *written(tmp_path / "a.tum"))
-
-
 SYSTEMS = {
     "log-to-delta": [[f"{block}.q[{k}]" for k in range(1, 7)] for block in ("log", "repolarizer")],
     "six-drives": [
@@ -213,3 +207,10 @@ def test_the_signals_of_a_simulation_come_back_or_are_asked_for(
     if not SYSTEMS[system]:
         for signal, rates in (("arm.phid", log.qd), ("arm.phidd", log.qdd)):
             np.testing.assert_array_equal(there(rates), simulation.signal(signal).values)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("simulated", ["driven-arm"], indirect=True)
+def test_the_tip_of_a_simulated_arm_comes_back(simulated: tuple[str, Simulation], tmp_path: Path) -> None:
+    urmpipe.export(simulated[1], output=tmp_path / "a.tum")
+    assert_path(tmp_path / "a.tum", *written(tmp_path / "a.tum"))

@@ -43,10 +43,19 @@ def planned(arm: Chain | None, rows: PathRows, **timing: Any) -> PlannedPath:
     return plan_path(given_path(rows), request, joints=followed(arm, rows))
 
 
-@lru_cache(maxsize=16)
 def followed(arm: Chain | None, rows: PathRows) -> PathJoints | None:
-    """Return the joints along rows, which are those of any timing."""
-    return joints_of(given_path(rows), Request(arm, None, Timing()))
+    """Return the joints along rows, which are those of any timing and of any limits of rates."""
+    if arm is None:
+        return None
+    free = tuple(replace(one, velocity=math.inf, acceleration=math.inf) for one in arm.joints)
+    return replace(_followed(replace(arm, joints=free), rows), chain=arm)
+
+
+@lru_cache(maxsize=16)
+def _followed(arm: Chain, rows: PathRows) -> PathJoints:
+    joints = joints_of(given_path(rows), Request(arm, None, Timing()))
+    assert joints is not None
+    return joints
 
 
 @cache

@@ -46,6 +46,13 @@ def joints_of(plan: PlannedPath) -> PlannedJoints:
     return there(plan.joints)
 
 
+def test_limits_of_rates_change_no_joint_along_a_path() -> None:
+    """So `followed` looks for them once; here the plan looks for them itself."""
+    slow = limited("ur5e", velocity=0.6, acceleration=4.0)
+    plan = plan_path(given_path(SMALL), Request(slow, None, checked_timing(Timing())))
+    np.testing.assert_array_equal(joints_of(plan).q, joints_of(planned(slow, SMALL)).q)
+
+
 def test_the_papers_contour_by_its_arm() -> None:
     plan = planned(load_robot("irb60"), CONTOUR)
     assert plan.verdict == "pass"
@@ -135,7 +142,7 @@ def test_the_period_changes_no_speed(limits: dict[str, float], law: dict[str, An
 @pytest.mark.slow
 def test_arcs_shorter_than_a_period_count() -> None:
     """An arc of 0.5 mm is passed between two samples, and its acceleration is 20 times what is allowed."""
-    rows = cube_rows("wall", 0.3, 0.0005, np.array([0.45, 0.0, 0.3]), rotation=DOWN)
+    rows = cube_rows("wall", 0.1, 0.0005, np.array([0.45, 0.0, 0.3]), rotation=DOWN)
     plan = planned(limited("ur5e", velocity=math.inf, acceleration=15.0), rows)
     fine = planned(limited("ur5e", velocity=math.inf, acceleration=15.0), rows, tsp=0.0005)
     assert plan.scaled < 0.2
