@@ -46,6 +46,7 @@ def joints_of(plan: PlannedPath) -> PlannedJoints:
     return there(plan.joints)
 
 
+@pytest.mark.slow
 def test_limits_of_rates_change_no_joint_along_a_path() -> None:
     """So `followed` looks for them once; here the plan looks for them itself."""
     slow = limited("ur5e", velocity=0.6, acceleration=4.0)
