@@ -113,7 +113,7 @@ def test_the_error_that_decides_is_chosen_and_a_cube_is_its_rows(capsys: Capture
     # as short a path as reaches 0.3 m/s; the contour of test_iso9283_accuracy.py begins there: the same FMU
     cube = "cube:wall,a=0.1,r=0.01,x=1.7,y=0.25,z=1"
     given = ("accuracy", "--robot", "irb60", "--path", cube, "--json")
-    between = "0.0021"  # in [m], as is asserted
+    between = "0.0021"  # m: between the two errors at 0.3 m/s
     verdicts = []
     for which, code in (("time", 1), ("path", 0)):
         assert run([*given, "--limit", between, "--error", which, "--velocities", "0.27,0.3"]) == code

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from pypdf import PdfReader
 
-from thinned_logs import thinned
+from pages import thinned
 from urmpipe_datasets import LOGS
 
 RunCommand = Callable[..., Any]

@@ -5,17 +5,8 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
+from pages import thinned
 from urmpipe_datasets import LOGS
-
-EVERY = 8
-"""Of so many rows of a bundled log one is left: of 7400, 900 show the same."""
-
-
-def thinned(log: Path) -> str:
-    """Return the header of a log, and some of its rows."""
-    lines = log.read_text(encoding="utf-8").splitlines(keepends=True)
-    head = next(i for i, line in enumerate(lines) if line[0].isdigit())
-    return "".join([*lines[:head], *lines[head::EVERY]])
 
 
 @cache
