@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 import xml.etree.ElementTree as ET
 from itertools import pairwise
 from pathlib import Path
@@ -36,16 +37,24 @@ NOISE = 2e-5
 """Standard deviation of what a cycle trembles, in [m]."""
 
 
-@pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+@pytest.fixture(scope="module")
+def laid(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a square to run, four cycles of it, and all of them in one log."""
-    monkeypatch.chdir(tmp_path)
+    folder = tmp_path_factory.mktemp("laid")
     rng = np.random.default_rng(1)
     square = along(SQUARE, 0.2)
     cycles = [square + 1e-4 + NOISE * rng.standard_normal(square.shape) for _ in range(4)]
-    written(tmp_path / "square.csv", square)
-    logs(tmp_path, cycles)
-    written(tmp_path / "all.csv", np.vstack(cycles))
+    written(folder / "square.csv", square)
+    logs(folder, cycles)
+    written(folder / "all.csv", np.vstack(cycles))
+    return folder
+
+
+@pytest.fixture(autouse=True)
+def folder(laid: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of that folder, to work in."""
+    shutil.copytree(laid, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
     return tmp_path
 
 

@@ -210,7 +210,7 @@ def test_in_python_it_stands_in_its_comparison() -> None:
     assert isinstance(made, Comparison)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urmpipe.UrmpipeWarning)
-        compared = urmpipe.compare(PATH, WRONG, robot="urm6", diagnose=True)
+        compared = urmpipe.compare(PATH, WRONG, robot="urm6")
         assert urmpipe.report(found, "report.html").results == (made,)
     assert made.verdict == compared.verdict
     np.testing.assert_array_equal(made.runs[0].delta, compared.runs[0].delta)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -24,14 +26,21 @@ ALLOWED = (
 def lay_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Enter a folder with a reference and three logs: within tolerance, a little worse, out of it."""
     monkeypatch.chdir(tmp_path)
-    t = 0.005 * np.arange(200)
-    q = np.cos(np.outer(t, 0.5 + 0.1 * np.arange(6)))
     for name, off in (("wanted", 0.0), ("good", 0.0005), ("slack", 0.0006), ("bad", 0.02)):
-        write_log(f"{name}.csv", t, q - off * np.sin(t)[:, np.newaxis])
+        Path(f"{name}.csv").write_text(_log(off), encoding="utf-8")
     return tmp_path
 
 
-def write_log(name: str, t: NDArray[Any], q: NDArray[Any]) -> None:
+@cache
+def _log(off: float) -> str:
+    """Return the text of a log that differs by so much from the one that is wanted."""
+    t, text = 0.005 * np.arange(200), StringIO()
+    q = np.cos(np.outer(t, 0.5 + 0.1 * np.arange(6)))
+    write_log(text, t, q - off * np.sin(t)[:, np.newaxis])
+    return text.getvalue()
+
+
+def write_log(name: str | StringIO, t: NDArray[Any], q: NDArray[Any]) -> None:
     """Write a log of six joints."""
     header = "t [s]," + ",".join(f"q{i} [rad]" for i in range(1, 7))
     np.savetxt(name, np.column_stack([t, q]), fmt="%.9f", delimiter=",", header=header, comments="")
