@@ -91,11 +91,9 @@ def of_readme() -> list[str]:
     """Run the demo, a system of blocks and a target's inverse, and picture what they made, for the pages."""
     HERE.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
-        demo = Path(folder) / "demo"
-        urmpipe = [sys.executable, "-m", "urmpipe"]
-        drives = Path(folder) / "driven-arm.rrd"
-        subprocess.run([*urmpipe, "demo", "-q", "-o", str(demo)], check=True)
-        subprocess.run([*urmpipe, "simulate", "driven-arm", "-q", "-o", str(drives)], check=True)
+        demo, drives = Path(folder) / "urmpipe-demo", Path(folder) / "driven-arm.rrd"
+        for line in ("demo", f"simulate driven-arm -o {drives.name}"):  # there: so they name no folder
+            subprocess.run([sys.executable, "-m", "urmpipe", *line.split(), "-q"], cwd=folder, check=True)
         return [
             *of_recording(demo / "demo.rrd", HERE / "recording.png", None),
             *of_page(demo / "report.html", HERE / "report.png", 1280),
