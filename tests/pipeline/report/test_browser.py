@@ -16,8 +16,7 @@ import pytest
 import urmpipe
 from asserting import there
 from made_plans import FAILED, SMALL, limited, planned
-from pages import thinned
-from urmpipe_datasets import LOGS
+from thinned_logs import lay_thinned_logs
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, View
@@ -444,10 +443,7 @@ def printed_pages(page: Page) -> list[tuple[float, float]]:
 
 def test_four_logs_take_a_page_each_and_three_for_the_rest(browser: Browser, tmp_path: Path) -> None:
     """The report that `urmpipe demo` writes, with the same options, of some rows of the same logs."""
-    for log in LOGS.rglob("*.csv"):
-        few = tmp_path / log.relative_to(LOGS)
-        few.parent.mkdir(exist_ok=True)
-        few.write_text(thinned(log), encoding="utf-8")
+    lay_thinned_logs(tmp_path)
     names = ("solidworks", "coppeliasim.csv", "matlab.csv", "counter_rotating.csv")
     logs = [tmp_path / name for name in names]
     compared = urmpipe.compare(tmp_path / "path.csv", logs, robot="urm6", diagnose=True)
