@@ -26,11 +26,12 @@ from urmpipe_pipeline.comparison.matching import (
     file_of,
     lacking,
     match,
+    wanted_rows,
     without_robot,
 )
 from urmpipe_pipeline.comparison.measure import measure, unheld
 from urmpipe_pipeline.comparison.sync import SyncOption, check_sync, sync_doubts, synchronise
-from urmpipe_pipeline.comparison.tolerance import check_tolerance
+from urmpipe_pipeline.comparison.tolerance import check_tolerance, complete_tolerance, deviations_of
 from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
 from urmpipe_pipeline.comparison.warnings import (
     exchanged,
@@ -67,7 +68,8 @@ class CompareOptions:
 
     Attributes:
         tolerance: Largest deviation allowed in [m] or [rad], by kind: axis, norm, path, angle, joint, or one
-            coordinate. What is not named has no tolerance.
+            coordinate. What is not named has no tolerance. Least shares 0..1: coverage (0.9 unless given)
+            and judged (0.5).
         tcp: Where a log was: by forward kinematics of its joints, or as it recorded itself.
         sync: How the clocks are put together: start (both start together), auto (by the motion), or
             the offset in [s]: t_reference = t_log + offset, both from their first samples.
@@ -95,6 +97,8 @@ class CompareOptions:
         check_choice("tcp", self.tcp, get_args(Tcp))
         check_sync(self.sync)
         check_choice("align", self.align, get_args(AlignMode))
+        complete = complete_tolerance(self.tolerance, iso=self.iso is not None)
+        object.__setattr__(self, "tolerance", complete)
 
     def _refuse_with_iso(self) -> None:
         """Raise an `OptionError` with what does not go with criteria after ISO 9283."""
@@ -166,7 +170,7 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     if chosen.tcp == "fk" and wanted.joints:
         told += recorded_apart((reference, *runs), RECORDED_APART)
     elif chosen.tcp == "fk":
-        failed = [one for one in deviations if one.verdict == "fail"]
+        failed = [one for one in deviations if one.furthest.verdict == "fail"]
         told += [hint.of(one.name) for one in failed for hint in lacking_tool(one.run.robot, one.run.log)]
     return _comparison(wanted, deviations, chosen, told, _taken_for_granted(reference, runs, chosen))
 
@@ -208,7 +212,7 @@ def _joints_alone(reference: Run, runs: Sequence[Run], options: CompareOptions) 
     lacks = [run for run in every if run.log.joints and run.tcp is None]
     if not lacks or options.tcp == "recorded" or not all(run.log.joints for run in every):
         return False
-    if options.align == "none" and set(options.tolerance) == {"joint"}:
+    if options.align == "none" and set(deviations_of(options.tolerance)) == {"joint"}:
         return True
     hints = (JOINTS_ALONE,) if options.align == "none" else ()
     raise LogError(*dict.fromkeys(without_robot(run, *hints) for run in lacks))
@@ -330,7 +334,8 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     assumed = assumptions([(run, {"joint", *_recorded_roles(chosen, "start")})])  # others go by the joints'
     sides = Side(run, recorded, by_joints=False), Side(run, computed, by_joints=True)
     found = _comparison(recorded, [_deviation(*sides, chosen)], chosen, (), assumed)
-    asked, turned = found.verdict == "fail" and "tool" not in chosen.align, "angle" in chosen.tolerance
+    failed = any(one.furthest.verdict == "fail" for one in found.runs)
+    asked, turned = failed and "tool" not in chosen.align, "angle" in chosen.tolerance
     lacks = lacking_tool(run.robot, log, turned=turned) if asked else []
     return replace(found, warnings=(*found.warnings, *lacks))
 
@@ -342,7 +347,8 @@ def _comparison(
     told: Sequence[LogWarning],
     assumed: tuple[str, ...],
 ) -> Comparison:
-    bare = {kind: value for kind, value in options.tolerance.items() if kind not in options.with_unit}
+    given = deviations_of(options.tolerance)
+    bare = {kind: value for kind, value in given.items() if kind not in options.with_unit}
     warnings = [*large_tolerances(bare), *told]
     for one in deviations if options.iso is None else ():
         warnings += sync_doubts(one.name, one.sync, one.run.tsp)
@@ -353,10 +359,10 @@ def _comparison(
             warnings.append(LogWarning("joints-not-compared", said, about=one.name))
     warnings += _shapes_gone([one.run for one in deviations])
     inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
-    given = {name: getattr(options, name) for name in ("tcp", "sync", "align")}
-    given |= {"diagnose": True} if options.diagnose else {}
+    made = {name: getattr(options, name) for name in ("tcp", "sync", "align")}
+    made |= {"diagnose": True} if options.diagnose else {}
     if options.iso is not None:
-        given |= {"iso": True, **{name: getattr(options.iso, name) for name in ("cycles", "planes", "band")}}
+        made |= {"iso": True, **{name: getattr(options.iso, name) for name in ("cycles", "planes", "band")}}
     name = f"{deviations[0].name}-" if len(deviations) == 1 else ""
     return Comparison(
         f"{name}against-{reference.name}",
@@ -364,7 +370,7 @@ def _comparison(
         tuple(deviations),
         dict(options.tolerance),
         tuple(warnings),
-        provenance("compare", {"tolerance": dict(options.tolerance), **given}, inputs),
+        provenance("compare", {"tolerance": dict(options.tolerance), **made}, inputs),
         assumptions=assumed,
         on_rows=True,
     )
@@ -378,13 +384,13 @@ def _shapes_gone(runs: Sequence[Run]) -> list[LogWarning]:
 
 def _deviation(asked: Side, done: Side, options: CompareOptions) -> Deviation:
     """Return the deviation of one trajectory, at its own samples; why it deviates, if asked for."""
-    run, reference, actual = done.run, asked.trajectory, done.trajectory
+    run, reference, actual = done.run, wanted_rows(asked, done), done.trajectory
     sync = synchronise(reference, actual, options.sync, options.align)
     matched = match(reference, actual, sync)
     if not len(matched.sample):
         said = f"no sample in common with {reference.name} (time offset {sync.offset} s)"
         raise LogError(lacking(run, said))
-    found = measure(run, reference, align(matched, options.align, run), options.tolerance)
+    found = measure(run, reference, actual, align(matched, options.align, run), options.tolerance)
     if not options.diagnose:
         return found
     lag = _moves_alike(asked, done, sync)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.display import line_of, number_of
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.change import BaselineComparison
-from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Verdict
+from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics, Verdict
 from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.comparison.unjudged import Unjudged
 from urmpipe_pipeline.iso9283.result import IsoTest
@@ -23,9 +23,18 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+ROW = ("run", "sync_offset", *(one.name for one in fields(Statistics)), "value")
+"""The columns of `Comparison.rows`: of a share its `value`, of a deviation its statistics."""
+
+
 def by_tolerance(run: Deviation) -> tuple[bool, float, float]:
     """Return how far out of its tolerance a log is, the furthest last: share used up, then the rms norm."""
-    return run.verdict == "fail", run.decisive.used or 0.0, run.statistics.get("norm", run.decisive).rms
+    return run.verdict == "fail", run.decisive.used or 0.0, run.statistics.get("norm", run.furthest).rms
+
+
+def _decided(run: Deviation) -> str:
+    one = run.decisive
+    return f"{one.quantity} {one.value:.1%}" if isinstance(one, Share) else f"{one.max:.4g} {one.unit}"
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -81,10 +90,6 @@ class Comparison(Result):
             return "fail"
         return None if self.unjudged else "pass"
 
-    def covered(self, run: Deviation) -> float:
-        """Return the share of the reference's samples, 0..1, that lie within the time of a log."""
-        return 1.0 - run.reference_left_out / len(self.reference.t_ns)
-
     def warnings_of(self, run: Deviation) -> tuple[LogWarning, ...]:
         """Return the warnings of a log: those from before, and what the comparison says of it."""
         return (*run.run.warnings, *(one for one in self.warnings if one.about == run.name))
@@ -98,17 +103,17 @@ class Comparison(Result):
     def ranking(self) -> tuple[Deviation, ...]:
         """The logs from best to worst.
 
-        Those that pass come first, and among them (as among the others) those that cover the reference; then
+        Those that pass come first, and among them (as among the others) those that were seen as a whole; then
         the share of a tolerance that is used up decides, then the rms norm.
         """
         by_used = sorted(self.runs, key=by_tolerance)
-        return tuple(sorted(by_used, key=lambda run: (run.verdict == "fail", self.covered(run) < WHOLE)))
+        return tuple(sorted(by_used, key=lambda run: (run.verdict == "fail", bool(run.partly))))
 
     @property
     def worst(self) -> Deviation:
         """The log that is furthest out of its tolerance, or closest to it: by it the verdict is told.
 
-        It need not be the last of the ranking, where logs that cover a part of the reference stand behind.
+        It need not be the last of the ranking, where logs that were seen in part stand behind.
         """
         return sorted(self.runs, key=by_tolerance)[-1]
 
@@ -121,9 +126,9 @@ class Comparison(Result):
             yield from self.iso.rows()
             return
         for run in self.runs:
-            for one in run.all_statistics:
+            for one in run.quantities:
                 offset = run.sync.offset if run.run.timed else None
-                yield {"run": run.name, "sync_offset": offset, **one.fields()}
+                yield dict.fromkeys(ROW) | {"run": run.name, "sync_offset": offset} | one.fields()
 
     def _headline(self) -> str:
         """Return its verdict, and that of each log: the worst first, so that it is not what is cut."""
@@ -133,10 +138,7 @@ class Comparison(Result):
             )
             cycles = number_of(len(self.iso.cycles), "cycle")
             return line_of(f"{self.name}: {self.verdict or 'not judged'}", cycles, *worst)
-        logs = (
-            f"{one.name} {one.verdict} ({one.decisive.max:.4g} {one.decisive.unit})"
-            for one in reversed(self.ranking)
-        )
+        logs = (f"{one.name} {one.verdict} ({_decided(one)})" for one in reversed(self.ranking))
         failed = sum(one.verdict == "fail" for one in self.runs)
         share = f" ({failed} of {len(self.runs)} logs)" if failed and len(self.runs) > 1 else ""
         worse = ", worse than the baseline" if self.baseline and self.baseline.verdict == "fail" else ""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ Kind = Literal["axis", "norm", "path", "angle", "joint"]
 """What a deviation is measured of: a coordinate, the distance at one time, the distance from the path,
 the orientation, a joint."""
 
+ShareKind = Literal["coverage", "judged"]
+
 AXES = ("x", "y", "z", "norm")
 """The columns of `Deviation.delta`."""
 
@@ -33,7 +35,7 @@ KINDS: dict[str, Kind] = {"x": "axis", "y": "axis", "z": "axis", "norm": "norm"}
 """What these are measured of."""
 
 WHOLE = 0.99
-"""A log that covers a smaller share of the reference is told: by hand, starts and ends vary by less."""
+"""A smaller share stands in the verdict's line: by hand, starts and ends of logs vary by less."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,11 +96,11 @@ class Statistics:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """Samples in a row that are out of tolerance.
+    """Samples in a row that are out of tolerance, or unseen.
 
     Attributes:
         samples: How many.
-        sample: The first of them, by its row of the log from 0.
+        sample: The first of them, by its row of the log from 0; of coverage by that of the reference.
         t: When it begins, in [s] of the log; None without times.
         duration: From its first to its last sample in [s]; None without times.
     """
@@ -107,6 +109,47 @@ class Stretch:
     sample: int
     t: float | None
     duration: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """How much of a motion a verdict rests on, as `comparison.coverage` defines it.
+
+    Attributes:
+        quantity: coverage or judged.
+        value: Share of the reference's samples that the log shows; of the log's motion that was judged; 0..1.
+        samples: Samples shown or judged.
+        of: Samples with a value, of the reference or of the log.
+        tolerance: Least share allowed, or None.
+        verdict: pass or fail, None without a tolerance.
+        unseen: The longest stretch that was not seen, of the first of equally long ones; None without any.
+    """
+
+    quantity: ShareKind
+    value: float
+    samples: int
+    of: int
+    tolerance: float | None
+    verdict: Verdict | None
+    unseen: Stretch | None
+
+    @property
+    def kind(self) -> ShareKind:
+        """What it is measured of: a tolerance of that name holds for it."""
+        return self.quantity
+
+    @property
+    def used(self) -> float | None:
+        """Part of what may be unseen that is; None without a tolerance, inf if nothing may be."""
+        if self.tolerance is None:
+            return None
+        unseen, allowed = 1.0 - self.value, 1.0 - self.tolerance
+        return unseen / allowed if allowed else math.inf if unseen else 0.0
+
+    def fields(self) -> dict[str, Any]:
+        """Return the fields of `Statistics` that it has, its share as `value`."""
+        own = {name: getattr(self, name) for name in ("quantity", "kind", "value", "tolerance", "verdict")}
+        return own | {"unit": "1", "samples": self.samples, "missing": self.of - self.samples}
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -140,6 +183,8 @@ class Deviation(Shown):
         speed_correlation: Pearson's r of the norm and the speed; None where one of them does not change.
         verdict: pass or fail; None of a cycle, which is not judged alone.
         diagnosis: Why it deviates, where that was asked for.
+        shares: How much was seen: `coverage` of the reference, `judged` of the log's motion; none in a
+            recording made before they were measured.
     """
 
     name: str
@@ -165,6 +210,7 @@ class Deviation(Shown):
     speed_correlation: float | None
     verdict: Verdict | None
     diagnosis: Diagnosis | None = None
+    shares: dict[str, Share] = field(default_factory=dict)
 
     @property
     def t(self) -> FloatArray:
@@ -184,7 +230,7 @@ class Deviation(Shown):
     @property
     def worst(self) -> int:
         """Index into the compared samples of the largest norm."""
-        return int(np.argmax(self.delta[:, 3])) if self.statistics else self.decided_at
+        return int(np.argmax(self.delta[:, 3])) if self.statistics else self.furthest_at
 
     @property
     def share_out(self) -> float:
@@ -215,6 +261,11 @@ class Deviation(Shown):
         return (*self.statistics.values(), *self.joint_statistics.values())
 
     @property
+    def quantities(self) -> tuple[Statistics | Share, ...]:
+        """Whatever may have a tolerance: every deviation, then the shares."""
+        return (*self.all_statistics, *self.shares.values())
+
+    @property
     def values(self) -> tuple[FloatArray, ...]:
         """Every quantity at the compared samples in [m] or [rad], shape (m,) each; as `all_statistics`."""
         angle = () if self.angle is None else (self.angle,)
@@ -231,9 +282,9 @@ class Deviation(Shown):
         return int(np.searchsorted(self.sample, one.sample_max))
 
     @property
-    def decided_at(self) -> int:
-        """Index into the compared samples of what decides; the norm need not be largest there."""
-        return self.peak(self.decisive)
+    def furthest_at(self) -> int:
+        """Index into the compared samples of the furthest quantity; the norm need not be largest there."""
+        return self.peak(self.furthest)
 
     def place(self, one: Statistics) -> tuple[float, float, float] | None:
         """Return where the log was when one of its quantities was largest, in [m]; None without a place."""
@@ -247,17 +298,31 @@ class Deviation(Shown):
         return one.sample_max + 1
 
     @property
-    def decisive(self) -> Statistics:
-        """The quantity that uses up most of its tolerance; the norm where nothing has one."""
+    def furthest(self) -> Statistics:
+        """The deviation that uses up most of its tolerance; the norm where nothing has one."""
         held = [one for one in self.all_statistics if one.used is not None]
         otherwise = self.statistics.get("norm", self.all_statistics[0])
         return max(held, key=lambda one: one.used or 0.0, default=otherwise)
 
+    @property
+    def decisive(self) -> Statistics | Share:
+        """What decides the verdict: the furthest deviation; if none fails, a share that is too small."""
+        small = [one for one in self.shares.values() if one.verdict == "fail"]
+        if self.furthest.verdict == "fail" or not small:
+            return self.furthest
+        return max(small, key=lambda one: one.used or 0.0)
+
+    @property
+    def partly(self) -> tuple[Share, ...]:
+        """The shares that are not nearly whole, which its verdict has to name."""
+        return tuple(one for one in self.shares.values() if one.value < WHOLE)
+
     def _headline(self) -> str:
         """Return its verdict, and by what it is decided."""
-        one, samples = self.decisive, number_of(len(self.sample), "sample")
+        one, samples = self.furthest, number_of(len(self.sample), "sample")
         largest = f"{one.quantity} up to {one.max:.4g} {one.unit}"
-        return line_of(self.name, self.verdict, largest, f"{samples} compared")
+        shares = (f"{share.quantity} {share.value:.1%}" for share in self.partly)
+        return line_of(self.name, self.verdict, largest, f"{samples} compared", *shares)
 
     def _notes(self) -> list[str]:
         """Return what is to be known of the log."""
@@ -293,6 +358,8 @@ class Deviation(Shown):
             "path": told.get("path"),
             "angle": told.get("angle"),
             "joints": {name: one.to_dict() for name, one in self.joint_statistics.items()},
+            **dict.fromkeys(get_args(ShareKind)),
+            **{name: asdict(share) for name, share in self.shares.items()},
             "joint_turns": dict(zip(self.joint_statistics, self.joint_turns, strict=True)),
             "start": dict(zip(AXES, self.start, strict=True)) if told else {},
             "worst": {

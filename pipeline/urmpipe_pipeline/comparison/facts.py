@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -12,7 +13,7 @@ from urmpipe_models.transform import Transform
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import as_option, placed
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
+from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.comparison.warnings import rests
 from urmpipe_pipeline.comparison.wording import decided_words, out_words, size_of, stretch_words, used_words
@@ -21,18 +22,24 @@ from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts
 from urmpipe_pipeline.presentation.section import Advice, Fact, Place, Ref, Value
 from urmpipe_pipeline.runs.parts import log_facts
 
+MEANING = {"coverage": "of the reference, shown by the log", "judged": "of the log's motion, judged"}
+"""What a share is of."""
+
 
 def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
     """Yield why a log deviates, if that is known, and what decided the verdict: how much, when and where."""
-    held = one.decisive
+    held, furthest = one.decisive, one.furthest
     cause = () if one.diagnosis is None else diagnosis_facts(one.diagnosis)[:1]
     yield from (replace(fact, page=False) for fact in cause)  # a page says it where the log stands
     yield Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", Ref(one.name, colour))
     yield Fact("Decided by", decided_words(held), page=False)
     yield Fact("Decided by", ", ".join(filter(None, (size_of(held), used_words(held)))), brief=False)
-    if not held.missing and one.run.timed:
-        yield Fact("Data row", Value(one.row(held)), page=False)
-    yield Fact("Position", place_of(one, held), page=False)
+    if held is furthest:
+        if not furthest.missing and one.run.timed:
+            yield Fact("Data row", Value(one.row(furthest)), page=False)
+        yield Fact("Position", place_of(one, furthest), page=False)
+    else:
+        yield Fact(size_of(furthest), largest(furthest), page=False)
     yield from _furthest_joint(one)
     yield from (replace(fact, page=False) for fact in _undiagnosed(one))
 
@@ -50,9 +57,19 @@ def largest(one: Statistics | None, *, most: bool = False) -> Value | None:
     return Value(one.max, one.unit, one.tolerance, one.verdict, one.used, most=most)
 
 
+def share_value(one: Share | None) -> Value | None:
+    """Return a share with what is needed of it; None without one."""
+    if one is None:
+        return None
+    used = math.inf if one.verdict == "fail" else one.used
+    return Value(one.value, "%", one.tolerance, one.verdict, used, least=True)
+
+
 def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     """Yield what is to be known of a compared log, what decided first."""
-    held, covered = one.decisive, result.covered(one)
+    held = one.furthest
+    if isinstance(one.decisive, Share):
+        yield Fact(one.decisive.quantity, share_value(one.decisive), brief=False, page=False)
     yield Fact(size_of(held), largest(held), used_words(held), brief=False, page=False)
     timed = one.run.timed
     if timed:
@@ -63,8 +80,10 @@ def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     yield from (replace(fact, brief=False) for fact in _furthest_joint(one))
     compared = f"{text.counted(len(one.sample), 'sample')} over {text.seconds(one.duration)} s"
     yield Fact("Compared", compared if timed else f"{text.counted(len(one.sample), 'pose')}, row by row")
-    share = "share of the reference within the log's time"
-    yield Fact("Covered", Value(covered, "%"), share, covered < WHOLE, page=not ranked)
+    for share in one.shares.values():
+        seen = f"{share.samples} of {text.counted(share.of, 'sample')}"
+        name, words = share.quantity.capitalize(), f"{MEANING[share.quantity]}: {seen}"
+        yield Fact(name, share_value(share), words, share in one.partly, page=not ranked)
     yield _left_out(one, len(result.reference.t_ns))
     yield from _out_of_tolerance(one, ranked=ranked)
     if timed:
@@ -154,7 +173,7 @@ def _vector(metres: tuple[float, ...]) -> str:
 def _furthest_joint(one: Deviation) -> Iterator[Fact]:
     """Yield the joint that deviates most, of a log that is decided by something else."""
     joint = one.furthest_joint("rad") or one.furthest_joint("m")
-    if joint is not None and one.decisive.kind != "joint" and joint.max:
+    if joint is not None and one.furthest.kind != "joint" and joint.max:
         said = f"{joint.quantity}: {text.quantity(joint.max, joint.unit)}"
         yield Fact("Joint furthest off", said, page=False)
 

@@ -14,7 +14,7 @@ from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
 from urmpipe_pipeline.comparison.mended import mended_figure, mended_path
 from urmpipe_pipeline.comparison.scene import allowed_norm, deviation_arrows
 from urmpipe_pipeline.comparison.trajectory import extent
-from urmpipe_pipeline.comparison.wording import SYMBOLS, amount_words, symbol, when
+from urmpipe_pipeline.comparison.wording import SYMBOLS, amount_words, peak_words, symbol, when
 from urmpipe_pipeline.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
@@ -83,10 +83,11 @@ def deviation_figures(one: Deviation) -> Iterator[Figure]:
 
 def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
     """Yield the reference and the actual path in space, the actual one coloured by its deviation."""
-    place = one.place(one.decisive)
+    place = one.place(one.furthest)
     if place is None:
         return
-    spots = (*ends(one.actual), Spot(place, "decides", DEVIATION_COLOUR))
+    spots = (*ends(one.actual), Spot(place, peak_words(one), DEVIATION_COLOUR))
+    decided = "The verdict was decided" if isinstance(one.decisive, Statistics) else "It deviates most"
     if not one.run.timed:
         arrows = deviation_arrows(one, extent(one.actual) / 2)
         yield SpaceFigure(
@@ -94,7 +95,7 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
             f"Equal scale on all axes. A dot is where a pose was asked for, the arrow from it"
             f" the {arrows.name}, in the colour of its size.",
             f"Poses of {one.name} in three dimensions, each with its deviation as an arrow."
-            f" The verdict was decided at x, y, z = {text.point(place)} m: {amount_words(one.decisive)}.",
+            f" {decided} at x, y, z = {text.point(place)} m: {amount_words(one.furthest)}.",
             (),
             spots[2:],
             arrows,
@@ -107,14 +108,14 @@ def path_figure(one: Deviation) -> Iterator[SpaceFigure]:
     yield SpaceFigure(
         "Path in space",
         said,
-        f"Paths of the reference and of {one.name} in three dimensions. The verdict was decided at"
-        f" x, y, z = {text.point(place)} m: {amount_words(one.decisive)}.",
+        f"Paths of the reference and of {one.name} in three dimensions. {decided} at"
+        f" x, y, z = {text.point(place)} m: {amount_words(one.furthest)}.",
         (
             Path("reference", one.reference, one.t_ns, REFERENCE_COLOUR, asked=True, sample=one.sample),
             *supposed,
             Path(
                 "actual: ‖Δ‖", one.actual, one.t_ns, AXIS_COLOURS["norm"], values=column(one.delta, 3),
-                limit=allowed_norm(one), sample=one.sample, kept=(one.decided_at,),
+                limit=allowed_norm(one), sample=one.sample, kept=(one.furthest_at,),
             ),
         ),
         spots,
@@ -191,7 +192,7 @@ def _deviation(one: Deviation) -> Figure:
         f" {_out_words(one)}",
         tuple(views),
         _instant(one),
-        opened={"path": 1, "angle": 2}.get(one.decisive.kind, 0),
+        opened={"path": 1, "angle": 2}.get(one.furthest.kind, 0),
         share=3.6,
     )
 
@@ -212,7 +213,7 @@ def _joints(one: Deviation) -> Iterator[Figure]:
         f"Deviation of the joints of {one.name}. Largest absolute values: {largest}.",
         tuple(View("Joints, reference - log", (panel,)) for panel in panels),
         _instant(one),
-        opened=units.index(one.decisive.unit) if one.decisive.kind == "joint" else 0,
+        opened=units.index(one.furthest.unit) if one.furthest.kind == "joint" else 0,
         share=3.0,
     )
 
@@ -242,10 +243,10 @@ def _line(one: Deviation, values: FloatArray, names: tuple[str, ...], colours: t
 
 
 def _instant(one: Deviation) -> dict[int, str]:
-    """Return when the verdict was decided."""
+    """Return when the verdict was decided, or the log deviates most."""
     if not one.run.timed:
-        return {one.decisive.sample_max: f"decides {when(one.decisive)}"}
-    return {int(one.t_ns[one.decided_at]): f"decides at {text.seconds(one.decisive.t_max)} s"}
+        return {one.furthest.sample_max: f"{peak_words(one)} {when(one.furthest)}"}
+    return {int(one.t_ns[one.furthest_at]): f"{peak_words(one)} at {text.seconds(one.furthest.t_max)} s"}
 
 
 def _out_words(one: Deviation) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.matching import lacking, match
+from urmpipe_pipeline.comparison.matching import lacking, match, wanted_rows
 from urmpipe_pipeline.comparison.measure import measure
 from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.trajectory import Sync, Trajectory
@@ -261,11 +261,12 @@ def _sync(option: SyncOption, cycle: Followed, timed: bool) -> Sync:
 
 def _deviation(asked: Side, done: Side, sync: Sync) -> Deviation:
     """Return the deviation of a cycle at the same times; nothing of it is judged."""
-    matched = match(asked.trajectory, done.trajectory, sync)
+    reference = wanted_rows(asked, done)
+    matched = match(reference, done.trajectory, sync)
     if not len(matched.sample):
         said = f"no sample in common with {asked.run.name} (time offset {sync.offset} s)"
         raise LogError(lacking(done.run, said))
-    return measure(done.run, asked.trajectory, matched, {})
+    return measure(done.run, reference, done.trajectory, matched, {})
 
 
 def _refuse_unvalued(test: IsoTest, tolerance: Mapping[str, float]) -> None:

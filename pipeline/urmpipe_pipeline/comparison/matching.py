@@ -15,6 +15,7 @@ from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import quaternions, slerp
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
+from urmpipe_pipeline.diagnosis.sides import Side
 from urmpipe_pipeline.runs.grid import ROUNDING_NS, interpolate
 from urmpipe_pipeline.runs.results import Run
 
@@ -120,6 +121,15 @@ def _trajectory(run: Run, position: FloatArray, quat: FloatArray | None) -> Traj
     joints, units, rows = run.log.joints, tuple(run.joint_units), run.on_rows
     q = rows.q if joints else None
     return Trajectory(run.name, rows.t_ns, position, run.log.files, quat, joints, units, q)
+
+
+def wanted_rows(asked: Side, done: Side) -> Trajectory:
+    """Return the rows of a reference that are joined by lines: those with a value, on its own clock.
+
+    All rows where nothing is joined: of still poses, and of what a log recorded itself.
+    """
+    whole = asked.trajectory
+    return whole if asked.run is done.run or not asked.run.timed else whole.rows_with_value()
 
 
 def match(reference: Trajectory, log: Trajectory, sync: Sync) -> Matched:

@@ -11,6 +11,7 @@ from urmpipe_models.delta import delta
 from urmpipe_models.errors import LogError
 from urmpipe_models.orientation import angle_between
 from urmpipe_models.repolarizer import FULL_TURN
+from urmpipe_pipeline.comparison.coverage import measure_shares
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS, Deviation
 from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, joints_apart, lacking
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
@@ -25,14 +26,17 @@ START_SAMPLES = 11
 """Samples by which the turns of the start are counted: as few as outvote a wild one."""
 
 
-def measure(run: Run, reference: Trajectory, matched: Matched, tolerance: Mapping[str, float]) -> Deviation:
-    """Return the deviation of a log: delta, distance from the path, angle, joints, and the verdict.
+def measure(
+    run: Run, reference: Trajectory, log: Trajectory, matched: Matched, tolerance: Mapping[str, float]
+) -> Deviation:
+    """Return the deviation of a log: delta, distance from the path, angle, joints, shares, and the verdict.
 
     Args:
         run: The log, its name unique in the comparison.
-        reference: What was asked for, whole.
+        reference: What was asked for, its rows that have a value.
+        log: What was done, whole.
         matched: Both sides at the same times, the log aligned.
-        tolerance: In [m] or [rad], by kind or by coordinate.
+        tolerance: In [m] or [rad], by kind or by coordinate; least shares 0..1.
 
     Raises:
         LogError: If there is a tolerance for what a side does not have.
@@ -56,6 +60,7 @@ def measure(run: Run, reference: Trajectory, matched: Matched, tolerance: Mappin
         {one.quantity: describe(one, t, sample, tolerance) for one in measured}
         for measured in (in_space, of_joints)
     )
+    shares = measure_shares(reference, log, matched, tolerance, timed=run.timed)
     speed = _speed(run, matched)
     x, y, z, norm = (float(value) for value in values[0])
     return Deviation(
@@ -80,7 +85,8 @@ def measure(run: Run, reference: Trajectory, matched: Matched, tolerance: Mappin
         joint_statistics=joint_statistics,
         start=(x, y, z, norm),
         speed_correlation=correlation(values[:, 3], speed),
-        verdict=overall([*statistics.values(), *joint_statistics.values()]),
+        verdict=overall([*statistics.values(), *joint_statistics.values(), *shares.values()]),
+        shares=shares,
     )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.baseline_section import baseline_checks, baseline_section, worse_facts
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.deviation import Deviation, Share
 from urmpipe_pipeline.comparison.facts import alignment_words, decisive_facts, deviation_facts, sync_words
 from urmpipe_pipeline.comparison.figures import deviation_figures, overview_figure, path_figure, speed_cloud
 from urmpipe_pipeline.comparison.iso_presenter import present_test
@@ -59,8 +59,8 @@ def present(result: Comparison) -> Presentation:
         verdict=result.verdict,
         facts=(*decisive_facts(worst, colour), *_against(result)),
         body=_body(result),
-        opens_at_ns=int(worst.t_ns[worst.decided_at]) if worst.run.timed else 0,
-        opens_at_row=None if worst.run.timed else worst.decisive.sample_max,
+        opens_at_ns=int(worst.t_ns[worst.furthest_at]) if worst.run.timed else 0,
+        opens_at_row=None if worst.run.timed else worst.furthest.sample_max,
         scene=partial(comparison_scene, result) if worst.statistics else None,
         lines=tuple(comparison_lines(result)),
         rows=partial(statistics_rows, result),
@@ -141,6 +141,10 @@ def _checks(result: Comparison, one: Deviation) -> Iterator[Check]:
             out = out_words(held.out_of_tolerance or 0, len(one.sample))
             said = f"{decided_words(held)}{row}; out of tolerance: {out}"
             yield Check(quantity_name(held), held.verdict, said if held.verdict == "fail" else "", one.name)
+    for share in one.shares.values():
+        if share.verdict is not None:
+            said = decided_words(share) if share.verdict == "fail" else ""
+            yield Check(share.quantity, share.verdict, said, one.name)
     if result.baseline:
         yield from baseline_checks(result.baseline, one.name)
 
@@ -164,7 +168,7 @@ def _properties(result: Comparison, one: Deviation) -> dict[str, Any]:
         "speed_correlation": one.speed_correlation,
     } | {
         f"{quantity_name(held)}.{field}": value
-        for held in one.all_statistics
+        for held in one.quantities
         for field, value in held.fields().items()
     }
 
@@ -192,8 +196,10 @@ def _events(one: Deviation) -> Iterator[Event]:
     if (longest := one.longest_out) is not None and longest.t is not None and longest.duration is not None:
         lasts = f"{longest.samples} samples, {text.seconds(longest.duration)} s"
         yield Event(round(longest.t * 1e9), f"longest stretch out of tolerance begins: {lasts}", level)
-    held, timed = one.decisive, one.run.timed
-    if held.tolerance is not None:
+    held, timed = one.furthest, one.run.timed
+    if isinstance(one.decisive, Share):
+        yield Event(start, f"decides: {decided_words(one.decisive)}", level)
+    elif held.tolerance is not None:
         at = round(held.t_max * 1e9) if timed else None
         yield Event(at, f"decides: {amount_words(held)}{'' if timed else f' {when(held)}'}", level)
     if not one.statistics:

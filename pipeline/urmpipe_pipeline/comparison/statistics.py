@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.comparison.deviation import Kind, Statistics, Verdict
+from urmpipe_pipeline.comparison.deviation import Kind, Share, Statistics, Verdict
 from urmpipe_pipeline.comparison.tolerance import allowed_for
 from urmpipe_pipeline.iso9283.criteria import overall_verdict
 
@@ -80,7 +80,7 @@ def describe(
     )
 
 
-def overall(statistics: Iterable[Statistics]) -> Verdict | None:
+def overall(statistics: Iterable[Statistics | Share]) -> Verdict | None:
     """Return fail if any quantity fails; None if none has a tolerance."""
     return overall_verdict(one.verdict for one in statistics)
 

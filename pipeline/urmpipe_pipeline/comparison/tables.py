@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.baseline_section import quantities
-from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
-from urmpipe_pipeline.comparison.facts import alignment_words, largest, place_of
+from urmpipe_pipeline.comparison.comparison import ROW, Comparison
+from urmpipe_pipeline.comparison.deviation import Deviation, Share, ShareKind, Statistics
+from urmpipe_pipeline.comparison.facts import MEANING, alignment_words, largest, place_of, share_value
 from urmpipe_pipeline.comparison.wording import size_of, symbol
 from urmpipe_pipeline.palette import run_colour
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, minute_of, rows_table
-from urmpipe_pipeline.presentation.section import Cell, Column, Judged, Ref, Table, Value
+from urmpipe_pipeline.presentation.section import Cell, Column, Judged, Place, Ref, Table, Value
 
 ABOUT = {"axis": "position", "norm": "position", "path": "path", "angle": "orientation", "joint": "joints"}
 """What the kinds of deviation are about."""
@@ -32,10 +32,11 @@ def ranking_tables(result: Comparison) -> tuple[Table, ...]:
     }
     note = "The logs are ranked by the largest share of a tolerance that each uses."
     left_out = "Left out: samples of the log without a counterpart or without a value."
-    whole = min(map(result.covered, result.runs)) >= WHOLE
-    note += "" if whole else " Covered: share of the reference within the log's time."
+    partly = {share.quantity for one in result.runs for share in one.partly}
+    note += "".join(f" {name.capitalize()}: share {MEANING[name]}." for name in MEANING if name in partly)
+    hidden = set(MEANING) - partly
     columns = (
-        replace(one, brief=not (one.key == "covered" and whole), page=_leads(result, one.key, whole=whole))
+        replace(one, brief=one.key not in hidden, page=one.key not in hidden and _leads(result, one.key))
         for one in columns_of(result.ranking, far)
     )
     return (
@@ -49,14 +50,12 @@ def ranking_tables(result: Comparison) -> tuple[Table, ...]:
     )
 
 
-def _leads(result: Comparison, key: str, *, whole: bool) -> bool:
+def _leads(result: Comparison, key: str) -> bool:
     """Tell whether a page shows a column of the largest deviations here, not in the statistics of each log.
 
     Where joints of a unit are compared, the statistics have the largest values of all in that unit.
     """
     joints = {held.unit for one in result.runs for held in one.joint_statistics.values()}
-    if key == "covered":
-        return not whole
     if key in ("max_angle", "max_joint", "max_slide"):
         return "rad" not in joints and key == "max_angle"
     return not (key.startswith("max_") and "m" in joints)
@@ -68,7 +67,11 @@ def reference_of(result: Comparison, one: Deviation) -> Ref:
 
 
 def _sizes(result: Comparison) -> Heads[Deviation]:
-    """Return the columns of the largest deviations, and of how much was out and covered."""
+    """Return the columns of the largest deviations, and of how much was out and seen."""
+
+    def seen(quantity: ShareKind) -> Callable[[Deviation], Cell]:
+        return lambda one: share_value(one.shares.get(quantity))
+
     return {
         "max_x": ("max |Δx|", lambda one: largest(one.statistics.get("x"))),
         "max_y": ("max |Δy|", lambda one: largest(one.statistics.get("y"))),
@@ -79,7 +82,8 @@ def _sizes(result: Comparison) -> Heads[Deviation]:
         "max_joint": ("max joint", lambda one: largest(one.furthest_joint("rad"))),
         "max_slide": ("max slide", lambda one: largest(one.furthest_joint("m"))),
         "share_out": ("out", lambda one: Value(one.share_out, "%")),
-        "covered": ("covered", lambda one: Value(result.covered(one), "%")),
+        "coverage": ("coverage", seen("coverage")),
+        "judged": ("judged", seen("judged")),
     }
 
 
@@ -88,8 +92,8 @@ def _conditions(result: Comparison, names: Heads[Deviation]) -> Iterator[Column]
     runs = result.ranking
     heads: Heads[Deviation] = {
         **names,
-        "t": ("decided at t", lambda one: Value(one.decisive.t_max, "s")),
-        "place": ("log there at x, y, z", lambda one: place_of(one, one.decisive)),
+        "t": ("decided at t", lambda one: Value(_decided_t(one), "s")),
+        "place": ("log there at x, y, z", _decided_place),
         "longest_out": ("longest out", lambda one: _stretch(one, "duration")),
         "longest_out_t": ("longest out from t", lambda one: _stretch(one, "t")),
         "sync_offset": ("offset", lambda one: Value(one.sync.offset, "s", signed=True)),
@@ -99,7 +103,7 @@ def _conditions(result: Comparison, names: Heads[Deviation]) -> Iterator[Column]
         "alignment": ("alignment", lambda one: alignment_words(one)[0]),
     }
     if not all(one.run.timed for one in runs):
-        row = ("decided in row", lambda one: Value(one.row(one.decisive)))
+        row = ("decided in row", lambda one: Value(_decided_row(one)))
         heads = {
             **names,
             "t": row,
@@ -110,6 +114,24 @@ def _conditions(result: Comparison, names: Heads[Deviation]) -> Iterator[Column]
     brief |= {"left_out"} if any(one.left_out for one in runs) else set()
     for column in columns_of(runs, heads):
         yield replace(column, brief=column.key in brief)
+
+
+def _decided_t(one: Deviation) -> float | None:
+    """Return when the verdict was decided in [s] of the log: of a share where most was unseen."""
+    held = one.decisive
+    return held.t_max if isinstance(held, Statistics) else held.unseen.t if held.unseen else None
+
+
+def _decided_place(one: Deviation) -> Place | None:
+    return place_of(one, one.furthest) if one.decisive is one.furthest else None
+
+
+def _decided_row(one: Deviation) -> int | None:
+    """Return the row, from 1, in which the verdict was decided: of a share the first of those unseen."""
+    held = one.decisive
+    if isinstance(held, Statistics):
+        return one.row(held)
+    return held.unseen.sample + 1 if held.unseen else None
 
 
 def _stretch(one: Deviation, name: str) -> Value | None:
@@ -138,7 +160,7 @@ def comparison_lines(result: Comparison) -> Iterator[dict[str, Cell]]:
 
 
 def statistics_tables(one: Deviation, *, ranked: bool = False) -> Iterator[Table]:
-    """Yield the statistics of every quantity of a log: those in m, then those in rad.
+    """Yield the statistics of every quantity of a log: those in m, then those in rad, then the shares.
 
     Args:
         one: The log.
@@ -161,6 +183,29 @@ def statistics_tables(one: Deviation, *, ranked: bool = False) -> Iterator[Table
                 replace(column, page=column.key not in known) for column in _statistics(one, own, starts)
             )
             yield Table(f"Statistics of {about}", tuple(columns), note)
+    if one.shares:
+        note = " ".join(f"{name.capitalize()}: share {MEANING[name]}." for name in one.shares)
+        yield Table("How much was judged", _shares(one), note)
+
+
+def _shares(one: Deviation) -> tuple[Column, ...]:
+    """Return the columns of the shares of a log."""
+
+    def unseen(name: str, unit: str = "") -> Callable[[Share], Cell]:
+        return lambda held: None if held.unseen is None else Value(getattr(held.unseen, name), unit)
+
+    heads: Heads[Share] = {
+        "quantity": ("Quantity", lambda held: held.quantity),
+        "verdict": ("Verdict", lambda held: Judged(held.verdict)),
+        "tolerance": ("at least", lambda held: Value(held.tolerance, "%", given=True)),
+        "value": ("share", share_value),
+        "samples": ("samples", lambda held: Value(held.samples)),
+        "of": ("of", lambda held: Value(held.of)),
+        "unseen_t": ("longest unseen from t", unseen("t", "s")),
+        "unseen": ("unseen for", unseen("duration", "s")),
+        "unseen_samples": ("unseen samples", unseen("samples")),
+    }
+    return columns_of(list(one.shares.values()), heads)
 
 
 def _statistics(one: Deviation, own: list[Statistics], starts: Mapping[int, float]) -> tuple[Column, ...]:
@@ -189,5 +234,4 @@ def _statistics(one: Deviation, own: list[Statistics], starts: Mapping[int, floa
 
 def statistics_rows(result: Comparison) -> Table:
     """Return what --csv writes: a row a log and quantity; lengths in [m], angles in [rad], times in [s]."""
-    keys = ("run", "sync_offset", *(field.name for field in fields(Statistics)))
-    return rows_table("Statistics", keys, result.rows())
+    return rows_table("Statistics", ROW, result.rows())

@@ -11,6 +11,7 @@ from numbers import Real
 from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.measure_units import units_of
 from urmpipe_models.messages import Hint
+from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.iso9283.criteria import UNITS as CRITERIA
 
 LENGTHS, ANGLES = ({"": Decimal(1), **units_of(si)} for si in ("m", "rad"))
@@ -23,8 +24,13 @@ WRITTEN = {
 """The units that a quantity may be written in, by its own."""
 
 DEVIATIONS = ("axis", "x", "y", "z", "norm", "path", "angle", "joint")
+
+LEAST_SHARES = {"coverage": 0.9, "judged": 0.5}
+"""What has to be seen unless other shares are given: of the reference's samples, of the log's motion."""
+
 UNITS: dict[str, dict[str, Decimal]] = {
     **{kind: ANGLES if kind in ("angle", "joint") else LENGTHS for kind in DEVIATIONS},
+    **dict.fromkeys(LEAST_SHARES, WRITTEN["1"]),
     **{name: WRITTEN[unit] for name, unit in CRITERIA.items()},
 }
 """What a tolerance may be of, deviations and criteria after ISO 9283, and the units it may be written in.
@@ -48,6 +54,8 @@ ALLOWED_CRITERIA = (
 )
 """What a tolerance of a test after ISO 9283 may be of."""
 
+ALLOWED_SHARES = ", coverage=, judged= (least shares, %)"
+
 NUMBER = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 QUANTITY = re.compile(rf"\s*(?:±|\+-)?\s*({NUMBER})\s*([a-z/%]*)\s*")
 """A number in plain digits and its unit, ± before it or not."""
@@ -70,7 +78,7 @@ def parse_tolerance(
         text: One length, or some kinds with theirs. What is not named has no tolerance.
         parameter: The keyword that gave it, for messages.
         bare: The kinds that a length without a name is for.
-        zero: Whether 0 is allowed.
+        zero: Whether it is a noise: 0 is allowed, and no share.
         iso: Whether criteria after ISO 9283 are judged: messages name them.
 
     Raises:
@@ -84,14 +92,14 @@ def parse_tolerance(
     named: set[str] = set()
     faults = []
     for part, kinds, value in _parts(text, bare):
-        number = _number(value, UNITS.get(kinds[0], {}), zero)
+        number = _number(value, kinds[0], zero)
         twice = " twice" if number is not None and not named.isdisjoint(kinds) else ""
         if number is None or twice:
-            angle = value == part and _number(value, ANGLES, zero) is not None and not twice
+            angle = value == part and _number(value, "angle", zero) is not None and not twice
             of_what = ("angle", "joint") if angle else ()
             hints = tuple(Hint(parameter, f"{one}={part.strip()}", "specifies the kind") for one in of_what)
             said = f"{shown(part.strip())}{twice}"
-            allowed = ALLOWED_CRITERIA if iso else ALLOWED
+            allowed = (ALLOWED_CRITERIA if iso else ALLOWED) + ("" if zero else ALLOWED_SHARES)
             faults.append(Finding(parameter=parameter, found=said, allowed=allowed, hints=hints))
             continue
         named.update(kinds)
@@ -130,16 +138,16 @@ def check_tolerance(
     Args:
         tolerance: In [m] or [rad], by kind; of criteria in their units.
         parameter: The keyword that gave it, for messages.
-        zero: Whether 0 is allowed.
+        zero: Whether it is a noise: 0 is allowed, and no share.
         iso: Whether criteria after ISO 9283 are judged, which need none; else deviations; None: of either.
     """
-    sign = "0 or positive" if zero else "positive"
+    sign = "0 or positive" if zero else "positive; coverage, judged 0 to 1"
     allowed = ALLOWED_CRITERIA if iso else ALLOWED_NUMBERS
-    kinds = UNITS if iso is None else CRITERIA if iso else DEVIATIONS
+    kinds = UNITS if iso is None else (*(CRITERIA if iso else DEVIATIONS), *LEAST_SHARES)
     faults = [
         Finding(parameter=parameter, found=f"{kind}={value}", allowed=f"{allowed}; {sign}")
         for kind, value in tolerance.items()
-        if kind not in kinds or not isinstance(value, Real) or not _fits(float(value), zero)
+        if kind not in kinds or not isinstance(value, Real) or not _fits(kind, float(value), zero)
     ]
     if not tolerance and not iso:
         faults = [Finding(parameter=parameter, found="nothing", allowed=ALLOWED_NUMBERS)]
@@ -153,17 +161,30 @@ def allowed_for(quantity: str, kind: str, tolerance: Mapping[str, float]) -> flo
     return own if own is not None else tolerance.get(kind)
 
 
-def _number(text: str, units: Mapping[str, Decimal], zero: bool) -> float | None:
-    """Return a number with one of the units, in SI; None if it is none that is allowed.
+def complete_tolerance(given: Mapping[str, float], *, iso: bool) -> dict[str, float]:
+    """Return a tolerance with what always holds: least shares, and an axis where no deviation is named."""
+    otherwise = {} if iso or deviations_of(given) else {"axis": DEFAULT_TOLERANCE}
+    return LEAST_SHARES | otherwise | dict(given)
+
+
+def deviations_of(tolerance: Mapping[str, float]) -> dict[str, float]:
+    """Return a tolerance without its least shares."""
+    return {kind: value for kind, value in tolerance.items() if kind not in LEAST_SHARES}
+
+
+def _number(text: str, kind: str, zero: bool) -> float | None:
+    """Return a number with one of the units of a kind, in SI; None if it is none that is allowed.
 
     It is rounded once: 1.1mm and 0.0011 are one number.
     """
-    match = QUANTITY.fullmatch(text)
+    match, units = QUANTITY.fullmatch(text), UNITS.get(kind, {})
     if match is None or match[2] not in units:
         return None
     value = float(Decimal(match[1]) * units[match[2]])
-    return value if _fits(value, zero) else None
+    return value if _fits(kind, value, zero) else None
 
 
-def _fits(value: float, zero: bool) -> bool:
+def _fits(kind: str, value: float, zero: bool) -> bool:
+    if kind in LEAST_SHARES:
+        return not zero and 0.0 <= value <= 1.0
     return 0.0 < value < math.inf or (zero and value == 0.0)

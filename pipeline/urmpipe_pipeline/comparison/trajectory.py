@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.hand_eye import Untold
 from urmpipe_models.orientation import angle_between, quaternions
 from urmpipe_pipeline.joint_log import SourceFile, seconds
@@ -50,6 +50,35 @@ class Trajectory:
     def t(self) -> FloatArray:
         """Times in [s], shape (m,)."""
         return seconds(self.t_ns)
+
+    @property
+    def has_value(self) -> BoolArray:
+        """Which rows have a position, or all joints where no row has one, shape (m,)."""
+        values = self.position
+        if self.q is not None and not np.isfinite(values).any():
+            values = self.q
+        return np.asarray(np.isfinite(values).all(axis=1))
+
+    def rows_with_value(self) -> Trajectory:
+        """Return the rows that have a value: the others may be those of another topic, and are no gaps."""
+        valued = self.has_value
+        if valued.all() or not valued.any():
+            return self
+        kept = np.flatnonzero(valued)
+        return replace(
+            self,
+            t_ns=self.t_ns[kept],
+            position=self.position[kept],
+            quat_xyzw=None if self.quat_xyzw is None else self.quat_xyzw[kept],
+            q=None if self.q is None else self.q[kept],
+            broken=None if self.broken is None else _behind(self.broken, kept),
+        )
+
+
+def _behind(broken: IntArray, kept: IntArray) -> IntArray:
+    """Return the kept rows, by their new numbers, behind which a step of the whole trajectory is broken."""
+    rows = np.unique(np.searchsorted(kept, broken, side="right") - 1)
+    return np.asarray(rows[rows >= 0])
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,10 +9,11 @@ import numpy as np
 from urmpipe_models.hand_eye import OPEN, Part, Untold
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share
 from urmpipe_pipeline.comparison.matching import by_kinematics
 from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
 from urmpipe_pipeline.comparison.trajectory import Trajectory, extent
+from urmpipe_pipeline.comparison.wording import stretch_words
 from urmpipe_pipeline.diagnosis.sides import AT_REST
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
@@ -58,24 +59,20 @@ def left_out_warnings(one: Deviation, reference: Trajectory) -> Iterator[LogWarn
     if one.left_out > beyond:
         said = f"{one.left_out - beyond} of {samples} samples have no reference or no value"
         yield LogWarning("left-out", said, about=one.name)
-    partly = one.reference_left_out > (1.0 - WHOLE) * whole
-    if partly:
-        yield LogWarning("not-covered", _covered(one, reference), about=one.name)
+    coverage = one.shares["coverage"]
+    if partly := coverage.verdict != "fail" and coverage in one.partly:
+        yield LogWarning("not-covered", _covered(coverage, reference), about=one.name)
     if one.sync.offset and (beyond or (one.reference_left_out and not partly)):
         theirs = f"{one.reference_left_out} of {whole} samples of {reference.name}"
         said = f"the offset of {one.sync.offset:.6g} s leaves {beyond} of {samples} samples and {theirs}"
         yield LogWarning(BEYOND, f"{said} without the other side", about=one.name)
 
 
-def _covered(one: Deviation, reference: Trajectory) -> str:
-    """Say how much of the time of the reference a log lasts, and by which offset."""
-    kept = len(reference.t_ns) - one.reference_left_out
-    first, last = one.sync.offset, one.sync.offset + float(one.run.t[-1])
-    lasts = min(last, float(reference.t[-1])) - max(first, 0.0)
-    share = text.percent(kept / len(reference.t_ns))
-    shifted = f" at the offset of {one.sync.offset:.6g} s" if one.sync.offset else ""
-    said = f"{text.seconds(lasts)} s of the {text.seconds(reference.t[-1])} s of {reference.name}"
-    return f"it covers {said} ({share}){shifted}: the rest was not judged"
+def _covered(coverage: Share, reference: Trajectory) -> str:
+    """Say how many samples of the reference a log shows, and where most are unseen."""
+    said = f"it shows {coverage.samples} of {text.counted(coverage.of, 'sample')} of {reference.name}"
+    unseen = "" if coverage.unseen is None else f", longest unseen: {stretch_words(coverage.unseen)}"
+    return f"{said} ({text.percent(coverage.value)}){unseen}"
 
 
 def _beyond(one: Deviation, reference: Trajectory) -> int:

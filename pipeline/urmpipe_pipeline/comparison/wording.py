@@ -9,7 +9,8 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.assumptions import assuming
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
-from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation, Statistics, Stretch
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share, Statistics, Stretch
+from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES
 from urmpipe_pipeline.presentation.digits import held
 from urmpipe_pipeline.presentation.section import Value
 
@@ -55,60 +56,81 @@ def _points(one: Comparison) -> str:
 
 
 def _part(one: Comparison) -> str:
-    """Return what a verdict does not rest on: "; only 40.0 % of the reference was judged"; else nothing."""
-    partly = [share for share in map(one.covered, one.runs) if share < WHOLE]
-    if not partly:
-        return ""
-    if len(one.runs) == 1:
-        return f"; only {text.percent(partly[0])} of the reference was judged"
-    verb = "covers" if len(partly) == 1 else "cover"
-    return f"; {text.counted(len(partly), 'log')} {verb} only a part of the reference"
+    """Return what a verdict does not rest on, as "; coverage 0.5 % of 90 % needed, ..."; else nothing."""
+    partly = [run for run in one.runs if run.partly]
+    if len(partly) > NAMED:
+        return f"; coverage or judged below 99 % in {len(partly)} logs"
+    whose = " of {}" if len(one.runs) > 1 else ""
+    return "".join(
+        f"; {share_words(share)}{whose.format(run.name)}" for run in partly for share in run.partly
+    )
 
 
-def symbol(one: Statistics | DeltaVerdict) -> str:
-    """Return what a quantity is called: Δx, ‖Δ‖, path, angle, or a joint by its name."""
+def share_words(one: Share) -> str:
+    """Return a share, and if it is too small what was not seen.
+
+    As in "coverage 0.5 % of 90 % needed, nothing seen for 3.970 s from t = 0.010 s".
+    """
+    if one.verdict != "fail" or one.tolerance is None:
+        return f"{one.quantity} {text.percent(one.value)}"
+    said = f"{one.quantity} {text.percent(one.value)} of {text.percent(one.tolerance)} needed"
+    return said if one.unseen is None else f"{said}, longest unseen: {stretch_words(one.unseen)}"
+
+
+def symbol(one: Statistics | Share | DeltaVerdict) -> str:
+    """Return what a quantity is called: Δx, ‖Δ‖, path, angle, coverage, or a joint by its name."""
     return SYMBOLS[one.quantity] if one.kind in ("axis", "norm") else one.quantity
 
 
-def size_of(one: Statistics | DeltaVerdict) -> str:
+def size_of(one: Statistics | Share | DeltaVerdict) -> str:
     """Return what the absolute value of a quantity is called: |Δx|, ‖Δ‖, path, angle, |Δ phi1|."""
     if one.kind == "joint":
         return f"|Δ {one.quantity}|"
     return f"|{symbol(one)}|" if one.kind == "axis" else symbol(one)
 
 
-def quantity_name(one: Statistics) -> str:
+def quantity_name(one: Statistics | Share) -> str:
     """Return the name of a quantity, unique in its log: a joint may be called x."""
     return f"joint {one.quantity}" if one.kind == "joint" else one.quantity
 
 
-def used_words(one: Statistics | DeltaVerdict) -> str:
-    """Return how much of its tolerance a quantity uses up: "71.0 % of the tolerance"; nothing without one."""
-    if one.used is None:
+def used_words(one: Statistics | Share | DeltaVerdict) -> str:
+    """Return how much of its tolerance a deviation uses up: "71.0 % of the tolerance"; else nothing."""
+    if one.used is None or isinstance(one, Share):
         return ""
     if isinstance(one, Statistics) and one.missing:
         return f"no value at {one.missing} of {(one.samples or 0) + one.missing} samples"
     return "" if math.isinf(one.used) else f"{text.portion(one.used)} the tolerance"
 
 
-def amount_words(one: Statistics) -> str:
+def amount_words(one: Statistics | Share) -> str:
     """Return how far a quantity goes, and of how much: "|Δx| = 4.2000 mm of 3.5 mm allowed".
 
     Where a quantity with a tolerance lacks values, that: "angle has no value at 3 of 40 samples".
     """
+    if isinstance(one, Share):
+        return f"{one.quantity} = {held(Value(one.value, '%', one.tolerance, least=True))}"
     if one.tolerance is not None and one.missing:
         return f"{size_of(one)} has {used_words(one)}"
     return f"{size_of(one)} = {held(Value(one.max, one.unit, one.tolerance))}"
 
 
-def decided_words(one: Statistics) -> str:
-    """Return how much of how much a quantity is, and when.
+def decided_words(one: Statistics | Share) -> str:
+    """Return how much of how much a quantity is, and when; of a share what was not seen.
 
     As in "|Δx| = 4.2000 mm of 3.5 mm allowed (1.2 times the tolerance) at t = 1.250 s".
     """
+    if isinstance(one, Share):
+        unseen = "" if one.unseen is None else f"; longest unseen: {stretch_words(one.unseen)}"
+        return f"{amount_words(one)} ({one.samples} of {text.counted(one.of, 'sample')}){unseen}"
     lacks = one.tolerance is not None and one.missing
     used = used_words(one)
     return amount_words(one) if lacks else f"{amount_words(one)}{f' ({used})' if used else ''} {when(one)}"
+
+
+def peak_words(one: Deviation) -> str:
+    """Return what the furthest quantity of a log does where it is largest: it decides, if no share does."""
+    return "decides" if isinstance(one.decisive, Statistics) else "deviates most"
 
 
 def when(one: Statistics) -> str:
@@ -132,7 +154,7 @@ def out_words(out: int, of: int) -> str:
 
 
 def stretch_words(found: Stretch) -> str:
-    """Return how long and from when a log was out of tolerance: "0.500 s from t = 1.250 s"."""
+    """Return how long and from when a log was out of tolerance or unseen: "0.500 s from t = 1.250 s"."""
     if found.t is None or found.duration is None:
         return f"{text.counted(found.samples, 'row')} from row {found.sample + 1}"
     lasts = "1 sample at" if found.samples == 1 else f"{text.seconds(found.duration)} s from"
@@ -143,7 +165,7 @@ def tolerance_words(allowed: Mapping[str, float], joint_units: Iterable[str] = (
     """Return a comparison's tolerance as people read it: "±3.5 mm per axis, 0.5 deg of orientation".
 
     Args:
-        allowed: In [m] or [rad], by kind or coordinate.
+        allowed: In [m] or [rad], by kind or coordinate; least shares, named if they are not the default.
         joint_units: The units of the joints that are held to a tolerance, rad or m.
     """
     words = {
@@ -153,9 +175,15 @@ def tolerance_words(allowed: Mapping[str, float], joint_units: Iterable[str] = (
         "angle": "{} of orientation",
         "joint": "±{} per joint",
         **{axis: f"±{{}} {axis}" for axis in "xyz"},
+        **{share: f"{share} {{}}" for share in LEAST_SHARES},
     }
     units = {"angle": ["rad"], "joint": sorted(set(joint_units), reverse=True)}
     return ", ".join(
-        words[kind].format(" or ±".join(text.allowed(value, unit) for unit in units.get(kind, ["m"])))
-        for kind, value in allowed.items()
+        words[kind].format(
+            text.percent(value)
+            if kind in LEAST_SHARES
+            else " or ±".join(text.allowed(value, unit) for unit in units.get(kind, ["m"]))
+        )
+        for kind, value in sorted(allowed.items(), key=lambda one: one[0] in LEAST_SHARES)
+        if value != LEAST_SHARES.get(kind)
     )

@@ -40,8 +40,8 @@ def written(cell: Cell, *, unit: bool = False, voice: Voice = "command line") ->
 
 def held(value: Value) -> str:
     """Return a value with its unit and what is allowed of it: "2.5010 mm of 3.5 mm allowed"."""
-    allowed = allowed_words(value)
-    return f"{written(value, unit=True)} of {allowed} allowed" if allowed else written(value, unit=True)
+    allowed, by = allowed_words(value), "needed" if value.least else "allowed"
+    return f"{written(value, unit=True)} of {allowed} {by}" if allowed else written(value, unit=True)
 
 
 def allowed_words(value: Value) -> str:

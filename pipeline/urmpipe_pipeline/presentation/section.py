@@ -28,6 +28,7 @@ class Value:
         signed: Whether a plus sign is shown.
         given: True for what was given, not measured: it is written with no more digits than it has.
         most: Whether it stands out of its column.
+        least: Whether `limit` is the least that is needed, else the most that is allowed.
     """
 
     number: float | int | None
@@ -38,6 +39,7 @@ class Value:
     signed: bool = False
     given: bool = False
     most: bool = False
+    least: bool = False
 
 
 @dataclass(frozen=True, slots=True)
