@@ -39,6 +39,9 @@ def delta(reference: Vector, actual: Vector) -> Delta:
 
 
 def outside(deviation: Delta, tolerance: Element) -> Element:
-    """Return where |x|, |y| or |z| is above the tolerance in [m] (1 in a trace)."""
-    largest = np.maximum(np.maximum(np.abs(deviation.x), np.abs(deviation.y)), np.abs(deviation.z))
-    return largest > tolerance
+    """Return where |x|, |y| or |z| is above the tolerance in [m], or has no value (1 in a trace).
+
+    Compared one by one: C's fmax passes over a value that is NaN.
+    """
+    x, y, z = (np.abs(one) <= tolerance for one in (deviation.x, deviation.y, deviation.z))
+    return np.logical_not(np.logical_and(np.logical_and(x, y), z))

@@ -20,7 +20,7 @@ def test_the_tolerance_holds_an_axis_and_the_bound_itself_is_inside() -> None:
     x = np.array([0.0035, -0.0035, 0.00350001, 0.0, 0.0])
     z = np.array([0.0, 0.0, 0.0, -0.004, np.nan])
     zero = np.zeros(5)
-    assert outside(Delta(x, zero, z, zero), 0.0035).tolist() == [False, False, True, True, False]
+    assert outside(Delta(x, zero, z, zero), 0.0035).tolist() == [False, False, True, True, True]
     # an axis at its bound in all three: the norm may reach sqrt(3) times the tolerance
     assert not outside(Delta(0.0035, -0.0035, 0.0035, 0.00606), 0.0035)
 
@@ -33,3 +33,4 @@ def test_delta_and_flag_trace_with_casadi() -> None:
     got, flag = traced([1.0, 2.0, 3.0], [1.0, 2.0, 3.004])
     np.testing.assert_array_equal(np.ravel(got), delta((1.0, 2.0, 3.0), (1.0, 2.0, 3.004)))
     assert float(flag) == 1.0
+    assert float(traced([1.0, 2.0, np.nan], [1.0, 2.0, 3.0])[1]) == 1.0  # no value is out of tolerance

@@ -37,7 +37,7 @@ def delta_meter() -> Unit:
             Output(name="norm", description="Length of the deviation", unit="m", display_unit="mm"),
             Output(
                 name="out_of_tolerance",
-                description="Whether the deviation along x, y or z is above the tolerance",
+                description="Whether the deviation along x, y or z is above the tolerance or has no value",
                 type="Boolean",
             ),
         ),
@@ -45,7 +45,7 @@ def delta_meter() -> Unit:
         equations=(
             "delta = reference - actual (eq. 19-21)",
             "norm = sqrt(delta_x^2 + delta_y^2 + delta_z^2) (eq. 23)",
-            "out_of_tolerance = max(|delta_x|, |delta_y|, |delta_z|) > tolerance",
+            "out_of_tolerance = not max(|delta_x|, |delta_y|, |delta_z|) <= tolerance",
         ),
         source="UrmArm2021, eq. 19-21 and 23",
         recipe=Recipe(__name__, "delta_meter"),

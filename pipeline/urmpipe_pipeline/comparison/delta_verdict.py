@@ -31,6 +31,7 @@ class DeltaVerdict:
         out_of_tolerance: How many of them are out of it in any quantity; one without a value is.
         verdict: pass if none is, and nothing else is to be doubted.
         doubts: What else keeps it from passing, such as "bad.y, which leads to it, is not finite".
+        missing: Samples without a value, which are out of tolerance.
     """
 
     block: str
@@ -44,6 +45,12 @@ class DeltaVerdict:
     out_of_tolerance: int
     verdict: Verdict
     doubts: tuple[str, ...] = ()
+    missing: int = 0
+
+    @property
+    def coverage(self) -> float:
+        """Share of the samples, 0..1, that have a value."""
+        return 1.0 - self.missing / self.samples
 
     @property
     def kind(self) -> Kind:
@@ -70,7 +77,7 @@ class DeltaVerdict:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
         worst = self.worst if math.isfinite(self.worst) else None
-        told = asdict(self) | {"worst": worst, "doubts": list(self.doubts)}
+        told = asdict(self) | {"worst": worst, "doubts": list(self.doubts), "coverage": self.coverage}
         return {name: value for name, value in told.items() if name != "variables"}
 
 
@@ -115,6 +122,7 @@ def delta_verdict(
         out_of_tolerance=int(np.count_nonzero(out)),
         verdict="fail" if out.any() or doubts else "pass",
         doubts=tuple(doubts),
+        missing=int(np.count_nonzero(~known)),
     )
 
 

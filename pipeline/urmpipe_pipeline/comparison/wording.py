@@ -145,7 +145,8 @@ def meter_words(one: DeltaVerdict) -> str:
     used = used_words(one)
     said = f"{size_of(one)} {amount}{f' ({used})' if used else ''} at t = {text.seconds(one.t)} s"
     out = f"out of tolerance: {out_words(one.out_of_tolerance, one.samples)}"
-    return "; ".join((said, out, *one.doubts))
+    lacks = f"coverage {text.percent(one.coverage)}: {one.missing} without a value" if one.missing else ""
+    return "; ".join(filter(None, (said, out, lacks, *one.doubts)))
 
 
 def out_words(out: int, of: int) -> str:

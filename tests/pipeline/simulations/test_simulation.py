@@ -43,7 +43,7 @@ def test_its_json_has_the_extremes_of_every_scalar_and_when_they_stand(
     }  # fmt: skip
     assert said["verdicts"][0] == {
         "block": "meter", "tolerance": {"axis": 0.0035}, "quantity": "y", "worst": 4e-3, "t": 1.25,
-        "sample": 250, "samples": 600, "verdict": "fail", "doubts": [],
+        "sample": 250, "samples": 600, "missing": 0, "coverage": 1.0, "verdict": "fail", "doubts": [],
         "out_of_tolerance": np.count_nonzero(np.abs(values) > 0.0035),
     }  # fmt: skip
     assert (said["verdict"], said["failed"], said["recording"]) == ("fail", None, None)
