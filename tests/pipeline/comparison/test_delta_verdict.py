@@ -49,9 +49,10 @@ def test_a_sample_without_a_value_is_out_and_the_worst() -> None:
     found = there(delta_verdict("meter", T_NS, lacking, {"axis": 1.0}))
     assert (found.sample, found.out_of_tolerance, found.verdict, found.used) == (0, 1, "fail", None)
     assert math.isnan(found.worst) and found.to_dict()["worst"] is None
-    assert found.to_dict()["missing"] == 1 and found.coverage == 1.0 - 1.0 / len(lacking)
+    assert (found.missing, found.coverage) == (1, 1.0 - 1.0 / len(lacking))
     assert meter_words(found) == (
-        "|Δx| has no value at t = 0.000 s; out of tolerance: 1 of 3 samples (33.3 %)"
+        "|Δx| has no value at t = 0.000 s; out of tolerance: 1 of 3 samples (33.3 %); coverage 66.7 %: 1"
+        " without a value"
     )
 
 
