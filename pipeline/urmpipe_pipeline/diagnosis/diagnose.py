@@ -98,6 +98,7 @@ def _diagnosed(deviation: Deviation, asked: Question, lag: float | None) -> Diag
     return Diagnosis(
         name=deviation.name,
         verdict=deviation.verdict,
+        seen={name: share.value for name, share in deviation.shares.items()},
         samples=model.rows,
         unit=_unit(asked),
         rms=whole,
@@ -223,6 +224,7 @@ def _nothing(deviation: Deviation, asked: Question, reason: str, held: float = 0
     return Diagnosis(
         name=deviation.name,
         verdict=deviation.verdict,
+        seen={name: share.value for name, share in deviation.shares.items()},
         samples=model.rows,
         unit=_unit(asked),
         rms=before,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -156,6 +157,8 @@ class Diagnosis(Result):
         warnings: What a person should know.
         recording: Where it was written.
         comparison: The comparison that it stands in, where `urmpipe.diagnose` made it.
+        seen: The shares, 0..1, on which the verdict and the causes rest: coverage of the reference, judged of
+            the log's motion.
     """
 
     name: str
@@ -172,6 +175,7 @@ class Diagnosis(Result):
     warnings: tuple[LogWarning, ...] = ()
     recording: Path | None = field(default=None, metadata={"stored": False})
     comparison: Result | None = field(default=None, metadata={"stored": False})
+    seen: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def sentence(self) -> str:
@@ -199,6 +203,7 @@ class Diagnosis(Result):
             "name": self.name,
             "verdict": self.verdict,
             "samples": self.samples,
+            **{"coverage": None, "judged": None, **self.seen},
             "unit": self.unit,
             "rms": self.rms,
             "causes": [one.to_dict() for one in self.causes],
