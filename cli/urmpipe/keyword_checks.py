@@ -13,7 +13,7 @@ from typing import Any, ParamSpec, TypeVar
 from urmpipe.kinds import kind_of
 from urmpipe_models.display import Shown
 from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError, shown
-from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.joint_log import PASSED_OVER, LogWarning
 from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.sources.options import read_options
 from urmpipe_pipeline.text import counted
@@ -147,7 +147,8 @@ def refuse_recording(given: object, allowed: str) -> None:
 
 
 def refuse_warnings(strict: bool, found: Sequence[LogWarning]) -> None:
-    """Raise a `LogError` with all warnings if they are to be errors."""
+    """Raise a `LogError` with all warnings if they are to be errors, but for those that doubt nothing."""
+    found = [one for one in found if one.kind != PASSED_OVER]
     if strict and found:
         first = Finding(parameter="strict", found=counted(len(found), "warning"), allowed="none")
         raise LogError(first, *(one.as_finding() for one in found))

@@ -35,6 +35,10 @@ ASSUMED_PERIOD = "assumed-period"
 """The kind of the warning of a log whose rows have neither times nor a given period."""
 
 
+PASSED_OVER = "columns-passed-over"
+"""The kind of the warning about columns that were not read because measured ones were: it doubts nothing."""
+
+
 def seconds(nanoseconds: IntArray) -> FloatArray:
     """Return integer `nanoseconds` as [s], each rounded once, of the same shape."""
     return np.true_divide(nanoseconds, 1e9, dtype=np.float64)

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.resources import files
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from urmpipe_models.orientation import RotationForm
 
@@ -25,6 +25,8 @@ _INSIDE = re.compile(
 )
 """A unit between other words of a name, perhaps one per second."""
 
+_CAPITAL = re.compile(r"(?<=[a-z\d])(?=[A-Z])")
+_BEGINS, _ENDS = r"(?<![^\W\d_])", r"(?![^\W\d_])"  # of a word of letters
 _PER_SECOND = re.compile(r"\s*(?:/|per\s+)\s*(?:s|sec|second|sek)\s*(?:\^|\*\*)?\s*(?P<power>[2²]?)$")
 
 
@@ -110,7 +112,11 @@ class Vocabulary:
     orders: tuple[tuple[str, ...], ...]
     other: frozenset[str]
     grippers: frozenset[str]
+    measured_words: frozenset[str]
     commanded: frozenset[str]
+    present: re.Pattern[str]
+    marked: re.Pattern[str]
+    glued: re.Pattern[str]
     tcp_position: Patterns
     measured: Patterns
     outside: frozenset[str]
@@ -148,6 +154,9 @@ def vocabulary() -> Vocabulary:
     data = tomllib.loads(files(__package__).joinpath("vocabulary.toml").read_text(encoding="utf-8"))
     time, joint, tcp, units = data["time"], data["joint"], data["tcp"], dict(_units(data["units"]))
     roles = ("position", "rate", "acceleration")
+    words = sorted((*joint["measured"], *joint["commanded"]), key=len, reverse=True)
+    marks, longer = "|".join(words), "|".join(word for word in words if len(word) > 1)  # dq is a rate
+    stems = "|".join(joint["stems"])
     return Vocabulary(
         time=_compiled(time["patterns"]),
         dates=_compiled(time["dates"]),
@@ -164,7 +173,11 @@ def vocabulary() -> Vocabulary:
         orders=tuple(tuple(order) for order in joint["orders"]),
         other=frozenset((*joint["other"], *joint["grippers"])),
         grippers=frozenset(joint["grippers"]),
+        measured_words=frozenset(joint["measured"]),
         commanded=frozenset(joint["commanded"]),
+        present=re.compile(joint["present"]),
+        marked=re.compile(rf"{_BEGINS}({marks}){_ENDS}"),
+        glued=re.compile(rf"{_BEGINS}(({stems})(?=({longer}){_ENDS})|({longer})(?=({stems}){_ENDS}))"),
         tcp_position=_compiled(tcp["position"]),
         measured=_compiled(tcp["measured"]),
         outside=frozenset(tcp["outside"]),
@@ -223,6 +236,40 @@ def split_unit(name: str) -> tuple[str, str | None]:
 def key(label: str) -> str:
     """Return a column's name for comparison: lower case, every run of other signs an underscore."""
     return re.sub(r"[\W_]+", "_", label.lower()).strip("_")
+
+
+class MarkedName(NamedTuple):
+    """A column's name for comparison, and what it says of its values: were they measured, or asked for?
+
+    Attributes:
+        key: The name with every word for measured or commanded as a word of its own.
+        bare: The same without these words, which columns of one quantity share.
+        measured: The words for measured.
+        commanded: Those for commanded.
+    """
+
+    key: str
+    bare: str
+    measured: frozenset[str]
+    commanded: frozenset[str]
+
+
+@lru_cache(maxsize=1 << 14)
+def mark_name(label: str) -> MarkedName:
+    """Return a column's name, without its unit, with the words for measured and commanded found in it.
+
+    A change of case parts words only where one of these comes out: q1Measured is q1_measured, jointPos is
+    jointpos.
+    """
+    words = vocabulary()
+    plain, parted = (
+        words.glued.sub(r"\1_", key(words.present.sub("present_", key(text))))
+        for text in (label, _CAPITAL.sub("_", label))
+    )
+    text = max(plain, parted, key=lambda one: len(words.marked.findall(one)))  # the first of equals
+    marks = frozenset(match.group() for match in words.marked.finditer(text))
+    bare = key(words.marked.sub("_", text))
+    return MarkedName(text, bare, marks & words.measured_words, marks & words.commanded)
 
 
 def _compiled(patterns: Sequence[str]) -> Patterns:

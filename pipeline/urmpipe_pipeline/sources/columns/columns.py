@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import IntEnum
 
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_models.messages import Hint
@@ -13,16 +14,35 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.limits import refuse_wide
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.vocabulary import Patterns, Quantity, Unit, key, split_unit, vocabulary
+from urmpipe_pipeline.sources.vocabulary import (
+    MarkedName,
+    Patterns,
+    Quantity,
+    Unit,
+    key,
+    mark_name,
+    split_unit,
+    vocabulary,
+)
 
 _UNIT_WORDS = re.compile(r"_(rad|deg)(_(per_)?s(ec)?2?)?(?=_|$)")
-_GLUED = re.compile(r"(?<![a-z])q(?=(act|actual|cmd|des|fb|meas|msr|ref|set|target)_?\d)")
 _RANGE = re.compile(r"(?P<first>\d{1,5})-(?P<last>\d{1,5})")
 _NAME_COLUMN = re.compile(r"(?P<before>.*?)name_?(?P<n>\d+)\Z")
 SHOWN_TWINS = 12
 """Columns of one name that are told by their numbers."""
 
 _NUMBERED = re.compile(r"(?P<before>.*?)(position|velocity|effort)_?(?P<n>\d+)\Z")
+
+
+class Kind(IntEnum):
+    """What the name of a column says of its values, the kind that is read first of all."""
+
+    MEASURED, PLAIN, COMMANDED = range(3)
+
+
+def kind_of(measured: frozenset[str], commanded: frozenset[str]) -> Kind:
+    """Return what the words for measured and commanded in a name say; of both, the latter counts."""
+    return Kind.COMMANDED if commanded else Kind.MEASURED if measured else Kind.PLAIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,14 +80,35 @@ class Column:
         return any(pattern.search(self.key) for pattern in vocabulary().index)
 
     @property
+    def marked(self) -> MarkedName:
+        """Its key, and what it says of its values: were they measured, or asked for?"""
+        return mark_name(self.name if key(self.name) == self.key else split_unit(self.header)[0])
+
+    @property
     def words(self) -> frozenset[str]:
         """The words of its name."""
-        return frozenset(self.key.split("_"))
+        marked = self.marked
+        return marked.measured | marked.commanded | frozenset(marked.key.split("_"))
+
+    @property
+    def kind(self) -> Kind:
+        """Whether its values were measured, asked for, or nothing says so."""
+        return kind_of(self.marked.measured, self.marked.commanded)
 
     @property
     def plain(self) -> str:
         """Its key without the words of a unit, qdes as q_des: joint_rad_1 is joint_1."""
-        return _GLUED.sub("q_", _UNIT_WORDS.sub("", self.key))
+        return _UNIT_WORDS.sub("", self.marked.key)
+
+    @property
+    def bare(self) -> str:
+        """The same without words for measured and commanded: q_des_1 is q_1."""
+        return _UNIT_WORDS.sub("", self.marked.bare)
+
+    @property
+    def quantity(self) -> str:
+        """The letters and digits of it, which columns share that differ by such words alone."""
+        return self.bare.replace("_", "")
 
     @property
     def called(self) -> str:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TypeVar
 
-from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.columns.columns import Column, Kind, kind_of
 from urmpipe_pipeline.sources.vocabulary import Patterns, vocabulary
 
-T = TypeVar("T", Column, "Family")
-
 _AXES = {name: k for names in ("xyzw", "abc", ("roll", "pitch", "yaw")) for k, name in enumerate(names)}
+
+_BESIDE = re.compile(r"_?#_?")
+_LETTER = re.compile(r"[^\W\d_]")
+"""Without one, what is left of a name is no name: sensor_1 is no joint 1."""
 
 LONGEST = 200
 """Letters of a name that may be one of a family: no recorder writes longer ones."""
@@ -24,36 +25,32 @@ class Family:
 
     Attributes:
         rank: Index of the pattern that found them: the lower, the surer.
-        name: Their name with # in the number's place.
-        order: How often they are differentiated in time: 0 for positions.
+        name: Their name with # in the number's place, without words for measured and commanded.
+        kind: What these words say.
+        known: Whether a pattern has their whole name, with these words; else only without them.
         columns: The columns by their number.
         twins: Columns that share a number with one of them.
     """
 
     rank: int
     name: str
-    order: int = 0
+    kind: Kind
+    known: bool
     columns: dict[int, Column] = field(default_factory=dict)
     twins: list[Column] = field(default_factory=list)
+
+    def shares_name(self, other: Family) -> bool:
+        """Return whether the names are the same, with or without a sign beside the number."""
+        one, two = (_BESIDE.sub("#", family.name) for family in (self, other))
+        return one == two
 
     def ordered(self) -> tuple[Column, ...]:
         """Return the columns in the order of their numbers."""
         return tuple(self.columns[n] for n in sorted(self.columns))
 
-    @property
-    def words(self) -> frozenset[str]:
-        """The words of their name; the d of a derivative, which also stands for desired, is none."""
-        words = self.name.replace("#", "_").split("_")
-        return frozenset(words[1:] if self.order and words[0] == "d" else words)
 
-    @property
-    def commanded(self) -> bool:
-        """Whether they hold what was asked for, not what was measured."""
-        return bool(self.words & vocabulary().commanded)
-
-
-def families(columns: Iterable[Column], patterns: Patterns, order: int) -> list[Family]:
-    """Return the families of columns that match, the surest first; measured ones where both kinds are there.
+def find_families(columns: Iterable[Column], patterns: Patterns, order: int) -> list[Family]:
+    """Return the families of columns that match, the surest first.
 
     Args:
         columns: Candidates.
@@ -61,37 +58,71 @@ def families(columns: Iterable[Column], patterns: Patterns, order: int) -> list[
             i and j (row and column of a matrix).
         order: Derivative in time that their units may not contradict: 0 for positions.
     """
-    found: dict[tuple[int, str, str | None], Family] = {}
+    found: dict[tuple[object, ...], Family] = {}
     for column in columns:
-        match = _first_match(column, patterns)
-        if match is None or (column.unit is not None and column.unit.order != order):
+        matched = _match(column, patterns, order)
+        if matched is None or (column.unit is not None and column.unit.order != order):
             continue
-        rank, place = match
-        number, start, end = _number(place)
-        name = f"{column.plain[:start]}#{column.plain[end:]}"
-        family = found.setdefault((rank, name, None), Family(rank, name, order))
+        number, alike = matched
+        shape = tuple(tuple(vocabulary().marked.findall(word)) for word in column.plain.split("_"))
+        family = found.setdefault((*alike, shape, None), Family(*alike))
         if number in family.columns:
             family.twins.append(column)
             if column.unit_text == family.columns[number].unit_text:
                 continue
-            family = found.setdefault((rank, name, column.unit_text), Family(rank, name, order))
+            family = found.setdefault((*alike, shape, column.unit_text), Family(*alike))
         family.columns.setdefault(number, column)
     whole = [family for (*_, unit), family in found.items() if unit is None or len(family.columns) > 1]
-    ranked = sorted(whole, key=lambda family: family.rank)
-    return measured(ranked)
+    return sorted(whole, key=lambda family: family.rank)
 
 
-def measured(items: Sequence[T]) -> list[T]:
-    """Return the items without those that hold commands, unless all do."""
-    without = [item for item in items if not item.words & vocabulary().commanded]
-    return without or list(items)
+def prefer_measured(found: Sequence[Family]) -> list[Family]:
+    """Return the families to read: of each quantity those measured, else plain; commands if all are."""
+    best = [family for family in found if not any(_stands_for(other, family) for other in found)]
+    return [family for family in best if family.kind != Kind.COMMANDED] or best
 
 
-def _first_match(column: Column, patterns: Patterns) -> tuple[int, re.Match[str]] | None:
-    if len(column.plain) > LONGEST or ("n" in patterns[0].groupindex and column.words & vocabulary().other):
+def _stands_for(other: Family, family: Family) -> bool:
+    """Return whether another family is the same quantity, of a kind that is read first.
+
+    One that is known only without its words has to have the same name.
+    """
+    alike = other.shares_name(family) or (other.known and other.kind == Kind.MEASURED)
+    return other.kind < family.kind and len(other.columns) == len(family.columns) and alike
+
+
+def drop_unknown(found: Sequence[Family], *, lone: bool) -> list[Family]:
+    """Return the families that are known, and the others that share a name with one of them.
+
+    Args:
+        found: The families.
+        lone: Whether all count if none is known.
+    """
+    kept = [f for f in found if f.known or any(o is not f and o.shares_name(f) for o in found)]
+    return kept or (list(found) if lone else [])
+
+
+def _match(column: Column, patterns: Patterns, order: int) -> tuple[int, tuple[int, str, Kind, bool]] | None:
+    """Return a column's number and its family: rank, name, kind, and whether it is known."""
+    plain, bare, kind = column.plain, column.bare, column.kind
+    if order and plain.startswith("d_"):  # the d of a derivative, which also stands for desired
+        bare = f"d_{bare}"
+        kind = kind_of(column.marked.measured, column.marked.commanded - {"d"})
+    if len(plain) > LONGEST or ("n" in patterns[0].groupindex and column.words & vocabulary().other):
         return None
+    known = _first(plain, patterns)
+    found = (_first(bare, patterns) if _LETTER.search(bare) else None) or known
+    if found is None:
+        return None
+    rank, match = found
+    number, start, end = _number(match)
+    name = f"{match.string[:start]}#{match.string[end:]}"
+    return number, (min(rank, known[0]) if known else rank, name, kind, known is not None)
+
+
+def _first(text: str, patterns: Patterns) -> tuple[int, re.Match[str]] | None:
     for rank, pattern in enumerate(patterns):
-        match = pattern.search(column.plain)
+        match = pattern.search(text)
         if match:
             return rank, match
     return None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import NoReturn
 
@@ -12,8 +12,13 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.sources.columns.blocks import period_of
-from urmpipe_pipeline.sources.columns.columns import Column, listed
-from urmpipe_pipeline.sources.columns.families import families, measured
+from urmpipe_pipeline.sources.columns.columns import Column, Kind, listed
+from urmpipe_pipeline.sources.columns.families import (
+    Family,
+    drop_unknown,
+    find_families,
+    prefer_measured,
+)
 from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, OTHER_ROBOT, RECORD, which_joints
 from urmpipe_pipeline.sources.tables.whole import Whole
 from urmpipe_pipeline.sources.vocabulary import key, vocabulary
@@ -23,13 +28,17 @@ _LAST_NUMBER = re.compile(r"\d+(?=\D*$)")
 
 @dataclass(frozen=True, slots=True)
 class NamedJoints:
-    """Joint columns, why they are, the names and numbers that their rates share, and these if proved."""
+    """Joint columns, why they are, the names and numbers that their rates share, and these if proved.
+
+    `others` are groups of columns that would have been the joints without these.
+    """
 
     columns: tuple[Column, ...]
     evidence: str = ""
     numbers: tuple[int, ...] = ()
     names: tuple[str, ...] = ()
     rates: tuple[Column, ...] = ()
+    others: tuple[tuple[Column, ...], ...] = ()
 
 
 def numbered_alike(columns: Sequence[Column]) -> list[tuple[Column, ...]]:
@@ -58,7 +67,7 @@ def proved_by_rates(families: Sequence[tuple[Column, ...]], whole: Sequence[Whol
 
 def family_of(joints: Sequence[Column]) -> tuple[tuple[int, ...], tuple[str, ...]]:
     """Return the numbers, or else the names, that chosen joints share with their rates, in their order."""
-    for family in families(joints, vocabulary().joint["position"], order=0):
+    for family in find_families(joints, vocabulary().joint["position"], order=0):
         if len(family.columns) == len(joints):
             number_of = {column: n for n, column in family.columns.items()}
             return tuple(number_of[column] for column in joints), ()
@@ -75,41 +84,111 @@ def called_as_joints(numeric: Sequence[Column], robot: Chain | None) -> tuple[Co
         return ()
     found = named_after(numeric, robot.coordinates, "position")
     names = [key(name) for name in robot.coordinates]
-    return found if [column.key for column in found] == names else ()
+    return found if all(name in (c.key, c.bare) for name, c in zip(names, found, strict=False)) else ()
 
 
-def find_joints(free: Sequence[Column], file: str, robot: Chain | None, *, half_pose: bool) -> NamedJoints:
-    """Return the joints among some columns; beside half a pose, three angles may be its other half."""
+def find_joints(
+    free: Sequence[Column], file: str, robot: Chain | None, *, half_pose: bool, path: bool
+) -> NamedJoints:
+    """Return the joints among some columns, those that were measured where these are there as well.
+
+    Args:
+        free: The columns.
+        file: The file, for errors.
+        robot: The arm, or None.
+        half_pose: Whether a position is beside them without an orientation: three angles may be it.
+        path: Whether a position is beside them, so that it is a log without joints, too.
+
+    Raises:
+        LogError: With the question which they are.
+    """
+    numbered = _find_numbered(free, lone=not path)
+    found = _find_joints(free, numbered, file, robot, half_pose=half_pose)
+    kinds = {column.kind for column in found.columns}
+    same = same_quantities(found.columns, free) if len(kinds) > 1 else ()
+    alike = [
+        family.ordered()
+        for family in numbered
+        if len(family.columns) == len(found.columns) and not {*family.ordered()} & {*found.columns}
+    ]
+    surer = [group for group in alike if kinds and group[0].kind == Kind.MEASURED < min(kinds)]
+    if same or surer:
+        _refuse_groups([found.columns, *surer, *same], file)
+    return replace(found, others=tuple(dict.fromkeys((*found.others, *alike))))
+
+
+def _find_numbered(free: Sequence[Column], *, lone: bool) -> list[Family]:
+    """Return the families of joints by numbers; if no whole name is known, only if they are alone."""
+    words = vocabulary()
+    moving = words.joint_words["rate"] | words.joint_words["acceleration"]
+    found = find_families([c for c in free if not c.words & moving], words.joint["position"], order=0)
+    kept = drop_unknown(found, lone=lone)
+    sizes = {len(family.columns) for family in kept} - {1}
+    return [family for family in found if family in kept or len(family.columns) in sizes]
+
+
+def _find_joints(
+    free: Sequence[Column], numbered: Sequence[Family], file: str, robot: Chain | None, *, half_pose: bool
+) -> NamedJoints:
+    """Return the joints by the names of an arm's joints, by numbers, or by what else their names share."""
     count = len(robot.coordinates) if robot else None
     orders = [*((robot.coordinates,) if robot else ()), *vocabulary().orders]
     for names in orders:
         by_name = named_after(free, names, "position")
         if by_name and count in (None, len(by_name)):
             whose = "the robot's" if robot and names == robot.coordinates else "known"
-            return NamedJoints(by_name, f"{whose} joint names", names=tuple(names))
+            others = tuple(arm for arm in _arms(free, names) if not {*arm} & {*by_name})
+            return NamedJoints(by_name, f"{whose} joint names", names=tuple(names), others=others)
         if count in (None, len(names)):
             _refuse_several_arms(free, names, file)
-    return _numbered(free, file, count) or _without_number(free, file, count, half_pose=half_pose)
+    by_number = _numbered(free, numbered, file, count)
+    return by_number or _without_number(free, file, count, half_pose=half_pose)
 
 
 def _without_number(free: Sequence[Column], file: str, count: int | None, *, half_pose: bool) -> NamedJoints:
     """Return joints without numbers: by a word that they share, by their units, or as all that is left."""
     words = vocabulary()
     about_else = words.other | words.joint_words["rate"] | words.joint_words["acceleration"]
-    still = [c for c in free if not c.words & about_else and not (c.unit and c.unit.order)]
-    family = _sharing_a_mark(measured(still))
+    every = [c for c in free if not c.words & about_else and not (c.unit and c.unit.order)]
+    still = _of_first_kind(every)
+    family = _sharing_a_mark(_not_commanded(still))
     if family and count in (None, len(family)):
-        _refuse_half(family, free, measured(still), file, count)
+        _refuse_half(family, free, _not_commanded(still), file, count)
         names = tuple("_".join(w for w in c.key.split("_") if w not in words.marks) for c in family)
         evidence = "the word position or angle in their names; the order is the file's"
-        return NamedJoints(family, evidence, names=names)
+        return NamedJoints(family, evidence, names=names, others=same_quantities(family, every))
     sized = tuple(c for c in still if c.unit and c.unit.quantity in ("angle", "length"))
     turning = any(c.unit and c.unit.quantity == "angle" for c in sized)
     if turning and count in (None, len(sized)) and not (half_pose and count is None and len(sized) == 3):
-        return NamedJoints(sized, "their units; the order is the file's")
+        return NamedJoints(
+            sized, "their units; the order is the file's", others=same_quantities(sized, every)
+        )
     if count is not None and len(still) == count:
-        return NamedJoints(tuple(still), f"the only {count} columns left; the order is the file's")
+        evidence = f"the only {count} columns left; the order is the file's"
+        return NamedJoints(tuple(still), evidence, others=same_quantities(still, every))
     return NamedJoints(())
+
+
+def _of_first_kind(columns: Sequence[Column]) -> list[Column]:
+    """Return of columns whose names differ only by words for measured and commanded those to read first."""
+    first: dict[str, Kind] = {}
+    for column in columns:
+        first[column.quantity] = min(column.kind, first.get(column.quantity, column.kind))
+    return [column for column in columns if column.kind == first[column.quantity]]
+
+
+def _not_commanded(columns: Sequence[Column]) -> list[Column]:
+    """Return the columns without those that hold commands, unless all do."""
+    return [column for column in columns if column.kind != Kind.COMMANDED] or list(columns)
+
+
+def same_quantities(chosen: Sequence[Column], columns: Sequence[Column]) -> tuple[tuple[Column, ...], ...]:
+    """Return the other columns with the names of those that are chosen, by their words."""
+    names, groups = {column.quantity for column in chosen}, dict[frozenset[str], list[Column]]()
+    for column in columns:
+        if column not in chosen and column.quantity in names:
+            groups.setdefault(column.marked.measured | column.marked.commanded, []).append(column)
+    return tuple(tuple(group) for group in groups.values())
 
 
 def _sharing_a_mark(still: Sequence[Column], having: Sequence[Column] = ()) -> tuple[Column, ...]:
@@ -140,7 +219,8 @@ def _refuse_half(
     limbs = frozenset(word for order in words.orders for name in order for word in name.split("_"))
     own = frozenset(word for column in family for word in column.words) | limbs
     moving = words.joint_words["rate"] | words.joint_words["acceleration"] | words.grippers
-    same = _sharing_a_mark(measured([column for column in free if not column.words & moving]), family)
+    columns = _not_commanded(_of_first_kind([column for column in free if not column.words & moving]))
+    same = _sharing_a_mark(columns, family)
     others = [c for c in free if c not in family and (c in same or (c in still and c.words & own))]
     if not others or len(family) == count:
         return
@@ -151,14 +231,20 @@ def _refuse_half(
 
 def _refuse_several_arms(free: Sequence[Column], names: Sequence[str], file: str) -> None:
     """Raise a `LogError` where columns have the names of all joints more than once, as those of two arms."""
-    arms: dict[str, dict[str, Column]] = {}
+    arms = _arms(free, names)
+    first = [arm for arm in arms if arm[0].kind == min(other[0].kind for other in arms)]
+    if len(first) > 1:
+        _refuse_groups(first, file)
+
+
+def _arms(columns: Sequence[Column], names: Sequence[str]) -> list[tuple[Column, ...]]:
+    """Return the groups of columns that have the names of all joints, and else the same words."""
+    arms: dict[frozenset[str] | None, dict[str, Column]] = {}
     for name in names:
-        for column in measured([one for one in free if _role_beside(one, name) == "position"]):
-            rest = f"_{column.key}_".replace(f"_{key(name)}_", "_", 1).strip("_")
-            arms.setdefault(rest, {}).setdefault(name, column)
-    groups = [[arm[name] for name in names] for arm in arms.values() if len(arm) == len(names)]
-    if len(groups) > 1:
-        _refuse_groups(groups, file)
+        for column in columns:
+            if _role_beside(column, name) == "position":
+                arms.setdefault(_beside(column, name), {}).setdefault(name, column)
+    return [tuple(arm[name] for name in names) for arm in arms.values() if len(arm) == len(names)]
 
 
 def _refuse_groups(groups: Sequence[Sequence[Column]], file: str) -> NoReturn:
@@ -178,7 +264,8 @@ def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> t
     result = []
     for name in names:
         matches = [column for column in columns if _role_beside(column, name) == role]
-        matches, own = measured(matches), frozenset(key(name).split("_"))
+        matches = [c for c in matches if c.kind == min(other.kind for other in matches)]
+        own = frozenset(key(name).split("_"))
         exact = [c for c in matches if c.words - own <= vocabulary().joint_words["position"]]
         matches = exact if len(exact) == 1 else matches
         if len(matches) != 1:
@@ -187,14 +274,20 @@ def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> t
     return tuple(result) if len(set(result)) == len(result) else ()
 
 
+def _beside(column: Column, name: str) -> frozenset[str] | None:
+    """Return the words of a column beside the name of a joint, None without that name; they may part it."""
+    for text in (column.marked.key, column.bare):
+        before, inner, behind = f"_{text}_".partition(f"_{key(name)}_")
+        if inner:
+            marks = column.marked.measured | column.marked.commanded
+            return frozenset(f"{before}_{behind}".split("_")) - {""} | marks
+    return None
+
+
 def _role_beside(column: Column, name: str) -> str | None:
     """Return what a column says about a joint: by the words beside the joint's name in its own."""
-    padded, inner = f"_{column.key}_", f"_{key(name)}_"
-    if inner not in padded:
-        return None
-    beside = frozenset(padded.replace(inner, "_", 1).strip("_").split("_")) - {""}
-    words = vocabulary().joint_words
-    if beside & vocabulary().other:
+    beside, words = _beside(column, name), vocabulary().joint_words
+    if beside is None or beside & vocabulary().other:
         return None
     order = column.unit.order if column.unit else 0
     for role, its_order in (("acceleration", 2), ("rate", 1)):
@@ -203,22 +296,27 @@ def _role_beside(column: Column, name: str) -> str | None:
     return "position"
 
 
-def _numbered(free: Sequence[Column], file: str, count: int | None) -> NamedJoints | None:
+def _numbered(
+    free: Sequence[Column], found: Sequence[Family], file: str, count: int | None
+) -> NamedJoints | None:
     """Return the joints by a word and a number: q1, J1_Angle, actual_q_0, ..."""
-    words = vocabulary()
-    moving = words.joint_words["rate"] | words.joint_words["acceleration"]
-    still = [column for column in free if not column.words & moving]
-    found = families(still, words.joint["position"], order=0)
     if not found:
         return None
-    fitting = [family for family in found if len(family.columns) == count] or found
-    best = [family for family in fitting if family.rank == min(f.rank for f in fitting)]
-    if len(best) > 1 and not all(len(family.columns) == 1 for family in best):
-        _refuse_groups([family.ordered() for family in best], file)
+    words, preferred = vocabulary(), prefer_measured(found)
+    fitting = [family for family in preferred if len(family.columns) == count] or preferred
+    size = len(fitting[0].columns)
+    best = [f for f in fitting if f.rank == fitting[0].rank or len(f.columns) == size > 1]
+    surer = [f for f in found if f.kind == Kind.MEASURED < best[0].kind]
+    if len(best) + len(surer) > 1 and not all(len(family.columns) == 1 for family in (*best, *surer)):
+        _refuse_groups([family.ordered() for family in (*best, *surer)], file)
     if len(best) > 1:  # one plot a joint, each with a number of its own
         columns = tuple(column for family in best for column in family.ordered())
         return NamedJoints(columns, "their names; the order is the file's")
     family = best[0]
+    others = tuple(f.ordered() for f in found if f is not family and f.shares_name(family))
+    moving = words.joint_words["rate"] | words.joint_words["acceleration"]
+    passed = {column for group in others for column in group}
+    still = [column for column in free if not column.words & moving and column not in passed]
     lowest = min(family.columns)
     first = lowest if len(family.columns) == 1 else min(lowest, 1)
     gaps = [n for n in range(first, first + len(family.columns)) if n not in family.columns]
@@ -232,7 +330,7 @@ def _numbered(free: Sequence[Column], file: str, count: int | None) -> NamedJoin
     if larger := _sharing_a_mark(still, family.ordered()):
         _refuse_half(family.ordered(), larger, larger, file, count)
     evidence = "their names, in the order of their numbers"
-    return NamedJoints(family.ordered(), evidence, tuple(sorted(family.columns)))
+    return NamedJoints(family.ordered(), evidence, tuple(sorted(family.columns)), others=others)
 
 
 def cure(missing: int, spare: Sequence[Column], count: int | None) -> tuple[Hint, Hint]:

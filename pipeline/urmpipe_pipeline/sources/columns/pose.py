@@ -14,7 +14,7 @@ from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.orientation import FORMS, RotationForm, width
 from urmpipe_pipeline.sources.cells.cell import to_float
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
-from urmpipe_pipeline.sources.columns.families import Family, families
+from urmpipe_pipeline.sources.columns.families import Family, drop_unknown, find_families, prefer_measured
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import FEW, Layout
 from urmpipe_pipeline.sources.vocabulary import vocabulary
@@ -46,6 +46,7 @@ class Pose:
         forms: What these may be; one if it is known.
         evidence: Why.
         measured: Whether it was measured from outside, in a frame of its own.
+        others: Groups of columns that would have been the position without these.
     """
 
     position: tuple[Column, ...] = ()
@@ -53,6 +54,7 @@ class Pose:
     forms: tuple[RotationForm, ...] = ()
     evidence: str = "their names"
     measured: bool = False
+    others: tuple[tuple[Column, ...], ...] = ()
 
 
 def find_pose(
@@ -62,6 +64,7 @@ def find_pose(
     *,
     form: RotationForm | None = None,
     some: bool = False,
+    lone: bool = False,
 ) -> Pose:
     """Return the recorded pose among some columns with names.
 
@@ -71,21 +74,27 @@ def find_pose(
         file: The file, if it is an error that several positions are recorded; else they are left.
         form: Form of the orientation, if it is told: its columns are not asked then whether they hold it.
         some: Whether it is enough that some rows hold an orientation: the others are wrong.
+        lone: Whether columns are a position that are known only without their words for measured or
+            commanded: target_x beside joints is no place of the tool unless actual_x is there.
 
     Raises:
         LogError: If there are several positions where one is needed.
     """
-    vectors = [f for f in families(numeric, vocabulary().tcp_pose_vector, 0) if _numbers(f) == range(6)]
+    every = [f for f in find_families(numeric, vocabulary().tcp_pose_vector, 0) if _numbers(f) == range(6)]
+    vectors = prefer_measured(every)
     if len(vectors) == 1:
         ordered = vectors[0].ordered()
-        return Pose(ordered[:3], ordered[3:], ("vector",))
-    for family in families(numeric, vocabulary().tcp_matrix, 0):
+        return Pose(ordered[:3], ordered[3:], ("vector",), others=_others(vectors[0], every))
+    every = find_families(numeric, vocabulary().tcp_matrix, 0)
+    for family in prefer_measured(every):
         pose = matrix_pose(family.ordered(), layouts, some=some)
         if pose is not None:
-            return pose
-    position = _position([column for column in numeric if not column.words & vocabulary().outside], file)
+            same = [other for other in every if other.shares_name(family)]
+            return replace(pose, others=_others(family, same))
+    position, others = _position(numeric, file, lone=lone)
     measured = not position
-    position = position or _xyz(families(numeric, vocabulary().measured, 0))
+    if measured:
+        position, others = _xyz(find_families(numeric, vocabulary().measured, 0))
     if not position and (counted := _counted_pose(numeric, layouts, form)):
         return counted
     rest = [column for column in numeric if column not in position]
@@ -93,15 +102,19 @@ def find_pose(
         stem = os.path.commonprefix([column.key for column in position])  # noqa: RUF071 (names, not paths)
         stem = _OF_POSITION.sub("", stem)
         rest = [column for column in rest if stem and column.key.startswith(stem)]
-    rotation, forms = _rotation(rest, layouts, form, some=some) if position else ((), ())
-    return Pose(position, rotation, forms, measured=measured and bool(position))
+    if others:  # the orientation of another position is not that of this one
+        rest, lone = [column for column in rest if column.kind == position[0].kind], True
+    rotation, forms = _rotation(rest, layouts, form, some=some, lone=lone) if position else ((), ())
+    own_frame = any(p.search(column.key) for column in position[:1] for p in vocabulary().measured)
+    return Pose(position, rotation, forms, measured=own_frame, others=others)
 
 
 def _counted_pose(
     numeric: Sequence[Column], layouts: Sequence[Layout], form: RotationForm | None
 ) -> Pose | None:
     """Return p1, p2, p3 and the only quaternion beside them, which has length 1 in each row."""
-    found = [f for f in families(numeric, vocabulary().tcp_counted, 0) if _numbers(f) == range(3)]
+    every = prefer_measured(find_families(numeric, vocabulary().tcp_counted, 0))
+    found = [f for f in every if _numbers(f) == range(3)]
     if len(found) != 1:
         return None
     position = found[0].ordered()
@@ -279,37 +292,59 @@ def _enough(holds: BoolArray, *, some: bool) -> bool:
     return bool(holds.any()) if some else len(holds) > 0 and bool(holds.all())
 
 
-def _position(numeric: Sequence[Column], file: str | None) -> tuple[Column, ...]:
-    """Return the columns x, y, z; none if there are several and these need not be known."""
+def _position(
+    numeric: Sequence[Column], file: str | None, *, lone: bool
+) -> tuple[tuple[Column, ...], tuple[tuple[Column, ...], ...]]:
+    """Return the columns x, y, z, and others that may be; none if there are several and need not be known."""
+    numeric = [column for column in numeric if not column.words & vocabulary().outside]
     forces = any(column.key in ("fx", "f_x") for column in numeric)  # tx, ty, tz beside them are torques
     numeric = [c for c in numeric if not (forces and c.key.startswith("t") and len(c.key) <= len("t_x"))]
-    return _xyz(families(numeric, vocabulary().tcp_position, 0), file)
+    return _xyz(drop_unknown(find_families(numeric, vocabulary().tcp_position, 0), lone=lone), file)
 
 
-def _xyz(found: Sequence[Family], file: str | None = None) -> tuple[Column, ...]:
-    """Return the columns of the only one of the surest families that is x, y, z."""
-    found = [family for family in found if _numbers(family) == range(3)]
+def _xyz(
+    found: Sequence[Family], file: str | None = None
+) -> tuple[tuple[Column, ...], tuple[tuple[Column, ...], ...]]:
+    """Return the columns of the only one of the surest families that is x, y, z, and those of the others."""
+    every = [family for family in found if _numbers(family) == range(3)]
+    found = [family for family in prefer_measured(found) if family in every]
     best = [family for family in found if family.rank == found[0].rank]
     if len(best) > 1 and file is not None:
         groups = "; ".join(listed(family.ordered()) for family in best)
         raise LogError(Finding(f"found several positions: {groups}; allowed: one x, y, z", file=file))
-    return best[0].ordered() if len(best) == 1 else ()
+    return (best[0].ordered(), _others(best[0], every)) if len(best) == 1 else ((), ())
+
+
+def _others(family: Family, every: Sequence[Family]) -> tuple[tuple[Column, ...], ...]:
+    """Return the columns of the other families of as many."""
+    return tuple(
+        other.ordered()
+        for other in every
+        if other is not family and len(other.columns) == len(family.columns)
+    )
 
 
 def _rotation(
-    rest: Sequence[Column], layouts: Sequence[Layout], form: RotationForm | None, *, some: bool
+    rest: Sequence[Column],
+    layouts: Sequence[Layout],
+    form: RotationForm | None,
+    *,
+    some: bool,
+    lone: bool = False,
 ) -> tuple[tuple[Column, ...], tuple[RotationForm, ...]]:
     """Return the columns of the only orientation, and the forms that their names allow."""
     for words in vocabulary().tcp_rotations:
         wanted = range(4) if words.forms[0].startswith("quat") else range(3)
-        found = [f for f in families(rest, words.patterns, 0) if _numbers(f) == wanted]
+        every = [f for f in find_families(rest, words.patterns, 0) if _numbers(f) == wanted]
+        found = prefer_measured(drop_unknown(every, lone=lone))
         if len(found) != 1:
             continue
         columns = found[0].ordered()
-        told = not _LIKE_JOINT.fullmatch(columns[0].plain) or form in words.forms
+        told = not _LIKE_JOINT.fullmatch(columns[0].bare) or form in words.forms
         if told or _is_unit(columns, layouts, some=some):
             return columns, words.forms
-    nine = [family for family in families(rest, vocabulary().tcp_matrix, 0) if len(family.columns) == 9]
+    matrices = prefer_measured(find_families(rest, vocabulary().tcp_matrix, 0))
+    nine = [family for family in matrices if len(family.columns) == 9]
     if len(nine) == 1:
         columns = nine[0].ordered()
         holds = _orthogonal(_sampled(columns, layouts)[0].reshape(-1, 3, 3))

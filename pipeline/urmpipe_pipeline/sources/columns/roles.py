@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,11 +11,11 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import RotationForm
-from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import grouped_number
 from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS
-from urmpipe_pipeline.sources.columns.columns import Column, chosen_columns, listed
-from urmpipe_pipeline.sources.columns.families import families
+from urmpipe_pipeline.sources.columns.columns import Column, Kind, chosen_columns, listed
+from urmpipe_pipeline.sources.columns.families import find_families
 from urmpipe_pipeline.sources.columns.joint_names import (
     NamedJoints,
     called_as_joints,
@@ -25,11 +25,12 @@ from urmpipe_pipeline.sources.columns.joint_names import (
     named_after,
     numbered_alike,
     proved_by_rates,
+    same_quantities,
     some_named,
 )
 from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, turns_as_quaternion, with_form
 from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS, OTHER_ROBOT, by_arm, take, which_joints
-from urmpipe_pipeline.sources.columns.sides import SIDES
+from urmpipe_pipeline.sources.columns.sides import REST
 from urmpipe_pipeline.sources.columns.tcp_like import about_odd_rows, about_tcp
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -115,11 +116,16 @@ def assign(
     else:
         own = () if path else called_as_joints(numeric, robot)
         pose = chosen_pose(columns, options) or find_pose(
-            [c for c in numeric if c not in own], layouts, form=options.rotation if path else None, some=path
+            [c for c in numeric if c not in own],
+            layouts,
+            form=options.rotation if path else None,
+            some=path,
+            lone=path,
         )
-        free = [column for column in numeric if column not in (*pose.position, *pose.rotation)]
-        half = bool(pose.position and not pose.rotation)
-        found = NamedJoints(()) if path else find_joints(free, file, robot, half_pose=half)
+        about_tool = {*pose.position, *pose.rotation, *(column for group in pose.others for column in group)}
+        free = [column for column in numeric if column not in about_tool]
+        half, placed = bool(pose.position and not pose.rotation), bool(pose.position)
+        found = NamedJoints(()) if path else find_joints(free, file, robot, half_pose=half, path=placed)
         if whole and not (path or found.columns or pose.position or some_named(free, robot)[0]):
             found = proved_by_rates(numbered_alike(free), whole)
         if len(found.columns) == 4 and turns_as_quaternion(found.columns, layouts):
@@ -138,7 +144,7 @@ def assign(
     for what, group in (("rates", rates), ("accelerations", accelerations)):
         if group:
             said.append(Inference(what, ", ".join(column.name for column in group), "their names"))
-    return _with_rest(roles, [*said, *about_pose(pose)], numeric, layouts)
+    return _with_rest(roles, [*said, *about_pose(pose)], numeric, layouts, found.others, pose.others)
 
 
 def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> None:
@@ -168,12 +174,15 @@ def _derivative(role: str, numeric: Sequence[Column], joints: NamedJoints) -> tu
     if joints.names:
         return named_after(numeric, joints.names, role)
     order = ("position", "rate", "acceleration").index(role)
-    asked = any(column.words & vocabulary().commanded for column in joints.columns)
-    matching = [
+    kind, others = joints.columns[0].kind, {group[0].kind for group in joints.others}
+    families = [
         family
-        for family in families(numeric, vocabulary().joint[role], order=order)
-        if set(family.columns) == set(joints.numbers) and family.commanded == asked
+        for family in find_families(numeric, vocabulary().joint[role], order=order)
+        if set(family.columns) == set(joints.numbers)
     ]
+    matching = [family for family in families if family.kind == kind]
+    if not matching and kind != Kind.COMMANDED and Kind.PLAIN not in others:
+        matching = [family for family in families if family.kind != Kind.COMMANDED]
     best = [family for family in matching if family.rank == min(f.rank for f in matching)]
     return tuple(best[0].columns[n] for n in joints.numbers) if len(best) == 1 else ()
 
@@ -213,12 +222,19 @@ def _path(
 ) -> Roles:
     """Return the roles of a path; raise if it is none either."""
     file = layouts[0].file
-    pose = pose if pose.position else find_pose(numeric, layouts, file)
+    pose = pose if pose.position else find_pose(numeric, layouts, file, lone=True)
     if pose.position:
+        same = [group for group in pose.others if group[0].kind == pose.position[0].kind]
+        if same:
+            groups = "; ".join(map(listed, (pose.position, *same)))
+            hint = Hint("log_map", None, 'names them: [tcp] position = ["A", "B", "C"]')
+            raise LogError(
+                Finding(f"found several positions: {groups}; allowed: one x, y, z", file, hints=(hint,))
+            )
         names = ", ".join(column.name for column in pose.position)
         said = [path_inference(names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
         roles = Roles((), (), (), pose.position, pose.rotation, pose.forms, measured=pose.measured)
-        return _with_rest(roles, said, numeric, layouts)
+        return _with_rest(roles, said, numeric, layouts, (), pose.others)
     _refuse_thousands(layouts, file)
     if path:
         hints = (
@@ -276,20 +292,69 @@ def _as_written(row: Sequence[str], layout: Layout) -> Iterator[str]:
 
 
 def _with_rest(
-    roles: Roles, said: list[Inference], numeric: Sequence[Column], layouts: Sequence[Layout]
+    roles: Roles,
+    said: list[Inference],
+    numeric: Sequence[Column],
+    layouts: Sequence[Layout],
+    *others: Sequence[tuple[Column, ...]],
 ) -> Roles:
+    """Return the roles with what is said of the columns that are not used.
+
+    Args:
+        roles: The roles.
+        said: What was found out.
+        numeric: All columns of numbers.
+        layouts: The tables.
+        others: Groups of columns that would have been read as the joints, and as the position, without these.
+    """
     used = frozenset(roles.columns)
     rest = [column for column in numeric if column not in used]
-    said += [replace(one, hints=_sides_of(rest, used)) for one in not_used(rest, "no role is known for them")]
+    pairs = list(zip((roles.joints, roles.position), others, strict=True))
+    pairs += [(one, same_quantities(one, rest)) for one in (roles.rates, roles.accelerations, roles.rotation)]
+    passed = _passed_over(pairs, used)
+    hints = _sides_of(passed[0]) if passed else ()
+    said += [replace(one, hints=hints) for one in not_used(rest, "no role is known for them")]
     warnings = about_odd_rows(rest, layouts) or ([] if roles.position else about_tcp(rest))
-    return replace(roles, inferences=tuple(said), warnings=tuple(warnings))
+    return replace(roles, inferences=tuple(said), warnings=(*_about_passed_over(passed, roles), *warnings))
 
 
-def _sides_of(rest: Sequence[Column], used: frozenset[Column]) -> tuple[Hint, ...]:
-    """Return how to compare the columns that are not used with those that are, if their names pair them."""
-    of_rest, of_used = (frozenset().union(*(one.words for one in columns)) for columns in (rest, used))
-    pairs = [pair for pair in SIDES if pair[0] in of_rest and pair[1] in of_used]
-    return tuple(Hint("sides", list(pair), "compares them", call="compare") for pair in pairs[:1])
+def _passed_over(
+    pairs: Sequence[tuple[tuple[Column, ...], Sequence[tuple[Column, ...]]]], used: Collection[Column]
+) -> list[tuple[tuple[Column, ...], tuple[Column, ...]]]:
+    """Return the groups that are read, each with one that was not read for it; a column stands in one."""
+    named, passed = set(used), []
+    for group, others in pairs:
+        for other in others:
+            if left := tuple(column for column in other if column not in named):
+                passed.append((group, left))
+                named |= {*left}
+    return passed
+
+
+def _about_passed_over(
+    passed: Sequence[tuple[tuple[Column, ...], tuple[Column, ...]]], roles: Roles
+) -> Iterator[LogWarning]:
+    """Yield one line with all columns that were not read because others were."""
+    if passed:
+        said = "; ".join(f"{_ends(other)} passed over for {_ends(group)}" for group, other in passed)
+        takes = [take(other) for group, other in passed if group == roles.joints]
+        hints = takes[:1] or [Hint("log_map", None, "with tcp.position in it takes others")]
+        yield LogWarning(PASSED_OVER, said, hints=tuple(hints))
+
+
+def _ends(group: Sequence[Column]) -> str:
+    """Return the names of the first and the last column."""
+    return " to ".join(dict.fromkeys(listed([column]) for column in (group[0], group[-1])))
+
+
+def _sides_of(passed: tuple[tuple[Column, ...], tuple[Column, ...]]) -> tuple[Hint, ...]:
+    """Return how to compare columns that are read with those passed over, by the words in their names."""
+    done, asked = (frozenset.intersection(*(one.words for one in group)) for group in passed)
+    pair = [
+        min(asked & vocabulary().commanded, default=REST),
+        min(done & vocabulary().measured_words, default=REST),
+    ]
+    return () if pair == [REST, REST] else (Hint("sides", pair, "compares them", call="compare"),)
 
 
 def not_used(rest: Sequence[Column], why: str) -> list[Inference]:

@@ -11,9 +11,6 @@ from urmpipe_pipeline.sources.columns.columns import Column
 REST = "rest"
 """The side of all columns without the other side's word."""
 
-SIDES = (("target", "actual"), ("desired", "actual"), ("commanded", "measured"))
-"""Words by which programs name what was asked for, and what was done."""
-
 SHARED = 8
 """Words that a message names, those of most columns."""
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, listed
-from urmpipe_pipeline.sources.columns.families import families
+from urmpipe_pipeline.sources.columns.families import find_families, prefer_measured
 from urmpipe_pipeline.sources.columns.pose import odd_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import vocabulary
@@ -47,7 +47,7 @@ def about_tcp(rest: Sequence[Column]) -> list[LogWarning]:
 
 def about_odd_rows(rest: Sequence[Column], layouts: Sequence[Layout]) -> list[LogWarning]:
     """Return a warning for columns that are called as a matrix, and are one but for a few rows."""
-    for family in families(rest, vocabulary().tcp_matrix, 0):
+    for family in prefer_measured(find_families(rest, vocabulary().tcp_matrix, 0)):
         columns = family.ordered()
         if len(columns) in (9, 12, 16) and (rows := odd_rows(columns, layouts)):
             found = f"{listed(columns, most=4)} hold no orientation in {counted(len(rows), 'row')}, first in"

@@ -13,7 +13,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import FORMS, RotationForm, width
-from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.sources.clocks.time_file import named_file
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of, listed
 from urmpipe_pipeline.sources.options import ReadOptions
@@ -114,10 +114,11 @@ def _read(file: Path, options: ReadOptions, further: Mapping[str, ExtraColumn], 
     form, assumed = target_form(plan.roles, _unused(plan), str(file), asked.rotation, named=named)
     rows = read_rows(plan, further)
     poses = _poses(plan, rows, form, further)
+    passed_over = (one for one in plan.roles.warnings if one.kind == PASSED_OVER)
     return replace(
         poses,
         inferences=(*_about_file(plan), *rows.inferences, *poses.inferences),
-        warnings=(*plan.clock.warnings, *rows.warnings, *assumed, *poses.warnings),
+        warnings=(*plan.clock.warnings, *passed_over, *rows.warnings, *assumed, *poses.warnings),
     )
 
 
