@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.joint_log import PASSED_OVER, JointLog
 from urmpipe_pipeline.sources import ReadOptions, read_log
 
 PAGE = (Path(__file__).parents[2] / "docs" / "recording-logs.md").read_text(encoding="utf-8")
@@ -253,7 +253,8 @@ def test_the_recipe_of_rtde_names_the_joints_and_the_tool_centre_point(tmp_path:
     rates, joints = (names.index(f"actual_{what}_0") for what in ("qd", "q"))
     table[:, joints : joints + 2], table[:, rates : rates + 2] = VALUES, np.gradient(VALUES, 0.05, axis=0)
     np.savetxt(tmp_path / "monday.csv", table, "%.17g", header=" ".join(names), comments="")
-    log = read_plainly(tmp_path / "monday.csv")
+    log = read_log([tmp_path / "monday.csv"])
+    assert [one.kind for one in log.warnings] == [PASSED_OVER]  # target_q beside actual_q
     assert log.source == "ur-rtde"
     assert log.joints == tuple(f"actual_q_{k}" for k in range(6))
     np.testing.assert_array_equal(log.q[:, :2], VALUES)
