@@ -52,7 +52,7 @@ def write_tum(path: Path, t: FloatArray, position: FloatArray) -> None:
 
 def compare(logs: list[Path], output: Path) -> list[str]:
     """Return the command that holds the logs against the path; whether they pass is no matter here."""
-    options = ["--robot", "urm6", "--tolerance", "1", "-q", "-o", str(output)]
+    options = ["--robot", "urm6", "--tolerance", "1m", "-q", "-o", str(output)]
     return [*URMPIPE, "compare", str(LOGS / "path.csv"), *map(str, logs), *options]
 
 

@@ -40,7 +40,9 @@ The output of `urmpipe COMMAND --help`, written by `docs/write_commands.py`. The
 """
 
 SHARED = """
-**Values.** Times are in s, lengths in m and angles in rad, unless a unit follows: `5ms`, `3.5mm`, `0.5deg`.
+**Values.** A number may have its unit behind it: `5ms`, `3.5mm`, `0.5deg`, `250mm/s`, `500mm/s2`, `5%`. Alone
+it is in SI. Tolerances, limits, noise and bands are refused without a unit where another may be meant: a
+length of 0.02 or more, an angle above 0.2, a share above 1. `NUMBER[s|ms|us]` names the units of an option.
 The shell completes options, names, files of the right kind, columns of the log and kinds of tolerance.
 
 **Exit codes.** 0 within tolerance (done, reached, no problems), 1 otherwise, 2 bad input or usage. An error

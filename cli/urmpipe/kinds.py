@@ -99,7 +99,9 @@ def _is_tables(value: Any) -> bool:
 
 
 def _are_controls(value: Any) -> bool:
-    return isinstance(value, Mapping) and all(map(_is_text, value)) and all(map(_is_number, value.values()))
+    return isinstance(value, Mapping) and all(
+        _is_text(name) and (_is_number(one) or _is_text(one)) for name, one in value.items()
+    )
 
 
 def _is_table(value: Any) -> bool:
@@ -146,12 +148,8 @@ PATHS = Kind(_one_or_many(_is_path), "a path or a list of paths: text or a Path,
 SECONDS = Kind(_is_number, "a number, in s")
 COUNT = Kind(_is_count, "a whole number, 0 or more")
 FLAG = Kind(lambda value: isinstance(value, (bool, np.bool_)), "True or False")
-KIND_OF_LIMIT = Kind(
-    _is_limit,
-    'a number in m, or a mapping of kinds to m or rad, such as {"axis": 0.0035, "angle": 0.01}',
-)
 KIND_OF_TOLERANCE = Kind(
-    lambda value: isinstance(value, str) or _is_limit(value),
+    lambda value: _is_text(value) or _is_limit(value),
     'a number in m, a text such as "axis=3.5mm,angle=0.5deg", or a mapping of kinds to m or rad, such as'
     ' {"axis": 0.0035, "angle": 0.01}',
 )
@@ -175,7 +173,9 @@ KINDS = {
         "a block, or one for each simulation",
     ),
     "band": Kind(_is_number, "a number, in m"),
-    "controls": Kind(_are_controls, 'a mapping of names to numbers, such as {"crank": 0.9}'),
+    "controls": Kind(
+        _are_controls, 'a mapping of names to numbers or texts, such as {"crank": 0.9} or {"crank": "40deg"}'
+    ),
     "csv": PATH,
     "cycles": Kind(_are_cycles, 'a text such as "1:1477,1478:2955", or pairs of rows, such as [(1, 1477)]'),
     "baseline": Kind(_is_baseline, "a recording, or what `compare` returned"),
@@ -212,7 +212,7 @@ KINDS = {
     "method": _one_of("auto", "closed", "iterative"),
     "name_or_path": ROBOT_FILE,
     "network": Kind(_is_network, "a name, a TOML file, the tables of one, or a Network"),
-    "noise": KIND_OF_LIMIT,
+    "noise": KIND_OF_TOLERANCE,
     "options": Kind(lambda value: isinstance(value, Mapping), 'a mapping, such as {"joints": 6}'),
     "output": PATH,
     "path": PATH,

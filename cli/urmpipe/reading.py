@@ -14,7 +14,7 @@ from urmpipe_models.errors import for_each
 from urmpipe_models.orientation import RotationForm
 from urmpipe_models.transform import from_offset
 from urmpipe_pipeline.sources import LogMap, ReadOptions, read_map
-from urmpipe_pipeline.sources.options import read_options
+from urmpipe_pipeline.sources.options import GivenInterval, read_options
 
 
 class UntimedReading(TypedDict, total=False):
@@ -70,15 +70,15 @@ class Reading(LogReading, total=False):
     """How a log is read, and what its joints are limited to.
 
     Attributes:
-        interval: LOW, HIGH that the environment limits all joints that turn to, in the file's own unit; or by
-            joint, such as {"q1": (-180, 180)}.
+        interval: LOW, HIGH that the environment limits all joints that turn to, in the file's own unit or as
+            texts with units; or by joint, such as {"q1": (-180, 180)}.
         repair: Put samples that a linear resampling left on a wrap on the line of their neighbours.
         poses: The rows are still poses, which no motion joins: they have no time, and a clock is a label.
         measured: Columns of the tool centre point as it was measured from outside, in a frame of its own: x,
             y, z, and perhaps those of the orientation; names or numbers (from 1).
     """
 
-    interval: tuple[float, float] | Mapping[str, tuple[float, float]] | None
+    interval: GivenInterval | Mapping[str, GivenInterval] | None
     repair: bool
     poses: bool
     measured: Sequence[str | int] | None

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from decimal import Decimal, DecimalException
+from decimal import Decimal
 
-from urmpipe_models.errors import OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, shown
 
 DEGREE = Decimal("0.01745329251994329576923690768488612713443")
 """pi / 180."""
@@ -16,29 +16,101 @@ MEASURES: dict[str, dict[str, Decimal]] = {
     "m": {"m": Decimal(1), "mm": Decimal("1e-3"), "um": Decimal("1e-6")},
     "m/s": {"m/s": Decimal(1), "mm/s": Decimal("1e-3")},
     "m/s2": {"m/s2": Decimal(1), "mm/s2": Decimal("1e-3")},
+    "m/s3": {"m/s3": Decimal(1), "mm/s3": Decimal("1e-3")},
     "rad": {"rad": Decimal(1), "mrad": Decimal("1e-3"), "deg": DEGREE},
     "rad/s": {"rad/s": Decimal(1), "deg/s": DEGREE, "rpm": 6 * DEGREE},
     "rad/s2": {"rad/s2": Decimal(1), "deg/s2": DEGREE},
+    "rad/s3": {"rad/s3": Decimal(1), "deg/s3": DEGREE},
     "s": {"s": Decimal(1), "ms": Decimal("1e-3"), "us": Decimal("1e-6")},
     "A": {"A": Decimal(1), "mA": Decimal("1e-3")},
     "V": {"V": Decimal(1), "mV": Decimal("1e-3")},
 }
 """What is measured, named by its SI unit: its units, and how many SI units each is."""
 
+WRITTEN: dict[str, dict[str, Decimal]] = {
+    **{si: {"": Decimal(1), **units} for si, units in MEASURES.items()},
+    "m": {"": Decimal(1), **MEASURES["m"], "cm": Decimal("1e-2")},
+    "N": {"": Decimal(1), "N": Decimal(1)},
+    "1": {"": Decimal(1), "%": Decimal("1e-2")},
+    "pt": {"": Decimal(1), "pt": Decimal(1)},
+}
+"""The units that a value may have behind it, by what is measured; a value without one is in SI, or in pt."""
 
-TIMES = {"": Decimal(1), **MEASURES["s"]}
-LENGTHS = {"": Decimal(1), "cm": Decimal("1e-2"), **MEASURES["m"]}
-ANGLES = {"": Decimal(1), **MEASURES["rad"]}
-"""Units that a value may have behind it, and how many SI units each is; a value without one is in SI."""
+SPELLED = str.maketrans({"^": "", "²": "2", "³": "3", "°": "deg", "µ": "u", "μ": "u"})
+"""Other spellings of units: m/s^2, m/s², 0.5°, 20µm (with the sign for micro, or the Greek letter)."""
+
+QUANTITY = re.compile(r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([^\s0-9.]\S*)?")
+"""A number in plain digits, and its unit."""
+
+NAMES = {
+    "m": "a length in m, such as 0.0004 or 0.4mm",
+    "m/s": "a speed in m/s, such as 0.25 or 250mm/s",
+    "m/s2": "an acceleration in m/s2, such as 0.5 or 500mm/s2",
+    "m/s3": "a jerk in m/s3, such as 60 or 60m/s3",
+    "rad": "an angle in rad, such as 1.57 or 90deg",
+    "rad/s": "a speed in rad/s, such as 30deg/s",
+    "rad/s2": "an acceleration in rad/s2, such as 100deg/s2",
+    "rad/s3": "a jerk in rad/s3, such as 1000deg/s3",
+    "s": "a time in s, such as 0.005 or 5ms",
+    "A": "a current in A, such as 20mA",
+    "V": "a voltage in V, such as 500mV",
+    "N": "a force in N, such as 50N",
+    "1": "a share, such as 5%",
+    "pt": "a size in pt, such as 8pt",
+}
+"""What is measured in words, with an example."""
+
+MEANT = {"m": "mm", "rad": "deg", "1": "%"}
+"""The unit that a number of a deviation without one is often meant in."""
 
 
 def quantity(text: str, units: Mapping[str, Decimal]) -> float:
     """Return a number with one of the units behind it in SI, rounded once; NaN if it is none."""
-    match = re.fullmatch(r"(.*?)\s*([a-z]*)", text.strip())
-    try:
-        return float(Decimal(match[1]) * units[match[2]]) if match else math.nan
-    except (ValueError, KeyError, DecimalException):
-        return math.nan
+    found = _parts(text)
+    return float(found[0] * units[found[1]]) if found and found[1] in units else math.nan
+
+
+def read_quantity(text: str, si: str, *, positive: bool = True, deviation: bool = False) -> float:
+    """Return a quantity in SI from a number and its unit; a number alone is in SI.
+
+    Args:
+        text: The number, and the unit behind it.
+        si: What is measured, by its SI unit: a key of `NAMES`.
+        positive: Whether it has to be above 0.
+        deviation: Whether it says how large a deviation may be: see `readings`.
+
+    Raises:
+        OptionError: If it is no such quantity, or a deviation that needs its unit.
+    """
+    value = quantity(text, WRITTEN[si])
+    if not (0.0 < value < math.inf if positive else math.isfinite(value)):
+        allowed = f"a positive {NAMES[si].partition(' ')[2]}" if positive else NAMES[si]
+        raise OptionError(Finding(found=shown(text), allowed=allowed))
+    if deviation and (both := readings(text, si)):
+        raise OptionError(Finding(found=text.strip(), allowed=f"a unit: {' or '.join(both)}"))
+    return value
+
+
+def readings(text: str, si: str) -> tuple[str, ...]:
+    """Return what a number without a unit may mean that says how large a deviation may be: ("3.5mm", "3.5m").
+
+    Nothing where it is clear: with a unit, and below 0.02 m, up to 0.2 rad, and up to a share of 1. No arm is
+    accepted that misses by more, so whoever writes 3.5 may mean mm.
+    """
+    found = _parts(text)
+    if found is None or found[1] or si not in MEANT:
+        return ()
+    number = found[0]
+    clear = number < Decimal("0.02") if si == "m" else number <= (Decimal("0.2") if si == "rad" else 1)
+    written = text.strip()
+    in_si = f"{(100 * number).normalize():f}%" if si == "1" else f"{written}{si}"
+    return () if clear else (f"{written}{MEANT[si]}", in_si)
+
+
+def _parts(text: str) -> tuple[Decimal, str] | None:
+    """Return a number and the unit behind it as `WRITTEN` spells it; None if there is no number."""
+    match = QUANTITY.fullmatch(text.strip())
+    return match and (Decimal(match[1]), (match[2] or "").translate(SPELLED))
 
 
 def units_of(si: str) -> dict[str, Decimal]:

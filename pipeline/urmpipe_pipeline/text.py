@@ -102,8 +102,9 @@ def significant(value: float) -> str:
 
 
 def allowed(value: float, unit: str = "m") -> str:
-    """Return a tolerance with the unit that people read: "3.5 mm", "0.5 deg"."""
-    return f"{limit(value, unit)} {SHOWN[unit][0]}"
+    """Return a given value with the unit that people read: "3.5 mm", "0.5 deg", "5 %", "0.25 m/s"."""
+    shown, scale = SHOWN.get(unit, (unit, 1.0)) if unit != "1" else ("%", 100.0)
+    return f"{value * scale:.6g} {shown}"
 
 
 def point(values: Any) -> str:

@@ -50,13 +50,16 @@ def test_all_or_none_within(good: bool, speed: float | None) -> None:
     assert running_speed(runs(lambda _: good)[1], [0.1, 1.0]) == speed
 
 
+SPEED = "allowed: a speed in m/s, such as 0.25 or 250mm/s"
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
         (["--velocities", "0,-1"], "--velocities: found 0.0, -1.0, allowed: finite numbers of m/s above 0"),
-        (["--velocities", "nan"], "--velocities: found 'nan', allowed: numbers in m/s, such as 0.1,0.2"),
-        (["--velocities", "abc"], "--velocities: found 'abc', allowed: numbers in m/s, such as 0.1,0.2"),
-        (["--limit", "0"], "--limit: found '0', allowed: a positive length in m, such as 0.4mm"),
+        (["--velocities", "nan"], f"--velocities: found 'nan', {SPEED}"),
+        (["--velocities", "abc"], f"--velocities: found 'abc', {SPEED}"),
+        (["--limit", "0"], "--limit: found '0', allowed: a positive length in m, such as 0.0004 or 0.4mm"),
         (["--force", "1,2"], "--force: found [1.0, 2.0], allowed: three finite numbers of N"),
         (["--law", "limit"], "--law: found 'limit' (did you mean limits?), allowed: trapezoid, jerk, limits"),
     ],

@@ -95,10 +95,10 @@ def test_the_report_of_a_recording_says_what_the_exit_code_said(folder: Path) ->
 
 
 @pytest.mark.slow
-def test_a_noise_in_mm_without_its_unit_is_told(capsys: Captured) -> None:
+def test_a_noise_that_reaches_the_tolerance_is_told(capsys: Captured) -> None:
     assert compare("good.csv", "-q", "-o", "before.rrd") == 0
     capsys.readouterr()
-    noise = ["--baseline", "before.rrd", "--noise", "0.5", "-o", "now.rrd"]
+    noise = ["--baseline", "before.rrd", "--noise", "0.5m", "-o", "now.rrd"]
     assert compare("slack.csv", *noise) == 1  # by its angles: a length is for lengths alone
     told = [line for line in capsys.readouterr().err.splitlines() if "noise" in line]
     assert told == [
@@ -106,7 +106,7 @@ def test_a_noise_in_mm_without_its_unit_is_told(capsys: Captured) -> None:
         " than the baseline; a number without a unit is in m"
     ]
     again = ["compare", "now.rrd", "--baseline", "before.rrd"]
-    assert run([*again, "--noise", "0.5"]) == 1
+    assert run([*again, "--noise", "0.5m"]) == 1
     assert [line for line in capsys.readouterr().err.splitlines() if "noise" in line] == told
     assert run([*again, "--noise", "0.5mm", "--strict"]) == 1  # the doubt about another noise is gone
     assert "noise" not in capsys.readouterr().err

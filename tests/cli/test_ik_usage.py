@@ -97,8 +97,8 @@ def test_a_start_of_the_wrong_length(capsys: Captured) -> None:
 def test_a_start_beyond_the_limits_of_joints(capsys: Captured) -> None:
     start = "0,-45,0,-135,0,90,2.8974"  # joint 7 ends at 2.8973
     assert refused(capsys, "targets.csv", "--robot", "panda", "--start", start) == [
-        "error: --start: found panda_joint2 = -45, allowed: -1.7628 to 1.7628 rad; in deg?",
-        "error: --start: found panda_joint4 = -135, allowed: -3.0718 to -0.0698 rad; in deg?",
+        "error: --start: found panda_joint2 = -45 rad, allowed: -1.7628 to 1.7628 rad; in deg?",
+        "error: --start: found panda_joint4 = -135 rad, allowed: -3.0718 to -0.0698 rad; in deg?",
         "error: --start: found panda_joint6 = 90, allowed: -0.0175 to 3.7525 rad; in deg?",
     ]
 
@@ -192,26 +192,33 @@ def test_a_method_that_a_path_does_not_take(capsys: Captured) -> None:
     ]
 
 
+JOINTS = "allowed: joint values in rad and m, or with units, such as 0,180deg,500mm"
+
+
 @pytest.mark.parametrize(
     ("option", "value", "said"),
     [
-        ("--start", "0,a,0,0,0,0", "found '0,a,0,0,0,0', allowed: numbers in rad and m, such as 0,3.14,0.5"),
+        (
+            "--start",
+            "0,a,0,0,0,0",
+            f"found '0,a,0,0,0,0', {JOINTS}",
+        ),
         (
             "--start",
             "0,nan,0,0,0,0",
-            "found '0,nan,0,0,0,0', allowed: numbers in rad and m, such as 0,3.14,0.5",
+            f"found '0,nan,0,0,0,0', {JOINTS}",
         ),
         ("--tsp", "0", "found '0', allowed: a positive time in s, such as 0.005 or 5ms"),
         (
             "--tolerance",
             "norm=3mm",
-            "found 'norm=3mm', allowed: a length on each axis, such as 0.0035 or 3.5mm",
+            "found 'norm=3mm', allowed: a positive length in m, such as 0.0004 or 0.4mm",
         ),
         *(
             (
                 "--tolerance",
                 value,
-                f"found {value!r}, allowed: a length on each axis, such as 0.0035 or 3.5mm",
+                f"found {value!r}, allowed: a positive length in m, such as 0.0004 or 0.4mm",
             )
             for value in ("0", "-1", "nan", "3.5 km", "angle=1deg")
         ),

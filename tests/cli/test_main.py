@@ -97,7 +97,7 @@ FRAMES = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0
         ("robot lst", "found 'lst' (did you mean list?), allowed: equations, export, list, show"),
         ("ingest", "found no LOG..., allowed: urmpipe ingest [OPTIONS] LOG..."),
         ("ingest x --robt a", "--robt: no such option (did you mean --robot?); see urmpipe ingest --help"),
-        ("ingest x --tsp", "--tsp: found no value, allowed: --tsp SECONDS"),
+        ("ingest x --tsp", "--tsp: found no value, allowed: --tsp NUMBER[s|ms|us]"),
         (
             "ingest x --delimiter",  # as from a shell that ended the line at ;
             "--delimiter: found no value, allowed: --delimiter comma|semicolon|tab|spaces|bar",
@@ -112,7 +112,11 @@ FRAMES = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0
         ("ingest x --tsp -1", f"--tsp: found '-1', {DURATIONS}"),
         ("ingest x --tsp 5m", f"--tsp: found '5m', {DURATIONS}"),
         ("ingest x --derivative magic", "--derivative: found 'magic', allowed: central, savgol"),
-        ("ingest x --interval 3", "--interval: found '3', allowed: LOW:HIGH or JOINT=LOW:HIGH"),
+        (
+            "ingest x --interval 3",
+            "--interval: found '3', allowed: LOW:HIGH or JOINT=LOW:HIGH, in the file's unit or with units,"
+            " such as -180deg:180deg",
+        ),
         ("ingest x --base 0,0,1kg", f"--base: found '0,0,1kg', {FRAMES}"),
         ("compare x --sync soon", f"--sync: found 'soon', {OFFSETS}"),
     ],

@@ -42,12 +42,12 @@ def test_laws_and_arcs_are_those_of_the_planner() -> None:
 
 def test_all_that_is_wrong_is_told_at_once(capsys: Captured) -> None:
     cube = "cube:wall,a=0.06,r=0.03,x=1.7,y=0,z=1,plane=zz"
-    options = ["--velocity", "0", "--acceleration", "nan", "--jerk", "3", "-o", "plan.txt"]
+    options = ["--velocity", "0", "--acceleration", "-6", "--jerk", "3", "-o", "plan.txt"]
     timing = [
         "PATH: plane of a wall section: found 'zz', allowed: xy, xz, yz",
         "PATH: found a = 0.06 m, allowed: more than 2 r = 0.06 m",
         "--velocity: found 0.0, allowed: a finite number of m/s above 0",
-        "--acceleration: found nan, allowed: a finite number of m/s2 above 0",
+        "--acceleration: found -6.0, allowed: a finite number of m/s2 above 0",
         "--jerk: found a jerk with the law trapezoid, allowed: with the law jerk",
         "--output: found 'plan.txt', allowed: a name that ends in .csv (a plan) or .rrd (a recording)",
     ]
@@ -126,10 +126,13 @@ def test_rows_that_make_no_path(
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--velocity", "0.5m/s"], "--velocity: found '0.5m/s', allowed: a number of m/s"),
-        (["--acceleration", "fast"], "--acceleration: found 'fast', allowed: a number of m/s2"),
-        (["--jerk", ""], "--jerk: found '', allowed: a number of m/s3"),
-        (["--velocity", "inf"], "--velocity: found inf, allowed: a finite number of m/s above 0"),
+        (["--velocity", "5m"], "--velocity: found '5m', allowed: a speed in m/s, such as 0.25 or 250mm/s"),
+        (
+            ["--acceleration", "fast"],
+            "--acceleration: found 'fast', allowed: an acceleration in m/s2, such as 0.5 or 500mm/s2",
+        ),
+        (["--jerk", ""], "--jerk: found '', allowed: a jerk in m/s3, such as 60 or 60m/s3"),
+        (["--velocity", "inf"], "--velocity: found 'inf', allowed: a speed in m/s, such as 0.25 or 250mm/s"),
         (["--tsp", "0s"], "--tsp: found '0s', allowed: a positive time in s, such as 0.005 or 5ms"),
         (["--tsp", "1e-9"],
          "--tsp: found 1e-09 s, allowed: a period that makes up to 1000000 samples of 4.78032 s"),

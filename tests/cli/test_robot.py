@@ -196,7 +196,10 @@ def test_show_errors_are_one_line(urmpipe: Any, arguments: list[str], said: str)
 def test_joint_values_that_are_none_are_usage(urmpipe: Any) -> None:
     ran = urmpipe("robot", "show", "urm4", "--q", "1,2,x,4")
     assert ran.code == 2
-    assert "found '1,2,x,4', allowed: numbers in rad and m, such as 0,3.14,0.5" in ran.err
+    assert (
+        "found '1,2,x,4', allowed: joint values in rad and m, or with units, such as 0,180deg,500mm"
+        in ran.err
+    )
 
 
 # --- export ----------------------------------------------------------------------------------------

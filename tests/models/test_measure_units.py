@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urmpipe_models.errors import OptionError
-from urmpipe_models.measure_units import LENGTHS, MEASURES, factor, quantity, units_of
+from urmpipe_models.measure_units import MEASURES, WRITTEN, factor, quantity, units_of
 
 EVERY = [(si, unit) for si, units in MEASURES.items() for unit in units]
 PAIRS = [(one, other) for units in MEASURES.values() for one in units for other in units]
@@ -25,8 +25,8 @@ def test_factors_are_those_of_the_definitions() -> None:
 
 
 def test_each_unit_is_what_its_prefix_or_a_turn_says() -> None:
-    thousand = ("mm", "mm/s", "mm/s2", "mrad", "ms", "mA", "mV")
-    degrees = ("deg", "deg/s", "deg/s2")
+    thousand = ("mm", "mm/s", "mm/s2", "mm/s3", "mrad", "ms", "mA", "mV")
+    degrees = ("deg", "deg/s", "deg/s2", "deg/s3")
     said = dict.fromkeys(thousand, 1e3) | dict.fromkeys(degrees, 180.0 / math.pi)
     said |= {"um": 1e6, "us": 1e6, "rpm": 30.0 / math.pi}
     found = {unit: factor(si, unit) for si, unit in EVERY if unit != si}
@@ -63,8 +63,10 @@ def test_an_unknown_unit_is_refused_with_all_that_are_known() -> None:
     [
         ("0.6", 0.6), ("600mm", 0.6), (" 1.1 mm ", 1.1e-3), ("3cm", 0.03), ("-2e3um", -2e-3), ("1e3", 1e3),
         ("nan", math.nan), ("inf", math.nan), ("mm", math.nan), ("", math.nan), ("1 2", math.nan),
-        ("1rad", math.nan), ("0x1", math.nan), ("1e999", math.inf),
+        ("20µm", 2e-5), ("1rad", math.nan), ("0x1", math.nan), ("1e999", math.inf),
     ],
 )  # fmt: skip
 def test_a_quantity_is_a_number_with_one_of_the_units_rounded_once(text: str, value: float) -> None:
-    assert quantity(text, LENGTHS) == value or (math.isnan(quantity(text, LENGTHS)) and math.isnan(value))
+    assert quantity(text, WRITTEN["m"]) == value or (
+        math.isnan(quantity(text, WRITTEN["m"])) and math.isnan(value)
+    )

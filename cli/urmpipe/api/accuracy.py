@@ -21,7 +21,6 @@ from urmpipe.reading import UntimedReading, map_files, options_of, resolved
 from urmpipe.systems.blocks import ON_PYTHON
 from urmpipe.systems.units import Backend
 from urmpipe_fmus.build import chosen_backend
-from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.drives.joint_drives import DrivenJoint
 from urmpipe_models.dynamics.sampled_loop import spectral_radius
@@ -38,7 +37,7 @@ from urmpipe_pipeline.planned_paths.planning import joints_of, plan_path
 from urmpipe_pipeline.planned_paths.request import Law, Request, Timing, checked_timing, refuse_unlimited
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.solved_targets.request import start_of
+from urmpipe_pipeline.solved_targets.request import JointValues, start_of
 
 VELOCITIES = tuple(round(0.1 * k, 1) for k in range(1, 11))
 """Ten velocities in [m/s], where none are given: those of the paper's Fig. 7."""
@@ -73,7 +72,7 @@ def accuracy(
     tool: Frame | None = None,
     base_link: str | None = None,
     tip_link: str | None = None,
-    start: Sequence[float] | FloatArray | None = None,
+    start: JointValues | None = None,
     backend: Backend | None = None,
     strict: bool = False,
     output: PathLike | None = None,
@@ -105,7 +104,8 @@ def accuracy(
         tool: The tool centre point in the frame of the arm's tip, likewise.
         base_link: Link of a URDF where the arm begins; default: its root.
         tip_link: Link of a URDF where the arm ends; default: its end.
-        start: Joint values in [rad] or [m] to be near to at the first sample, shape (joints,).
+        start: Joint values in [rad] or [m], or texts with units, shape (joints,), to be near to at
+            the first sample.
         backend: native: as machine code; python: in NumPy; default: native if it can be built here.
         strict: Whether a warning is an error, but for the one that the arm runs in NumPy.
         output: The recording (.rrd) to write.
@@ -146,7 +146,7 @@ def accuracy(
         return written.recorded(result, lambda share: done(RUNNING + (1.0 - RUNNING) * share))
 
 
-def _request(arm: Chain | None, start: Sequence[float] | FloatArray | None, timing: Timing) -> Request:
+def _request(arm: Chain | None, start: JointValues | None, timing: Timing) -> Request:
     """Return the request; raise an error if the arm cannot be driven, or suits neither start nor law."""
     if arm is None:
         raise OptionError(Finding(parameter="robot", found="none", allowed="an arm with masses and drives"))

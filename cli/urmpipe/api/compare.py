@@ -29,7 +29,7 @@ from urmpipe_pipeline.comparison.baseline import against_baseline, complete_nois
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.sync import SyncOption
-from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
+from urmpipe_pipeline.comparison.tolerance import parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.unjudged import Unjudged, judge_others
 from urmpipe_pipeline.comparison.warnings import BEYOND, EXCHANGED, LARGE_NOISE, large_noises
@@ -88,7 +88,7 @@ def compare(
     band: float | None = None,
     targets: TargetsLike | None = None,
     baseline: PathLike | Comparison | None = None,
-    noise: float | Mapping[str, float] | None = None,
+    noise: float | str | Mapping[str, float] | None = None,
     strict: bool = False,
     keep_going: bool = False,
     output: PathLike | None = None,
@@ -133,8 +133,8 @@ def compare(
         band: Half of the width of the band round a final pose in [m]; default: 0.1 mm.
         targets: The poses to judge, as `ik` takes them; default: those in which the reference rests.
         baseline: An earlier comparison, to tell what changed since.
-        noise: Changes since then that mean nothing, in [m], or in [m] and [rad] by kind; default: 1 um and
-            1 urad.
+        noise: Changes since then that mean nothing, in [m], or in [m] and [rad] by kind, or as a text
+            with units; default: 1 um and 1 urad.
         strict: Whether a warning is an error.
         keep_going: Whether logs are judged even if others cannot be: these are then the result's `unjudged`,
             and its `verdict` is None, or fail. Not with `iso`.
@@ -168,7 +168,7 @@ def compare(
         )
         options = CompareOptions(
             _allowed(tolerance, iso=iso), tcp, _clocks(sync, iso=iso),
-            align, _with_unit(tolerance), diagnose, test,
+            align, isinstance(tolerance, str), diagnose, test,
         )  # fmt: skip
         if keep_going and iso:
             raise OptionError(Finding(parameter="keep_going", found="with iso", allowed="one of the two"))
@@ -232,11 +232,6 @@ def _clocks(sync: SyncOption | None, *, iso: bool) -> SyncOption:
     return ("auto" if iso else "start") if sync is None else sync
 
 
-def _with_unit(tolerance: float | str | Mapping[str, float] | None) -> frozenset[str]:
-    """Return the kinds of which it was said with a unit what is allowed."""
-    return kinds_with_unit(tolerance) if isinstance(tolerance, str) else frozenset()
-
-
 def _refuse_unused(operands: Sequence[Operand | Comparison], given: Mapping[str, Any]) -> None:
     """Raise an `OptionError` with all that says how logs are read, if every operand was ingested before."""
     logs = (Path(one) if isinstance(one, str) else one for one in operands)
@@ -245,7 +240,7 @@ def _refuse_unused(operands: Sequence[Operand | Comparison], given: Mapping[str,
 
 
 def _noise_level(
-    noise: float | Mapping[str, float] | None, baseline: PathLike | Comparison | None
+    noise: float | str | Mapping[str, float] | None, baseline: PathLike | Comparison | None
 ) -> Mapping[str, float]:
     """Return what changes mean nothing, by kind.
 

@@ -13,7 +13,6 @@ from urmpipe.arm_placing import Frame, Robot
 from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_recording, refuse_warnings
 from urmpipe.output_files import output_kind
 from urmpipe.reading import Resolved, TableReading, map_files, resolved
-from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, for_each
 from urmpipe_models.inverse.search import USUAL_SEARCH, Search
@@ -23,7 +22,7 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import guarded_output, refuse_output
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets, TargetsLike, given_targets
-from urmpipe_pipeline.solved_targets.request import Request, refuse_unsolvable, start_of
+from urmpipe_pipeline.solved_targets.request import JointValues, Request, refuse_unsolvable, start_of
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.solved_targets.solving import solve_targets
 from urmpipe_pipeline.sources import ReadOptions
@@ -47,7 +46,7 @@ def ik(
     tip_link: str | None = None,
     t: ArrayLike | None = None,
     tsp: float | None = None,
-    start: Sequence[float] | FloatArray | None = None,
+    start: JointValues | None = None,
     every: bool = False,
     tolerance: float | None = None,
     within_pi: bool = False,
@@ -74,7 +73,8 @@ def ik(
         tip_link: Link of a URDF where the arm ends; default: its end.
         t: Times of arrays in [s], shape (n,).
         tsp: Time from target to target in [s] where the targets have no times.
-        start: Joint values in [rad] or [m] to be near to, shape (joints,); default: the robot's own.
+        start: Joint values in [rad] or [m], or texts with units, shape (joints,), to be near to;
+            default: the robot's own.
         every: Collect all solutions of any arm, and record every branch as a ghost arm.
         tolerance: A target out of reach takes the nearest point within this on each axis, in [m].
         within_pi: Write the joints of a path within -pi to pi, with jumps.

@@ -41,7 +41,7 @@ def load_network(network: PathLike | Mapping[str, Any]) -> Network:
 def network_check(
     network: NetworkLike,
     *,
-    controls: Mapping[str, float] | None = None,
+    controls: Mapping[str, float | str] | None = None,
     restarts: int = RESTARTS,
     seed: int = 0,
     strict: bool = False,
@@ -53,7 +53,8 @@ def network_check(
 
     Args:
         network: A name, a file, the tables of one, or a `Network`.
-        controls: Values of controls instead of their starts, by name.
+        controls: Values of controls instead of their starts, by name: numbers in the units of the network,
+            or texts with units, such as "40deg".
         restarts: Random starts that are tried in vain where the network's own start does not close.
         seed: Of the random starts.
         strict: Whether a warning is an error.
@@ -77,7 +78,7 @@ def network_check(
 def network_solve(
     network: NetworkLike,
     *,
-    controls: Mapping[str, float] | None = None,
+    controls: Mapping[str, float | str] | None = None,
     every: bool = False,
     restarts: int = RESTARTS,
     seed: int = 0,
@@ -90,7 +91,8 @@ def network_solve(
 
     Args:
         network: A name, a file, the tables of one, or a `Network`.
-        controls: Values of controls instead of their starts, by name.
+        controls: Values of controls instead of their starts, by name: numbers in the units of the network,
+            or texts with units, such as "40deg".
         every: Find all assemblies, by random starts.
         restarts: Random starts in a row without anything new that end the search.
         seed: Of the random starts: the same seed, the same assemblies.

@@ -33,7 +33,7 @@ from urmpipe_pipeline.planned_paths.request import (
 )
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.results import write_recording
-from urmpipe_pipeline.solved_targets.request import start_of
+from urmpipe_pipeline.solved_targets.request import JointValues, start_of
 from urmpipe_pipeline.tables.joint_file import write_joint_log
 
 PLANNING = 0.8
@@ -55,7 +55,7 @@ def plan(
     jerk: float | None = None,
     arcs: Arcs = "tangential",
     tsp: float = PERIOD,
-    start: Sequence[float] | FloatArray | None = None,
+    start: JointValues | None = None,
     strict: bool = False,
     output: PathLike | None = None,
     inputs: Sequence[PathLike] = (),
@@ -78,8 +78,8 @@ def plan(
         jerk: The largest jerk of the law jerk in [m/s3].
         arcs: What the acceleration limits on arcs; tangential: that along the path; total: v^2 / r, too.
         tsp: Time from sample to sample in [s].
-        start: Joint values in [rad] or [m] to be near to at the first sample, shape (joints,); default: the
-            robot's own.
+        start: Joint values in [rad] or [m], or texts with units, shape (joints,), to be near to at
+            the first sample; default: the robot's own.
         strict: Whether a warning is an error.
         output: A log (.csv) or a recording (.rrd) to write.
         inputs: Files besides the path that are never replaced.
@@ -130,7 +130,7 @@ def plan(
     return replace(result, log=written)
 
 
-def _request(arm: Chain | None, start: Sequence[float] | FloatArray | None, timing: Timing) -> Request:
+def _request(arm: Chain | None, start: JointValues | None, timing: Timing) -> Request:
     """Return the request; raise an `OptionError` if the arm suits neither the start nor the law."""
     parts: tuple[Callable[[], Any], ...] = (
         lambda: _start(arm, start),
@@ -140,7 +140,7 @@ def _request(arm: Chain | None, start: Sequence[float] | FloatArray | None, timi
     return Request(arm, begin, timing)
 
 
-def _start(arm: Chain | None, start: Sequence[float] | FloatArray | None) -> FloatArray | None:
+def _start(arm: Chain | None, start: JointValues | None) -> FloatArray | None:
     """Return joint values to start at, shape (joints,); raise an `OptionError` if there is no arm."""
     if arm is not None:
         return start_of(arm, start)

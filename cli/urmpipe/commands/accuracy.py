@@ -12,7 +12,7 @@ from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.planning import law_options, path_completion, start_option
 from urmpipe.options.reading import path_options
-from urmpipe.options.types import LENGTH, NumbersType, OneOf
+from urmpipe.options.types import DEVIATION, OneOf, quantity_type
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.accuracy.result import Accuracy
@@ -30,16 +30,16 @@ if TYPE_CHECKING:
 @option(
     Heading.PLANNING,
     "--velocities",
-    type=NumbersType("V1,V2,...", "m/s", "0.1,0.2"),
+    type=quantity_type("m/s", "V1,V2,...", positive=False),
     default="0.1,0.2,0.3,0.4,0.5,0.6,0.7,0.8,0.9,1.0",
     show_default=True,
-    help="Speeds along the path to run, in m/s.",
+    help="Speeds along the path to run, such as 100mm/s,0.2m/s; numbers alone are in m/s.",
 )
 @law_options
 @option(
     Heading.JUDGING,
     "--limit",
-    type=LENGTH,
+    type=DEVIATION,
     help="Largest allowed error, such as 0.4mm: judge each velocity, and find the largest within it.",
 )
 @option(
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 @option(
     Heading.RUNNING,
     "--force",
-    type=NumbersType("FX,FY,FZ", "N", "0,0,-50"),
+    type=quantity_type("N", "FX,FY,FZ", positive=False),
     help="External force on the tool in N, in the world frame [default: none].",
 )
 @start_option
@@ -78,7 +78,7 @@ def accuracy(path: str, output: Path | None, terminal: Terminal, **options: Any)
       urmpipe accuracy --robot irb60 --path cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1
       urmpipe accuracy --robot irb60 --path contour.csv --limit 0.4mm -o run.rrd
       urmpipe accuracy --robot my-arm.toml --path contour.csv --error path --json
-      urmpipe accuracy --robot my-arm.toml --path contour.csv --force 0,0,-50
+      urmpipe accuracy --robot my-arm.toml --path contour.csv --force 0,0,-50N
 
     Exit codes: 0 done, and with --limit every velocity within it, 1 a velocity above the limit, 2 bad input
     or usage.

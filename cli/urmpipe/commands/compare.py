@@ -15,7 +15,7 @@ from urmpipe.options.completion import tolerances
 from urmpipe.options.given import for_logs, options_given
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import log_options
-from urmpipe.options.types import ANY_FILE, LENGTH, RECORDING, FileType, OneOf, ParsedType
+from urmpipe.options.types import ANY_FILE, DEVIATION, RECORDING, FileType, OneOf, ParsedType
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.comparison.comparison import Comparison
@@ -85,7 +85,7 @@ def _cycles(text: str) -> tuple[tuple[int, int], ...]:
 @option(
     Heading.ISO,
     "--band",
-    type=LENGTH,
+    type=DEVIATION,
     help="With --iso: half width of the band around a final pose [default: 0.1mm].",
 )
 @option(
@@ -126,7 +126,7 @@ def _cycles(text: str) -> tuple[tuple[int, int], ...]:
 @option(
     Heading.BASELINE,
     "--noise",
-    type=ParsedType("M|KIND=VALUE,...", _noise),
+    type=ParsedType("LENGTH|KIND=VALUE,...", _noise),
     shell_complete=tolerances,
     help="Ignore smaller changes since the baseline; written like --tolerance [default: 1um, 1e-6 rad].",
 )

@@ -12,7 +12,7 @@ import urmpipe
 from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import table_options
-from urmpipe.options.types import ANY_FILE, DURATION, JOINT_VALUES, OneOf, WholeType
+from urmpipe.options.types import ANY_FILE, DEVIATION, DURATION, JOINT_VALUES, OneOf, WholeType, parsed
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.solved_targets.result import SolvedTargets
@@ -22,19 +22,11 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
     """Return a tolerance on each axis in [m]; of one of several kinds in urmpipe.toml that on an axis."""
     if value is None:
         return None
-    from urmpipe_models.errors import OptionError, shown
+    if ctx.get_parameter_source("tolerance") != ParameterSource.DEFAULT_MAP:
+        return float(parsed(DEVIATION.read, value.removeprefix("axis="), ctx, param))
     from urmpipe_pipeline.comparison.tolerance import parse_tolerance
 
-    said = f"found {shown(value)}, allowed: a length on each axis, such as 0.0035 or 3.5mm"
-    by_file = ctx.get_parameter_source("tolerance") == ParameterSource.DEFAULT_MAP
-    try:
-        kinds = parse_tolerance(value)
-    except OptionError:
-        if by_file:  # of several kinds, and not all of them lengths on an axis
-            raise
-        raise click.BadParameter(said) from None
-    if set(kinds) != {"axis"} and not by_file:
-        raise click.BadParameter(said)
+    kinds: dict[str, float] = parsed(parse_tolerance, value, ctx, param)
     return kinds.get("axis")
 
 
@@ -52,12 +44,13 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
     Heading.SOLVING,
     "--start",
     type=JOINT_VALUES,
-    help="Prefer solutions near these joint values, in rad and m [default: the robot's start pose].",
+    help="Prefer solutions near these joint values, in rad and m or with units, such as 0,-90deg,500mm"
+    " [default: the robot's start pose].",
 )
 @option(
     Heading.SOLVING,
     "--tolerance",
-    metavar="M",
+    metavar=DEVIATION.name,
     callback=_on_axes,
     help="Allow the nearest reachable point within this distance on each axis, such as 3.5mm.",
 )

@@ -9,7 +9,7 @@ import click
 
 import urmpipe
 from urmpipe.options.grouped import Command, with_options
-from urmpipe.options.named import NamedType, control_names, named_numbers
+from urmpipe.options.named import NamedType, control_names, named_values
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import STRICT_OPTION
 from urmpipe.options.types import DRAWING, NETWORK, WholeType
@@ -55,9 +55,10 @@ def _search_options(command: Command) -> Command:
             "--set",
             type=NamedType(control_names),
             multiple=True,
-            callback=named_numbers,
+            callback=named_values,
             metavar="CONTROL=VALUE",
-            help="Value of a control, in the units of the network's file [default: its start value].",
+            help="Value of a control, such as crank=40deg; a number alone is in the units of the network's"
+            " file [default: its start value].",
         ),
         click.option(
             "--restarts",
@@ -94,7 +95,7 @@ def check(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
     \b
     Examples:
       urmpipe network check four-bar
-      urmpipe network check bennett --set turn=0.7 --json
+      urmpipe network check bennett --set turn=40deg --json
       urmpipe network check my-linkage.toml --draw my-linkage.svg
 
     Exit codes: 0 assembled, 1 not assembled, 2 bad file or usage.
@@ -118,7 +119,7 @@ def solve(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
 
     \b
     Examples:
-      urmpipe network solve four-bar --set crank=1.2
+      urmpipe network solve four-bar --set crank=70deg
       urmpipe network solve four-bar --all --json
       urmpipe network solve stewart-gough --all --draw sg.svg -o sg.rrd
 

@@ -13,7 +13,7 @@ from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.planning import law_options, path_completion, start_option
 from urmpipe.options.reading import path_options
-from urmpipe.options.types import DURATION, NumberType
+from urmpipe.options.types import DURATION, quantity_type
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.planned_paths.result import PlannedPath
@@ -28,8 +28,8 @@ PLACED = ("base", "tool", "base_link", "tip_link")
 @option(
     Heading.PLANNING,
     "--velocity",
-    type=NumberType("M/S", "m/s"),
-    help="Largest speed along the path [default: 0.5; none with --law limits].",
+    type=quantity_type("m/s", positive=False),
+    help="Largest speed along the path, such as 250mm/s [default: 0.5m/s; none with --law limits].",
 )
 @law_options
 @option(
@@ -38,7 +38,7 @@ PLACED = ("base", "tool", "base_link", "tip_link")
     type=DURATION,
     default="5ms",
     show_default=True,
-    help="Sample period.",
+    help="Sample period, such as 8ms.",
 )
 @start_option
 @path_options
@@ -56,8 +56,8 @@ def plan(path: str, output: Path | None, terminal: Terminal, **options: Any) -> 
     Examples:
       urmpipe plan contour.csv -o planned.csv
       urmpipe plan cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1 --robot irb60 -o plan.rrd
-      urmpipe plan contour.csv --robot ur5e --velocity 0.25 -o plan.csv
-      urmpipe plan contour.csv --robot ur5e --law jerk --jerk 60
+      urmpipe plan contour.csv --robot ur5e --velocity 250mm/s -o plan.csv
+      urmpipe plan contour.csv --robot ur5e --law jerk --jerk 60m/s3
       urmpipe plan contour.csv --robot my-arm.toml --law limits --json
 
     Exit codes: 0 the arm can follow the plan (at reduced speed where joint limits require it), 1 it cannot

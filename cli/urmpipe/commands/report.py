@@ -11,7 +11,7 @@ import urmpipe
 from urmpipe.options.completion import folders, one_of_each, words
 from urmpipe.options.given import options_given
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.types import RECORDING, NamesType, NumberType, WholeType
+from urmpipe.options.types import RECORDING, NamesType, WholeType, quantity_type
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.messages import Hint
 
@@ -58,10 +58,10 @@ OF_FIGURES = ("formats", "figure_names", "figure_width", "figure_font", "figure_
 )
 @click.option(
     "--figure-font",
-    type=NumberType("PT", "pt"),
+    type=quantity_type("pt"),
     default=8.0,
     show_default=True,
-    help="Size of the text in figures in pt.",
+    help="Size of the text in figures, such as 8pt.",
 )
 @click.option(
     "--figure-dpi",

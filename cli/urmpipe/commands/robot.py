@@ -49,14 +49,14 @@ def list_(terminal: Terminal) -> int:
 @click.option(
     "--q",
     type=JOINT_VALUES,
-    help="Joint values in rad and m [default: the start pose].",
+    help="Joint values in rad and m, or with units, such as 0,90deg,500mm [default: the start pose].",
 )
 @click.option("--picture", metavar="FILE.svg", type=DRAWING, help="Draw the robot.")
 @placing_options
 @output_options
 def show(
     name: str,
-    q: tuple[float, ...] | None,
+    q: tuple[str, ...] | None,
     picture: Path | None,
     terminal: Terminal,
     **placing: Any,
@@ -72,10 +72,7 @@ def show(
       urmpipe robot show urm6 --q 0,3.14,0,3.14,0,0 --picture urm6.svg
       urmpipe robot show panda.urdf --tip panda_hand_tcp --json
     """
-    import numpy as np
-
     from urmpipe.printing.robot import chain_at, print_chain
-    from urmpipe_models.errors import Finding, OptionError
     from urmpipe_models.robots.written import EXPORT_MARK, write_export
     from urmpipe_pipeline.masses import mass_notices
     from urmpipe_pipeline.projections import (
@@ -86,17 +83,15 @@ def show(
         chain_spots,
         projected,
     )
+    from urmpipe_pipeline.solved_targets.request import joint_values
     from urmpipe_pipeline.solved_targets.solution_warnings import start_warnings
 
     chain = _placed(name, placing)
-    q = chain.start if q is None else q
-    if len(q) != len(chain.coordinates):
-        allowed = f"{len(chain.coordinates)}, one for each of {', '.join(chain.coordinates)}"
-        raise OptionError(Finding(parameter="q", found=f"{len(q)} values", allowed=allowed))
-    terminal.warn([*start_warnings(chain, np.array(q), "q"), *mass_notices(chain)])
-    posed = chain_at(chain, q)
+    values = joint_values(chain, chain.start if q is None else q, "q")
+    terminal.warn([*start_warnings(chain, values, "q"), *mass_notices(chain)])
+    posed = chain_at(chain, values.tolist())
     if picture is not None:
-        masses = chain_masses(chain, np.array(q))
+        masses = chain_masses(chain, values)
         sketch = Sketch([posed.skeleton], spots=chain_spots(posed.skeleton), masses=masses)
         write_export(picture, projected(sketch, (SIDEWAYS, FRONT), posed.title, EXPORT_MARK), Path(name))
     terminal.answer(posed.to_dict, lambda: print_chain(posed))

@@ -11,7 +11,7 @@ from urmpipe.headings import Heading, option
 from urmpipe.options.completion import tolerances, words
 from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.types import OneOf, ParsedType, parsed
-from urmpipe_models.measure_units import TIMES, quantity
+from urmpipe_models.measure_units import WRITTEN, quantity
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 
 
@@ -23,7 +23,7 @@ def _sync(text: str) -> str | float:
     """
     from urmpipe_models.errors import OptionError, shown
 
-    offset = quantity(text, TIMES)
+    offset = quantity(text, WRITTEN["s"])
     if text not in ("start", "auto") and not math.isfinite(offset):
         allowed = "start, auto, or a time in s, such as -0.2 or 200ms"
         raise OptionError(f"found {shown(text)}, allowed: {allowed}")
@@ -59,15 +59,16 @@ SYNC = ParsedType("sync", _sync)
 TOLERANCE_OPTION = option(
     Heading.JUDGING,
     "--tolerance",
-    default=[str(DEFAULT_TOLERANCE)],
+    default=[f"{1e3 * DEFAULT_TOLERANCE:g}mm"],
     show_default=True,
     multiple=True,
     callback=_tolerance,
     shell_complete=tolerances,
-    metavar="M|KIND=VALUE,...",
-    help="Largest allowed deviation on each axis in m, or per kind, such as axis=3.5mm,norm=5mm,angle=0.5deg."
-    " Kinds: axis, x, y, z, norm, path (m, mm, um), angle, joint (rad, mrad, deg; m for sliding joints). It"
-    " replaces the default completely: kinds that are not named are not judged.",
+    metavar="LENGTH|KIND=VALUE,...",
+    help="Largest allowed deviation on each axis, such as 3.5mm, or per kind, such as"
+    " axis=3.5mm,norm=5mm,angle=0.5deg. Kinds: axis, x, y, z, norm, path (m, mm, um), angle, joint (rad,"
+    " mrad, deg; m for sliding joints). A number alone is in m or rad; lengths from 0.02 and angles above 0.2"
+    " need their unit. It replaces the default completely: kinds that are not named are not judged.",
 )
 TCP_OPTION = option(
     Heading.COMPARED,
@@ -84,9 +85,9 @@ SYNC_OPTION = option(
     show_default=True,
     type=SYNC,
     shell_complete=words("start", "auto"),
-    metavar="start|auto|SECONDS",
-    help="Align the clocks: at the first samples (start), by the motion (auto), or by an offset: t_reference"
-    " = t_log + SECONDS, negative if the log is late.",
+    metavar="start|auto|TIME",
+    help="Align the clocks: at the first samples (start), by the motion (auto), or by an offset such as"
+    " 200ms: t_reference = t_log + TIME, negative if the log is late.",
 )
 SIDES_OPTION = option(
     Heading.COMPARED,

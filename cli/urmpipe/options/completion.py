@@ -77,11 +77,12 @@ def units(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[C
 
 def tolerances(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Return the completions of KIND=VALUE,...: kinds, those of ISO 9283 behind --iso, and units."""
+    from urmpipe_models.measure_units import WRITTEN
     from urmpipe_pipeline.comparison.tolerance import DEVIATIONS, UNITS
 
     before, comma, last = incomplete.rpartition(",")
     if number := BEGUN.fullmatch(last):
-        allowed = [unit for unit in UNITS.get(last.partition("=")[0], {}) if unit]
+        allowed = filter(None, WRITTEN.get(UNITS.get(last.partition("=")[0], ""), {}))
         return items(allowed, number["unit"], f"{before}{comma}{number['number']}")
     criteria = [kind for kind in UNITS if kind not in DEVIATIONS]
     kinds = criteria if ctx.params.get("iso") else DEVIATIONS

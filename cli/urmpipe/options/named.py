@@ -85,18 +85,3 @@ def named_values(ctx: click.Context, param: click.Parameter, values: tuple[str, 
             raise click.BadParameter(f"found {shown(value)}, allowed: NAME=VALUE, each name once")
         found[name.strip()] = text
     return found
-
-
-def named_numbers(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, float]:
-    """Return NAME=NUMBER options as a mapping.
-
-    Raises:
-        BadParameter: If one has no name, one name stands twice, or a value is no finite number.
-    """
-    found = {}
-    for name, text in named_values(ctx, param, values).items():
-        try:
-            found[name] = float(text)
-        except ValueError:
-            raise click.BadParameter(f"{name}: found {shown(text)}, allowed: a number") from None
-    return found

@@ -5,14 +5,15 @@ from __future__ import annotations
 from urmpipe.headings import Heading, option
 from urmpipe.options.completion import files
 from urmpipe.options.grouped import Command, with_options
-from urmpipe.options.types import JOINT_VALUES, NumberType, OneOf
+from urmpipe.options.types import JOINT_VALUES, OneOf, quantity_type
 
 LAW = (
     option(
         Heading.PLANNING,
         "--acceleration",
-        type=NumberType("M/S2", "m/s2"),
-        help="Largest acceleration along the path [default: 6; none with --law limits].",
+        type=quantity_type("m/s2", positive=False),
+        help="Largest acceleration along the path, such as 500mm/s2 [default: 6m/s2; none with --law"
+        " limits].",
     ),
     option(
         Heading.PLANNING,
@@ -26,8 +27,8 @@ LAW = (
     option(
         Heading.PLANNING,
         "--jerk",
-        type=NumberType("M/S3", "m/s3"),
-        help="Largest jerk along the path, for --law jerk.",
+        type=quantity_type("m/s3", positive=False),
+        help="Largest jerk along the path, for --law jerk, such as 60m/s3.",
     ),
     option(
         Heading.PLANNING,
@@ -46,7 +47,8 @@ start_option = option(
     Heading.PLANNING,
     "--start",
     type=JOINT_VALUES,
-    help="Prefer joint values near these at the first sample (rad, m) [default: the robot's start pose].",
+    help="Prefer joint values near these at the first sample, in rad and m or with units, such as"
+    " 0,-90deg,500mm [default: the robot's start pose].",
 )
 
 

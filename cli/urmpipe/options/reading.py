@@ -42,17 +42,28 @@ def _units(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
 
 def _intervals(
     ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
-) -> dict[str, tuple[float, float]] | None:
+) -> dict[str, tuple[float | str, ...]] | None:
     """Return LOW:HIGH (all joints that turn) and JOINT=LOW:HIGH options as a mapping."""
+    if not values:
+        return None
+    from urmpipe_pipeline.sources.options import is_interval
+
     intervals = {}
     for value in values:
         joint, _, ends = value.rpartition("=")
-        try:
-            low, high = map(float, ends.split(":"))
-        except ValueError:
-            raise click.BadParameter(f"found {shown(value)}, allowed: LOW:HIGH or JOINT=LOW:HIGH") from None
-        intervals[joint] = low, high
-    return intervals or None
+        found = tuple(map(_end, ends.split(":")))
+        if not is_interval(found):
+            allowed = "LOW:HIGH or JOINT=LOW:HIGH, in the file's unit or with units, such as -180deg:180deg"
+            raise click.BadParameter(f"found {shown(value)}, allowed: {allowed}")
+        intervals[joint] = found
+    return intervals
+
+
+def _end(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
 
 
 ROBOT_OPTION = option(
@@ -191,8 +202,8 @@ JOINTS = (
         callback=_intervals,
         metavar="[JOINT=]LOW:HIGH",
         shell_complete=columns(sign="="),
-        help="Interval to which the program wraps the joint values, in their own unit [default: found from"
-        " the wraps].",
+        help="Interval to which the program wraps the joint values, in their own unit or with units, such as"
+        " -180deg:180deg [default: found from the wraps].",
     ),
     option(
         Heading.PROCESSING,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +13,8 @@ import click
 from click.shell_completion import CompletionItem
 
 from urmpipe.options.completion import files
-from urmpipe_models.errors import shown
-from urmpipe_models.measure_units import ANGLES, LENGTHS, TIMES, quantity
+from urmpipe_models.errors import Finding, OptionError, for_each, shown
+from urmpipe_models.measure_units import WRITTEN, quantity, read_quantity
 
 
 class CatalogueType(click.ParamType[str]):
@@ -120,7 +121,7 @@ def parsed(
         OptionError: With everything that is wrong with it, by the option or the key that says it.
     """
     from urmpipe.usage import place_of
-    from urmpipe_models.errors import OptionError, UrmpipeError
+    from urmpipe_models.errors import UrmpipeError
 
     try:
         return parse(text)
@@ -140,11 +141,15 @@ class ParsedType(click.ParamType[Any]):
 
     def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
         self.name = name
-        self._parse = parse
+        self.read = parse
+
+    def get_metavar(self, param: click.Parameter, ctx: click.Context) -> str:
+        """Return what the value is called, in small letters where these are units."""
+        return self.name
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the value."""
-        return parsed(self._parse, value, ctx, param) if isinstance(value, str) else value
+        return parsed(self.read, value, ctx, param) if isinstance(value, str) else value
 
 
 class OffsetType(click.ParamType[Any]):
@@ -159,32 +164,12 @@ class OffsetType(click.ParamType[Any]):
         if not isinstance(value, str):
             return value
         parts = value.split(",")
-        values = [quantity(part, LENGTHS) for part in parts[:3]]
-        values += [quantity(part, ANGLES) for part in parts[3:]]
+        values = [quantity(part, WRITTEN["m"]) for part in parts[:3]]
+        values += [quantity(part, WRITTEN["rad"]) for part in parts[3:]]
         if len(values) not in (3, 6) or not all(map(math.isfinite, values)):
             allowed = "X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0,150mm,0,0,90deg"
             self.fail(f"found {shown(value)}, allowed: {allowed}", param, ctx)
         return from_offset(values)
-
-
-class NumberType(click.ParamType[float]):
-    """A number in a unit that is not written behind it.
-
-    Args:
-        name: What the value is called in the help.
-        unit: The unit.
-    """
-
-    def __init__(self, name: str, unit: str) -> None:
-        self.name = name
-        self._unit = unit
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the number."""
-        try:
-            return float(value)
-        except ValueError:
-            self.fail(f"found {shown(value)}, allowed: a number of {self._unit}", param, ctx)
 
 
 class WholeType(click.ParamType[int]):
@@ -209,72 +194,36 @@ class NamesType(click.ParamType[Any]):
         return tuple(part.strip() for part in value.split(",")) if isinstance(value, str) else value
 
 
-class NumbersType(click.ParamType[tuple[float, ...]]):
-    """Finite numbers in a unit that is not written behind them, separated by commas.
+def quantity_type(si: str, name: str = "", *, positive: bool = True, deviation: bool = False) -> ParsedType:
+    """Return the type of a number with a unit behind it, or in SI; `read_quantity` has the details.
 
     Args:
-        name: What the value is called in the help.
-        unit: The unit.
-        example: Such a value.
+        si: What it measures, by its SI unit.
+        name: What a list separated by commas, returned as a tuple, is called in the help; empty: no list.
+        positive: Whether it has to be above 0.
+        deviation: Whether it says how large a deviation may be: it needs its unit where that is unclear.
     """
-
-    def __init__(self, name: str, unit: str, example: str) -> None:
-        self.name = name
-        self._unit = unit
-        self._example = example
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[float, ...]:
-        """Return the values."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            values = tuple(float(part) for part in str(value).split(","))
-        except ValueError:
-            values = ()
-        if not values or not all(map(math.isfinite, values)):
-            allowed = f"numbers in {self._unit}, such as {self._example}"
-            self.fail(f"found {shown(value)}, allowed: {allowed}", param, ctx)
-        return values
+    read = partial(read_quantity, si=si, positive=positive, deviation=deviation)
+    if name:
+        return ParsedType(name, lambda text: tuple(for_each(read, text.split(","))))
+    return ParsedType(f"NUMBER[{'|'.join(filter(None, WRITTEN[si]))}]", read)
 
 
-JOINT_VALUES = NumbersType("Q1,Q2,...", "rad and m", "0,3.14,0.5")
+def _joint_values(text: str) -> tuple[str, ...]:
+    """Return joint values as texts: their joints tell whether they are angles or lengths.
+
+    Raises:
+        OptionError: If one is neither.
+    """
+    parts = tuple(text.split(","))
+    if any(all(math.isnan(quantity(part, WRITTEN[si])) for si in ("rad", "m")) for part in parts):
+        allowed = "joint values in rad and m, or with units, such as 0,180deg,500mm"
+        raise OptionError(Finding(found=shown(text), allowed=allowed))
+    return parts
+
+
+JOINT_VALUES = ParsedType("Q1,Q2,...", _joint_values)
 """Joint values, one for each joint in the robot's order."""
 
-
-class LengthType(click.ParamType[float]):
-    """A positive length in m, or with its unit behind it: 0.0004 or 0.4mm."""
-
-    name = "LENGTH"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the length in [m]."""
-        if isinstance(value, float):
-            return value
-        length = quantity(str(value), LENGTHS)
-        if not 0.0 < length < math.inf:
-            self.fail(f"found {shown(value)}, allowed: a positive length in m, such as 0.4mm", param, ctx)
-        return length
-
-
-LENGTH = LengthType()
-
-
-class DurationType(click.ParamType[float]):
-    """A positive time in s, or with its unit behind it: 0.005 or 5ms."""
-
-    name = "SECONDS"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the time in [s]."""
-        if isinstance(value, float):
-            return value
-        seconds = quantity(str(value), TIMES)
-        if not 0.0 < seconds < math.inf:
-            allowed = "a positive time in s, such as 0.005 or 5ms"
-            self.fail(f"found {shown(value)}, allowed: {allowed}", param, ctx)
-        return seconds
-
-
-DURATION = DurationType()
+DEVIATION = quantity_type("m", deviation=True)
+DURATION = quantity_type("s")

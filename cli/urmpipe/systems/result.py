@@ -17,6 +17,8 @@ from urmpipe_fmus.robot_entry import robot_in
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import LogError, OptionError
+from urmpipe_models.files.toml_text import toml_text
+from urmpipe_models.measure_units import readings
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict, delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.provenance import provenance
@@ -32,13 +34,19 @@ def check_meters(plan: Plan, blocks: Blocks) -> None:
     """Refuse what delta meters cannot judge by, before the first step.
 
     Raises:
-        OptionError: If one has no tolerance.
+        OptionError: If one has no tolerance, or one whose unit is unclear.
         LogError: With each reading of a log that has to be told before a verdict rests on it.
     """
     meters = list(_meters(plan.system))
     wrong = [name for name in meters if not _value(plan, Port(name, TOLERANCE)) > 0.0]
-    if wrong:
-        raise OptionError(*(f"block {name}: tolerance: found 0, allowed: above 0, in m" for name in wrong))
+    faults = [f"block {name}: tolerance: found 0, allowed: above 0, in m" for name in wrong]
+    for block in plan.system.blocks:
+        given = str(block.start.get(TOLERANCE, ""))
+        if block.name in meters and (both := readings(given, "m")):
+            allowed = f"a unit: {' or '.join(map(toml_text, both))}"
+            faults.append(f"block {block.name}: tolerance: found {given}, allowed: {allowed}")
+    if faults:
+        raise OptionError(*faults)
     asked = [one.as_finding() for one in blocks.warnings if one.asks]
     if meters and asked:
         raise LogError(*asked)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from urmpipe_models.errors import Finding, shown
 from urmpipe_models.files.contents import is_there
+from urmpipe_models.measure_units import WRITTEN, quantity
 from urmpipe_models.messages import Hint
 from urmpipe_models.names import not_among
 
@@ -83,9 +85,12 @@ def _like(default: Any, text: str) -> Any:
         if text not in ("true", "false"):
             raise ValueError(text)
         return text == "true"
-    if isinstance(default, int):
-        return int(text) if text.lstrip("+-").isdigit() else float(text)
-    return float(text) if isinstance(default, float) else text
+    if isinstance(default, str) or any(math.isfinite(quantity(text, units)) for units in _WITH_UNIT):
+        return text
+    return int(text) if isinstance(default, int) and text.lstrip("+-").isdigit() else float(text)
+
+
+_WITH_UNIT = [{unit: one for unit, one in units.items() if unit} for units in WRITTEN.values()]
 
 
 def _mapped(function: Callable[[Any], Any], value: Any) -> Any:

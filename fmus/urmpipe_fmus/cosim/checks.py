@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 from urmpipe_fmus.cosim.interface import Interface, Variable, si_base, unit_fault
 from urmpipe_fmus.cosim.system import Block, Connection, Port, System
 from urmpipe_models.errors import Finding
+from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
 from urmpipe_models.names import not_among
 
 
@@ -188,7 +190,7 @@ class Wiring:
             if len(values) != len(found):
                 self._fault(where, f"found {len(values)} values, allowed: {len(found)}, or one for all")
                 continue
-            for one, each in zip(found, values, strict=True):
+            for one, each in zip(found, map(_in_si, found, values), strict=True):
                 fault = _start_fault(one, each) or ("set twice" if one.name in seen else "")
                 seen.add(one.name)
                 if fault:
@@ -220,6 +222,12 @@ def _unit(one: Variable) -> str:
     return one.unit or "no unit"
 
 
+def _in_si(one: Variable, value: Any) -> Any:
+    """Return a start value; a text with its unit as a number, where the variable is in SI."""
+    number = quantity(value, WRITTEN.get(one.unit or "", {})) if isinstance(value, str) else math.nan
+    return number if one.type == "Real" and math.isfinite(number) else value
+
+
 def _start_fault(one: Variable, value: Any) -> str:
     """Return why a scalar cannot start with a value; empty if it can."""
     if not one.settable:
@@ -228,7 +236,7 @@ def _start_fault(one: Variable, value: Any) -> str:
         "String": (str, "a text"),
         "Boolean": (bool, "true, false"),
     }
-    right, allowed = types.get(one.type, ((int, float), "a number"))
+    right, allowed = types.get(one.type, ((int, float), NAMES.get(one.unit or "", "a number")))
     if not isinstance(value, right) or (isinstance(value, bool) and one.type != "Boolean"):
         found = str(value).lower() if isinstance(value, bool) else repr(value)
         return f"found {found}, allowed: {allowed}"

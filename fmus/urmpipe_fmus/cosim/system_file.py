@@ -17,17 +17,13 @@ from urmpipe_models.files.contents import is_there
 from urmpipe_models.files.missing import meant_by
 from urmpipe_models.files.places import placed
 from urmpipe_models.files.toml_text import parse_toml
+from urmpipe_models.measure_units import WRITTEN, quantity
 from urmpipe_models.names import did_you_mean, not_among
 
 NOWHERE = Port("", "")
 """Stands for an end of a connection that the file does not tell rightly."""
 
 BLOCK_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
-
-TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
-"""What a time may be told in, in [s]."""
-
-TIME = re.compile(r"(\d+\.?\d*(?:e-?\d+)?|\.\d+) ?(s|ms|us)")
 
 TABLES: dict[str, tuple[str, ...] | None] = {
     "system": ("name", "description", "step", "duration", "record_every"),
@@ -292,14 +288,13 @@ class _System:
 
     def _time(self, head: Mapping[str, Any], key: str) -> float | None:
         """Return a time of the system in [s]: a number, or a text with its unit; None if there is none."""
-        value = head.get(key)
-        if value is None:
+        found = head.get(key)
+        if found is None:
             return None
-        if isinstance(value, str) and (told := TIME.fullmatch(value.strip())):
-            value = float(told[1]) * TIME_UNITS[told[2]]
+        value = quantity(found, WRITTEN["s"]) if isinstance(found, str) else found
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
             allowed = 'a time above 0 in s, or with its unit as in "1ms"'
-            self._fault(f"system.{key}", f"found {shown(value)}, allowed: {allowed}")
+            self._fault(f"system.{key}", f"found {shown(found)}, allowed: {allowed}")
             return None
         return float(value)
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from typing import Any, TypeAlias
 
 from urmpipe_models.errors import Finding, shown
+from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
 from urmpipe_models.names import did_you_mean
 
 Rows3: TypeAlias = tuple[tuple[float, ...], ...]
@@ -77,24 +79,34 @@ class Table:
         self._refuse(key, value, _one_of(allowed) + did_you_mean(str(value), allowed))
         return allowed[0]
 
-    def number(self, key: str, default: float | None = None, *, infinite: bool = False) -> float:
-        """Return a number; without a default the key is required; infinities only where `infinite`."""
+    def number(
+        self, key: str, default: float | None = None, *, infinite: bool = False, si: str = ""
+    ) -> float:
+        """Return a number; without a default the key is required; infinities only where `infinite`.
+
+        A text with a unit is one, too, where `si` says what is measured.
+        """
         if default is not None and not self.has(key):
             return default
-        allowed = "a number" if infinite else "a finite number"
-        value = self._get(key)
+        allowed = NAMES.get(si, "a number" if infinite else "a finite number")
+        given = self._get(key)
+        value = _in_si(given, si)
         if is_number(value, infinite):
             return float(value)
-        self._refuse(key, value, allowed)
+        self._refuse(key, given, allowed)
         return default if default is not None else 0.0
 
     def numbers(
-        self, key: str, count: int | None, default: Sequence[float] | None = None
+        self, key: str, count: int | None, default: Sequence[float] | None = None, si: Sequence[str] = ()
     ) -> tuple[float, ...]:
-        """Return finite numbers, `count` of them (or any); without a default the key is required."""
+        """Return finite numbers, `count` of them (or any); without a default the key is required.
+
+        Texts with units are such, too, where `si` says what each measures.
+        """
         allowed = "a list of finite numbers" if count is None else f"{count} finite numbers"
         value = self._get(key, default)
         if isinstance(value, (list, tuple)) and count in {None, len(value)}:
+            value = [_in_si(item, unit) for item, unit in zip_longest(value, si[: len(value)], fillvalue="")]
             if all(is_number(item) for item in value):
                 return tuple(float(item) for item in value)
             for index, item in enumerate(value):
@@ -192,6 +204,12 @@ class Table:
         """Note that the value of a key is not allowed."""
         found = "nothing" if value is _Missing else shown(value)
         self.fault(key, f"found {found}, allowed: {allowed}")
+
+
+def _in_si(value: Any, si: str) -> Any:
+    """Return a text with a unit as a number in SI, where that is a quantity; else the value as it is."""
+    number = quantity(value, WRITTEN[si]) if si and isinstance(value, str) else math.nan
+    return value if math.isnan(number) else number
 
 
 class _Missing:

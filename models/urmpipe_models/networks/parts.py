@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
 from functools import cached_property
 from typing import Literal, TypeAlias
 
 from urmpipe_models.elementwise import ZERO, Vector, cross
+from urmpipe_models.measure_units import DEGREE
 from urmpipe_models.networks.expressions import Expression
 from urmpipe_models.transform import Transform
 
@@ -196,6 +198,18 @@ class Parts:
         return tuple(
             (f"elements.{one.name}.{'h' if one.kind == 'eg' else 'd'}", one.length) for one in self.elements
         )
+
+    def unit_of(self, control: str) -> tuple[str, Decimal] | None:
+        """Return what a control is, m or rad, and how many of these one of it is.
+
+        None where it drives neither a joint nor a length by itself, or both, or in several units.
+        """
+        driven = [pair for one in self.joints for pair in zip(one.units, one.drives, strict=True)]
+        driven += [("m", one.length) for one in self.elements]
+        alone = {control: Decimal(1)}  # as files in m and rad, in mm and in deg have it
+        alone |= {f"({control}) * 0.001": Decimal("0.001"), f"({control}) * pi / 180": DEGREE}
+        found = {(unit, alone[one.text]) for unit, one in driven if one is not None and one.text in alone}
+        return found.pop() if len(found) == 1 else None
 
     @cached_property
     def between_controls(self) -> tuple[Placed, ...]:

@@ -54,12 +54,14 @@ def parse_noise(text: str) -> dict[str, float]:
     return DEFAULT_NOISE | parse_tolerance(text, "noise", LENGTHS, zero=True)
 
 
-def complete_noise(noise: float | Mapping[str, float] | None) -> dict[str, float]:
-    """Return the noise of every kind, from one of all lengths in [m], or of some kinds.
+def complete_noise(noise: float | str | Mapping[str, float] | None) -> dict[str, float]:
+    """Return the noise of every kind, from one of all lengths in [m], of some kinds, or a text.
 
     Raises:
         OptionError: With everything that is wrong.
     """
+    if isinstance(noise, str):
+        return parse_noise(noise)
     given = noise if isinstance(noise, Mapping) else {} if noise is None else dict.fromkeys(LENGTHS, noise)
     if given:
         check_tolerance(given, "noise", zero=True, iso=None)
@@ -67,7 +69,7 @@ def complete_noise(noise: float | Mapping[str, float] | None) -> dict[str, float
 
 
 def against_baseline(
-    now: Comparison, before: Comparison, noise: float | Mapping[str, float] | None = None
+    now: Comparison, before: Comparison, noise: float | str | Mapping[str, float] | None = None
 ) -> BaselineComparison:
     """Tell what changed since an earlier comparison: by log and quantity, and in how it was made.
 

@@ -74,7 +74,7 @@ class CompareOptions:
         sync: How the clocks are put together: start (both start together), auto (by the motion), or
             the offset in [s]: t_reference = t_log + offset, both from their first samples.
         align: How a log is moved in space before it is compared: none, start, rigid, tool or base+tool.
-        with_unit: Kinds whose tolerance was given with its unit: however large it is, it is meant.
+        from_text: Whether the tolerance was read from a text, in which a large value has its unit.
         diagnose: Whether it is asked why each log deviates. Base and tool are causes then: no alignment may
             be asked for, and only a log that was measured in a frame of its own, whose base and tool are
             always unknown, is moved first.
@@ -86,7 +86,7 @@ class CompareOptions:
     tcp: Tcp = "fk"
     sync: SyncOption = "start"
     align: AlignMode = "none"
-    with_unit: frozenset[str] = frozenset()
+    from_text: bool = False
     diagnose: bool = False
     iso: IsoOptions | None = None
 
@@ -347,9 +347,8 @@ def _comparison(
     told: Sequence[LogWarning],
     assumed: tuple[str, ...],
 ) -> Comparison:
-    given = deviations_of(options.tolerance)
-    bare = {kind: value for kind, value in given.items() if kind not in options.with_unit}
-    warnings = [*large_tolerances(bare), *told]
+    deviations_allowed = () if options.from_text else large_tolerances(deviations_of(options.tolerance))
+    warnings = [*deviations_allowed, *told]
     for one in deviations if options.iso is None else ():
         warnings += sync_doubts(one.name, one.sync, one.run.tsp)
         warnings += left_out_warnings(one, reference)

@@ -5,35 +5,25 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from decimal import Decimal
 from numbers import Real
 
 from urmpipe_models.errors import Finding, OptionError, shown
-from urmpipe_models.measure_units import units_of
+from urmpipe_models.measure_units import WRITTEN, quantity, readings
 from urmpipe_models.messages import Hint
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.iso9283.criteria import UNITS as CRITERIA
-
-LENGTHS, ANGLES = ({"": Decimal(1), **units_of(si)} for si in ("m", "rad"))
-WRITTEN = {
-    "m": LENGTHS,
-    "rad": ANGLES,
-    "1": {"": Decimal(1), "%": Decimal("0.01")},
-    **{si: {"": Decimal(1), **units_of(si)} for si in ("s", "m/s")},
-}
-"""The units that a quantity may be written in, by its own."""
 
 DEVIATIONS = ("axis", "x", "y", "z", "norm", "path", "angle", "joint")
 
 LEAST_SHARES = {"coverage": 0.9, "judged": 0.5}
 """What has to be seen unless other shares are given: of the reference's samples, of the log's motion."""
 
-UNITS: dict[str, dict[str, Decimal]] = {
-    **{kind: ANGLES if kind in ("angle", "joint") else LENGTHS for kind in DEVIATIONS},
-    **dict.fromkeys(LEAST_SHARES, WRITTEN["1"]),
-    **{name: WRITTEN[unit] for name, unit in CRITERIA.items()},
+UNITS = {
+    **{kind: "rad" if kind in ("angle", "joint") else "m" for kind in DEVIATIONS},
+    **dict.fromkeys(LEAST_SHARES, "1"),
+    **CRITERIA,
 }
-"""What a tolerance may be of, deviations and criteria after ISO 9283, and the units it may be written in.
+"""What a tolerance may be of, deviations and criteria after ISO 9283, and its SI unit; 1 of a share.
 
 axis holds for x, y and z each; joint for each joint: a number without a unit is in rad where the joint turns
 and in m where it slides. A unit of length is refused there: joints that turn would take it for rad.
@@ -55,10 +45,6 @@ ALLOWED_CRITERIA = (
 """What a tolerance of a test after ISO 9283 may be of."""
 
 ALLOWED_SHARES = ", coverage=, judged= (least shares, %)"
-
-NUMBER = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
-QUANTITY = re.compile(rf"\s*(?:±|\+-)?\s*({NUMBER})\s*([a-z/%]*)\s*")
-"""A number in plain digits and its unit, ± before it or not."""
 
 DECIMAL_COMMA = re.compile(r"\s*[0-9]+,[0-9]+\s*[a-z]*\s*")
 """A length alone with a decimal comma: a comma parts two kinds."""
@@ -92,10 +78,16 @@ def parse_tolerance(
     named: set[str] = set()
     faults = []
     for part, kinds, value in _parts(text, bare):
-        number = _number(value, kinds[0], zero)
-        twice = " twice" if number is not None and not named.isdisjoint(kinds) else ""
-        if number is None or twice:
-            angle = value == part and _number(value, "angle", zero) is not None and not twice
+        unit = UNITS.get(kinds[0], "")
+        number = quantity(value, WRITTEN.get(unit, {}))
+        fits = _fits(kinds[0], number, zero)
+        if both := readings(value, unit):
+            name = f"{kinds[0]}=" if "=" in part else ""
+            allowed = f"a unit: {' or '.join(f'{name}{one}' for one in both)}"
+            faults.append(Finding(parameter=parameter, found=part.strip(), allowed=allowed))
+        twice = " twice" if fits and not named.isdisjoint(kinds) else ""
+        if (not fits and not both) or twice:
+            angle = "=" not in part and _fits("angle", quantity(value, WRITTEN["rad"]), zero) and not twice
             of_what = ("angle", "joint") if angle else ()
             hints = tuple(Hint(parameter, f"{one}={part.strip()}", "specifies the kind") for one in of_what)
             said = f"{shown(part.strip())}{twice}"
@@ -109,21 +101,11 @@ def parse_tolerance(
     return found
 
 
-def kinds_with_unit(text: str, bare: Sequence[str] = ("axis",)) -> frozenset[str]:
-    """Return the kinds whose tolerance has its unit behind it: nobody took a metre for a millimetre there."""
-    kinds: set[str] = set()
-    for _, some, value in _parts(text, bare):
-        match = QUANTITY.fullmatch(value)
-        if match is not None and match[2]:
-            kinds.update(some)
-    return frozenset(kinds)
-
-
 def _parts(text: str, bare: Sequence[str]) -> Iterator[tuple[str, tuple[str, ...], str]]:
-    """Yield each part of a tolerance with the kinds that it is for and, behind its name, the quantity."""
+    """Yield each part of a tolerance with the kinds that it is for and the quantity, without its ±."""
     for part in text.split(","):
         name, sign, value = part.rpartition("=")
-        yield part, (name.strip(),) if sign else tuple(bare), value
+        yield part, (name.strip(),) if sign else tuple(bare), re.sub(r"^\s*(±|\+-)", "", value)
 
 
 def check_tolerance(
@@ -170,18 +152,6 @@ def complete_tolerance(given: Mapping[str, float], *, iso: bool) -> dict[str, fl
 def deviations_of(tolerance: Mapping[str, float]) -> dict[str, float]:
     """Return a tolerance without its least shares."""
     return {kind: value for kind, value in tolerance.items() if kind not in LEAST_SHARES}
-
-
-def _number(text: str, kind: str, zero: bool) -> float | None:
-    """Return a number with one of the units of a kind, in SI; None if it is none that is allowed.
-
-    It is rounded once: 1.1mm and 0.0011 are one number.
-    """
-    match, units = QUANTITY.fullmatch(text), UNITS.get(kind, {})
-    if match is None or match[2] not in units:
-        return None
-    value = float(Decimal(match[1]) * units[match[2]])
-    return value if _fits(kind, value, zero) else None
 
 
 def _fits(kind: str, value: float, zero: bool) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from urmpipe_models.hand_eye import OPEN, Part, Untold
+from urmpipe_models.measure_units import MEANT
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share
@@ -40,11 +41,8 @@ DIMENSIONS = 3
 STRAIGHT = 0.9999
 """A larger component of a unit vector makes it an axis of the frame: it is off by less than a degree."""
 
-LARGE_LENGTH = 0.1
-"""A larger tolerance in [m] was meant in mm: no arm misses by a tenth of a metre and is accepted."""
-
-LARGE_ANGLE = float(np.radians(10.0))
-"""A larger tolerance in [rad] was meant in deg."""
+LARGE = {"m": 0.1, "rad": float(np.radians(10.0))}
+"""A larger tolerance in [m] or [rad] was meant in mm or deg: no arm misses by so much and is accepted."""
 
 
 def left_out_warnings(one: Deviation, reference: Trajectory) -> Iterator[LogWarning]:
@@ -139,11 +137,11 @@ def rests(one: Deviation) -> bool:
 
 
 def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
-    """Yield a warning for each tolerance in [m] or [rad], given without a unit, that hardly anybody means."""
+    """Yield a warning for each number in [m] or [rad] as a tolerance that hardly anybody means."""
     for kind, value in tolerance.items():
-        unit, other, most = ("rad", "deg", LARGE_ANGLE) if "rad" in UNITS[kind] else ("m", "mm", LARGE_LENGTH)
-        if value > most:
-            bare = f"{value:g}"
+        unit = UNITS[kind]
+        if value > LARGE.get(unit, np.inf):
+            bare, other = f"{value:g}", MEANT[unit]
             said = f"a tolerance of {text.allowed(value, unit)} ({kind}) accepts any deviation"
             hints = (
                 Hint("tolerance", f"{kind}={bare}{other}", f"if {other} was meant"),
@@ -160,7 +158,7 @@ def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> 
     for kind, allowed in tolerance.items():
         level = allowed_for(kind, "axis" if kind in AXES else kind, noise)
         if level is not None and level >= allowed:
-            unit = "rad" if "rad" in UNITS[kind] else "m"
+            unit = UNITS[kind]
             said = f"a noise of {text.allowed(level, unit)} ({kind}) reaches the tolerance of"
             why = f"{text.allowed(allowed, unit)}: nothing within it can be worse than the baseline"
             yield LogWarning(LARGE_NOISE, f"{said} {why}; a number without a unit is in {unit}")

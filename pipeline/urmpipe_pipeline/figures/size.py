@@ -8,12 +8,12 @@ from decimal import Decimal
 from numbers import Real
 
 from urmpipe_models.errors import Finding, OptionError, shown
-from urmpipe_models.measure_units import LENGTHS, quantity
+from urmpipe_models.measure_units import WRITTEN, quantity
 
 WIDTHS = {"column": 0.088, "page": 0.180}
 """Widths by name in [m], as most journals have them."""
 
-PAPER_UNITS = {**LENGTHS, "in": Decimal("0.0254")}
+PAPER_UNITS = {**WRITTEN["m"], "in": Decimal("0.0254")}
 """Units of a width, and how many m each is."""
 
 NARROWEST, WIDEST = 0.04, 1.0

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
+from functools import partial
 from numbers import Integral, Real
 
 from urmpipe_models.display import number_of
-from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, for_each, shown
+from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
 from urmpipe_models.networks.assembly import RESTARTS, Assembled, assemble
 from urmpipe_models.networks.findings import Mobility
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
@@ -26,13 +30,14 @@ class Search:
     """How a network is assembled.
 
     Attributes:
-        controls: Values of controls instead of their starts, as they are given.
+        controls: Values of controls instead of their starts, in the units of the network; texts with
+            their own.
         every: Whether all assemblies are sought.
         restarts: Random starts in a row without anything new that end the search.
         seed: Of the random starts.
     """
 
-    controls: Mapping[str, float]
+    controls: Mapping[str, float | str]
     every: bool = False
     restarts: int = RESTARTS
     seed: int = 0
@@ -45,6 +50,8 @@ class Search:
     def _faults(self) -> Iterator[Finding]:
         """Yield which of the values make no sense."""
         for name, value in self.controls.items():
+            if isinstance(value, str):  # whose unit the network knows
+                continue
             if isinstance(value, bool) or not isinstance(value, Real) or not abs(float(value)) < float("inf"):
                 yield Finding(
                     parameter="controls", found=f"{name} = {shown(value)}", allowed="a finite number"
@@ -74,14 +81,16 @@ def find_network(
         NetworkError: If a control is not of the network, or its value out of its range.
     """
     mechanism = mechanism_of(network)
+    read = partial(_control, network)
+    controls = dict(zip(search.controls, for_each(read, search.controls.items()), strict=True))
     found = assemble(
-        mechanism, search.controls, every=search.every, restarts=search.restarts, seed=search.seed,
+        mechanism, controls, every=search.every, restarts=search.restarts, seed=search.seed,
         progress=progress,
     )  # fmt: skip
     mobility = mobility_of(mechanism, found.x_nearest) if found.assemblies else None
     graph = mechanism.graph
     options = {
-        "network": network.name, "controls": dict(search.controls), "every": search.every,
+        "network": network.name, "controls": controls, "every": search.every,
         "restarts": search.restarts, "seed": search.seed,
     }  # fmt: skip
     return NetworkResult(
@@ -101,6 +110,24 @@ def find_network(
         warnings=tuple(_warnings(mechanism, found, mobility, every=search.every)),
         provenance=provenance(f"network {command}", options, inputs),
     )
+
+
+def _control(network: Network, given: tuple[str, float | str]) -> float:
+    """Return the value of a control in the units of the network.
+
+    Raises:
+        OptionError: If a text is no number, or its unit is not that of what the control drives by itself.
+    """
+    name, value = given
+    if not isinstance(value, str):
+        return value
+    si, factor = network.unit_of(name) or ("", Decimal(1))
+    own = {unit: in_si / factor for unit, in_si in WRITTEN.get(si, {}).items()} | {"": Decimal(1)}
+    number = quantity(value, own)
+    if not math.isfinite(number):
+        allowed = f"a number, or {NAMES[si].partition(' in ')[0]} with its unit" if si else "a number"
+        raise OptionError(Finding(parameter="controls", found=f"{name} = {value}", allowed=allowed))
+    return number
 
 
 def _warnings(

@@ -10,7 +10,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import Finding, OptionError
-from urmpipe_models.measure_units import ANGLES, LENGTHS, quantity
+from urmpipe_models.measure_units import WRITTEN, quantity
 from urmpipe_models.names import not_among
 from urmpipe_models.orientation import matrices, quaternions
 from urmpipe_models.planning.cube import PLANES, cube_faults, cube_rows
@@ -70,7 +70,7 @@ def _values(given: Mapping[str, str], faults: list[Finding]) -> Iterator[tuple[s
     for key, text in given.items():
         if key == PLANE:
             continue
-        value = quantity(text, ANGLES if key in ANGLE_KEYS else LENGTHS)
+        value = quantity(text, WRITTEN["rad" if key in ANGLE_KEYS else "m"])
         if math.isfinite(value):
             yield key, value
         else:

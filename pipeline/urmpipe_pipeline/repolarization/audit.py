@@ -18,7 +18,8 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.gaps import MISSED_SAMPLE
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogWarning, seconds
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
-from urmpipe_pipeline.repolarization.interval import Interval, double_turns, given_periods, said_intervals
+from urmpipe_pipeline.repolarization.interval import double_turns, given_periods, said_intervals
+from urmpipe_pipeline.sources.options import GivenInterval
 
 ALL = (Hint("audit", None, "lists all", call="ingest"),)
 """Where those are of which a warning gives the number."""
@@ -77,7 +78,7 @@ def audit_log(
     log: JointLog,
     robot: Chain | None = None,
     *,
-    interval: Mapping[str, Interval] | None = None,
+    interval: Mapping[str, GivenInterval] | None = None,
     repaired: bool = False,
 ) -> Audited:
     """Repolarize the joints that turn, on the file's own rows, and tell all about it.
@@ -123,7 +124,7 @@ def audit_log(
 
 
 def _repolarized(
-    log: JointLog, robot: Chain | None, given: Mapping[str, Interval]
+    log: JointLog, robot: Chain | None, given: Mapping[str, GivenInterval]
 ) -> tuple[Repolarized, FloatArray, FloatArray]:
     """Repolarize the joints; return P of each and the largest speed of each too."""
     turns = turning(log, robot)

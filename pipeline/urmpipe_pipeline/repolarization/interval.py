@@ -13,10 +13,12 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.measure_units import quantity, units_of
 from urmpipe_models.messages import Hint
 from urmpipe_models.repolarizer import FULL_TURN, Repolarized
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.repolarization.joint_motion import over_rows
+from urmpipe_pipeline.sources.options import GivenInterval
 from urmpipe_pipeline.text import counted
 
 Interval = tuple[float, float]
@@ -42,7 +44,13 @@ def _refuse_empty(name: str, low: float, high: float) -> None:
         raise OptionError(Finding(parameter="interval", found=found, allowed=allowed))
 
 
-def given_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, Interval]) -> FloatArray:
+def _in_own_unit(interval: GivenInterval, factor: float) -> Interval:
+    """Return an interval in the file's own unit, one of which is `factor` rad."""
+    low, high = (quantity(end, units_of("rad")) / factor if isinstance(end, str) else end for end in interval)
+    return low, high
+
+
+def given_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, GivenInterval]) -> FloatArray:
     """Return P of each joint in [rad], shape (joints,): of the interval given, or a full turn.
 
     It is infinite for joints that slide.
@@ -50,14 +58,15 @@ def given_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, In
     Args:
         log: The log.
         turning: Which of its joints turn.
-        given: Interval of a joint by its name, by "" that of all that turn; in the file's own unit.
+        given: Interval of a joint by its name, by "" that of all that turn; in the file's own unit or with
+            units.
 
     Raises:
         OptionError: If an interval makes no sense, or is one of a joint that is not there or slides.
         LogError: If values lie outside, with a finding for each joint.
     """
-    for name, (low, high) in given.items():
-        _refuse_empty(name, low, high)
+    for name, ends in given.items():
+        _refuse_empty(name, *_in_own_unit(ends, 1.0))
     able = [name for name, turns in zip(log.joints, turning, strict=True) if turns]
     unknown = [name for name in given if name and name not in able]
     if unknown:
@@ -67,13 +76,14 @@ def given_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, In
     for j, name in enumerate(log.joints):
         if not turning[j]:
             continue
-        interval = given.get(name, given.get(""))
+        chosen = given.get(name, given.get(""))
         periods[j] = FULL_TURN
-        if interval is not None:
+        if chosen is not None:
             column = _column(log, j)
-            ends = sorted(column.factor * (column.sign * end + column.offset) for end in interval)
-            periods[j] = _whole_turns(ends[1] - ends[0])
-            findings += _outside(log, j, column, interval, (ends[0], ends[1]))
+            interval = _in_own_unit(chosen, column.factor)
+            low, high = sorted(column.factor * (column.sign * end + column.offset) for end in interval)
+            periods[j] = _whole_turns(high - low)
+            findings += _outside(log, j, column, interval, (low, high))
     if findings:
         raise LogError(*findings)
     return periods
@@ -113,7 +123,7 @@ def double_turns(
 
 
 def said_intervals(
-    log: JointLog, fixed: Repolarized, periods: FloatArray, given: Mapping[str, Interval]
+    log: JointLog, fixed: Repolarized, periods: FloatArray, given: Mapping[str, GivenInterval]
 ) -> tuple[list[Inference], list[LogWarning]]:
     """Return the interval of each joint that was given or seen to wrap, and what contradicts it.
 
@@ -128,8 +138,9 @@ def said_intervals(
         least, most = over_rows(np.minimum, log.q), over_rows(np.maximum, log.q)
     for j in np.flatnonzero(np.isfinite(periods)).tolist():
         column = _column(log, j)
-        interval = given.get(log.joints[j], given.get(""))
-        if interval is not None:
+        chosen = given.get(log.joints[j], given.get(""))
+        if chosen is not None:
+            interval = _in_own_unit(chosen, column.factor)
             groups.setdefault((_shown(interval, column), True), []).append(j)
             if periods[j] != _turns(periods[j]) * FULL_TURN:
                 broken.setdefault((_shown(interval, column), float(periods[j])), []).append(column.name)

@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from functools import partial
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.errors import Finding, OptionError, for_each, shown
 from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, exact_form
 from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.solve import METHODS, Method
+from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets
 
@@ -101,7 +103,11 @@ def _not_for_paths(request: Request, recorded: bool) -> Iterator[Finding]:
         yield Finding(parameter="every", found=found, allowed=allowed, hints=(hint,))
 
 
-def start_of(arm: Chain, start: Sequence[float] | FloatArray | None) -> FloatArray | None:
+JointValues: TypeAlias = Sequence[float | str] | FloatArray
+"""Joint values in [rad] and [m], or as texts with units, shape (joints,)."""
+
+
+def start_of(arm: Chain, start: JointValues | None) -> FloatArray | None:
     """Return the start as an array in [rad] and [m], shape (joints,).
 
     Raises:
@@ -109,21 +115,51 @@ def start_of(arm: Chain, start: Sequence[float] | FloatArray | None) -> FloatArr
     """
     if start is None:
         return None
-    allowed = f"{len(arm.coordinates)}, one for each of {', '.join(arm.coordinates)}"
-    try:
-        values = np.asarray(start, dtype=float)
-    except (TypeError, ValueError):
-        allowed = f"{allowed}, in rad and m"
-        raise OptionError(Finding(parameter="start", found=shown(start), allowed=allowed)) from None
-    if values.shape != (len(arm.coordinates),):
-        raise OptionError(Finding(parameter="start", found=f"{values.size} values", allowed=allowed))
-    if not np.isfinite(values).all():
-        found, allowed = "a value that is not finite", f"{allowed}, in rad and m"
-        raise OptionError(Finding(parameter="start", found=found, allowed=allowed))
+    values = joint_values(arm, start, "start")
     beyond = list(_beyond_limits(arm, values))
     if beyond:
         raise OptionError(*beyond)
     return values
+
+
+def joint_values(arm: Chain, given: JointValues, parameter: str) -> FloatArray:
+    """Return joint values as an array in [rad] and [m], shape (joints,).
+
+    Args:
+        arm: The arm, whose joints say whether a value is an angle or a length.
+        given: The values.
+        parameter: The keyword that gave them, for messages.
+
+    Raises:
+        OptionError: If there is not one finite value for each joint, or its unit is not the joint's.
+    """
+    allowed = f"{len(arm.coordinates)}, one for each of {', '.join(arm.coordinates)}"
+    if isinstance(given, (list, tuple)) and len(given) == len(arm.coordinates):
+        given = for_each(partial(_joint_value, parameter), list(zip(arm.moving, given, strict=True)))
+    try:
+        values = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        allowed = f"{allowed}, in rad and m"
+        raise OptionError(Finding(parameter=parameter, found=shown(given), allowed=allowed)) from None
+    if values.shape != (len(arm.coordinates),):
+        raise OptionError(Finding(parameter=parameter, found=f"{values.size} values", allowed=allowed))
+    if not np.isfinite(values).all():
+        found, allowed = "a value that is not finite", f"{allowed}, in rad and m"
+        raise OptionError(Finding(parameter=parameter, found=found, allowed=allowed))
+    return values
+
+
+def _joint_value(parameter: str, given: tuple[Joint, float | str]) -> float:
+    """Return the value of one joint; a text is an angle or a length as its joint turns or slides."""
+    joint, value = given
+    if not isinstance(value, str):
+        return value
+    si = "m" if joint.kind == "prismatic" else "rad"
+    number = quantity(value, WRITTEN[si])
+    if not math.isfinite(number):
+        found = f"{joint.name} = {value}"
+        raise OptionError(Finding(parameter=parameter, found=found, allowed=NAMES[si]))
+    return number
 
 
 def _beyond_limits(arm: Chain, start: FloatArray) -> Iterator[Finding]:
@@ -133,4 +169,5 @@ def _beyond_limits(arm: Chain, start: FloatArray) -> Iterator[Finding]:
             unit = "rad" if joint.kind == "revolute" else "m"
             degrees = "; in deg?" if unit == "rad" and abs(value) > 2.0 * math.pi else ""
             limits = f"{joint.lower:.6g} to {joint.upper:.6g} {unit}"
-            yield Finding(parameter="start", found=f"{joint.name} = {value:g}", allowed=f"{limits}{degrees}")
+            found = f"{joint.name} = {value:g} {unit}"
+            yield Finding(parameter="start", found=found, allowed=f"{limits}{degrees}")

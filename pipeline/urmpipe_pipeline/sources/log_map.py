@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.files.tables import Table
 from urmpipe_models.files.toml_text import parse_toml, toml_lines, toml_text
 from urmpipe_models.messages import one_line
@@ -18,7 +19,7 @@ from urmpipe_models.orientation import FORMS
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, Role
 from urmpipe_pipeline.outputs import MAP_HEADER
 from urmpipe_pipeline.sources.clocks.time_file import TIME_FILE, named_file
-from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.options import GivenInterval, ReadOptions, is_interval
 from urmpipe_pipeline.sources.units.rotation import PURE
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 
@@ -79,7 +80,7 @@ def read_map(path: Path) -> LogMap:
             decimal=_given(table, "decimal", table.text),
             layout=_given(table, "layout", table.text),
             time=time,
-            period=_given(clock, "period", clock.number),
+            period=_given(clock, "period", partial(clock.number, si="s")),
             joints=tuple(column for column, _, _, _ in columns),
             names=names,
             signs=tuple(sign for _, _, sign, _ in columns),
@@ -171,12 +172,15 @@ def _joint(table: Table, units: dict[str, str]) -> tuple[str, str, int, float]:
     return column, table.text("name", column), int(sign), table.number("offset", 0.0)
 
 
-def _interval(table: Table) -> tuple[float, float] | None:
+def _interval(table: Table) -> GivenInterval | None:
     """Return the interval of a joint, if the table has one."""
     if not table.has("interval"):
         return None
-    low, high = table.numbers("interval", 2)
-    return low, high
+    given = table.value("interval")
+    if is_interval(given):
+        return given[0], given[1]
+    table.fault("interval", f"found {shown(given)}, allowed: 2 finite numbers, or two angles with units")
+    return None
 
 
 def _note_unit(table: Table, column: str | None, units: dict[str, str]) -> None:
@@ -195,7 +199,7 @@ def _frame(table: Table, key: str) -> tuple[float, ...]:
     """Return three or six numbers, or nothing."""
     if not table.has(key):
         return ()
-    values = table.numbers(key, None)
+    values = table.numbers(key, None, si=("m", "m", "m", "rad", "rad", "rad"))
     if len(values) not in (3, 6):
         table.fault(key, f"found {len(values)} numbers, allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad")
     return values

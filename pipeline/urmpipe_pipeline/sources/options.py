@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from numbers import Real
-from typing import Any
+from typing import Any, TypeAlias
 
 from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.measure_units import quantity, units_of
 from urmpipe_models.orientation import FORMS, RotationForm
 
 COLUMNS = "columns by name or number, such as ['q1', 'q2'] or [2, 3]"
 UNITS = "a unit of every angle, such as 'deg', or a mapping, such as {'q1': 'deg'}"
 INTERVALS = "two ends for all joints that turn, or a mapping, such as {'q1': (-180.0, 180.0)}"
+
+GivenInterval: TypeAlias = tuple[float | str, float | str]
+"""LOW and HIGH of a joint: numbers in the file's own unit, or both angles as texts with units."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,7 @@ class ReadOptions:
         period: Time between rows in [s], of a log without a time column.
         skip_bad: Leave out rows that cannot be read, up to one in a hundred; each is a warning.
         interval: LOW, HIGH of the interval to which the environment limits a joint, by its name; by "" that
-            of all joints that turn; in the file's own unit.
+            of all joints that turn; in the file's own unit, or angles as texts with units.
         side: A word in the names of the columns to read, or "rest", and that of the columns to leave out, in
             a table that holds both what was asked for and what was done.
         repair: Whether samples that a linear resampling left on a wrap are put on the line through their
@@ -66,7 +71,7 @@ class ReadOptions:
     unit: Mapping[str, str] = field(default_factory=dict)
     period: float | None = None
     skip_bad: bool = False
-    interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    interval: Mapping[str, GivenInterval] = field(default_factory=dict)
     repair: bool = False
     side: tuple[str, str] | None = None
     poses: bool = False
@@ -126,8 +131,11 @@ def _are_named(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
     return lambda value: isinstance(value, Mapping) and all(map(fits, value.values()))
 
 
-def _is_interval(value: Any) -> bool:
-    return _are(_is_number)(value) and len(value) == 2
+def is_interval(value: Any) -> bool:
+    """Return whether a value is two ends: numbers in the file's own unit, or angles with units."""
+    angle = units_of("rad")
+    kinds = (_is_number, lambda end: isinstance(end, str) and math.isfinite(quantity(end, angle)))
+    return any(_are(fits)(value) for fits in kinds) and len(value) == 2
 
 
 def _is_layout(value: Any) -> bool:
@@ -155,7 +163,7 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "unit": (_are_named(_is_word), UNITS),
     "period": (_is_number, "a number, in s"),
     "skip_bad": _FLAG,
-    "interval": (_are_named(_is_interval), INTERVALS),
+    "interval": (_are_named(is_interval), INTERVALS),
     "repair": _FLAG,
     "shared": _FLAG,
     "side": (

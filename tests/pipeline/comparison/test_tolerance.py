@@ -50,13 +50,36 @@ def test_what_is_written_is_found_in_si(text: str, found: dict[str, float]) -> N
 
 @given(st.floats(1e-9, 1e3), st.sampled_from(sorted(UNITS)))
 def test_a_number_in_si_comes_back_bit_for_bit(value: float, kind: str) -> None:
-    assert parse_tolerance(f"{kind}={value!r}") == {kind: value}
+    unit = UNITS[kind].removesuffix("1")  # a share has none
+    value = value if unit else min(value, 1.0)
+    assert parse_tolerance(f"{kind}={value!r}{unit}") == {kind: value}
 
 
 @given(st.integers(1, 999_999))
 def test_a_unit_is_a_shift_of_the_decimal_point(number: int) -> None:
-    assert parse_tolerance(f"{number}um") == parse_tolerance(f"{number}e-6")
-    assert parse_tolerance(f"{number}mm") == parse_tolerance(f"{number}e-3")
+    assert parse_tolerance(f"{number}um") == parse_tolerance(f"{number}e-6m")
+    assert parse_tolerance(f"{number}mm") == parse_tolerance(f"{number}e-3m")
+
+
+@pytest.mark.parametrize(
+    ("clear", "unclear", "both"),
+    [
+        ("axis=0.0199", "axis=0.02", "axis=0.02mm or axis=0.02m"),
+        ("0.0199", "±3.5", "3.5mm or 3.5m"),
+        ("angle=0.2", "angle=0.2001", "angle=0.2001deg or angle=0.2001rad"),
+        ("joint=.2", "joint=1", "joint=1deg or joint=1rad"),
+        ("AP_rz=0.2", "AP_rz=0.21", "AP_rz=0.21deg or AP_rz=0.21rad"),
+        ("AV=1", "AV=1.01", "AV=1.01% or AV=101%"),
+    ],
+)
+def test_a_large_number_needs_its_unit(clear: str, unclear: str, both: str) -> None:
+    assert parse_tolerance(clear) == {clear.rpartition("=")[0] or "axis": float(clear.rpartition("=")[2])}
+    said = f"tolerance: found {unclear}, allowed: a unit: {both}"
+    assert refusal(OptionError, parse_tolerance, unclear) == said
+
+
+def test_times_and_speeds_need_none() -> None:
+    assert parse_tolerance("PSt=20,FV=3", iso=True) == {"PSt": 20.0, "FV": 3.0}
 
 
 def test_a_degree_is_that_of_pi() -> None:
@@ -102,13 +125,14 @@ def test_an_angle_alone_and_a_decimal_comma_are_told_how_to_be_written() -> None
 
 def test_everything_that_is_wrong_is_told_at_once() -> None:
     with pytest.raises(OptionError) as error:
-        parse_tolerance("1mm, foo=2, axis=3mm,norm=x,,norm=4mm,norm=5mm", "noise")
+        parse_tolerance("1mm, foo=2, axis=3mm,norm=x,,norm=4mm,norm=5mm,angle= 1", "noise")
     assert [str(one) for one in error.value.findings] == [
         f"noise: found 'foo=2', {ALLOWED}",
         f"noise: found 'axis=3mm' twice, {ALLOWED}",
         f"noise: found 'norm=x', {ALLOWED}",
         f"noise: found '', {ALLOWED}",
         f"noise: found 'norm=5mm' twice, {ALLOWED}",
+        "noise: found angle= 1, allowed: a unit: angle=1deg or angle=1rad",
     ]
 
 

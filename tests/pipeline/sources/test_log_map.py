@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -118,6 +119,24 @@ def test_robot_and_frames_come_back(write: Write) -> None:
     log = read_log([write("t [s],q1 [rad]\n0,1\n1,2\n")])
     said = read_map(write(map_of(log, "ur5e", (0.0, 0.0, 0.5), (0.1, 0.2, 0.3, 0.0, 0.5, 0.0)), "lab.toml"))
     assert (said.robot, said.base, said.tool) == ("ur5e", (0.0, 0.0, 0.5), (0.1, 0.2, 0.3, 0.0, 0.5, 0.0))
+
+
+def test_a_map_takes_units(write: Write) -> None:
+    text = """
+    base = [0, "1cm", "800mm", 0, 0, "90deg"]
+    tool = [0, 0, "150mm"]
+    clock = {column = "none", period = "5ms"}
+    joints = [{column = "q1", interval = ["-180deg", "180deg"]}]
+    """
+    said = read_map(write(text, "lab.toml"))
+    assert (said.base, said.tool) == ((0.0, 0.01, 0.8, 0.0, 0.0, math.pi / 2), (0.0, 0.0, 0.15))
+    assert (said.read.period, said.read.interval) == (0.005, {"q1": ("-180deg", "180deg")})
+    with pytest.raises(OptionError) as error:
+        read_map(write('tool = [0, 0, "15deg"]\nclock.period = "5mm"\n', "lab.toml"))
+    assert [one.message.partition(": ")[2] for one in error.value.findings[:2]] == [
+        "found '5mm', allowed: a time in s, such as 0.005 or 5ms",
+        "found '15deg', allowed: a finite number",
+    ]
 
 
 def test_an_empty_map_says_nothing(write: Write) -> None:
