@@ -14,6 +14,8 @@ import pytest
 
 import urmpipe as public
 from urmpipe.main import COMMANDS, cli
+from urmpipe_pipeline.presentation.section import Section, Table
+from urmpipe_pipeline.results import present
 
 CUBE = "cube:wall,a=600mm,r=30mm,x=1.7,y=0,z=1"
 
@@ -211,3 +213,28 @@ def test_a_delta_meter_takes_a_tolerance_with_its_unit(
         assert f'found {said[:-2]}, allowed: a unit: "{said}" or "{said[:-2]}m"' in done.err
     else:
         assert (done.code, f"0.005000 mm of {said} allowed" in done.out) == (0, True), done.out
+
+
+def parts(section: Section) -> Iterator[Section]:
+    """Yield a section and all below it."""
+    yield section
+    for one in section.sections:
+        yield from parts(one)
+
+
+def test_what_is_printed_back_has_units(urmpipe: Any, tmp_path: Path) -> None:
+    rows = "".join(f"{i / 100},{i / 1000},0,0\n" for i in range(50))
+    for name in ("path.csv", "log.csv"):
+        (tmp_path / name).write_text(f"t,x,y,z\n{rows}", encoding="utf-8")
+    assert urmpipe("compare", "path.csv", "log.csv", "--tolerance", "0.01,norm=5mm", "-o", "a.rrd").code == 0
+    results = public.read_recording(tmp_path / "a.rrd"), public.plan(CUBE, velocity=0.25, acceleration=6)
+    blocks = [block for one in results for part in parts(present(one).body) for block in part.blocks()]
+    made = [one for one in blocks if isinstance(one, Table) and one.title == "How it was made"]
+    told = {
+        name: words
+        for one in made
+        for name, words in zip(*(column.cells for column in one.columns), strict=True)
+    }
+    assert told["option tolerance"] == '{"axis": "10 mm", "norm": "5 mm"}'
+    options = {name: told[f"option {name}"] for name in ("velocity", "acceleration", "tsp", "law")}
+    assert options == {"velocity": "0.25 m/s", "acceleration": "6 m/s2", "tsp": "0.005 s", "law": "trapezoid"}

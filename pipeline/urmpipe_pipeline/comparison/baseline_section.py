@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.change import BaselineComparison, Change, CriterionChange, Worse
 from urmpipe_pipeline.comparison.deviation import Verdict
+from urmpipe_pipeline.comparison.tolerance import UNITS
 from urmpipe_pipeline.comparison.wording import quantity_name, size_of, symbol
-from urmpipe_pipeline.json_values import plain
 from urmpipe_pipeline.presentation.digits import written
-from urmpipe_pipeline.presentation.parts import Heads, columns_of, table_of
+from urmpipe_pipeline.presentation.parts import Heads, columns_of, option_words, table_of
 from urmpipe_pipeline.presentation.section import Cell, Check, Fact, Judged, Ref, Section, Table, Value
 
 NAMED = 30
@@ -122,8 +122,7 @@ def worse_facts(found: BaselineComparison) -> Iterator[Fact]:
 def _facts(found: BaselineComparison) -> Iterator[Fact]:
     yield from worse_facts(found)
     yield Fact("New", _listed(list(map(str, found.new))))
-    units = {"angle": "rad", "joint": "rad"}
-    noise = (f"{kind} {text.allowed(value, units.get(kind, 'm'))}" for kind, value in found.noise.items())
+    noise = (f"{kind} {text.allowed(value, UNITS[kind])}" for kind, value in found.noise.items())
     yield Fact("Noise", ", ".join(noise), "smaller changes are not listed")
     yield Fact("Recording of the baseline", str(found.recording or ""), brief=False)
 
@@ -141,7 +140,10 @@ def _tables(found: BaselineComparison) -> Iterator[Table]:
             f"Criteria changed since {found.name} by more than the noise", columns_of(criteria, _CRITERIA)
         )
     if found.differences:
-        rows = [(one.what, plain(one.before), plain(one.now)) for one in found.differences]
+        rows = [
+            (one.what, *(option_words(one.what, value, UNITS) for value in (one.before, one.now)))
+            for one in found.differences
+        ]
         heads = {"what": "What", "before": "before", "now": "now"}
         yield table_of("Made differently", heads, rows, brief=True)
 

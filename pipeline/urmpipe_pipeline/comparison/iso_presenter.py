@@ -12,6 +12,7 @@ from urmpipe_pipeline.comparison.baseline_section import baseline_section, crite
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.iso_scene import iso_scene
+from urmpipe_pipeline.comparison.tolerance import UNITS
 from urmpipe_pipeline.iso9283.criteria import Criterion, overall_verdict
 from urmpipe_pipeline.iso9283.drawings import corner_drawing, pose_drawing
 from urmpipe_pipeline.iso9283.figures import deviation_figure, path_figure, speed_figure
@@ -152,7 +153,7 @@ def _files(result: Comparison) -> Iterator[Block]:
     yield inputs_table("Reference files", result.reference.files)
     files = dict.fromkeys(file for run in result.runs for file in run.run.log.files)
     yield inputs_table("Files of the cycles", files)
-    yield provenance_table(result.provenance)
+    yield provenance_table(result.provenance, kinds=UNITS)
 
 
 def _sections(test: IsoTest) -> Iterator[Section]:

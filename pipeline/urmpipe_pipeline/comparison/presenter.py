@@ -21,6 +21,7 @@ from urmpipe_pipeline.comparison.tables import (
     statistics_rows,
     statistics_tables,
 )
+from urmpipe_pipeline.comparison.tolerance import UNITS
 from urmpipe_pipeline.comparison.wording import (
     amount_words,
     decided_words,
@@ -109,7 +110,7 @@ def _overview(result: Comparison) -> Iterator[Block]:
     """Yield what a page shows of all logs together, and how the comparison was made."""
     yield from overview_figure(result)
     yield inputs_table("Reference files", result.reference.files)
-    yield provenance_table(result.provenance)
+    yield provenance_table(result.provenance, kinds=UNITS)
 
 
 def _log(one: Deviation, result: Comparison) -> Section:

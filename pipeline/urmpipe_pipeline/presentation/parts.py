@@ -85,15 +85,44 @@ def inputs_table(title: str, files: Iterable[SourceFile]) -> Table:
     return table_of(title, heads, rows, folded=True)
 
 
-def provenance_table(provenance: Provenance, title: str = "How it was made") -> Table:
-    """Return how to repeat a result: command, options, versions, when."""
+OPTION_UNITS = {
+    "acceleration": "m/s2", "band": "m", "duration": "s", "force": "N", "jerk": "m/s3", "limit": "m",
+    "period": "s", "start": "(rad, m)", "step": "s", "sync": "s", "tolerance": "m", "tsp": "s",
+    "velocities": "m/s", "velocity": "m/s",
+}  # fmt: skip
+"""The units of options that are numbers, or lists of them."""
+
+
+def provenance_table(
+    provenance: Provenance, title: str = "How it was made", kinds: Mapping[str, str] | None = None
+) -> Table:
+    """Return how to repeat a result: command, options, versions, when.
+
+    Args:
+        provenance: How it was made.
+        title: The title of the table.
+        kinds: The SI unit of each kind of tolerance.
+    """
+    options = {name: option_words(name, value, kinds) for name, value in provenance.options.items()}
     rows = [("command", provenance.command), ("created", provenance.created)]
-    rows += _named("option", provenance.options) + _named("version of", provenance.versions)
+    rows += [(f"option {name}", words) for name, words in options.items()]
+    rows += [(f"version of {name}", one) for name, one in provenance.versions.items()]
     return table_of(title, {"what": "What", "value": "Value"}, rows, folded=True)
 
 
-def _named(word: str, values: Mapping[str, Any]) -> list[tuple[str, str]]:
-    return [(f"{word} {name}", plain(value)) for name, value in values.items()]
+def option_words(name: str, value: Any, kinds: Mapping[str, str] | None = None) -> str:
+    """Return the value of an option as one line, numbers with their units: "0.25 m/s", {"axis": "3.5 mm"}."""
+    return plain(_in_unit(value, name, {**OPTION_UNITS, **(kinds or {})}))
+
+
+def _in_unit(value: Any, name: str, units: Mapping[str, str]) -> Any:
+    if isinstance(value, Mapping) and name in ("read", "tolerance"):  # the keys of others are no options
+        return {key: _in_unit(one, key, units) for key, one in value.items()}
+    if name not in units or isinstance(value, (str, bool)) or value is None:
+        return value
+    if isinstance(value, (list, tuple)):
+        return f"{', '.join(f'{one:.6g}' for one in value)} {units[name]}"
+    return text.allowed(value, units[name])
 
 
 def recording_fact(recording: Path | None) -> Fact:
