@@ -34,13 +34,13 @@ WRITTEN: dict[str, dict[str, Decimal]] = {
     "1": {"": Decimal(1), "%": Decimal("1e-2")},
     "pt": {"": Decimal(1), "pt": Decimal(1)},
 }
-"""The units that a value may have behind it, by what is measured; a value without one is in SI, or in pt."""
+"""The units that a text may give a number, by what is measured; "" is SI, or pt."""
 
 SPELLED = str.maketrans({"^": "", "²": "2", "³": "3", "°": "deg", "µ": "u", "μ": "u"})
 """Other spellings of units: m/s^2, m/s², 0.5°, 20µm (with the sign for micro, or the Greek letter)."""
 
-QUANTITY = re.compile(r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*([^\s0-9.]\S*)?")
-"""A number in plain digits, and its unit."""
+QUANTITY = re.compile(r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?)\s*([^\s0-9.]\S*)?")
+"""A number in plain digits, and its unit; Decimal holds no exponent of any length."""
 
 NAMES = {
     "m": "a length in m, such as 0.0004 or 0.4mm",
@@ -58,23 +58,23 @@ NAMES = {
     "1": "a share, such as 5%",
     "pt": "a size in pt, such as 8pt",
 }
-"""What is measured in words, with an example."""
+"""Names for messages, with examples."""
 
-MEANT = {"m": "mm", "rad": "deg", "1": "%"}
-"""The unit that a number of a deviation without one is often meant in."""
+USUAL_UNITS = {"m": "mm", "rad": "deg", "1": "%"}
+"""The units in which people think of deviations, by SI unit."""
 
 
 def quantity(text: str, units: Mapping[str, Decimal]) -> float:
-    """Return a number with one of the units behind it in SI, rounded once; NaN if it is none."""
-    found = _parts(text)
-    return float(found[0] * units[found[1]]) if found and found[1] in units else math.nan
+    """Return the value in SI of a number with its unit, rounded once; NaN of any other text."""
+    parts = _parts(text)
+    return float(parts[0] * units[parts[1]]) if parts and parts[1] in units else math.nan
 
 
 def read_quantity(text: str, si: str, *, positive: bool = True, deviation: bool = False) -> float:
     """Return a quantity in SI from a number and its unit; a number alone is in SI.
 
     Args:
-        text: The number, and the unit behind it.
+        text: The number with its unit.
         si: What is measured, by its SI unit: a key of `NAMES`.
         positive: Whether it has to be above 0.
         deviation: Whether it says how large a deviation may be: see `readings`.
@@ -92,23 +92,23 @@ def read_quantity(text: str, si: str, *, positive: bool = True, deviation: bool 
 
 
 def readings(text: str, si: str) -> tuple[str, ...]:
-    """Return what a number without a unit may mean that says how large a deviation may be: ("3.5mm", "3.5m").
+    """Return the two readings of a number without a unit that limits a deviation: ("3.5mm", "3.5m").
 
-    Nothing where it is clear: with a unit, and below 0.02 m, up to 0.2 rad, and up to a share of 1. No arm is
-    accepted that misses by more, so whoever writes 3.5 may mean mm.
+    Empty where the unit is clear: it is given, or the number is below 0.02 m, up to 0.2 rad or a share up to
+    1. Larger deviations are not accepted of an arm, so 3.5 may be a number of mm.
     """
-    found = _parts(text)
-    if found is None or found[1] or si not in MEANT:
+    parts = _parts(text)
+    if parts is None or parts[1] or si not in USUAL_UNITS:
         return ()
-    number = found[0]
+    number = parts[0]
     clear = number < Decimal("0.02") if si == "m" else number <= (Decimal("0.2") if si == "rad" else 1)
     written = text.strip()
     in_si = f"{(100 * number).normalize():f}%" if si == "1" else f"{written}{si}"
-    return () if clear else (f"{written}{MEANT[si]}", in_si)
+    return () if clear else (f"{written}{USUAL_UNITS[si]}", in_si)
 
 
 def _parts(text: str) -> tuple[Decimal, str] | None:
-    """Return a number and the unit behind it as `WRITTEN` spells it; None if there is no number."""
+    """Return a number and its unit as `WRITTEN` spells it; None if there is no number."""
     match = QUANTITY.fullmatch(text.strip())
     return match and (Decimal(match[1]), (match[2] or "").translate(SPELLED))
 

@@ -99,7 +99,7 @@ def test_a_start_beyond_the_limits_of_joints(capsys: Captured) -> None:
     assert refused(capsys, "targets.csv", "--robot", "panda", "--start", start) == [
         "error: --start: found panda_joint2 = -45 rad, allowed: -1.7628 to 1.7628 rad; in deg?",
         "error: --start: found panda_joint4 = -135 rad, allowed: -3.0718 to -0.0698 rad; in deg?",
-        "error: --start: found panda_joint6 = 90, allowed: -0.0175 to 3.7525 rad; in deg?",
+        "error: --start: found panda_joint6 = 90 rad, allowed: -0.0175 to 3.7525 rad; in deg?",
     ]
 
 

@@ -64,6 +64,7 @@ def test_an_unknown_unit_is_refused_with_all_that_are_known() -> None:
         ("0.6", 0.6), ("600mm", 0.6), (" 1.1 mm ", 1.1e-3), ("3cm", 0.03), ("-2e3um", -2e-3), ("1e3", 1e3),
         ("nan", math.nan), ("inf", math.nan), ("mm", math.nan), ("", math.nan), ("1 2", math.nan),
         ("20µm", 2e-5), ("1rad", math.nan), ("0x1", math.nan), ("1e999", math.inf),
+        ("1e99999999999999999999", math.nan),
     ],
 )  # fmt: skip
 def test_a_quantity_is_a_number_with_one_of_the_units_rounded_once(text: str, value: float) -> None:

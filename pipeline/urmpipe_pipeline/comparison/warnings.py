@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from urmpipe_models.hand_eye import OPEN, Part, Untold
-from urmpipe_models.measure_units import MEANT
+from urmpipe_models.measure_units import USUAL_UNITS
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share
@@ -141,7 +141,7 @@ def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
     for kind, value in tolerance.items():
         unit = UNITS[kind]
         if value > LARGE.get(unit, np.inf):
-            bare, other = f"{value:g}", MEANT[unit]
+            bare, other = f"{value:g}", USUAL_UNITS[unit]
             said = f"a tolerance of {text.allowed(value, unit)} ({kind}) accepts any deviation"
             hints = (
                 Hint("tolerance", f"{kind}={bare}{other}", f"if {other} was meant"),

@@ -202,7 +202,7 @@ def test_words_of_a_system_and_of_its_units_are_joined_by_either_sign(tmp_path: 
     assert load_system(tmp_path / "a.toml").blocks[0].unit == "dc_drive"
 
 
-@pytest.mark.parametrize("value", ["inf", "nan", "true", '"1"', "-0.1"])
+@pytest.mark.parametrize("value", ["inf", "nan", "true", '"1mm"', "-0.1"])
 def test_a_step_is_a_finite_number_above_zero(tmp_path: Path, value: str) -> None:
     text = f'[system]\nstep = {value}\n[blocks.a]\nunit = "x"\n'
     (found,) = said(tmp_path / "bad.toml", text)
