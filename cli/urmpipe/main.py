@@ -10,8 +10,9 @@ import gc
 import os
 import signal
 import sys
+import time
 import warnings
-from _thread import interrupt_main
+from _thread import interrupt_main, start_new_thread
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -153,11 +154,20 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 
 def _stop_again(dropped: sys.UnraisableHookArgs) -> None:
-    """Stop after all, where Python dropped the error: in a callback of its own, such as of an import."""
+    """Stop after all, where Python dropped the error: in a callback of its own, such as of an import.
+
+    From another thread and a little later: an interrupt that came before this function returns would be
+    dropped like the first.
+    """
     if isinstance(dropped.exc_value, KeyboardInterrupt):
-        interrupt_main()
+        start_new_thread(_interrupt_soon, ())
     else:
         sys.__unraisablehook__(dropped)
+
+
+def _interrupt_soon() -> None:
+    time.sleep(0.05)
+    interrupt_main()
 
 
 def run(arguments: Sequence[str]) -> int:

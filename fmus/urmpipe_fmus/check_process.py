@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 import mmap
 import os
-import signal
 import subprocess
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -15,7 +13,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from urmpipe_models.processes import command, ending, environment
+from urmpipe_models.processes import command, end_group, ending, environment
 
 STARTING = 60.0
 """Seconds that the process may take until it calls the FMU."""
@@ -123,8 +121,4 @@ def _started(folder: Path, printed: Path) -> Iterator[subprocess.Popen[bytes]]:
         try:
             yield process
         finally:
-            if sys.platform == "win32":
-                process.kill()
-            else:
-                with suppress(OSError):  # it and all that it started have ended
-                    os.killpg(process.pid, signal.SIGKILL)
+            end_group(process)

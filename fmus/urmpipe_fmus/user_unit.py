@@ -12,6 +12,7 @@ import sys
 import traceback
 from collections.abc import Iterator
 from dataclasses import replace
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -22,6 +23,7 @@ from urmpipe_fmus.dependencies import Dependencies
 from urmpipe_fmus.equations import Equations
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_models.errors import Finding, UnitError, UrmpipeError
+from urmpipe_models.files.contents import read_contents
 
 
 def load_unit_file(path: str | Path) -> Unit:
@@ -79,13 +81,12 @@ def _read(path: Path) -> str:
     Raises:
         UnitError: If it cannot be read or is no UTF-8.
     """
+    content = BytesIO(read_contents(path, UnitError, (".py",)))
     try:
-        return path.read_text(encoding="utf-8-sig")
+        return TextIOWrapper(content, "utf-8-sig").read()
     except UnicodeDecodeError as error:
         fault = f"byte {error.start} is not UTF-8; allowed: Python in UTF-8"
         raise UnitError(Finding(fault, str(path))) from error
-    except OSError as error:
-        raise UnitError(Finding(f"cannot be read: {error.strerror}", str(path))) from error
 
 
 def _neighbours(path: Path, source: str) -> Iterator[Finding]:

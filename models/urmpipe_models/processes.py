@@ -6,6 +6,8 @@ import os
 import signal
 import sys
 from contextlib import suppress
+from subprocess import Popen
+from typing import Any
 
 MEMORY = 4 * 2**30
 """Bytes that such a process may ask for: far more than any file in use needs, less than a machine has."""
@@ -28,6 +30,15 @@ def limit_memory(size: int = MEMORY) -> None:
 
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
         resource.setrlimit(resource.RLIMIT_AS, (size if hard < 0 else min(size, hard), hard))
+
+
+def end_group(process: Popen[Any]) -> None:
+    """Kill a process that was started with `start_new_session`, and all processes that it started."""
+    if sys.platform == "win32":
+        process.kill()
+    else:
+        with suppress(ProcessLookupError, PermissionError):  # macOS: of a group that has just ended
+            os.killpg(process.pid, signal.SIGKILL)
 
 
 def ending(exit_code: int) -> str:

@@ -104,6 +104,8 @@ def operands(ctx: click.Context) -> list[str]:
 def columns_of(log: Path) -> Sequence[str]:
     """Return the columns that the first row of a text names; none of a file that is no such table."""
     try:
+        if not log.is_file():  # a named pipe would be waited for
+            return ()
         with log.open(encoding="utf-8", newline="") as file:
             lines = file.read(HEAD).splitlines()[:10]
         dialect = csv.Sniffer().sniff("\n".join(lines), ",;\t|")

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -14,7 +12,7 @@ from time import monotonic
 from types import TracebackType
 
 from urmpipe_fmus.cosim.job import ELSEWHERE, SAID, Progress
-from urmpipe_models.processes import command, ending, environment
+from urmpipe_models.processes import command, end_group, ending, environment
 
 POLL = 0.02
 """How often it is looked at, in [s]."""
@@ -55,7 +53,7 @@ class Worker:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._kill()
+        end_group(self._process)
         with self._process:  # closes its input, and waits for its end
             pass
         self._folder.cleanup()
@@ -78,17 +76,9 @@ class Worker:
                 os.truncate(self.folder / SAID, 0)  # what is appended from then on begins there
             why = watch()
             if why:
-                self._kill()
+                end_group(self._process)
                 self._process.wait()
                 return why
-
-    def _kill(self) -> None:
-        """End it, and the processes that the FMUs started in its group."""
-        if sys.platform == "win32":
-            self._process.kill()
-        else:
-            with suppress(ProcessLookupError, PermissionError):  # macOS: of a group that has just ended
-                os.killpg(self._process.pid, signal.SIGKILL)
 
     def _begin(self) -> None:
         """Tell it that the job is there."""

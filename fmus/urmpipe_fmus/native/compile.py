@@ -16,6 +16,7 @@ from urmpipe_fmus.native.sources import GUID_HEADER, guid_header
 from urmpipe_fmus.platforms import is_windows, suffix_of, this_platform
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.errors import FmuError
+from urmpipe_models.processes import end_group
 
 TARGETS = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu"}
 """zig's name of the platforms, by FMI's."""
@@ -28,6 +29,9 @@ FLAGS = (
 
 ALONE = "sources/resources.c"
 """Of the sources this one alone reads the headers of Windows, whose names must not meet those of a model."""
+
+TEMPORARY = ("TMPDIR", "TMP", "TEMP", "ZIG_LOCAL_CACHE_DIR")
+"""Variables that tell compilers where to put temporary files."""
 
 LINES_OF_AN_ERROR = 12
 
@@ -125,16 +129,24 @@ def _compiled(unit: Unit, files: Mapping[str, bytes], target: str, command: Sequ
 
 
 def _run(unit: Unit, target: str, command: Sequence[str], folder: str) -> None:
-    """Run a compiler in a folder."""
+    """Run a compiler in a folder, which also takes its temporary files; whatever ends the run ends it, too."""
+    pipe, kept_inside = subprocess.PIPE, dict.fromkeys(TEMPORARY, folder)
     try:
-        done = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, errors="replace", check=False
-        )
+        process = subprocess.Popen(
+            command, cwd=folder, env={**os.environ, **kept_inside}, start_new_session=True,
+            stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, text=True, errors="replace",
+        )  # fmt: skip
     except OSError as error:
         raise FmuError(f"unit {unit.name}: {command[0]} cannot be run: {error}") from error
-    if done.returncode:
-        said = (done.stderr or done.stdout).splitlines()[-LINES_OF_AN_ERROR:]
+    with process:
+        try:
+            out, err = process.communicate()
+        finally:
+            end_group(process)
+            process.communicate()  # until each process that it started has closed its output, and so has ended
+    if process.returncode:
+        said = (err or out).splitlines()[-LINES_OF_AN_ERROR:]
         raise FmuError(
-            f"unit {unit.name}: the C compiler failed for {target} (exit code {done.returncode})",
+            f"unit {unit.name}: the C compiler failed for {target} (exit code {process.returncode})",
             *(line for line in said if line.strip()),
         )

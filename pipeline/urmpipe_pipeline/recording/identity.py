@@ -43,6 +43,8 @@ def import_ahead() -> None:
 
 def is_recording(path: Path) -> bool:
     """Tell whether a file is a Rerun recording, whoever wrote it and whether it is whole or not."""
+    if not path.is_file():  # opening a named pipe would wait for a writer
+        return False
     with path.open("rb") as file:
         return file.read(len(MAGIC)) == MAGIC
 

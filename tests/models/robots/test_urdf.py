@@ -336,7 +336,7 @@ def test_what_nests_deep_or_is_no_file_is_one_line(urdf: Any) -> None:
     assert refusal(RobotError, read_urdf, "a\0.urdf") == "found 'a\\x00.urdf', allowed: the name of a file"
     os.mkfifo("pipe.urdf")
     assert (
-        refusal(RobotError, read_urdf, "pipe.urdf") == "pipe.urdf: found a pipe or a device, allowed: a file"
+        refusal(RobotError, read_urdf, "pipe.urdf") == "pipe.urdf: found a named pipe, allowed: a file"
     )
 
 
