@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 
 from urmpipe.main import COMMANDS, cli, run
 from urmpipe.options.types import OffsetType
+from urmpipe_datasets import LOGS
 from urmpipe_models.errors import Finding
 
 RunCommand = Callable[..., Any]
@@ -124,6 +125,39 @@ FRAMES = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0
 def test_wrong_use_is_one_line_that_says_what_is_allowed(urmpipe: RunCommand, line: str, said: str) -> None:
     ran = urmpipe(*line.split())
     assert (ran.code, ran.out, ran.err) == (2, "", f"error: {said}\n")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (
+            "compare LOG LOG --iso --planes 1000000000",
+            "planes: found 1000000000, allowed: a whole number, 1 to 10000",
+        ),
+        (
+            "ik PATH --robot urm6 --unit m --restarts 10001",
+            "restarts: found 10001, allowed: a whole number, 0 to 10000",
+        ),
+        (
+            "network solve four-bar --restarts 1000000000",
+            "restarts: found 1000000000, allowed: a whole number, 0 to 200000",
+        ),
+        ("simulate one-drive --duration 1e300", "duration: found 1e+300 s, allowed: above 0, below 1e+09"),
+        ("ingest LOG --tsp 1e-300", "tsp: found 1e-300 s, allowed: a time from 1e-09 s to below 1e+09 s"),
+        (
+            "fmu build repolarizer -s joints=1001",
+            "unit repolarizer: option joints: found 1001, allowed: an integer, 1 to 1000",
+        ),
+    ],
+)
+def test_values_that_would_take_all_time_or_memory_name_their_option(
+    urmpipe: RunCommand, line: str, said: str
+) -> None:
+    logs = {"LOG": str(LOGS / "matlab.csv"), "PATH": str(LOGS / "path.csv")}
+    ran = urmpipe(*(logs.get(word, word) for word in line.split()))
+    option = "" if said.startswith("unit") else "--"
+    assert (ran.code, ran.out, ran.err) == (2, "", f"error: {option}{said}\n")
 
 
 @given(name=st.sampled_from(sorted(COMMANDS)), at=st.integers(0, 20))

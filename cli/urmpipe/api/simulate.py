@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -25,6 +24,9 @@ from urmpipe_pipeline.simulations.simulation import Simulation
 
 if TYPE_CHECKING:
     from urmpipe_fmus.cosim.system import System
+
+LONGEST = 1e9
+"""Times in [s] from this one on are none that integers of 64 bits hold in [ns]."""
 
 
 @public_reading(LogReading)
@@ -123,17 +125,17 @@ def own_logs(system: str) -> dict[str, str]:
 
 
 def _check_times(**given: float | None) -> None:
-    """Refuse times in [s] that are given and not positive.
+    """Refuse times in [s] that are given and not positive, or that integers of 64 bits do not hold in [ns].
 
     Raises:
         OptionError: With each of them.
     """
-    wrong = {name: value for name, value in given.items() if value is not None and not 0.0 < value < math.inf}
+    wrong = {name: value for name, value in given.items() if value is not None and not 0.0 < value < LONGEST}
     if wrong:
-        faults = (
-            Finding(parameter=name, found=f"{value:g} s", allowed="above 0") for name, value in wrong.items()
+        allowed = f"above 0, below {LONGEST:g}"
+        raise OptionError(
+            *(Finding(parameter=name, found=f"{value:g} s", allowed=allowed) for name, value in wrong.items())
         )
-        raise OptionError(*faults)
 
 
 def _files(system: System) -> list[Path]:

@@ -26,6 +26,10 @@ NANOSECOND = 1e-9
 """So much may be missing from a duration's last step: a log's times are rounded to nanoseconds."""
 
 
+MOST_STEPS = 10**8
+"""Most communication steps: a day of a millisecond each, which takes hours and 0.8 GB for the times alone."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class LogColumn:
     """A column of a log that an input follows.
@@ -209,18 +213,19 @@ def _count(step: float, length: float, faults: list[Finding]) -> int:
             )
         )
         return 0
+    another_end, another_step = (Hint(name, None, "sets another") for name in ("duration", "step"))
     if step < NANOSECOND:
-        faults.append(
-            Finding(f"found {step:g} s, allowed: from 1e-09 s, as times are in ns", about="system.step")
-        )
+        found = f"found {step:g} s, allowed: from 1e-09 s, as times are in ns"
+        faults.append(Finding(found, about="system.step", hints=(another_step,)))
+        return 0
+    if length / step > MOST_STEPS:
+        found = f"found {length:g} s in steps of {step:g} s, allowed: {MOST_STEPS:.0e} steps at most"
+        faults.append(Finding(found, about="system.duration", hints=(another_end, another_step)))
         return 0
     count = math.floor((length + NANOSECOND) / step)
     if count < 1:
-        faults.append(
-            Finding(
-                f"found {step:g} s, allowed: no more than the duration, {length:g} s", about="system.step"
-            )
-        )
+        found = f"found {step:g} s, allowed: no more than the duration, {length:g} s"
+        faults.append(Finding(found, about="system.step", hints=(another_step, another_end)))
     return count
 
 

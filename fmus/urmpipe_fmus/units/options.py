@@ -8,6 +8,10 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import UnitError, shown
 
 
+MOST = 1000
+"""Most of what an option counts: as many as the links of a robot; each adds variables, equations and C."""
+
+
 def an_arm(unit: str, value: Any) -> None:
     """Check the option of a robot.
 
@@ -22,10 +26,11 @@ def whole_number(unit: str, option: str, value: Any) -> int:
     """Return an option that counts something.
 
     Raises:
-        UnitError: If it is no integer of 1 or more.
+        UnitError: If it is no integer from 1 to `MOST`.
     """
-    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise UnitError(f"unit {unit}: option {option}: found {shown(value)}, allowed: an integer, 1 or more")
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST:
+        allowed = f"an integer, 1 to {MOST}"
+        raise UnitError(f"unit {unit}: option {option}: found {shown(value)}, allowed: {allowed}")
     return value
 
 

@@ -28,7 +28,7 @@ def repolarizer(joints: int) -> Unit:
         joints: The number of joints.
 
     Raises:
-        UnitError: If it is no integer of 1 or more.
+        UnitError: If it is no integer from 1 to 1000.
 
     Source: [UrmArm2021]_ eq. 15-18 with the corrections of the errata.
     """

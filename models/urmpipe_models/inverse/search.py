@@ -10,6 +10,10 @@ from numbers import Integral, Real
 from urmpipe_models.errors import Finding, shown
 
 
+MOST_RESTARTS = 10_000
+"""Most random starts: so many take minutes for one target already."""
+
+
 @dataclass(frozen=True, slots=True)
 class Search:
     """How far a search goes for what does not follow from the start.
@@ -34,9 +38,10 @@ class Search:
         elif self.tolerance is not None and not 0.0 < self.tolerance < math.inf:
             found = f"{self.tolerance:g} m"
             yield Finding(parameter="tolerance", found=found, allowed="more than 0, finite")
-        for name, value in (("restarts", self.restarts), ("seed", self.seed)):
-            if not isinstance(value, Integral) or value < 0:
-                yield Finding(parameter=name, found=shown(value), allowed="a whole number, 0 or more")
+        for name, value, most in (("restarts", self.restarts, MOST_RESTARTS), ("seed", self.seed, math.inf)):
+            if not isinstance(value, Integral) or not 0 <= value <= most:
+                allowed = "a whole number, 0 or more" if most == math.inf else f"a whole number, 0 to {most}"
+                yield Finding(parameter=name, found=shown(value), allowed=allowed)
 
 
 USUAL_SEARCH = Search()

@@ -33,7 +33,7 @@ RESTARTS = 2000
 BATCH, ENTRIES = 500, 2e7
 """Starts that are followed side by side, fewer where their Jacobians together have more entries."""
 
-MOST = 200_000
+MOST_STARTS = 200_000
 """Starts of a search at most, and assemblies that it may find: more are a continuum."""
 
 MANY = 1000
@@ -147,7 +147,7 @@ def _search(
     """Try random starts, and return how many starts were tried, and why the search ended."""
     mechanism, rng = found.mechanism, np.random.default_rng(seed)
     tried = in_vain = 0
-    while in_vain < restarts and tried < MOST and len(found.kept) < MANY:
+    while in_vain < restarts and tried < MOST_STARTS and len(found.kept) < MANY:
         together = max(1, int(ENTRIES / len(found.start) ** 2))
         count = min(BATCH, together, restarts - in_vain)
         starts = _random_starts(mechanism, found.start, count, rng)

@@ -46,6 +46,9 @@ UPRIGHT = np.radians(85.0)
 ENOUGH = {"poses": 30, "paths": 10}
 """Cycles that the standard takes."""
 
+MOST_PLANES = 10_000
+"""Most planes: they then stand closer than the rows of any cycle, and each is sought in every cycle."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IsoOptions:
@@ -69,8 +72,9 @@ class IsoOptions:
 
     def __post_init__(self) -> None:
         faults = []
-        if self.planes < 1:
-            faults.append(Finding(parameter="planes", found=str(self.planes), allowed="1 or more"))
+        if not 1 <= self.planes <= MOST_PLANES:
+            allowed = f"a whole number, 1 to {MOST_PLANES}"
+            faults.append(Finding(parameter="planes", found=str(self.planes), allowed=allowed))
         if not 0.0 < self.band < np.inf:
             faults.append(Finding(parameter="band", found=f"{self.band:g}", allowed="a positive length in m"))
         if faults:

@@ -12,7 +12,7 @@ from numbers import Integral, Real
 from urmpipe_models.display import number_of
 from urmpipe_models.errors import Finding, OptionError, for_each, shown
 from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
-from urmpipe_models.networks.assembly import RESTARTS, Assembled, assemble
+from urmpipe_models.networks.assembly import MOST_STARTS, RESTARTS, Assembled, assemble
 from urmpipe_models.networks.findings import Mobility
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.mobility import mobility_of, stuck_controls
@@ -56,9 +56,10 @@ class Search:
                 yield Finding(
                     parameter="controls", found=f"{name} = {shown(value)}", allowed="a finite number"
                 )
-        for key, count in (("restarts", self.restarts), ("seed", self.seed)):
-            if not isinstance(count, Integral) or count < 0:
-                yield Finding(parameter=key, found=shown(count), allowed="a whole number, 0 or more")
+        for key, count, most in (("restarts", self.restarts, MOST_STARTS), ("seed", self.seed, math.inf)):
+            if not isinstance(count, Integral) or not 0 <= count <= most:
+                allowed = "a whole number, 0 or more" if most == math.inf else f"a whole number, 0 to {most}"
+                yield Finding(parameter=key, found=shown(count), allowed=allowed)
 
 
 def find_network(

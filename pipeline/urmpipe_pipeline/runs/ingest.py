@@ -35,6 +35,9 @@ from urmpipe_pipeline.sources.read import read_numbers
 QUANTISED_DIGITS = 5
 """Joint values with this many significant digits or fewer are differentiated with smoothing."""
 
+SHORTEST_TSP = 1e-9
+"""Times of a log are whole nanoseconds."""
+
 LONGEST_TSP = 1e9
 """Periods in [s] from this one on are no times that integers of 64 bits hold in [ns]."""
 
@@ -150,8 +153,8 @@ def _of_poses(log: JointLog, robot: Chain | None, made: Provenance, told: Sequen
 
 def _refuse_senseless(tsp: float | None, derivative: str | None) -> None:
     """Raise an `OptionError` for a period or a method that makes no sense."""
-    if tsp is not None and not 0 < tsp < LONGEST_TSP:
-        allowed = f"a positive time below {LONGEST_TSP:g} s"
+    if tsp is not None and not SHORTEST_TSP <= tsp < LONGEST_TSP:
+        allowed = f"a time from {SHORTEST_TSP:g} s to below {LONGEST_TSP:g} s"
         raise OptionError(Finding(parameter="tsp", found=f"{tsp:g} s", allowed=allowed))
     if derivative is not None:
         check_choice("derivative", derivative, get_args(Method))
