@@ -7,6 +7,7 @@ is LOW:HIGH, True a flag, and None what the reader is to fill in.
 from __future__ import annotations
 
 import json
+import re
 import shlex
 import sys
 from collections.abc import Iterator, Mapping
@@ -38,6 +39,7 @@ _OWN: Mapping[str, Any] = {
     "robot": Own("NAME|FILE"),
     "rotation": Own("FORM"),
     "source": Own("NAME"),
+    "step": Own("SECONDS"),
     "sync": Own("SECONDS"),
     "time": Own("COLUMN"),
     "tip_link": Own("LINK"),
@@ -69,8 +71,14 @@ IN_FILE = {**IN_MAP, "log_map": "map", "robot": "robot"}
 ARGUMENTS = ("path",)
 """Parameters that the command line takes without an option, by their names in capitals."""
 
-_PARTING = frozenset(" \t'&()[]{},;=@#$`^!+%~|<>")
+_QUOTES = "'\u2018\u2019\u201a\u201b"
+"""What PowerShell takes for a single quote."""
+
+_PARTING = frozenset(_QUOTES + " \t\"\u201c\u201d\u201e&()[]{},;=@#$`^!+%~|<>")
 """What PowerShell or cmd reads as more than a letter of a word."""
+
+_BARE = re.compile("[A-Za-z0-9_-]+")
+"""A key of TOML that needs no quotes."""
 
 
 IN_NO_FILE = ("repair", "skip_bad", "derivative", "tsp")
@@ -149,7 +157,7 @@ def _in_file(parameter: str, value: Any) -> str:
     key = IN_FILE[parameter]
     if not isinstance(value, Mapping):
         return f"{key} = {_in_toml(value)}"
-    paths = (f"{key}.{name if name.isidentifier() else _quoted(name)}" for name in value)
+    paths = (f"{key}.{name if _BARE.fullmatch(name) else _quoted(name)}" for name in value)
     return ", ".join(f"{path} = {_in_toml(one)}" for path, one in zip(paths, value.values(), strict=True))
 
 
@@ -161,8 +169,12 @@ def _in_toml(value: Any) -> str:
 
 
 def _quoted(text: str) -> str:
-    """Return a text in the quotes of Python and TOML."""
-    return json.dumps(text, ensure_ascii=False)
+    """Return a text in the quotes of Python and TOML, with escapes of both for what is not printable."""
+    return _escaped(json.dumps(text, ensure_ascii=False))
+
+
+def _escaped(text: str) -> str:
+    return "".join(one if one.isprintable() else f"\\U{ord(one):08x}" for one in text)
 
 
 def pasted(word: object, platform: str = sys.platform) -> str:
@@ -170,9 +182,21 @@ def pasted(word: object, platform: str = sys.platform) -> str:
 
     Args:
         word: Such as the path of a file.
-        platform: As `sys.platform` tells it: on Windows a backslash parts folders and is not quoted.
+        platform: As `sys.platform` tells it: on Windows the shell is PowerShell, where a backslash parts
+            folders and is not quoted; elsewhere what is not printable stands in the $'...' of bash and zsh.
     """
     said = str(word)
-    if platform != "win32":
+    if platform == "win32":
+        quoted = re.sub(f"[{_QUOTES}]", lambda quote: 2 * quote[0], said)
+        return f"'{quoted}'" if not said or set(said) & _PARTING else said
+    if said.isprintable():
         return shlex.quote(said)
-    return f'"{said}"' if not said or set(said) & _PARTING else said
+    inner = said.replace("\\", "\\\\").replace("'", "\\'")
+    return f"$'{_escaped(inner)}'"
+
+
+def python_command(code: str) -> str:
+    """Return the command that runs a line of Python, in which texts stand as `repr` writes them."""
+    if sys.platform != "win32" and not set(code) & {'"', "\\"}:
+        code = code.replace("'", '"')  # in the single quotes of a shell it reads more easily so
+    return f"python -c {pasted(code)}"

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+import os
+import shlex
+import shutil
+import subprocess
+import tomllib
+from typing import Any, get_args
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
-from urmpipe_models.messages import Finding, Hint
+from urmpipe_models.messages import Finding, Hint, one_line
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import LogWarning
 
@@ -50,6 +57,28 @@ def test_a_value_is_spelled_by_its_type(hint: Hint, option: str, keyword: str, k
     assert hint.spelled("command line") == option
     assert hint.spelled("python") == keyword
     assert hint.spelled("system file") == key
+
+
+@given(name=st.text(min_size=1, max_size=9))
+@example("größe $HOME; 'a' \"b\" `c` \u2019")
+@example("q1\xa0\n\x7f\u2028")
+def test_any_name_in_a_hint_is_read_back_by_who_reads_the_voice(name: str) -> None:
+    hint = Hint("unit", {name: "deg"})
+    assert eval(f"dict({hint.spelled('python')})") == {"unit": {name: "deg"}}  # it is Python
+    assert tomllib.loads(hint.spelled("system file")) == {"units": {name: "deg"}}
+    if name.isprintable():
+        assert shlex.split(hint.spelled("command line")) == ["--unit", f"{name}=deg"]
+    for voice in get_args(Voice):  # printing leaves them as they are
+        assert one_line(hint.spelled(voice)) == hint.spelled(voice)
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+def test_a_shell_reads_a_name_that_is_not_printable() -> None:
+    name = "q1\xa0$HOME'\n\u2028\\n;"
+    spelled = Hint("time", name).spelled("command line")
+    shell = ["bash", "-c", f"printf %s {spelled.removeprefix('--time ')}"]
+    done = subprocess.run(shell, capture_output=True, env={**os.environ, "LC_ALL": "C.UTF-8"}, check=True)
+    assert done.stdout.decode() == name
 
 
 HINTS = (

@@ -81,11 +81,15 @@ def test_a_share_is_never_rounded_to_none_or_all_of_it(share: float, written: st
     ("word", "elsewhere", "on_windows"),
     [
         ("log.csv", "log.csv", "log.csv"),
-        ("weld path.csv", "'weld path.csv'", '"weld path.csv"'),
-        ("run(2).rrd", "'run(2).rrd'", '"run(2).rrd"'),
+        ("weld path.csv", "'weld path.csv'", "'weld path.csv'"),
+        ("run(2).rrd", "'run(2).rrd'", "'run(2).rrd'"),
         (r"logs\run.rrd", r"'logs\run.rrd'", r"logs\run.rrd"),
-        ("it's.csv", """'it'"'"'s.csv'""", '"it\'s.csv"'),
-        ("", "''", '""'),
+        ("it's.csv", """'it'"'"'s.csv'""", "'it''s.csv'"),
+        ("a\u2019b", "'a\u2019b'", "'a\u2019\u2019b'"),
+        ("$HOME;x", "'$HOME;x'", "'$HOME;x'"),
+        ("größe", "'größe'", "größe"),
+        ("q1\xa0'", "$'q1\\U000000a0\\''", "'q1\xa0'''"),
+        ("", "''", "''"),
     ],
 )
 def test_a_word_is_quoted_where_a_shell_would_part_it(word: str, elsewhere: str, on_windows: str) -> None:

@@ -90,6 +90,7 @@ def _print(run: Run, explain: bool, replaces: bool, options: Mapping[str, Any]) 
     """Print what was found in a log, and what was written."""
     from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
+    from urmpipe_models.spelling import pasted
     from urmpipe_pipeline.results import present
     from urmpipe_pipeline.text import counted
 
@@ -99,7 +100,7 @@ def _print(run: Run, explain: bool, replaces: bool, options: Mapping[str, Any]) 
     if audit := options["audit"]:
         say(f"Audit: {audit}  ({counted(len(run.audit), 'line')})")
     if written := options["write_map"]:
-        say(f"Map: {written}  (use it: urmpipe ingest LOG --map {written})")
+        say(f"Map: {written}  (use it: urmpipe ingest LOG --map {pasted(written)})")
 
 
 def default_name(logs: tuple[Path, ...]) -> str:

@@ -11,6 +11,7 @@ from urmpipe.options.completion import columns, units, words
 from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.types import DURATION, ROBOT, FileType, NamesType, OffsetType, OneOf
 from urmpipe_models.errors import shown
+from urmpipe_models.spelling import pasted
 
 FORMS = ["vector", "rpy", "zyx", "xyz", "zyz", "zxz", "quat_xyzw", "quat_wxyz", "matrix"]
 """Forms of a recorded orientation (a test compares them with those of the models)."""
@@ -32,7 +33,7 @@ def _units(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
         column, _, unit = value.rpartition("=")
         several = value.split(",")
         if len(several) > 1 and all("=" in one for one in several):
-            apart = " ".join(f"--unit {one.strip()}" for one in several)
+            apart = " ".join(f"--unit {pasted(one.strip())}" for one in several)
             raise click.BadParameter(f"found {value!r}, allowed: one COLUMN=UNIT per option: {apart}")
         if units.setdefault(column, unit) != unit:
             found = f"found {units[column]} and {unit} {f'for {column}' if column else 'without a column'}"

@@ -62,7 +62,9 @@ def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
         installed, here = Path(sys.executable).parent / command, Path.cwd()
         command = str(installed.relative_to(here) if installed.is_relative_to(here) else installed)
     earlier = "; it replaced an earlier one" if replaced else ""
-    say(f"Recording: {recording}  (open it: {pasted(command)} view {pasted(recording)}{earlier})")
+    called = pasted(command)
+    called = f"& {called}" if sys.platform == "win32" and called != command else called  # PowerShell's call
+    say(f"Recording: {recording}  (open it: {called} view {pasted(recording)}{earlier})")
 
 
 def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.errors import shown
+from urmpipe_models.spelling import pasted
 from urmpipe_pipeline.recording.array_form import ArrayOf, CodecError, In
 from urmpipe_pipeline.recording.codec import decode
 from urmpipe_pipeline.recording.forms import form_of
@@ -95,7 +96,7 @@ def _again(document: dict[str, Any]) -> str:
     """Return how to make a recording again: by which command, as far as its metadata tell."""
     try:
         made = document["result"]["provenance"]
-        inputs = " ".join(one["name"] for one in made["inputs"])
+        inputs = " ".join(pasted(one["name"]) for one in made["inputs"])
         return f": urmpipe {made['command']} {inputs} and its options"
     except (KeyError, TypeError):
         return " from what it was made of"

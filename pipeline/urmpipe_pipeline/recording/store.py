@@ -16,6 +16,7 @@ from urmpipe_models.arrays import IntArray
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_models.files.contents import other_than_file
 from urmpipe_models.files.missing import meant_by
+from urmpipe_models.spelling import pasted
 from urmpipe_pipeline.recording.identity import APPLICATION_ID, is_recording, open_reader, our_entries
 from urmpipe_pipeline.recording.trial import recording_abort
 
@@ -154,7 +155,7 @@ class Store:
         except (RuntimeError, ValueError) as error:
             raise self.error(
                 "found a recording that was cut off (no footer), allowed: a whole one;"
-                f" what is left of it can be looked at after: rerun rrd optimize {self.path} -o mended.rrd"
+                f" what is left of it can be looked at after: rerun rrd optimize {pasted(self.path)} -o mended.rrd"
             ) from error
 
     def _metadata(self) -> str:

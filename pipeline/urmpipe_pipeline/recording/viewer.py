@@ -170,7 +170,7 @@ def _shown(process: subprocess.Popen[bytes], url: str, path: Path, opening: Open
     how = f"did not answer within {PATIENCE:.0f} s" if code is None else f"ended with exit code {code}"
     raise ViewerError(
         f"the viewer {how}, allowed: a display and a graphics driver that it can use; to see its messages:"
-        f" {_program()} {path}"
+        f" {pasted(_program())} {pasted(path)}"
     )
 
 

@@ -9,6 +9,7 @@ import lzma
 import os
 import pickle
 import re
+import shlex
 import shutil
 import struct
 import subprocess
@@ -32,6 +33,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from asserting import refusal
 from urmpipe_models.errors import LogError
+from urmpipe_models.spelling import python_command
 from urmpipe_pipeline.sources import ReadOptions, read_log
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
@@ -255,20 +257,19 @@ def test_numpy_files_are_read(tmp_path: Path) -> None:
 
 def test_arrays_of_different_lengths(tmp_path: Path) -> None:
     """Demonstrations in one archive: the command keeps the first of them."""
-    path = tmp_path / "log.npz"
+    path = tmp_path / "it's $HOME.npz"
     parts = {"demo_0/q": Q, "demo_0/t": T, "demo_1/q": Q[:9], "demo_1/t": T[:9]}
     np.savez(path, **parts)
-    command = (
-        f"python -c \"import numpy; f = numpy.load('{path}'); numpy.savez('table.npz',"
-        " **{k: f[k] for k in f if k.startswith('demo_0/')})\""
+    command = python_command(
+        f"import numpy; f = numpy.load({str(path)!r}); numpy.savez('log.npz',"
+        " **{k: f[k] for k in f if k.startswith('demo_0/')})"
     )
     assert refusal(LogError, read_log, [path]) == (
         f"{path}: found demo_0/q (60, 6), demo_0/t (60,), demo_1/q (9, 6), demo_1/t (9,), allowed: arrays"
         f" of one length; to keep those of one length: {command}"
     )
-    argument = command.removeprefix('python -c "').removesuffix('"')
-    subprocess.run([sys.executable, "-c", argument], cwd=tmp_path, check=True)
-    np.testing.assert_array_equal(read_log([tmp_path / "table.npz"]).q, Q)
+    subprocess.run([sys.executable, *shlex.split(command)[1:]], cwd=tmp_path, check=True)
+    np.testing.assert_array_equal(read_log([tmp_path / "log.npz"]).q, Q)
 
 
 @pytest.mark.parametrize("name", ["a.npy", "a.npz"])

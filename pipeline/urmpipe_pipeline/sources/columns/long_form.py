@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
+from urmpipe_models.spelling import python_command
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.tables.sniff import Layout
 
@@ -54,4 +55,4 @@ def _command(joint: Column, name: Column, time: Column, layout: Layout) -> str:
     comma = ", decimal=','" if layout.decimal == "," else ""
     turned = f"index={time.header!r}, columns={name.header!r}, values={joint.header!r}"
     read = f"pandas.read_{kind}({layout.segment.path.name!r}{sign}{comma})"
-    return f"python -c \"import pandas; {read}.pivot({turned}).to_csv('table.csv')\""
+    return python_command(f"import pandas; {read}.pivot({turned}).to_csv('table.csv')")

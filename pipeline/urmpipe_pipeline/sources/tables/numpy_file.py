@@ -19,6 +19,7 @@ import pyarrow as pa
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
+from urmpipe_models.spelling import python_command
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.tables.held import Held
 from urmpipe_pipeline.sources.tables.limits import refuse_unpacked, refuse_wide
@@ -159,9 +160,9 @@ def _no_table(path: Path, arrays: Mapping[str, Array | None]) -> Finding:
     if (shown := ", ".join(shapes)) or "" not in arrays:
         allowed = "numbers in one or two dimensions, one row per sample"
         return Finding(file=str(path), found=shown or "no array of numbers", allowed=allowed)
-    command = (
-        f"python -c \"import numpy; numpy.savez('{_written(path)}',"
-        f" **dict(numpy.load('{path.as_posix()}', allow_pickle=True).item()))\""
+    command = python_command(
+        f"import numpy; numpy.savez({_written(path)!r},"
+        f" **dict(numpy.load({path.as_posix()!r}, allow_pickle=True).item()))"
     )
     hint = Hint("", does=f"only if you trust it, since loading it runs its code: {command}")
     return Finding(file=str(path), found="a Python object", allowed="arrays of numbers", hints=(hint,))
@@ -189,12 +190,12 @@ def _refuse_lengths(path: Path, tables: Mapping[str, Array]) -> None:
     keep = f"len(f[k]) == {lengths.most_common(1)[0][0]}"
     wide = next((name for name, array in tables.items() if array.ndim == 2 and "/" in name), "")
     folder = next((one for one in _folders(wide) if len(_lengths_in(one, tables)) == 1), None)
-    keep = keep if folder is None else f"k.startswith('{folder}')"
+    keep = keep if folder is None else f"k.startswith({folder!r})"
     if folder is None:
         keep = f"f[k].ndim and {keep}"
-    command = (
-        f"python -c \"import numpy; f = numpy.load('{path.as_posix()}');"
-        f" numpy.savez('{_written(path)}', **{{k: f[k] for k in f if {keep}}})\""
+    command = python_command(
+        f"import numpy; f = numpy.load({path.as_posix()!r});"
+        f" numpy.savez({_written(path)!r}, **{{k: f[k] for k in f if {keep}}})"
     )
     hint = Hint("", does=f"to keep those of one length: {command}")
     raise LogError(Finding(file=str(path), found=shown + more, allowed="arrays of one length", hints=(hint,)))
