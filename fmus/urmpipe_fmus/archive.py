@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
+from urmpipe_models.files.contents import keep_permissions
+
 EARLIEST = (1980, 1, 1, 0, 0, 0)
 """The time of every entry: zip knows none before."""
 
@@ -40,6 +42,7 @@ def write_fmu(path: Path, files: Mapping[str, bytes]) -> None:
         with zipfile.ZipFile(part, "x") as archive:
             for name in sorted(files):
                 archive.writestr(_entry(name), files[name])
+        keep_permissions(part, path)
         part.replace(path)
     finally:
         with suppress(OSError):  # why it cannot be written is told

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from urmpipe_models.errors import Finding, OutputError
+from urmpipe_models.files.contents import keep_permissions
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,8 @@ def placed(path: Path) -> Iterator[Path]:
     """Give a place to write a file to, and put it in its own place once it is written.
 
     The place is a new name with the suffix .part in the same folder, and nothing is there yet. It is renamed
-    to `path` if the body succeeds, and removed if it fails; an existing file is untouched until the rename.
+    to `path` if the body succeeds, and removed if it fails; an existing file is untouched until the rename,
+    and gives its permissions to the new one.
     Within `all_or_none` it is renamed at the end of that.
 
     Raises:
@@ -51,6 +53,7 @@ def placed(path: Path) -> Iterator[Path]:
         pending.append(Pending(part, path))
         with _named(path):
             yield part
+            keep_permissions(part, path)
             part.stat()
 
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import csv
+import itertools
 import json
+import os
+import stat
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -26,6 +29,28 @@ from urmpipe_pipeline.comparison.deviation import Statistics
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a reference and three logs: within tolerance, a little worse, and out of it."""
     return lay_logs(tmp_path, monkeypatch)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name == "nt", reason="Windows knows one permission")
+def test_a_replaced_output_keeps_its_permissions_and_a_new_one_has_the_usual() -> None:
+    lines = [
+        "compare reference.csv good.csv -o a.rrd --csv a.csv --junit a.xml",
+        "report a.rrd -o a.html",
+        "robot export urm6 -o a.urdf",
+        "fmu build repolarizer -s joints=1 --backend python -o a.fmu",
+    ]
+    Path("usual").touch()
+    usual, outputs = Path("usual").stat().st_mode, ["a.rrd", "a.csv", "a.xml", "a.html", "a.urdf", "a.fmu"]
+    assert [run([*line.split(), "-q"]) for line in lines] == [0] * 4
+    assert {Path(name).stat().st_mode for name in outputs} == {usual}
+    modes = dict(zip(outputs, itertools.cycle((0o640, 0o600, 0o664)), strict=False))
+    for name, mode in modes.items():
+        Path(name).chmod(mode)
+    before = {name: Path(name).stat().st_ino for name in outputs}
+    assert [run([*line.split(), "-q"]) for line in lines] == [0] * 4
+    assert {name: stat.S_IMODE(Path(name).stat().st_mode) for name in outputs} == modes
+    assert all(Path(name).stat().st_ino != number for name, number in before.items())
 
 
 @pytest.mark.slow

@@ -1,9 +1,10 @@
-"""Files that describe something: read whole, and only if they are files of a size that people write."""
+"""Files that describe something, read whole if they are of a size that people write; what is no file; permissions."""
 
 from __future__ import annotations
 
 import stat
 from collections.abc import Collection
+from contextlib import suppress
 from pathlib import Path
 
 from urmpipe_models.errors import Finding, UrmpipeError, shown
@@ -55,6 +56,18 @@ def other_than_file(mode: int) -> str:
         mode: Its `st_mode`; of a file nothing is returned.
     """
     return _OTHERS.get(stat.S_IFMT(mode), "")
+
+
+def keep_permissions(part: Path, path: Path) -> None:
+    """Give a file the permissions of the one that it is to replace; without one it keeps those it has.
+
+    Raises:
+        OSError: If they cannot be set.
+    """
+    with suppress(FileNotFoundError):
+        wanted = stat.S_IMODE(path.stat().st_mode)
+        if wanted != stat.S_IMODE(part.stat().st_mode):
+            part.chmod(wanted)
 
 
 def is_there(path: Path) -> bool:

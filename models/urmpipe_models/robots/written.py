@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 from urmpipe_models.errors import Finding, OutputError
+from urmpipe_models.files.contents import keep_permissions
 
 EXPORT_MARK = "urmpipe robot export"
 """Stands in a comment at the top of every robot file that urmpipe wrote."""
@@ -51,7 +53,10 @@ def replace_text(path: Path, text: str) -> None:
     part = path.with_name(f"{path.name}.part")
     try:
         part.write_bytes(text.encode())
+        keep_permissions(part, path)
         part.replace(path)
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise OutputError(Finding(f"cannot be written: {error.strerror}", str(path))) from error
+    finally:
+        with suppress(OSError):  # why it cannot be written is told
+            part.unlink(missing_ok=True)
