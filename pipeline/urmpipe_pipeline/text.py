@@ -10,6 +10,7 @@ import numpy as np
 
 from urmpipe_models.arrays import IntArray
 from urmpipe_models.measure_units import factor, units_of
+from urmpipe_models.messages import inert
 
 NOTHING = "–"
 """Stands where there is no value."""
@@ -199,3 +200,17 @@ def exact(value: Any) -> str:
 def encodable(value: str) -> str:
     """Return a text without the lone surrogates that stand for undecodable bytes of a file name."""
     return value.encode("utf-8", "replace").decode("utf-8")
+
+
+_FORMULA = ("=", "+", "-", "@")
+"""How a cell begins that a spreadsheet takes for a formula, and runs (OWASP, CSV Injection)."""
+
+
+def csv_text(text: str) -> str:
+    """Return a text as a cell of CSV: on one line, behind an apostrophe where a spreadsheet would run it."""
+    return f"'{inert(text)}" if text.startswith(_FORMULA) else inert(text)
+
+
+def without_apostrophe(cell: str) -> str:
+    """Return a cell without the apostrophe of `csv_text`."""
+    return cell[1:] if cell.startswith(tuple(f"'{sign}" for sign in _FORMULA)) else cell

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -214,3 +216,27 @@ def test_the_signals_of_a_simulation_come_back_or_are_asked_for(
 def test_the_tip_of_a_simulated_arm_comes_back(simulated: tuple[str, Simulation], tmp_path: Path) -> None:
     urmpipe.export(simulated[1], output=tmp_path / "a.tum")
     assert_path(tmp_path / "a.tum", *written(tmp_path / "a.tum"))
+
+
+@pytest.mark.slow
+def test_names_that_a_spreadsheet_would_run_leave_behind_an_apostrophe_and_come_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    names = ["=q1", "-q2", "@q3", "+q4", "q5", '=HYPERLINK("http://x")']
+    lines = (LOGS / "matlab.csv").read_text(encoding="utf-8").splitlines()[1:ROWS]
+    with Path("=log.csv").open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file).writerow(["t", *names])
+        file.write("\n".join(lines) + "\n")
+    told: Any = {"robot": "urm6", "unit": "rad"}
+    log = urmpipe.ingest("=log.csv", joints=names, output="log.rrd", audit="audit.csv", **told)
+    assert log.q.min() < 0.0  # whose signs are none of a text
+    urmpipe.compare("=log.csv", log, joints=names, csv="statistics.csv", **told)
+    urmpipe.export("log.rrd", "file.csv", rows="file")
+    urmpipe.export("log.rrd", "grid.csv")
+    for file in Path().glob("[!=]*.csv"):
+        for cell in (cell for row in csv.reader(file.open(encoding="utf-8", newline="")) for cell in row):
+            assert cell[:1] not in tuple("=+-@") or re.fullmatch(r"-[0-9.e-]+", cell), (file, cell)
+    again = urmpipe.ingest("file.csv", joints=names, **told)
+    np.testing.assert_array_equal(again.q, log.q)
+    assert again.log.joints == log.log.joints == urmpipe.ingest("grid.csv", "urm6").log.joints

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.messages import inert
 from urmpipe_pipeline.outputs import EXPORT_HEADER
 from urmpipe_pipeline.presentation.exports import ExportTable, Poses, Times
 from urmpipe_pipeline.tables.times import text_of
+from urmpipe_pipeline.text import csv_text
 
 SLICE = 65_536
 """Rows written at a time: few enough to keep memory low."""
@@ -93,9 +93,9 @@ def differences(path: Path, head: str, columns: Sequence[Any], delimiter: str) -
 
 
 def quoted(cell: str) -> str:
-    """Return a text as a cell of a CSV file, on one line and quoted where it must be."""
+    """Return a text as a cell of a CSV file, see `csv_text`, quoted where it must be."""
     text = io.StringIO()
-    csv.writer(text, lineterminator="").writerow([inert(cell)])
+    csv.writer(text, lineterminator="").writerow([csv_text(cell)])
     return text.getvalue()
 
 
@@ -132,7 +132,7 @@ def _holds(line: str, columns: Sequence[Any], row: int, delimiter: str) -> bool:
 
 def _same(cell: str, value: Any) -> bool:
     if isinstance(value, str):
-        return cell == inert(value)
+        return cell == csv_text(value)
     try:
         return float(cell or "nan") == value or (cell == "" and bool(np.isnan(value)))
     except ValueError:

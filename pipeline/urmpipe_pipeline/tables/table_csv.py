@@ -6,9 +6,8 @@ import csv
 from pathlib import Path
 
 from urmpipe_models.errors import Finding, OutputError
-from urmpipe_models.messages import inert
 from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Table, Value
-from urmpipe_pipeline.text import exact
+from urmpipe_pipeline.text import csv_text, exact
 
 
 def write_table(table: Table, part: Path, path: Path) -> None:
@@ -21,7 +20,7 @@ def write_table(table: Table, part: Path, path: Path) -> None:
         OutputError: If it did not read back as it was written.
     """
     cells = zip(*(map(_cell, column.cells) for column in table.columns), strict=True)
-    rows = [list(map(inert, row)) for row in ([column.key for column in table.columns], *cells)]
+    rows = [[csv_text(column.key) for column in table.columns], *map(list, cells)]
     with part.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file:
         csv.writer(file, lineterminator="\n").writerows(rows)
     with part.open(encoding="utf-8", errors="surrogateescape", newline="") as file:
@@ -36,10 +35,10 @@ def _cell(cell: Cell) -> str:
         case Judged():
             return cell.verdict or ""
         case Ref():
-            return cell.title
+            return csv_text(cell.title)
         case Place():
             return " ".join(map(exact, cell.position))
         case Advice():
-            return cell.words
+            return csv_text(cell.words)
         case _:
-            return cell or ""
+            return csv_text(cell or "")

@@ -31,7 +31,7 @@ from urmpipe_pipeline.sources.tables.form import Form
 from urmpipe_pipeline.sources.tables.header_lines import header_of, numbered, only_count
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.text import FEWEST_LINES, HeadLine, Segment, head_lines
-from urmpipe_pipeline.text import counted
+from urmpipe_pipeline.text import counted, without_apostrophe
 
 LEAST_FIT = 0.2
 """A delimiter that fits less than this is not believed because it makes several columns."""
@@ -332,7 +332,7 @@ def _names(
         names = tuple(str(k + 1) for k in range(width - trailing))
         said = Inference("header", "none", "the first line is numbers: columns by number")
         return names + ("",) * trailing, said
-    line, cells = header
+    line, cells = header[0], [without_apostrophe(cell) for cell in header[1]]
     found = Inference("header", f"line {line}", "the last line of names before the numbers")
     if len(cells) == width:
         return tuple(cells), found
