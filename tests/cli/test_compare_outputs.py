@@ -35,7 +35,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.skipif(os.name == "nt", reason="Windows knows one permission")
 def test_a_replaced_output_keeps_its_permissions_and_a_new_one_has_the_usual() -> None:
     lines = [
-        "compare reference.csv good.csv -o a.rrd --csv a.csv --junit a.xml",
+        "compare wanted.csv good.csv --robot ur5e -o a.rrd --csv a.csv --junit a.xml",
         "report a.rrd -o a.html",
         "robot export urm6 -o a.urdf",
         "fmu build repolarizer -s joints=1 --backend python -o a.fmu",
