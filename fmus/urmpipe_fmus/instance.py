@@ -18,6 +18,13 @@ from urmpipe_models.errors import UnitError
 STEP_SLACK = 1e-9
 """A step of n internal steps but for this share of one takes n of them: k h - (k-1) h is not quite h."""
 
+TIME_SLACK = 1e-6
+"""A communication point may differ by this share of the step from where the instance stands."""
+
+ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
+"""And by this share of itself, however short the step: start + k h is rounded here, in the master, and again
+in where the step before ended."""
+
 STOP_SLACK = 0.1
 """This share of a step past the stop time is what adding up steps may bring."""
 
@@ -100,13 +107,18 @@ class Instance:
             step: To the next one in [s], above 0.
 
         Raises:
-            UnitError: If the step is not above 0, goes past the stop time or is too long for its internal
-                steps, or a state is not finite after it; then nothing changed, but that what is fixed from
-                the first step on stays fixed.
+            UnitError: If the step is not above 0, does not begin where the instance stands, goes past the stop
+                time or is too long for its internal steps, or a state is not finite after it; then nothing
+                changed, but that what is fixed from the first step on stays fixed.
         """
         if not (math.isfinite(time + step) and step > 0.0):
             raise UnitError(
                 f"unit {self.unit.name}: found a step of {step:g} s at {time:g} s, allowed: finite, above 0"
+            )
+        if not abs(time - self.time) <= max(TIME_SLACK * step, ROUNDING * abs(time)):
+            raise UnitError(
+                f"unit {self.unit.name}: found a step from {time:.15g} s,"
+                f" allowed: from where it stands, {self.time:.15g} s"
             )
         if time + step - self.stop > STOP_SLACK * step:
             raise UnitError(

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
+from ctypes import c_double, c_void_p
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fmu_run import FmuRun
+from loaded_fmu import Loaded
 from made_masses import with_drives, with_masses
 from random_units import PATIENT, random_columns, random_starts, random_units
 from sliding_arm import sliding_arm, sprung_arm
@@ -27,6 +30,7 @@ from urmpipe_fmus.units import make_unit, unit_names
 from urmpipe_fmus.user_unit import load_unit_file
 from urmpipe_fmus.variable import Variable
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.errors import UnitError
 from urmpipe_models.robots.catalogue import load_robot
 
 Backend = Literal["native", "python"]
@@ -193,7 +197,7 @@ def test_an_fmu_gives_what_a_run_gives_and_goes_on_bit_by_bit_from_a_saved_state
         late = fmu.over(t[after], given(after))
         fmu.fmu.setFMUstate(state)
         again = fmu.over(t[after], given(after))
-        fmu.over(t[before] + 0.4, given(before))  # somewhere else
+        fmu.over(t[before] + t[-1], given(before))  # somewhere else
         fmu.fmu.setFMUstate(fmu.fmu.deSerializeFMUstate(kept))
         last = fmu.over(t[after], given(after))
     assert_same(np.concatenate((early, late[1:])), expected)
@@ -201,6 +205,46 @@ def test_an_fmu_gives_what_a_run_gives_and_goes_on_bit_by_bit_from_a_saved_state
     np.testing.assert_array_equal(again, late)
     np.testing.assert_array_equal(last, late)
     assert (np.ptp(late, axis=0) > 0.0).any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("backend", "status"), [("instance", None), pytest.param("native", 3, marks=needs_native), ("python", 2)]
+)
+def test_a_step_begins_where_the_unit_stands(backend: Any, status: int | None) -> None:
+    """To 1e-6 of it; else fmi2Error, and of pythonfmu's binary fmi2Discard, which is all that it has."""
+    for start, step in ((0.0, 0.25), (100.0, 1e-3)):
+        unit = unit_of("a load")
+        one: Any = Loaded(cached_fmu(unit, backend), start) if status else Instance(unit, start)
+        one.do_step(start + 0.9e-6 * step, step)
+        one.do_step(start + step, step)
+        own = start + 2.0 * step
+        for time in (start, start + step, own + 1.1e-6 * step, own - 1.1e-6 * step):
+            said = (
+                f"unit inertia: found a step from {time:.15g} s, allowed: from where it stands, {own:.15g} s"
+            )
+            with pytest.raises((UnitError, FMICallException)) as error:
+                one.do_step(time, step)
+            assert getattr(error.value, "status", None) == status
+            assert said == (one.log[-1][2] if status else str(error.value))
+        one.do_step(own, step)
+
+
+@pytest.mark.slow
+@needs_native
+@pytest.mark.parametrize(("start", "step"), [(0.0, 1e-3), (1.7e9, 1e-3), (0.1, 1.0 / 3.0)])
+def test_masters_that_add_up_steps_and_those_that_multiply_stay_where_the_unit_stands(
+    start: float, step: float
+) -> None:
+    fmu = Loaded(cached_fmu(unit_of("six joints"), "native"), start)
+    time, count = start, 100_000  # a million in C: native/test_runtime.py
+    state, call = fmu.fmu.getFMUstate(), partial(fmu.fmu.dll.fmi2DoStep, c_void_p(fmu.fmu.component))
+    for _ in range(count):
+        assert call(c_double(time), c_double(step), 1) == 0
+        time += step
+    fmu.fmu.setFMUstate(state)
+    for k in range(count):
+        assert call(c_double(start + k * step), c_double(step), 1) == 0
 
 
 @pytest.mark.slow

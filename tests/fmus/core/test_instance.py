@@ -162,8 +162,8 @@ def test_a_step_past_the_stop_time_is_refused() -> None:
     instance.do_step(0.4, 0.1001)  # what rounding may add
     before = everything(instance)
     with pytest.raises(UnitError) as error:
-        instance.do_step(0.5, 0.25)
-    assert str(error.value) == "unit mixed: found a step to 0.75 s, allowed: to the stop time, 0.5 s"
+        instance.do_step(0.5001, 0.25)
+    assert str(error.value) == "unit mixed: found a step to 0.7501 s, allowed: to the stop time, 0.5 s"
     assert everything(instance) == before
     instance.begin(0.5)
     instance.do_step(0.5, 0.25)
@@ -245,7 +245,7 @@ def test_a_step_is_divided_into_equal_internal_steps() -> None:
         (1.0, 0.35, 4),
     ):
         times.clear()
-        Instance(unit).do_step(time, step)
+        Instance(unit, time).do_step(time, step)
         h = step / count
         assert times == [
             t for k in range(count) for t in (time + k * h, *2 * (time + k * h + 0.5 * h,), time + k * h + h)

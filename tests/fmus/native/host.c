@@ -31,6 +31,7 @@ static void *symbol(const char *name) { return dlsym(library, name); }
 #define AT_ONCE 100
 
 static const char *guid, *resources;
+static double now; /* where the instance stands, s */
 
 static void told(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
                  fmi2String message, ...) {
@@ -45,7 +46,9 @@ static void told(fmi2ComponentEnvironment environment, fmi2String name, fmi2Stat
 
 static void step(fmi2Component me, char *rest) {
     double time = strtod(rest, &rest), size = strtod(rest, &rest);
-    printf("step %d\n", (int)((fmi2DoStepTYPE *)symbol("fmi2DoStep"))(me, time, size, fmi2True));
+    int status = (int)((fmi2DoStepTYPE *)symbol("fmi2DoStep"))(me, time, size, fmi2True);
+    if (status == fmi2OK) now = time + size;
+    printf("step %d\n", status);
 }
 
 static void get(fmi2Component me, char *rest) {
@@ -83,7 +86,7 @@ static void save_and_restore(fmi2Component me) {
     status |= ((fmi2SerializedFMUstateSizeTYPE *)symbol("fmi2SerializedFMUstateSize"))(me, state, &size);
     char *bytes = malloc(size);
     status |= ((fmi2SerializeFMUstateTYPE *)symbol("fmi2SerializeFMUstate"))(me, state, bytes, size);
-    status |= ((fmi2DoStepTYPE *)symbol("fmi2DoStep"))(me, 1000.0, 0.01, fmi2True);
+    status |= ((fmi2DoStepTYPE *)symbol("fmi2DoStep"))(me, now, 0.01, fmi2True);
     status |= ((fmi2DeSerializeFMUstateTYPE *)symbol("fmi2DeSerializeFMUstate"))(me, bytes, size, &again);
     status |= ((fmi2SetFMUstateTYPE *)symbol("fmi2SetFMUstate"))(me, again);
     status |= ((fmi2FreeFMUstateTYPE *)symbol("fmi2FreeFMUstate"))(me, &state);
@@ -92,13 +95,13 @@ static void save_and_restore(fmi2Component me) {
     printf("state %d %d\n", status, state == NULL && again == NULL);
 }
 
-/* Many steps, from time 0 on. */
+/* Many steps, whose sizes are added up. */
 static void steps(fmi2Component me, char *rest) {
     fmi2DoStepTYPE *do_step = (fmi2DoStepTYPE *)symbol("fmi2DoStep");
     long count = strtol(rest, &rest, 10);
     double size = strtod(rest, NULL);
     int status = 0;
-    for (long k = 0; k < count; k++) status |= do_step(me, (double)k * size, size, fmi2True);
+    for (long k = 0; k < count; k++, now += size) status |= do_step(me, now, size, fmi2True);
     printf("steps %d\n", status);
 }
 

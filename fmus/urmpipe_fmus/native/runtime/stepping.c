@@ -2,12 +2,15 @@
 /* A step through time: the rules are those of urmpipe's Instance in Python, and so is the order of operations. */
 #include "stepping.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
 #include "variables.h"
 
 #define STEP_SLACK 1e-9         /* a step of n internal steps but for this share of one takes n of them */
+#define TIME_SLACK 1e-6         /* a communication point may differ by this share of the step from the own time */
+#define ROUNDING (4.0 * DBL_EPSILON) /* and by this share of itself, however short the step: see instance.py */
 #define STOP_SLACK 0.1          /* this share of a step past the stop time is what adding up steps may bring */
 #define MOST_STEPS 2147483647.0 /* internal steps in a step */
 
@@ -62,6 +65,8 @@ static fmi2Status integrate(Instance *me, double time, double step) {
 fmi2Status take_step(Instance *me, double time, double step) {
     if (!isfinite(time + step) || step <= 0.0)
         return report(me, "found a step of %g s at %g s, allowed: finite, above 0", step, time);
+    if (!(fabs(time - me->state.time) <= fmax(TIME_SLACK * step, ROUNDING * fabs(time))))
+        return report(me, "found a step from %.15g s, allowed: from where it stands, %.15g s", time, me->state.time);
     if (time + step - me->stop > STOP_SLACK * step)
         return report(me, "found a step to %g s, allowed: to the stop time, %g s", time + step, me->stop);
     me->state.running = 1;
