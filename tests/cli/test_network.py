@@ -114,6 +114,27 @@ def test_a_control_is_set_and_held(urmpipe: Run) -> None:
     assert found["s"] == pytest.approx(way, abs=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("arguments", "kinds"),
+    [
+        ("solve four-bar --set crank=4.712", ["other-branch"]),
+        ("solve four-bar --set crank=0.9", []),
+        ("solve four-bar --set crank=4.712 --all --restarts 50", []),  # lists both
+        ("check four-bar --set crank=4.712", []),
+        ("solve four-bar", []),
+    ],
+)
+def test_a_control_away_from_its_start_may_lead_to_another_branch(
+    urmpipe: Run, arguments: str, kinds: list[str]
+) -> None:
+    ran = urmpipe("network", *arguments.split(), "--json")
+    told = json.loads(ran.out)
+    assert [one["kind"] for one in told["warnings"]] == kinds
+    assert ("crank = 4.712 (start 0.9)" in ran.err) == bool(kinds)
+    if "solve" in arguments and "4.712" in arguments:
+        assert told["assemblies"][0]["variables"]["B"] == pytest.approx(1.4597, abs=1e-4)
+
+
 def test_what_does_not_close_fails_with_its_loop_and_gap(urmpipe: Run, tmp_path: Path) -> None:
     (tmp_path / "longer.toml").write_text(bennett(1.05), encoding="utf-8")
     (tmp_path / "same.toml").write_text(bennett(1.0), encoding="utf-8")

@@ -87,7 +87,10 @@ def network_solve(
     output: PathLike | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> NetworkResult:
-    """Assemble a network with its controls held: near its start, or in every way there is.
+    """Assemble a network with its controls held: nearest to its start, or in every way there is.
+
+    A warning says if controls are away from their start: the nearest assembly may then be of another branch
+    than a motion from the start reaches.
 
     Args:
         network: A name, a file, the tables of one, or a `Network`.

@@ -114,8 +114,10 @@ def check(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
 def solve(name: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
     """Find the configuration nearest to the start in which a network closes, or with --all every one.
 
-    Controls keep their values. The command tries random starts if the start does not close; with --all it
-    ends after --restarts random starts without a new assembly.
+    Controls keep their values. The search begins at the start, and goes on at random places nearer to the
+    start than what it found; if the start does not close, anywhere. With --all it ends after --restarts
+    random starts without a new assembly. Away from the start of a control, the nearest assembly may be of
+    another branch than a motion from the start reaches.
 
     \b
     Examples:

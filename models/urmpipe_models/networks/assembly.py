@@ -11,13 +11,14 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import Finding, NetworkError
 from urmpipe_models.names import not_among
-from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.closure import closure_of, gap_of
 from urmpipe_models.networks.descent import Reached, descend
 from urmpipe_models.networks.findings import Assembly, Gap
 from urmpipe_models.networks.idle_spins import idle_spins, spinning_parts, unspun
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.mobility import mobility_at, mobility_nearby
 from urmpipe_models.networks.parts import POSE_UNITS
+from urmpipe_models.networks.rotations import rotation_of
 from urmpipe_models.networks.value_faults import value_faults
 
 CLOSED = 1e-9
@@ -26,6 +27,9 @@ CLOSED = 1e-9
 SAME = 1e-6
 """Assemblies whose bodies are nearer to each other, in lengths of the mechanism and in entries of their
 rotations, are one."""
+
+NEARER = 100
+"""So many starts about the network's own that find no assembly nearer to it end the search for the nearest."""
 
 RESTARTS = 2000
 """So many starts in a row that find nothing new end a search."""
@@ -79,14 +83,17 @@ def assemble(
 ) -> Assembled:
     """Return the assembly nearest to the start, or every one, with controls and idle spins held.
 
-    Every one is sought from random starts, until `restarts` of them in a row find nothing new. Where the
-    network's own start does not close, random ones are tried, too.
+    Near is the root of the squared differences of the free variables: angles by the shorter way round,
+    rotations by the angle between them, lengths over that of the mechanism. The nearest is sought from the
+    network's own start and from random ones that are nearer to it than what was found; every one from random
+    starts anywhere, until `restarts` of them in a row find nothing new. Where the network's own start does
+    not close, those are tried, too.
 
     Args:
         mechanism: The network.
         controls: Values to hold controls at instead of their starts.
         every: Whether all assemblies are sought.
-        restarts: Random starts in a row without anything new that end the search.
+        restarts: Random starts in a row without anything new that end the search; 0: the own start alone.
         seed: Of the random starts.
         progress: Called with the share that is done, 0..1.
 
@@ -97,18 +104,22 @@ def assemble(
     own = descend(mechanism, start[:, np.newaxis], mechanism.free)
     found = _Found(mechanism, start)
     closed = any(found.add(own))
-    continuum = _continuum(mechanism, own.x[:, 0]) if closed else 0
-    tried, reason = 1, "the start closes" if closed else "found one"
-    if (every and not continuum) or not closed:
-        tried, reason = _search(found, every, restarts, seed, progress)
-        if found.kept and not closed:
-            continuum = _continuum(mechanism, found.kept[0])
+    tried, reason = 1, "the start closes"
+    rng = np.random.default_rng(seed)
+    if not closed:
+        tried, reason = _search(found, False, restarts, rng, progress)
+    continuum = _continuum(mechanism, found.kept[0]) if found.kept else 0
+    if found.kept and not continuum:
+        tried += _seek_nearer(found, min(restarts, NEARER), seed)
+        if every:
+            more, reason = _search(found, True, restarts, rng, progress)
+            tried += more - 1
     if continuum and every:
         reason = (
             f"with its controls held the network still moves, with mobility {continuum}: the assembly nearest"
             " to the start is shown"
         )
-    return found.result(tried, reason, elsewhere=not closed and bool(found.kept), continuum=continuum)
+    return found.result(every, tried, reason, elsewhere=not closed and bool(found.kept), continuum=continuum)
 
 
 def start_with(mechanism: Mechanism, controls: Mapping[str, float]) -> FloatArray:
@@ -141,11 +152,33 @@ def start_with(mechanism: Mechanism, controls: Mapping[str, float]) -> FloatArra
     return start
 
 
+def _seek_nearer(found: _Found, count: int, seed: int) -> int:
+    """Try so many random starts nearer to the network's own than what was found, again after each success.
+
+    Returns:
+        How many starts were tried.
+    """
+    mechanism, rng, tried, before = found.mechanism, np.random.default_rng(seed), 0, math.inf
+    while count and (now := float(found.distances().min())) < before - SAME:
+        before, tried = now, tried + count
+        way = rng.normal(size=(len(mechanism.free), count))
+        way *= now * rng.uniform(size=count) / np.linalg.norm(way, axis=0)
+        starts = np.repeat(found.start[:, np.newaxis], count, axis=1)
+        starts[mechanism.free] += way * mechanism.column_scales[mechanism.free, np.newaxis]
+        for _ in found.add(descend(mechanism, starts, mechanism.free, patient=False)):
+            pass
+    return tried
+
+
 def _search(
-    found: _Found, every: bool, restarts: int, seed: int, progress: Callable[[float], None] | None
+    found: _Found,
+    every: bool,
+    restarts: int,
+    rng: np.random.Generator,
+    progress: Callable[[float], None] | None,
 ) -> tuple[int, str]:
     """Try random starts, and return how many starts were tried, and why the search ended."""
-    mechanism, rng = found.mechanism, np.random.default_rng(seed)
+    mechanism = found.mechanism
     tried = in_vain = 0
     while in_vain < restarts and tried < MOST_STARTS and len(found.kept) < MANY:
         together = max(1, int(ENTRIES / len(found.start) ** 2))
@@ -225,12 +258,24 @@ class _Found:
         self._places.append(place)
         return True
 
-    def result(self, tried: int, reason: str, *, elsewhere: bool, continuum: int) -> Assembled:
-        """Return what was found, sorted by the distance from the start."""
-        scales = self.mechanism.column_scales
-        order = sorted(
-            self.kept, key=lambda x: (round(float(np.linalg.norm((x - self.start) / scales)), 6), *x)
-        )
+    def distances(self) -> FloatArray:
+        """Return how far each assembly is from the start, in [rad] and lengths of the mechanism, shape (n,)."""
+        x, start = np.array(self.kept).T, self.start[:, np.newaxis]
+        apart = (x - start) / self.mechanism.column_scales[:, np.newaxis]
+        turned = self.mechanism.angles
+        apart[turned] -= 2.0 * np.pi * np.round(apart[turned] / (2.0 * np.pi))
+        for some in self.mechanism.rotations:
+            turn = rotation_of(tuple(start[some])).inverse() @ rotation_of(tuple(x[some]))
+            apart[some] = gap_of(turn, x.shape[1])[3:]
+        return np.asarray(np.linalg.norm(apart, axis=0))
+
+    def result(
+        self, every: bool, tried: int, reason: str, *, elsewhere: bool, continuum: int
+    ) -> Assembled:
+        """Return the nearest assembly, or every one, sorted by the distance from the start."""
+        near = self.distances().round(6) if self.kept else ()
+        order = [x for _, x in sorted(zip(near, self.kept, strict=True), key=lambda one: (one[0], *one[1]))]
+        order = order if every else order[:1]
         nearest = order[0] if order else self._turned(self._nearest[:, np.newaxis])[:, 0]
         every = np.array(order).T.reshape(len(self.start), -1)
         return Assembled(

@@ -12,6 +12,7 @@ from numbers import Integral, Real
 from urmpipe_models.display import number_of
 from urmpipe_models.errors import Finding, OptionError, for_each, shown
 from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
+from urmpipe_models.messages import Hint
 from urmpipe_models.networks.assembly import MOST_STARTS, RESTARTS, Assembled, assemble
 from urmpipe_models.networks.findings import Mobility
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
@@ -108,7 +109,10 @@ def find_network(
         every=search.every,
         tried=found.tried,
         reason=found.reason,
-        warnings=tuple(_warnings(mechanism, found, mobility, every=search.every)),
+        warnings=(
+            *_warnings(mechanism, found, mobility, every=search.every),
+            *(_branch_warnings(mechanism, search.controls) if command == "solve" and not search.every else ()),
+        ),
         provenance=provenance(f"network {command}", options, inputs),
     )
 
@@ -158,3 +162,18 @@ def _warnings(
     for name in stuck_controls(mechanism, found.x_nearest):
         said = f"control {name} cannot move: there are too many controls, or it is at a dead point"
         yield LogWarning("stuck-control", said)
+
+
+def _branch_warnings(mechanism: Mechanism, controls: Mapping[str, float]) -> Iterator[LogWarning]:
+    """Yield that the one assembly of loops whose controls were moved may be of another branch."""
+    moved = [
+        f"{one.name} = {controls[one.name]:.6g} (start {one.start:.6g})"
+        for one in mechanism.network.controls
+        if one.name in controls and controls[one.name] != one.start
+    ]
+    if moved and mechanism.rows:
+        said = (
+            f"controls away from their start: {', '.join(moved)}: the assembly is the nearest to the network's"
+            " start, and may be of another branch than a motion from there reaches"
+        )
+        yield LogWarning("other-branch", said, hints=(Hint("every", True, "lists the assemblies"),))

@@ -7,10 +7,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -313,6 +315,54 @@ def test_the_nearest_assembly_is_the_first_of_all() -> None:
         assert len(one.assemblies) == 1
         np.testing.assert_array_equal(one.x[:, 0], every(network, {"s": 0.05}).x[:, 0])
         assert (one.elsewhere, one.reason) == (False, "the start closes")
+
+
+LENGTHS, ANGLES = st.floats(0.2, 1.0), st.floats(-math.pi, math.pi)
+
+
+@pytest.mark.slow
+@settings(max_examples=60, deadline=None)
+@given(links=st.tuples(*[LENGTHS] * 4), crank=ANGLES, start=st.tuples(*[ANGLES] * 3))
+@example(links=(0.4, 0.9, 0.7, 1.0), crank=4.712, start=(-0.46, 1.04, 1.48))  # the shipped one: B is +1.460
+def test_the_assembly_is_the_nearer_one_of_both_of_a_four_bar(
+    links: tuple[float, float, float, float], crank: float, start: tuple[float, float, float]
+) -> None:
+    a, b, c, d = links
+    p, q = a * np.array([math.cos(crank), math.sin(crank)]), np.array([d, 0.0])
+    assume(1.01 * abs(b - c) < np.linalg.norm(q - p) < 0.99 * (b + c))  # both are apart
+    both = []
+    for sign in (1.0, -1.0):
+        end = circles(p, b, q, c, sign)
+        coupler, rocker = (math.atan2(*(end - one)[::-1]) for one in (p, q))
+        both.append((coupler - crank, rocker - coupler, rocker))
+    way = [
+        math.hypot(*(math.remainder(x - y, math.tau) for x, y in zip(one, start, strict=True)))
+        for one in both
+    ]
+    assume(abs(way[0] - way[1]) > 1e-3)
+    pins = {
+        "A": ("crank", "coupler", a, 0.0),
+        "B": ("coupler", "rocker", b, c),
+        "C": ("ground", "rocker", d, 0.0),
+    }
+    joints: dict[str, Any] = {
+        name: {"bodies": [first, second], "a": [[x, 0, 0], [y, 0, 0]], "start": angle}
+        for (name, (first, second, x, y)), angle in zip(pins.items(), start, strict=True)
+    }
+    joints["turn"] = {"bodies": ["ground", "crank"], "driven": "s"}
+    network = load_network(
+        {
+            "controls": {"s": {"start": crank}},
+            "bodies": {name: {} for name in ("crank", "coupler", "rocker")},
+            "joints": {name: {"kind": "revolute", "n": [0, 0, 1]} | one for name, one in joints.items()},
+        }
+    )
+    (found,) = assemble(mechanism_of(network)).assemblies
+    nearer = both[int(np.argmin(way))]
+    off = [
+        math.remainder(found.values[name][0] - one, math.tau) for name, one in zip("ABC", nearer, strict=True)
+    ]
+    assert np.abs(off).max() < 1e-7  # gaps near 1e-13 times conditions below 1e5
 
 
 # --- starts
