@@ -112,6 +112,17 @@ def test_a_call_that_does_not_return_fails_the_run(urmpipe: RunCommand, tmp_path
     assert recorded(tmp_path).failed == failed
 
 
+@pytest.mark.slow
+def test_the_time_that_is_printed_is_that_of_the_steps(urmpipe: RunCommand, tmp_path: Path) -> None:
+    """Ten of them of 30 ms each, after a second in which the FMU is made."""
+    slow = replace(ENDS, name="slow", start="usleep(1000000);", step="usleep(30000);")
+    ran = urmpipe(*write(tmp_path, {"slow": slow}, {ACTUAL: "slow.y"}))
+    (line,) = (line for line in ran.out.splitlines() if line.startswith("Simulated in "))
+    wall, factor = (float(one.split()[0]) for one in line.removeprefix("Simulated in ").split(" s, "))
+    assert 0.3 <= wall < 1.0
+    assert factor == pytest.approx(1.0 / wall, rel=0.03)  # 1 s in a time of two digits
+
+
 def test_the_time_that_a_call_may_take_is_above_0(urmpipe: RunCommand, tmp_path: Path) -> None:
     line = write(tmp_path, {"a": ENDS}, {ACTUAL: "a.y"})
     assert errors(urmpipe(*line, "--timeout", "0").err) == [

@@ -114,33 +114,31 @@ def simulate(
 
 def _run(system: str, target: Path, draw: Path | None, terminal: Terminal, asked: dict[str, Any]) -> int:
     """Run a system as it is asked, print what it came to, and return the exit code."""
-    from time import perf_counter
-
     from urmpipe.printing.terminal import prints_apart, say
     from urmpipe.systems.blocks import ON_PYTHON
 
-    started = perf_counter()
     replaces = target.exists()
     with prints_apart(), terminal.progress(f"Simulating {system}") as progress:
         result = urmpipe.simulate(
             system, output=target, draw=draw, told=terminal.note, progress=progress, **asked
         )
-    wall = perf_counter() - started
     terminal.warn([one for one in result.warnings if one.kind != ON_PYTHON])  # that is told already
-    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, wall, replaces, draw))
+    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces, draw))
     if result.failed is not None:
         say(f"error: {result.failed}; the samples until then are in {result.recording}", err=True)
     return 2 if result.failed is not None else 1 if result.verdict == "fail" else 0
 
 
-def _print(result: Simulation, wall: float, replaces: bool, draw: Path | None) -> None:
-    """Print what a simulation, which took `wall` seconds, came to."""
+def _print(result: Simulation, replaces: bool, draw: Path | None) -> None:
+    """Print what a simulation came to."""
     from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
     from urmpipe_pipeline.results import present
 
     print_presentation(present(result))
-    say(f"Simulated in {wall:.2g} s, {result.duration / wall:.3g} times as fast as real time")
+    if result.loop_seconds:
+        factor = result.duration / result.loop_seconds
+        say(f"Simulated in {result.loop_seconds:.2g} s, {factor:.3g} times as fast as real time")
     if draw:
         say(f"Drawing: {draw}")
     print_recording(result.recording, replaced=replaces)

@@ -85,6 +85,7 @@ def simulation_of(plan: Plan, recorded: Recorded, blocks: Blocks, svg: str) -> S
         connections={str(one.connection.destination): str(one.connection.source) for one in plan.links},
         arms=tuple(_arms(plan, recorded, blocks)),
         verdicts=tuple(_verdicts(plan, recorded, odd)),
+        loop_seconds=recorded.loop_seconds,
     )
     return replace(made, warnings=(*made.warnings, *coupling_warnings(made)))
 

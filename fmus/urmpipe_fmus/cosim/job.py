@@ -79,11 +79,12 @@ class Progress(ctypes.Structure):
         call: Block and function being called, see `call_code`, plus `next_call()`: each call has another.
         done: Whether all is done that the process was for: an FMU can end it before, with any exit code.
         ended: Where the last row stands in [s] if it was read once more as an FMU ended the run; else 0.
+        loop_seconds: How long the loop over the communication points took in [s]; 0 until it ends.
     """
 
     _fields_ = (
         *((name, ctypes.c_int64) for name in ("rows", "k", "call", "done")),
-        ("ended", ctypes.c_double),
+        *((name, ctypes.c_double) for name in ("ended", "loop_seconds")),
     )
 
     def begin(self, code: int) -> None:

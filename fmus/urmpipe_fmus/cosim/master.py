@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Collection, Sequence
 from functools import partial
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -100,7 +101,11 @@ class Master:
         """
         try:
             self._start()
-            self._loop()
+            started = perf_counter()
+            try:
+                self._loop()
+            finally:
+                self._progress.loop_seconds = perf_counter() - started
         except Ended as ended:  # while a step of a loop is done again
             self._note_end(ended, self._time.value, self._time.value)
         except (FmuFailed, NoConvergence):  # what is not finite may be why

@@ -77,6 +77,7 @@ class Recorded:
         failed: Why it ended before its time, one line; None if it did not fail.
         notes: What is allowed but should be seen.
         not_finite: The scalars that had values which are not finite.
+        loop_seconds: How long the steps took, without what is prepared before the first, in [s]; 0 after a crash.
     """
 
     t_ns: NDArray[np.int64]
@@ -87,6 +88,7 @@ class Recorded:
     failed: str | None
     notes: tuple[str, ...]
     not_finite: Mapping[Port, NotFinite] = field(default_factory=dict)
+    loop_seconds: float = 0.0
 
     def column(self, block: str, variable: str) -> NDArray[np.float64]:
         """Return the values of a scalar in its own unit, shape (n,).
@@ -217,6 +219,7 @@ def _recorded(
         failed=failed,
         notes=(*plan.notes, *(result["notes"] if result else ()), *_warnings(job, folder)),
         not_finite=_not_finite(assembly.recorded["Real"], job, folder),
+        loop_seconds=state.loop_seconds,
     )
 
 

@@ -174,6 +174,7 @@ class Simulation(Result):
         arms: The arms of blocks of kinematics; the first is drawn as solids, the others as lines.
         verdicts: One a delta meter.
         recording: Where it was written.
+        loop_seconds: How long its steps took in [s]; 0 if that is not known: it is not stored.
     """
 
     name: str
@@ -191,6 +192,7 @@ class Simulation(Result):
     arms: tuple[Arm, ...] = ()
     verdicts: tuple[DeltaVerdict, ...] = ()
     recording: Path | None = field(default=None, metadata={"stored": False})
+    loop_seconds: float = field(default=0.0, metadata={"stored": False})
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "t_ns", np.asarray(self.t_ns, dtype=np.int64))
