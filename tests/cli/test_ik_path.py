@@ -137,6 +137,16 @@ def test_a_jump_over_rows_that_are_not_reached_tells_from_where_it_comes(
     assert last[-4] == f"{fastest:.0f}" == "4471"  # over the gap, as the joint that is too fast
 
 
+def test_a_wrap_of_values_within_pi_is_no_speed(capsys: Captured, folder: Path) -> None:
+    q = np.array([-3.0, -1.0, 1.2, 0.5, 0.8, 3.0]) + np.outer(0.01 * np.arange(60), [-1, 0, 0, 0, 0, 2])
+    write_path(folder / "path.csv", "urm6", q)
+    for more in ((), ("--within-pi",)):
+        assert run(["ik", "path.csv", "--robot", "urm6", "--start", ",".join(map(str, q[0])), *more]) == 0
+        lines = [line.split() for line in capsys.readouterr().out.splitlines() if line.startswith("phi")]
+        assert [line[5] for line in lines] == ["57.30", *["0.0000"] * 4, "114.6"]  # deg/s
+        assert (abs(float(lines[0][4])) < 180.0) == bool(more)  # the last value is within pi
+
+
 def test_all_of_a_path_needs_a_recording_and_a_closed_form(capsys: Captured, folder: Path) -> None:
     assert run(["ik", "default.csv", "--robot", "arm6", "--tsp", "1", "--all"]) == 2
     assert capsys.readouterr().err == (

@@ -13,6 +13,7 @@ from urmpipe_models.inverse.along_path.joint_path import JointPath
 from urmpipe_models.inverse.along_path.joint_speeds import TooFast
 from urmpipe_models.inverse.along_path.jumps import Jump
 from urmpipe_models.inverse.closed.closed_form import method_words
+from urmpipe_models.inverse.limits import TURN, periods
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import colour_word, ghost_colour, run_colour
 from urmpipe_pipeline.presentation.parts import columns_of, recording_fact, spot_at, table_of
@@ -157,7 +158,9 @@ def joints_table(one: SolvedTargets) -> Table:
     columns = [Column("joint", "Joint", [joint.name for joint in joints])]
     columns += [Column(key, key, list(map(_shown, values, units))) for key, values in ends.items()]
     if one.t is not None and len(q) > 1:
-        speed = np.abs(np.diff(q, axis=0)) / np.diff(one.t[one.reached])[:, None]
+        step, endless = np.diff(q, axis=0), np.isfinite(periods(one.robot))
+        step[:, endless] -= TURN * np.round(step[:, endless] / TURN)  # of values within pi: no joint wraps
+        speed = np.abs(step) / np.diff(one.t[one.reached])[:, None]
         speeds = {"fastest": speed.max(axis=0), "allowed": [joint.velocity for joint in joints]}
         for key, values in speeds.items():
             cells = [
