@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import compress
 from os.path import isdir, isfile  # of a name that no file may have Path raises
 from pathlib import Path
 from typing import TypeAlias, TypeVar
@@ -23,6 +24,8 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.unjudged import Unjudged
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.repolarization.audit import turning
+from urmpipe_pipeline.repolarization.interval import refuse_unknown
 from urmpipe_pipeline.results import kind_of, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log
@@ -105,12 +108,14 @@ def load_runs(
     if sides is not None:
         both = for_each(run_of, [(operands[0], one) for one in (sides, sides[::-1])])
         blocks.refuse_unused()
+        _refuse_unturned(read, both)
         return _on_one_arm(both)
     found = for_each(run_of, each) if unjudged is None else _runs_or_errors(run_of, each)
     blocks.refuse_unused()
     runs = [one for one in found if isinstance(one, Run)]
     if shared and len(runs) == len(found):
         _refuse_unreached(read, runs)
+        _refuse_unturned(read, runs)
     named = list(zip(_names(operands, found), found, strict=True))
     if unjudged is not None:
         unjudged += [Unjudged(name, one.findings) for name, one in named if isinstance(one, UrmpipeError)]
@@ -202,6 +207,12 @@ def _refuse_unreached(read: ReadOptions, runs: Sequence[Run]) -> None:
         allowed = "a column that a log has, and that is read"
         said = (Finding(parameter="unit", found=f"no column {shown(name)}", allowed=allowed) for name in lost)
         raise OptionError(*said)
+
+
+def _refuse_unturned(read: ReadOptions, runs: Sequence[Run]) -> None:
+    """Raise an `OptionError` with each joint that is given an interval, and that turns in no run."""
+    turn = (name for run in runs for name in compress(run.log.joints, turning(run.log, run.robot)))
+    refuse_unknown(read.interval, turn)
 
 
 def _names(operands: Sequence[Operand], runs: Sequence[Run | UrmpipeError]) -> list[str]:

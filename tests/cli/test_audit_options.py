@@ -101,6 +101,36 @@ def test_an_interval_that_is_none_is_a_usage_error(urmpipe: RunCommand, log: Pat
     assert f"found {value!r}, allowed: LOW:HIGH or JOINT=LOW:HIGH" in ran.err
 
 
+@pytest.mark.parametrize(
+    ("operands", "joint", "allowed"),
+    [
+        (["q", "j"], "q2", None),
+        (["j", "q"], "q2", None),  # of the log that has the joint, whichever that is
+        (["tcp", "q"], "q2", None),
+        (["both", "--sides", "target,actual"], "actual_q2", None),
+        (["q", "j"], "z", "q1, q2, j1, j2"),
+        (["tcp", "q"], "z", "q1, q2"),
+        (["both", "--sides", "target,actual"], "q2", "target_q1, target_q2, actual_q1, actual_q2"),
+        (["slide", "slide"], "q2", "q1"),
+        (["tcp", "tcp"], "q2", "none"),
+    ],
+)
+def test_an_interval_is_that_of_a_joint_of_any_log(
+    urmpipe: RunCommand, tmp_path: Path, operands: list[str], joint: str, allowed: str | None
+) -> None:
+    t = 0.01 * np.arange(50)
+    heads = {
+        "q": "q1 [deg],q2 [deg]", "j": "j1 [deg],j2 [deg]", "slide": "q1 [deg],q2 [m]", "tcp": "x [m],y [m],z [m]",
+        "both": "target_q1 [deg],target_q2 [deg],actual_q1 [deg],actual_q2 [deg]",
+    }  # fmt: skip
+    for name, head in heads.items():
+        table = np.column_stack([t, *[10.0 * t] * (head.count(",") + 1)])
+        np.savetxt(tmp_path / name, table, delimiter=",", header=f"t,{head}", comments="")
+    ran = urmpipe("compare", *operands, "--tolerance", "joint=1deg", "--interval", f"{joint}=-180:180")
+    said = f"error: --interval: found {joint}, allowed: joints that turn: {allowed}"
+    assert [line for line in ran.err.splitlines() if "interval" in line] == ([said] if allowed else [])
+
+
 def test_the_options_hold_in_python(log: Path, tmp_path: Path) -> None:
     run = package.ingest(log, repair=True, interval={"q1": (-180.0, 180.0)}, audit=tmp_path / "a.csv")
     assert [one.kind for one in run.audit] == ["unexplained", "repaired", "wrap", "ambiguous"]

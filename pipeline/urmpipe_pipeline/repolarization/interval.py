@@ -7,7 +7,7 @@ is limited to +-2 pi.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -50,6 +50,15 @@ def _in_own_unit(interval: GivenInterval, factor: float) -> Interval:
     return low, high
 
 
+def refuse_unknown(given: Iterable[str], able: Iterable[str]) -> None:
+    """Raise an `OptionError` with the joints that are given an interval, and are none of those that turn."""
+    able = list(dict.fromkeys(able))
+    unknown = [name for name in given if name and name not in able]
+    if unknown:
+        allowed = f"joints that turn: {', '.join(able) or 'none'}"
+        raise OptionError(Finding(parameter="interval", found=", ".join(unknown), allowed=allowed))
+
+
 def given_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, GivenInterval]) -> FloatArray:
     """Return P of each joint in [rad], shape (joints,): of the interval given, or a full turn.
 
@@ -68,10 +77,7 @@ def given_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, Gi
     for name, ends in given.items():
         _refuse_empty(name, *_in_own_unit(ends, 1.0))
     able = [name for name, turns in zip(log.joints, turning, strict=True) if turns]
-    unknown = [name for name in given if name and name not in able]
-    if unknown:
-        allowed = f"joints that turn: {', '.join(able) or 'none'}"
-        raise OptionError(Finding(parameter="interval", found=", ".join(unknown), allowed=allowed))
+    refuse_unknown(given, able)
     periods, findings = np.full(len(log.joints), SLIDING), []
     for j, name in enumerate(log.joints):
         if not turning[j]:

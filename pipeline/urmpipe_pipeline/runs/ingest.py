@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, replace
+from itertools import compress
 from pathlib import Path
 from typing import get_args
 
@@ -79,6 +80,9 @@ def ingest_log(
     log = numbers.log(robot)
     if because:
         log = replace(log, inferences=(*log.inferences, because))
+    if options.shared or options.side:  # others are joints of another log, or of the other side
+        own = {"", *compress(log.joints, turning(log, robot))}
+        options = replace(options, interval={k: one for k, one in options.interval.items() if k in own})
     usual = asdict(ReadOptions())
     usual |= {"shared": options.shared}  # says nothing of this log
     read_by = {name: value for name, value in asdict(options).items() if value != usual[name]}

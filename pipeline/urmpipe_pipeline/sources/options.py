@@ -53,7 +53,8 @@ class ReadOptions:
         poses: Whether the rows are still poses, which no motion joins: a clock of theirs is a label.
         measured: Names or numbers of the x, y, z of the tool as it was measured from outside, in a frame of
             its own, and behind them of its orientation, if it was.
-        shared: Whether they hold for several logs: the unit of a column that this one lacks is another's.
+        shared: Whether they hold for several logs: the unit of a column or the interval of a joint that this
+            one lacks is another's.
     """
 
     source: str | None = None
