@@ -229,8 +229,8 @@ KINDS = {
     "step": SECONDS,
     "strict": FLAG,
     "sync": Kind(
-        lambda value: _is_number(value) or (isinstance(value, str) and value in ("start", "auto")),
-        "start, auto, or t_reference - t_log as a number, in s",
+        lambda value: _is_number(value) or (isinstance(value, str) and value in ("stamps", "start", "auto")),
+        "stamps, start, auto, or t_reference - t_log as a number, in s",
     ),
     "system": Kind(_is_path, "the name of a system, or a system file (TOML)"),
     "targets": Kind(lambda value: _is_text(value) or not isinstance(value, str), "a file, or an array"),

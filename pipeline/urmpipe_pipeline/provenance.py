@@ -26,6 +26,7 @@ class Provenance:
         inputs: The files it came from.
         versions: Versions of urmpipe, Python and the libraries that computed.
         created: When, in UTC, ISO 8601.
+        defaults: Options that decide a verdict and that a file set: "tolerance=2mm from ../urmpipe.toml".
     """
 
     command: str
@@ -33,13 +34,21 @@ class Provenance:
     inputs: tuple[SourceFile, ...]
     versions: Mapping[str, str]
     created: str
+    defaults: tuple[str, ...] = ()
 
 
-def provenance(command: str, options: Mapping[str, Any], inputs: Sequence[SourceFile]) -> Provenance:
+def provenance(
+    command: str, options: Mapping[str, Any], inputs: Sequence[SourceFile], defaults: tuple[str, ...] = ()
+) -> Provenance:
     """Return the provenance of a result made now; options that were left at None are left out."""
     given = {name: value for name, value in options.items() if value is not None}
     created = datetime.now(UTC).isoformat(timespec="seconds")
-    return Provenance(command, given, tuple(dict.fromkeys(inputs)), dict(_versions()), created)
+    return Provenance(command, given, tuple(dict.fromkeys(inputs)), dict(_versions()), created, defaults)
+
+
+def defaults_words(made: Provenance) -> str:
+    """Return what a verdict's line adds of options from files: "; sync=auto from ../urmpipe.toml"."""
+    return "".join(f"; {one}" for one in made.defaults)
 
 
 @cache

@@ -60,7 +60,7 @@ def completions(line: str, begun: str) -> list[str]:
         ("compare log.csv --iso --tolerance", "AP=1mm,AV", ["AP=1mm,AV="]),
         ("compare log.csv --iso --tolerance", "AV=5", ["AV=5%"]),
         ("compare log.csv --baseline a.rrd --noise", "no", ["norm="]),
-        ("compare log.csv --sync", "", ["start", "auto"]),
+        ("compare log.csv --sync", "", ["stamps", "start", "auto"]),
         ("compare log.csv --align", "b", ["base+tool"]),
         ("compare log.csv --sides", "d", ["desired,actual"]),
         ("compare log.csv bare.csv --joints", "", ["t", "q1", "q2"]),
@@ -169,4 +169,4 @@ def test_bash_completes_behind_signs_that_split_its_words(folder: Path) -> None:
         ["bash", "--norc", "-c", "\n".join(script)], capture_output=True, text=True, check=True
     )
     assert done.stderr == ""
-    assert done.stdout.splitlines() == ["1mm,norm=", "ur5 ur5e", "start auto", "sub"]
+    assert done.stdout.splitlines() == ["1mm,norm=", "ur5 ur5e", "stamps start auto", "sub"]

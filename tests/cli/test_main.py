@@ -85,7 +85,7 @@ def test_version(urmpipe: RunCommand) -> None:
 
 COMMAND_NAMES = ", ".join(COMMANDS)
 DURATIONS = "allowed: a positive time in s, such as 0.005 or 5ms"
-OFFSETS = "allowed: start, auto, or a time in s, such as -0.2 or 200ms"
+OFFSETS = "allowed: stamps, start, auto, or a time in s, such as -0.2 or 200ms"
 FRAMES = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0,150mm,0,0,90deg"
 
 

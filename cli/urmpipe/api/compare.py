@@ -26,6 +26,7 @@ from urmpipe_models.messages import Hint
 from urmpipe_models.spelling import Voice
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
+from urmpipe_pipeline.comparison.clocks import CLOCKS_DIFFER
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.sync import SyncOption
@@ -95,6 +96,7 @@ def compare(
     junit: PathLike | None = None,
     csv: PathLike | None = None,
     inputs: Sequence[PathLike] = (),
+    defaults: Sequence[str] = (),
     voice: Voice = "python",
     progress: Callable[[float], None] | None = None,
     **reading: Unpack[Reading],
@@ -116,8 +118,8 @@ def compare(
             units, such as "axis=3.5mm,angle=0.5deg"; default: 3.5 mm an axis. With `iso` of criteria, such as
             "AP=0.4mm,AV=5%"; default: none.
         tcp: Where a log was: fk or recorded.
-        sync: How the clocks are put together: start, auto, or t_reference - t_log in [s]; default: start,
-            with `iso` auto.
+        sync: How the clocks are put together: stamps, start, auto, or t_reference - t_log in [s]; default:
+            stamps where both sides have Unix times or dates that overlap, else start; with `iso` auto.
         align: How a log is moved in space first: none, start, rigid, tool or base+tool.
         sides: Two words in the names of the columns of one log, such as ("target", "actual"): what was asked
             for is the reference of what was done; "rest" for the columns without the other word.
@@ -142,6 +144,7 @@ def compare(
         junit: A JUnit file (XML) to write.
         csv: A table to write, one row a log and quantity.
         inputs: Files besides the operands that are never replaced.
+        defaults: Options that a file set, for the line of the verdict: "sync=auto from ../urmpipe.toml".
         voice: In whose words `junit` tells what to give: python or command line.
         progress: Told the share of the recording that is written, 0..1.
         **reading: How to read the logs where they cannot tell by themselves: unit, time, joints, log_map and
@@ -168,7 +171,7 @@ def compare(
         )
         options = CompareOptions(
             _allowed(tolerance, iso=iso), tcp, _clocks(sync, iso=iso),
-            align, isinstance(tolerance, str), diagnose, test,
+            align, isinstance(tolerance, str), diagnose, test, tuple(defaults),
         )  # fmt: skip
         if keep_going and iso:
             raise OptionError(Finding(parameter="keep_going", found="with iso", allowed="one of the two"))
@@ -227,9 +230,9 @@ def _allowed(tolerance: float | str | Mapping[str, float] | None, *, iso: bool) 
     return tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
 
 
-def _clocks(sync: SyncOption | None, *, iso: bool) -> SyncOption:
-    """Return how clocks are put together: as given, else each cycle for itself, or all at the start."""
-    return ("auto" if iso else "start") if sync is None else sync
+def _clocks(sync: SyncOption | None, *, iso: bool) -> SyncOption | None:
+    """Return how clocks are put together: as given, else each cycle for itself; None for logs."""
+    return "auto" if iso and sync is None else sync
 
 
 def _refuse_unused(operands: Sequence[Operand | Comparison], given: Mapping[str, Any]) -> None:
@@ -320,7 +323,7 @@ def _with_noise(made: Comparison, noise: Mapping[str, float]) -> Comparison:
 def _refuse_doubts(strict: bool, result: Comparison) -> None:
     """Raise a `LogError` with the warnings of the logs and the comparison, if they are to be errors."""
     of_logs = [w.of(one.name) for one in result.runs for w in one.run.warnings]
-    explaining = (LACKING_TOOL, BEYOND, EXCHANGED)  # a result, and no doubts about it
+    explaining = (LACKING_TOOL, BEYOND, EXCHANGED, CLOCKS_DIFFER)  # a result, and no doubts about it
     doubts = [w for w in result.warnings if w.kind not in explaining]
     refuse_warnings(strict, (*of_logs, *doubts))
 

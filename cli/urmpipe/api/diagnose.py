@@ -33,12 +33,13 @@ def diagnose(
     derivative: Method | None = None,
     tolerance: float | str | Mapping[str, float] = DEFAULT_TOLERANCE,
     tcp: Tcp = "fk",
-    sync: SyncOption = "start",
+    sync: SyncOption | None = None,
     sides: tuple[str, str] | None = None,
     block: str | Sequence[str] | None = None,
     strict: bool = False,
     output: PathLike | None = None,
     inputs: Sequence[PathLike] = (),
+    defaults: Sequence[str] = (),
     progress: Callable[[float], None] | None = None,
     **reading: Unpack[Reading],
 ) -> Diagnosis:
@@ -57,12 +58,13 @@ def diagnose(
         derivative: How a log is differentiated: central or savgol.
         tolerance: Largest deviation allowed, as of `compare`: the verdict is the same.
         tcp: Where a log was: fk or recorded.
-        sync: How the clocks are put together first: start, auto, or t_reference - t_log in [s].
+        sync: How the clocks are put together first, as of `compare`.
         sides: Two words in the names of the columns of one log, such as ("target", "actual").
         block: The block of a simulation whose motion is meant, as of `compare`.
         strict: Whether a warning is an error.
         output: The recording (.rrd) to write: that of the comparison, with its diagnosis.
         inputs: Files besides the operands that are never replaced.
+        defaults: Options that a file set, as of `compare`.
         progress: Told the share of the recording that is written, 0..1.
         **reading: How to read the logs where they cannot tell by themselves, as of `compare`.
 
@@ -92,6 +94,7 @@ def diagnose(
         strict=strict,
         output=output,
         inputs=inputs,
+        defaults=defaults,
         progress=progress,
         **reading,
     )

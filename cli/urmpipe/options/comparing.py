@@ -14,9 +14,11 @@ from urmpipe.options.types import OneOf, ParsedType, parsed
 from urmpipe_models.measure_units import WRITTEN, quantity
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 
+SYNC_WORDS = ("stamps", "start", "auto")
+
 
 def _sync(text: str) -> str | float:
-    """Return how the clocks are aligned: start, auto, or an offset in [s].
+    """Return how the clocks are aligned: stamps, start, auto, or an offset in [s].
 
     Raises:
         OptionError: If it is none of them.
@@ -24,10 +26,10 @@ def _sync(text: str) -> str | float:
     from urmpipe_models.errors import OptionError, shown
 
     offset = quantity(text, WRITTEN["s"])
-    if text not in ("start", "auto") and not math.isfinite(offset):
-        allowed = "start, auto, or a time in s, such as -0.2 or 200ms"
+    if text not in SYNC_WORDS and not math.isfinite(offset):
+        allowed = f"{', '.join(SYNC_WORDS)}, or a time in s, such as -0.2 or 200ms"
         raise OptionError(f"found {shown(text)}, allowed: {allowed}")
-    return text if text in ("start", "auto") else offset
+    return text if text in SYNC_WORDS else offset
 
 
 def _tolerance(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> str:
@@ -81,13 +83,12 @@ TCP_OPTION = option(
 SYNC_OPTION = option(
     Heading.ALIGNING,
     "--sync",
-    default="start",
-    show_default=True,
     type=SYNC,
-    shell_complete=words("start", "auto"),
-    metavar="start|auto|TIME",
-    help="Align the clocks: at the first samples (start), by the motion (auto), or by an offset such as"
-    " 200ms: t_reference = t_log + TIME, negative if the log is late.",
+    shell_complete=words(*SYNC_WORDS),
+    metavar="stamps|start|auto|TIME",
+    help="Align the clocks: by Unix times or dates on both sides (stamps), at the first samples (start), by"
+    " the motion (auto), or by an offset such as 200ms: t_reference = t_log + TIME, negative if the log is"
+    " late [default: stamps if both sides have them and overlap, else start].",
 )
 SIDES_OPTION = option(
     Heading.COMPARED,

@@ -13,6 +13,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.choices import check_choice
 from urmpipe_pipeline.comparison.alignment import align
 from urmpipe_pipeline.comparison.assumptions import assumptions
+from urmpipe_pipeline.comparison.clocks import clocks_differ, late, stamp_offset
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.iso_cycles import IsoOptions, judge_cycles
@@ -39,6 +40,7 @@ from urmpipe_pipeline.comparison.warnings import (
     left_out_warnings,
     open_frames,
     recorded_apart,
+    same_data,
     thin_evidence,
 )
 from urmpipe_pipeline.diagnosis.diagnose import diagnose
@@ -59,6 +61,8 @@ third of the default tolerance."""
 
 NO_ALIGNMENT_ISO = "none with iso: an alignment would hide AP and AT"
 
+CYCLES_CLOCKS = "auto, start or an offset with iso: each cycle is put beside one reference"
+
 NO_ALIGNMENT = "none with a diagnosis: base and tool are possible causes"
 
 
@@ -71,8 +75,9 @@ class CompareOptions:
             coordinate. What is not named has no tolerance. Least shares 0..1: coverage (0.9 unless given)
             and judged (0.5).
         tcp: Where a log was: by forward kinematics of its joints, or as it recorded itself.
-        sync: How the clocks are put together: start (both start together), auto (by the motion), or
-            the offset in [s]: t_reference = t_log + offset, both from their first samples.
+        sync: How the clocks are put together: stamps (Unix times or dates on both sides), start (both start
+            together), auto (by the motion), or the offset in [s]: t_reference = t_log + offset, both from
+            their first samples. None: stamps where both sides have them and overlap, else start.
         align: How a log is moved in space before it is compared: none, start, rigid, tool or base+tool.
         from_text: Whether the tolerance was read from a text, in which a large value has its unit.
         diagnose: Whether it is asked why each log deviates. Base and tool are causes then: no alignment may
@@ -80,15 +85,17 @@ class CompareOptions:
             always unknown, is moved first.
         iso: How the logs are evaluated as the cycles of a test after ISO 9283, whose criteria the tolerance
             is for; None: each log is judged for itself.
+        defaults: Options that a file set, for the line of the verdict: "sync=auto from ../urmpipe.toml".
     """
 
     tolerance: Mapping[str, float] = field(default_factory=lambda: {"axis": DEFAULT_TOLERANCE})
     tcp: Tcp = "fk"
-    sync: SyncOption = "start"
+    sync: SyncOption | None = None
     align: AlignMode = "none"
     from_text: bool = False
     diagnose: bool = False
     iso: IsoOptions | None = None
+    defaults: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.iso is not None:
@@ -105,6 +112,8 @@ class CompareOptions:
         faults = []
         if self.align != "none":
             faults.append(Finding(parameter="align", found=self.align, allowed=NO_ALIGNMENT_ISO))
+        if self.sync == "stamps":
+            faults.append(Finding(parameter="sync", found=self.sync, allowed=CYCLES_CLOCKS))
         if self.diagnose:
             faults.append(Finding(parameter="diagnose", found="with iso", allowed="one of the two"))
         if faults:
@@ -158,13 +167,16 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     chosen = _joined([(run, _goes_by_record(run, chosen.tcp)) for run in (reference, *runs)], chosen)
     alone = _joints_alone(reference, runs, chosen)
     reference, *runs = _named_apart((reference, *runs))
-    sides = (_side(run, chosen.tcp, alone=alone) for run in runs)
+    sides = [_side(run, chosen.tcp, alone=alone) for run in runs]
     asked = _side(reference, chosen.tcp, alone=alone)
     wanted = asked.trajectory
+    same = [warning for done in sides for warning in same_data(asked, done)]
     if chosen.iso is not None:
-        return _test(asked, list(sides), chosen)
+        return _test(asked, sides, chosen, same)
     deviations = for_each(lambda done: _deviation(asked, done, chosen), sides)
-    told = [*(one.of(reference.name) for one in reference.warnings), *exchanged(reference, runs)]
+    told = [*(one.of(reference.name) for one in reference.warnings), *exchanged(reference, runs), *same]
+    for done, one in zip(sides, deviations, strict=True):
+        told += clocks_differ(wanted, done.trajectory, one) if late(one) else ()
     if chosen.tcp == "fk":
         told += _differing_robots([reference, *runs])
     if chosen.tcp == "fk" and wanted.joints:
@@ -175,12 +187,15 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     return _comparison(wanted, deviations, chosen, told, _taken_for_granted(reference, runs, chosen))
 
 
-def _test(asked: Side, done: Sequence[Side], options: CompareOptions) -> Comparison:
+def _test(
+    asked: Side, done: Sequence[Side], options: CompareOptions, same: Sequence[LogWarning]
+) -> Comparison:
     """Return the comparison of the cycles of a test after ISO 9283."""
     assert options.iso is not None
-    found = judge_cycles(asked, done, options.iso, options.sync, options.tolerance)
+    sync = "start" if options.sync is None else options.sync
+    found = judge_cycles(asked, done, options.iso, sync, options.tolerance)
     reference, runs = asked.run, [one.run for one in done]
-    told = [*(one.of(reference.name) for one in reference.warnings), *found.warnings]
+    told = [*(one.of(reference.name) for one in reference.warnings), *found.warnings, *same]
     if len(runs) == 1:  # its cycles are parts of it
         told = [*(one.of(runs[0].name) for one in runs[0].warnings), *told]
     assumed = _taken_for_granted(reference, runs, options)
@@ -222,7 +237,7 @@ def _taken_for_granted(reference: Run, runs: Sequence[Run], options: CompareOpti
     """Return what a verdict on runs assumes of them and the reference; raise what has to be told first."""
     sides = [(run, _compared_roles(run, options)) for run in (reference, *runs)]
     without = all(any(w.role == "time" and w.assumption for w in run.warnings) for run, _ in sides)
-    alike = len({run.log.rows for run, _ in sides}) == 1 and isinstance(options.sync, str)
+    alike = len({run.log.rows for run, _ in sides}) == 1 and not isinstance(options.sync, (int, float))
     if not (without and alike):  # else the rows are compared one by one, whatever their period
         sides = [(run, {*roles, "time"} if run.timed else roles) for run, roles in sides]
     return assumptions(sides)
@@ -255,7 +270,7 @@ def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], options: Compar
     if others := [run for run in runs if run.log.rows != wanted]:
         allowed = f"{wanted}, as {reference.name} has: still poses are compared row by row"
         raise LogError(*(lacking(run, f"found {run.log.rows} rows, allowed: {allowed}") for run in others))
-    if options.sync != "start" and not (options.iso and options.sync == "auto"):
+    if options.sync not in (None, "start") and not (options.iso and options.sync == "auto"):
         found = f"{options.sync} of still poses"
         raise OptionError(Finding(parameter="sync", found=found, allowed="start, row by row"))
 
@@ -316,9 +331,10 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
         LogError: If the log has no joints, no robot, or recorded no position.
     """
     chosen = options or CompareOptions()
-    if chosen.sync != "start":
+    if chosen.sync not in (None, "start"):
         allowed = "start, since its joints and its recorded tool centre point share the same rows"
         raise OptionError(Finding(parameter="sync", found=f"{chosen.sync} for one log", allowed=allowed))
+    chosen = replace(chosen, sync="start")
     log = run.log
     if not log.joints:
         raise LogError(lacking(run, "a path alone, which has no joints; allowed: a log to compare with it"))
@@ -359,6 +375,8 @@ def _comparison(
     warnings += _shapes_gone([one.run for one in deviations])
     inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
     made = {name: getattr(options, name) for name in ("tcp", "sync", "align")}
+    if options.sync is None and not any(one.sync.mode == "stamps" for one in deviations):
+        made["sync"] = "start"
     made |= {"diagnose": True} if options.diagnose else {}
     if options.iso is not None:
         made |= {"iso": True, **{name: getattr(options.iso, name) for name in ("cycles", "planes", "band")}}
@@ -369,7 +387,7 @@ def _comparison(
         tuple(deviations),
         dict(options.tolerance),
         tuple(warnings),
-        provenance("compare", {"tolerance": dict(options.tolerance), **made}, inputs),
+        provenance("compare", {"tolerance": dict(options.tolerance), **made}, inputs, options.defaults),
         assumptions=assumed,
         on_rows=True,
     )
@@ -384,7 +402,8 @@ def _shapes_gone(runs: Sequence[Run]) -> list[LogWarning]:
 def _deviation(asked: Side, done: Side, options: CompareOptions) -> Deviation:
     """Return the deviation of one trajectory, at its own samples; why it deviates, if asked for."""
     run, reference, actual = done.run, wanted_rows(asked, done), done.trajectory
-    sync = synchronise(reference, actual, options.sync, options.align)
+    stamped = stamp_offset(asked.run, run)
+    sync = synchronise(reference, actual, options.sync, options.align, stamped)
     matched = match(reference, actual, sync)
     if not len(matched.sample):
         said = f"no sample in common with {reference.name} (time offset {sync.offset} s)"

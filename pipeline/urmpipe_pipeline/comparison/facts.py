@@ -124,8 +124,8 @@ def sync_words(sync: Sync) -> tuple[str, str]:
     sign = "-" if sync.offset < 0.0 else "+"
     within = "" if sync.precision is None else f" ± {text.standard_error(sync.precision)}"
     said = f"t_reference = t_log {sign} {abs(sync.offset):.6g} s{within}"
-    if sync.mode == "given":
-        return said, "as given"
+    if sync.mode in ("given", "stamps"):
+        return said, "as given" if sync.mode == "given" else "by absolute stamps on both sides"
     alike = "" if sync.similarity is None else f", similarity {sync.similarity:.4f}"
     return said, f"estimated from {sync.by or 'the motion'}{alike}"
 

@@ -58,6 +58,7 @@ from urmpipe_pipeline.presentation.section import (
     Table,
     Value,
 )
+from urmpipe_pipeline.provenance import defaults_words
 
 
 def present_test(result: Comparison, test: IsoTest) -> Presentation:
@@ -90,7 +91,7 @@ def headline(result: Comparison, test: IsoTest) -> str:
     if result.baseline is not None:
         worse = f"{'and' if failed else 'but'} worse" if result.baseline.verdict == "fail" else "not worse"
         said += f", {worse} than the baseline {result.baseline.name}"
-    return said + assuming(result.assumptions)
+    return said + assuming(result.assumptions) + defaults_words(result.provenance)
 
 
 def _cycles(result: Comparison, test: IsoTest) -> str:

@@ -15,7 +15,7 @@ from urmpipe_pipeline.comparison.sync_views import View, views
 from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory, extent
 from urmpipe_pipeline.joint_log import LogWarning
 
-SyncOption: TypeAlias = Literal["start", "auto"] | float
+SyncOption: TypeAlias = Literal["stamps", "start", "auto"] | float
 
 LONGEST_OFFSET = 1e9
 """Offset in [s] that integers of 64 bits in [ns] hold beside any time of a log: 30 years."""
@@ -44,6 +44,10 @@ ENOUGH = 0.99
 
 ALLOWED = "one motion that does not repeat itself, half of it in both"
 
+STAMPS = "Unix times or dates on both sides that overlap, a time for each row"
+
+BY_MOTION = Hint("sync", "auto", "estimates the offset from the motion")
+
 BY_HAND = (Hint("sync", "start", "aligns the first samples"), Hint("sync", None, "sets the offset"))
 
 SHOWN = 5
@@ -57,16 +61,23 @@ class _Fault(NamedTuple):
     similarity: float = -1.0
 
 
-def check_sync(option: SyncOption) -> None:
+def check_sync(option: SyncOption | None) -> None:
     """Raise an `OptionError` if there is no such way to put clocks together."""
-    known = option in ("start", "auto") if isinstance(option, str) else abs(option) < LONGEST_OFFSET
+    if isinstance(option, (int, float)):
+        known = abs(option) < LONGEST_OFFSET
+    else:
+        known = option in (None, "stamps", "start", "auto")
     if not known:
-        allowed = f"start, auto, or a time in s below {LONGEST_OFFSET:g}"
+        allowed = f"stamps, start, auto, or a time in s below {LONGEST_OFFSET:g}"
         raise OptionError(Finding(parameter="sync", found=str(option), allowed=allowed))
 
 
 def synchronise(
-    reference: Trajectory, log: Trajectory, option: SyncOption, align: AlignMode = "none"
+    reference: Trajectory,
+    log: Trajectory,
+    option: SyncOption | None,
+    align: AlignMode = "none",
+    stamped: float | str = "no stamps",
 ) -> Sync:
     """Return how the clocks of a log and the reference are put together.
 
@@ -77,17 +88,28 @@ def synchronise(
     Args:
         reference: What was asked for.
         log: What was done.
-        option: start, auto, or the offset in [s]: t_reference = t_log + offset.
+        option: stamps, start, auto, or the offset in [s]: t_reference = t_log + offset. None: stamps where
+            they give an offset, else start.
         align: How the log will be moved in space.
+        stamped: The offset by absolute stamps in [s], or why they give none.
 
     Raises:
         LogError: If the motion does not tell the offset: there is none, it repeats itself, it is too even, or
-            the two sides are not one motion.
+            the two sides are not one motion. Of stamps: if they give none.
     """
+    if option is None:
+        one_clock = stamped == 0.0 and reference.files == log.files  # two sets of columns of one file
+        option = "start" if one_clock or isinstance(stamped, str) else "stamps"
     if option == "start":
         return Sync()
-    if option != "auto":
-        return Sync("given", float(option))
+    if option == "stamps":
+        if isinstance(stamped, str):
+            raise LogError(_unknown(log, "stamps", stamped, STAMPS, BY_MOTION, *BY_HAND))
+        return Sync("stamps", stamped)
+    return _by_motion(reference, log, align) if option == "auto" else Sync("given", float(option))
+
+
+def _by_motion(reference: Trajectory, log: Trajectory, align: AlignMode) -> Sync:
     best: Estimate | None = None
     by = ""
     faults: list[_Fault] = []
@@ -101,9 +123,14 @@ def synchronise(
             break
     if best is None:
         fault = max(faults, key=lambda one: one.similarity).message
-        file = log.files[0].name if log.files else log.name
-        raise LogError(Finding("auto", file, parameter="sync", found=fault, allowed=ALLOWED, hints=BY_HAND))
+        raise LogError(_unknown(log, "auto", fault, ALLOWED, *BY_HAND))
     return Sync("auto", best.offset, by, best.precision, best.similarity)
+
+
+def _unknown(log: Trajectory, option: str, found: str, allowed: str, *hints: Hint) -> Finding:
+    """Return why an option determines no offset of a log."""
+    file = log.files[0].name if log.files else log.name
+    return Finding(option, file, parameter="sync", found=found, allowed=allowed, hints=hints)
 
 
 def _look(view: View, reference: str) -> Estimate | _Fault:

@@ -12,7 +12,7 @@ from urmpipe_models.hand_eye import Untold
 from urmpipe_models.orientation import angle_between, quaternions
 from urmpipe_pipeline.joint_log import SourceFile, seconds
 
-SyncMode = Literal["start", "given", "auto"]
+SyncMode = Literal["start", "stamps", "given", "auto"]
 AlignMode = Literal["none", "start", "rigid", "tool", "base+tool"]
 
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -86,7 +86,8 @@ class Sync:
     """How two clocks were put together: t_reference = t_log + offset, both from their first samples.
 
     Attributes:
-        mode: start (both start together), given, or auto (estimated from the motion).
+        mode: start (both start together), stamps (Unix times or dates on both sides), given, or auto
+            (estimated from the motion).
         offset: In [s].
         by: What an estimate rests on: joints or position; empty without one.
         precision: Standard error of an estimate in [s]; None without one.

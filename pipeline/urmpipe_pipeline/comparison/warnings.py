@@ -11,11 +11,11 @@ from urmpipe_models.measure_units import USUAL_UNITS
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share
-from urmpipe_pipeline.comparison.matching import by_kinematics
+from urmpipe_pipeline.comparison.matching import by_kinematics, joint_order
 from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
 from urmpipe_pipeline.comparison.trajectory import Trajectory, extent
 from urmpipe_pipeline.comparison.wording import stretch_words
-from urmpipe_pipeline.diagnosis.sides import AT_REST
+from urmpipe_pipeline.diagnosis.sides import AT_REST, Side
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
 from urmpipe_pipeline.runs.recorded_start import outlying_start
@@ -170,6 +170,24 @@ def exchanged(reference: Run, runs: Iterable[Run]) -> Iterator[LogWarning]:
         if reference.log.joints and not run.log.joints:
             said = f"a path without joints, compared with {reference.name}, which has joints"
             yield LogWarning(EXCHANGED, f"{said}: the reference comes first, then the logs", about=run.name)
+
+
+def same_data(reference: Side, log: Side) -> Iterator[LogWarning]:
+    """Yield a warning if a log and its reference have the same times and values, whatever they are called.
+
+    Two logs at rest may have these by chance, and have their own warning.
+    """
+    one, other = reference.trajectory, log.trajectory
+    alike = reference.by_joints == log.by_joints and np.array_equal(one.t_ns, other.t_ns)
+    alike = alike and np.array_equal(one.position, other.position, equal_nan=True)
+    moves = extent(other.position) > 0.0
+    order = joint_order(one.joints, other.joints)
+    if alike and order is not None and one.q is not None and other.q is not None:
+        alike = np.array_equal(one.q[:, order], other.q, equal_nan=True)
+        moves = moves or extent(other.q) > 0.0
+    if alike and moves:
+        said = f"the same data as {one.name}: every time and every value is equal"
+        yield LogWarning("same-data", said, about=other.name)
 
 
 def recorded_apart(runs: Sequence[Run], allowed: float) -> Iterator[LogWarning]:

@@ -13,6 +13,7 @@ from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share, Statis
 from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES
 from urmpipe_pipeline.presentation.digits import held
 from urmpipe_pipeline.presentation.section import Value
+from urmpipe_pipeline.provenance import defaults_words
 
 SYMBOLS = dict(zip(AXES, ("Δx", "Δy", "Δz", "‖Δ‖"), strict=True))
 """The quantities of a deviation as people read them."""
@@ -26,11 +27,11 @@ def verdict_words(one: Comparison) -> str:
     failed = [run for run in one.runs if run.verdict == "fail"]
     total = len(one.runs) + len(one.unjudged)
     said = f"{_who(failed or one.runs, total)} {'out of' if failed else 'within'} tolerance"
-    said += f" against {one.reference.name}{_points(one)}{_part(one)}"
+    said += f" against {one.reference.name}{_points(one)}{_part(one)}{_clocks(one)}"
     if one.baseline and one.baseline.verdict == "fail":
         said += f", {'and' if failed else 'but'} worse than the baseline {one.baseline.name}"
     lost = f"; not judged: {text.enumerated([log.name for log in one.unjudged])}" if one.unjudged else ""
-    return said + assuming(one.assumptions) + lost
+    return said + assuming(one.assumptions) + defaults_words(one.provenance) + lost
 
 
 def _who(runs: Sequence[Deviation], total: int) -> str:
@@ -64,6 +65,17 @@ def _part(one: Comparison) -> str:
     return "".join(
         f"; {share_words(share)}{whose.format(run.name)}" for run in partly for share in run.partly
     )
+
+
+def _clocks(one: Comparison) -> str:
+    """Return which clocks were put together by absolute stamps, the offset of a single log; else nothing."""
+    stamped = [run.sync for run in one.runs if run.sync.mode == "stamps"]
+    if not stamped:
+        return ""
+    if len(one.runs) == 1:
+        return f"; clocks by their stamps (offset {text.seconds(stamped[0].offset)} s)"
+    some = "" if len(stamped) == len(one.runs) else f" of {text.counted(len(stamped), 'log')}"
+    return f"; clocks{some} by their stamps"
 
 
 def share_words(one: Share) -> str:

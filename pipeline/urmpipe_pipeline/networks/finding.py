@@ -111,7 +111,11 @@ def find_network(
         reason=found.reason,
         warnings=(
             *_warnings(mechanism, found, mobility, every=search.every),
-            *(_branch_warnings(mechanism, search.controls) if command == "solve" and not search.every else ()),
+            *(
+                _branch_warnings(mechanism, search.controls)
+                if command == "solve" and not search.every
+                else ()
+            ),
         ),
         provenance=provenance(f"network {command}", options, inputs),
     )

@@ -13,6 +13,7 @@ from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, Role
 from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, ExportColumn, ExportTable, Times
 from urmpipe_pipeline.runs.originals import originals
+from urmpipe_pipeline.sources.checks import REBUILT
 from urmpipe_pipeline.sources.clocks.text_times import ZONED
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 from urmpipe_pipeline.text import encodable
@@ -105,7 +106,7 @@ def _lost(log: JointLog, kept: Sequence[LogColumn]) -> Iterator[LogWarning]:
             said = f"{inference.value}: not ingested ({inference.evidence}), so they cannot be exported"
             yield LogWarning("not-exported", said)
     for warning in log.warnings:
-        if warning.kind == "clock-rebuilt":
+        if warning.kind == REBUILT:
             said = f"the file's own times, which were not kept: {warning.message}"
             yield LogWarning("not-exported", said, warning.row)
         elif warning.kind in ("skipped-row", "end-rows", "other-lines"):

@@ -36,7 +36,7 @@ MANY_REPEATS = 0.1
 """More repeats than these few, and than this share of the rows, are one finding: the clock is too coarse.
 More steps backwards are as well: the column is no clock."""
 
-SPREAD = "clock-spread"
+REBUILT, SPREAD = "clock-rebuilt", "clock-spread"
 """The kind of the warning about stamps that several rows share."""
 
 INCREASING = "times that increase from row to row"
@@ -94,7 +94,7 @@ def rebuilt(numbers: Numbers) -> Numbers:
     period, resolution = f"{clock.period / 1e9:.9g} s", f"{clock.resolution / 1e9:.9g} s"
     seen = f"times in steps of {resolution} cover {clock.resolution / clock.period:.4g} rows each"
     found = Inference("clock", f"rebuilt with a period of {period}", seen, hints=EVEN)
-    warning = LogWarning("clock-rebuilt", f"{seen}: a regular clock of {period} is used instead")
+    warning = LogWarning(REBUILT, f"{seen}: a regular clock of {period} is used instead")
     found_out, warned = (*numbers.inferences, found), (*numbers.warnings, warning)
     return replace(numbers, clock=clock.t_ns, inferences=found_out, warnings=warned)
 
