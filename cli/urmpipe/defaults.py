@@ -7,14 +7,17 @@
     tolerance = {axis = 0.002, angle = "0.5deg"}
 
 A key is the name of an option without its dashes. The files in the working folder and in those above it
-hold together: of an option that several set, the nearest file decides. Options on the command line come
+are merged: of an option that several set, the nearest file decides. The search ends at the folder of a
+repository, at the home folder, and where the folders belong to another user. Options on the command line come
 first. Files named in a file are seen from its own folder.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+import os
+import stat
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +25,7 @@ import click
 
 if TYPE_CHECKING:
     from urmpipe_models.errors import Finding
+    from urmpipe_pipeline.joint_log import LogWarning
 
 NAME = "urmpipe.toml"
 
@@ -39,9 +43,38 @@ TABLES = ("tolerance", "noise")
 
 
 def find_defaults() -> list[Path]:
-    """Return each `urmpipe.toml` in the working folder and above it, the nearest first."""
-    folder = Path.cwd()
-    return [one / NAME for one in (folder, *folder.parents) if (one / NAME).is_file()]
+    """Return each `urmpipe.toml` in the working folder and above it, the nearest first.
+
+    Folders above the one with `.git`, above the home folder, and those of another user have no say.
+    """
+    working = Path.cwd()
+    try:
+        home = Path.home().resolve()
+    except RuntimeError:  # a user without one
+        home = Path(working.anchor)
+    files, owner = [], working.stat().st_uid
+    for folder in (working, *working.parents):
+        if folder.stat().st_uid != owner:
+            break
+        if (folder / NAME).is_file():
+            files.append(folder / NAME)
+        if folder == home or (folder / ".git").exists():
+            break
+    return files
+
+
+def shared_files(files: Iterable[Path]) -> Iterator[LogWarning]:
+    """Yield a warning for each file that users other than this one and root may write."""
+    from urmpipe_pipeline.joint_log import LogWarning
+
+    for path in files if os.name == "posix" else ():
+        status = path.stat()
+        whose = {stat.S_IWGRP: "its group", stat.S_IWOTH: "all users"}
+        writers = [who for bit, who in whose.items() if status.st_mode & bit]
+        writers += [f"its owner (user {status.st_uid})"] if status.st_uid not in (0, os.getuid()) else []
+        if writers:
+            message = f"{' and '.join(writers)} may write it: the defaults in it may be those of others"
+            yield LogWarning("defaults-writable", message, about=str(path))
 
 
 def deciding_defaults(

@@ -54,6 +54,14 @@ def option(heading: Heading, *names: str, **settings: Any) -> Callable[[Command]
 class HeadedCommand(click.Command):
     """A command whose help shows many options under their headings, and few in one list."""
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; with --strict a warning about the files of its defaults is an error, too."""
+        if ctx.obj and ctx.obj.warnings and ctx.params.get("strict"):
+            from urmpipe.keyword_checks import refuse_warnings
+
+            refuse_warnings(True, ctx.obj.warnings)
+        return super().invoke(ctx)
+
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options, each heading with its own in the order of the command."""
         records: dict[Heading, list[tuple[str, str]]] = {heading: [] for heading in Heading}

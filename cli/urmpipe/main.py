@@ -22,7 +22,7 @@ from typing import Any
 import click
 
 from urmpipe import __version__
-from urmpipe.defaults import deciding_defaults, find_defaults
+from urmpipe.defaults import deciding_defaults, find_defaults, shared_files
 from urmpipe.error_boundary import (
     close_streams,
     findings_of,
@@ -86,7 +86,8 @@ class LazyGroup(Group):
         by_file = deciding_defaults(command, files, {name: self._load(name) for name in COMMANDS})
         options = {param.name: max(param.opts, key=len).lstrip("-") for param in command.params}
         ctx.obj = Defaults(
-            {path: {options[name]: value for name, value in own.items()} for path, own in by_file.items()}
+            {path: {options[name]: value for name, value in own.items()} for path, own in by_file.items()},
+            tuple(shared_files(by_file)),
         )
         return {name: value for own in by_file.values() for name, value in own.items()}
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
+from os.path import relpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ from urmpipe.headings import HeadedCommand
 
 if TYPE_CHECKING:
     from urmpipe_models.errors import Finding
+    from urmpipe_pipeline.joint_log import LogWarning
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,14 +25,22 @@ class Defaults:
     Attributes:
         by_file: The values that each urmpipe.toml sets, the nearest file first, by the long names of options
             without dashes.
+        warnings: About files among them that other users may write.
     """
 
     by_file: dict[Path, dict[str, Any]]
+    warnings: tuple[LogWarning, ...] = ()
 
     def lines(self) -> Iterator[str]:
         """Yield a line for each file: its name, and its values as TOML has them, without quotes."""
         for path, values in self.by_file.items():
             yield f"defaults of {path}: {', '.join(f'{k}={_shown(v)}' for k, v in values.items())}"
+
+    def origins(self, options: Collection[str]) -> Iterator[str]:
+        """Yield which of some options each file sets: "sync=auto from ../urmpipe.toml"."""
+        for path, values in self.by_file.items():
+            if own := [f"{name}={_shown(value)}" for name, value in values.items() if name in options]:
+                yield f"{', '.join(own)} from {Path(relpath(path)).as_posix()}"
 
     def file_of(self, option: str) -> Path:
         """Return the file that sets an option."""

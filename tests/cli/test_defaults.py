@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import os
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from urmpipe import read_recording
 from urmpipe.main import COMMANDS, run
 from urmpipe.options.reading import FORMS
 from urmpipe_models import orientation
+from urmpipe_pipeline.comparison.comparison import Comparison
 
 LOG = "t [s],a,b,c,d,e,f\n" + "".join(f"{k * 0.005},{k},1,2,3,4,5\n" for k in range(20))
 
@@ -259,3 +263,74 @@ def test_tables_and_truths_are_no_values(lab: Path, capsys: Captured) -> None:
     (lab / "urmpipe.toml").write_text("robot = true\n")
     assert run([*INGEST]) == 2
     assert "urmpipe.toml: key robot: found true, allowed: a text, a number, " in capsys.readouterr().err
+
+
+def limited_by_git(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (folder / ".git").mkdir()
+
+
+def limited_by_home(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(folder))
+    monkeypatch.setenv("USERPROFILE", str(folder))
+
+
+def limited_by_owner(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not hasattr(os, "getuid") or os.getuid() != 0:
+        pytest.skip("giving a folder to another user needs root")
+    os.chown(folder.parent, 12345, -1)
+
+
+@pytest.mark.parametrize("limit", [limited_by_git, limited_by_home, limited_by_owner])
+def test_files_are_looked_for_up_to_the_own_folders(
+    lab: Path, capsys: Captured, monkeypatch: pytest.MonkeyPatch, limit: Callable[..., None]
+) -> None:
+    (lab.parent / "urmpipe.toml").write_text('tsp = "10ms"\n')
+    (lab / "urmpipe.toml").write_text('robot = "ur5e"\nunit = "deg"\n')
+    assert run(["ingest", "log.csv", "--json"]) == 0
+    assert result(capsys)["tsp"] == 0.01
+    limit(lab, monkeypatch)
+    assert run(["ingest", "log.csv", "--json"]) == 0
+    out, err = capsys.readouterr()
+    assert json.loads(out)["tsp"] == 0.005
+    assert err == f"note: defaults of {lab}/urmpipe.toml: robot=ur5e, unit=deg\n"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="POSIX alone has these modes")
+@pytest.mark.parametrize(("mode", "who"), [(0o664, "its group"), (0o646, "all users"), (0o644, "its owner")])
+def test_a_file_that_others_may_write_is_a_warning(lab: Path, capsys: Captured, mode: int, who: str) -> None:
+    path = lab / "urmpipe.toml"
+    path.write_text('robot = "ur5e"\nunit = "deg"\n')
+    path.chmod(mode)
+    if who == "its owner":
+        if os.getuid() != 0:
+            pytest.skip("giving a file to another user needs root")
+        os.chown(path, 12345, -1)
+        who += " (user 12345)"
+    said = f"{path}: {who} may write it: the defaults in it may be those of others"
+    for command in (["ingest", "log.csv"], ["compare", "log.csv", "log.csv"]):
+        assert run(command) == 0
+        assert f"warning: {said}\n" in capsys.readouterr().err
+    assert run(["ingest", "log.csv", "--strict"]) == 2
+    assert f"error: {said}\n" in capsys.readouterr().err
+    assert run(["compare", "log.csv", "--strict", "--help"]) == 0
+
+
+def test_the_line_of_a_verdict_names_the_file_that_sets_what_decides_it(lab: Path, capsys: Captured) -> None:
+    (lab / "urmpipe.toml").write_text(
+        'robot = "ur5e"\nunit = "deg"\nskip-bad = true\n[compare]\ntolerance = {axis = "9mm"}\n'
+        'sync = "start"\n[diagnose]\ntolerance = "8mm"\n'
+    )
+    (lab / "today" / "urmpipe.toml").write_text('[compare]\nalign = "start"\nsync = "auto"\n')
+    given = ["compare", "log.csv", "log.csv", "--sync", "0", "-o", "v.rrd"]
+    assert run(given) == 0
+    upper = "; skip-bad=true, tolerance=axis=9mm from ../urmpipe.toml"
+    line = f"; align=start from urmpipe.toml{upper}"
+    assert capsys.readouterr().out.splitlines()[0].endswith(line)
+    made = read_recording("v.rrd")
+    assert isinstance(made, Comparison)
+    assert made.provenance.defaults == tuple(line.removeprefix("; ").split("; "))
+    assert run(["report", "v.rrd", "-o", "v.html"]) == 0
+    assert line in Path("v.html").read_text(encoding="utf-8")
+    capsys.readouterr()
+    assert run(["diagnose", "log.csv", "log.csv"]) == 0
+    assert "; skip-bad=true, tolerance=8mm from ../urmpipe.toml\n" in capsys.readouterr().out

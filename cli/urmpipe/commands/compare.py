@@ -12,7 +12,7 @@ from urmpipe.error_boundary import print_findings
 from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.comparing import comparing_options
 from urmpipe.options.completion import tolerances
-from urmpipe.options.given import for_logs, options_given
+from urmpipe.options.given import deciding_defaults, for_logs, options_given
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import log_options
 from urmpipe.options.types import ANY_FILE, DEVIATION, RECORDING, FileType, OneOf, ParsedType
@@ -183,6 +183,7 @@ def compare(
             made or reference,
             logs,
             output=target,
+            defaults=deciding_defaults(ctx, options),
             voice="command line",
             progress=progress,
             **options,

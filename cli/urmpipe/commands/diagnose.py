@@ -10,7 +10,7 @@ import click
 import urmpipe
 from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.comparing import comparing_options
-from urmpipe.options.given import for_logs
+from urmpipe.options.given import deciding_defaults, for_logs
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import log_options
 from urmpipe.options.types import ANY_FILE, ParsedType
@@ -81,7 +81,10 @@ def diagnose(
     target = output or Path(click.format_filename(f"{operands[-1].resolve().stem}-diagnosed.rrd"))
     replaces = target.exists()
     with terminal.progress(f"Writing {target}") as progress:
-        result = urmpipe.diagnose(reference, log, output=target, progress=progress, **options)
+        defaults = deciding_defaults(ctx, options)
+        result = urmpipe.diagnose(
+            reference, log, output=target, defaults=defaults, progress=progress, **options
+        )
     terminal.warn(result.warnings)
     terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces))
     terminal.tell_failure(result)

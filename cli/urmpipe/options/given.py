@@ -28,6 +28,27 @@ def options_given(ctx: click.Context, asked: Callable[[str], bool]) -> list[str]
     ]
 
 
+DECIDING = ("tolerance", "align", "sync", "skip_bad")
+"""Options that may turn a verdict: its line names the file that sets them."""
+
+
+def deciding_defaults(ctx: click.Context, options: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return which of a command's options decide a verdict and come from a file: "sync=auto from FILE".
+
+    Args:
+        ctx: The command's context.
+        options: The options as they are used, by their keywords.
+    """
+    used = {
+        max(param.opts, key=len).removeprefix("--")
+        for param in ctx.command.params
+        if param.name in DECIDING
+        and options.get(param.name) not in (None, False)
+        and ctx.get_parameter_source(param.name) == ParameterSource.DEFAULT_MAP
+    }
+    return tuple(ctx.obj.origins(used)) if used else ()
+
+
 def for_logs(
     ctx: click.Context, operands: Sequence[Path], options: Mapping[str, Any]
 ) -> tuple[dict[str, Any], str | None]:

@@ -146,4 +146,5 @@ def _tell_defaults(ctx: click.Context, param: click.Parameter, quiet: bool) -> b
 
         for line in ctx.obj.lines():
             say(f"note: {line}", err=True)
+        Terminal(as_json=False, quiet=quiet).warn(ctx.obj.warnings)
     return quiet
