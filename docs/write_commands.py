@@ -50,8 +50,12 @@ names what was found, what is allowed, and the next step; with `--json` it is al
 output. Closing a pipe early, as `head` does, does not change the exit code.
 
 **Defaults.** `urmpipe.toml` sets options for all commands, or for one command in its table. The files in the
-working folder and in every folder above it are merged: if several set an option, the nearest file decides.
+working folder and in the folders above it are merged: if several set an option, the nearest file decides.
+The search ends at the folder of a repository (with `.git`), at the home folder, and below a folder of another
+user. A file that others may write is a warning (`defaults-writable`).
 Options on the command line override them all. A command prints the defaults that it uses, and their file.
+The line of a verdict of `compare` and `diagnose` names the file that sets `tolerance`, `align`, `sync` or
+`skip-bad`.
 Options for the output of a single call (`output`, `json`, `junit`, `csv`, `baseline`, `audit`, `write-map`,
 `explain`, `draw`, `list`) have no default. An upper file's `tool` also applies to the `robot` of a nearer
 file, unless that file sets `tool`, too.

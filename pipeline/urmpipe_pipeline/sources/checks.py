@@ -36,8 +36,9 @@ MANY_REPEATS = 0.1
 """More repeats than these few, and than this share of the rows, are one finding: the clock is too coarse.
 More steps backwards are as well: the column is no clock."""
 
-REBUILT, SPREAD = "clock-rebuilt", "clock-spread"
-"""The kind of the warning about stamps that several rows share."""
+REBUILT = "clock-rebuilt"
+SPREAD = "clock-spread"
+"""The kinds of the warnings about stamps that several rows share."""
 
 INCREASING = "times that increase from row to row"
 _TOO_COARSE = "found {now} again, as {rows} repeat a time: too coarse to rebuild a clock"
