@@ -180,6 +180,10 @@ KINDS = {
     "cycles": Kind(_are_cycles, 'a text such as "1:1477,1478:2955", or pairs of rows, such as [(1, 1477)]'),
     "baseline": Kind(_is_baseline, "a recording, or what `compare` returned"),
     "build_fmu.log": Kind(_is_table, "a log: CSV, or a folder of plots"),
+    "defaults": Kind(
+        lambda value: isinstance(value, (list, tuple)) and all(map(_is_text, value)),
+        'a list of texts, such as ["sync=auto from urmpipe.toml"]',
+    ),
     "derivative": _one_of("central", "savgol"),
     "diagnose": FLAG,
     "draw": PATH,

@@ -441,7 +441,7 @@ def test_angles_that_are_not_separately_defined_are_told(
     ry: float, kinds: list[str], capsys: Captured
 ) -> None:
     written(Path("square.csv"), turned_square(ry), names=TURNED)
-    logs(Path(), [turned_square(ry)] * 2, TURNED)
+    logs(Path(), [turned_square(ry) + 1e-9] * 2, TURNED)
     told = answer(capsys, "cycle1.csv", "cycle2.csv")["warnings"]
     assert isinstance(told, list)
     assert [one["kind"] for one in told if one["kind"] != "few-cycles"] == kinds

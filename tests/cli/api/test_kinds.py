@@ -59,7 +59,17 @@ RIGHT = {
         "figure_font",
         "figure_dpi",
     },
-    "a list": {"logs", "inputs", "platforms", "formats", "joints", "measured", "names", "figure_names"},
+    "a list": {
+        "logs",
+        "inputs",
+        "defaults",
+        "platforms",
+        "formats",
+        "joints",
+        "measured",
+        "names",
+        "figure_names",
+    },
     "a mapping": {"arguments", "controls", "network", "options", "unit", "interval"},
     "a table": {"ingest.log", "compare.reference", "compare.logs", "diagnose.reference", "diagnose.log"},
 }

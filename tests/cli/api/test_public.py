@@ -171,9 +171,11 @@ def test_a_warning_is_shown_once(tmp_path: Path) -> None:
     log.write_text("t [s],q1,q2,q3,q4,q5,q6\n" + "".join(f"{i / 100},0,{i / 90},0,0,0,0\n" for i in range(9)))
     with pytest.warns(urmpipe.UrmpipeWarning, match="no unit is given"):
         run = urmpipe.ingest(log, "urm6", period=0.01)
+    with pytest.warns(urmpipe.UrmpipeWarning, match="the same data as log") as shown:
+        compared = urmpipe.compare(run, run, tolerance=0.01)
+    assert len(shown) == 1
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        compared = urmpipe.compare(run, run, tolerance=0.01)
         urmpipe.compare(compared, baseline=compared)
         report = urmpipe.report([compared, run], tmp_path / "report.html")
     assert {one.kind for one in run.warnings} == {"assumed-unit", "period-not-used"}
