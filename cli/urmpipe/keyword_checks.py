@@ -147,7 +147,7 @@ def refuse_recording(given: object, allowed: str) -> None:
 
 
 def refuse_warnings(strict: bool, found: Sequence[LogWarning]) -> None:
-    """Raise a `LogError` with all warnings if they are to be errors, but for those that doubt nothing."""
+    """Raise a `LogError` with all warnings if they are to be errors; columns passed over are none."""
     found = [one for one in found if one.kind != PASSED_OVER]
     if strict and found:
         first = Finding(parameter="strict", found=counted(len(found), "warning"), allowed="none")

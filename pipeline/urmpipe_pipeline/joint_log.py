@@ -36,7 +36,7 @@ ASSUMED_PERIOD = "assumed-period"
 
 
 PASSED_OVER = "columns-passed-over"
-"""The kind of the warning about columns that were not read because measured ones were: it doubts nothing."""
+"""The kind of the warning about columns that were not read because others were: `--strict` accepts it."""
 
 
 def seconds(nanoseconds: IntArray) -> FloatArray:

@@ -112,7 +112,7 @@ class Vocabulary:
     orders: tuple[tuple[str, ...], ...]
     other: frozenset[str]
     grippers: frozenset[str]
-    measured_words: frozenset[str]
+    measured_markers: frozenset[str]
     commanded: frozenset[str]
     present: re.Pattern[str]
     marked: re.Pattern[str]
@@ -173,7 +173,7 @@ def vocabulary() -> Vocabulary:
         orders=tuple(tuple(order) for order in joint["orders"]),
         other=frozenset((*joint["other"], *joint["grippers"])),
         grippers=frozenset(joint["grippers"]),
-        measured_words=frozenset(joint["measured"]),
+        measured_markers=frozenset(joint["measured"]),
         commanded=frozenset(joint["commanded"]),
         present=re.compile(joint["present"]),
         marked=re.compile(rf"{_BEGINS}({marks}){_ENDS}"),
@@ -239,10 +239,10 @@ def key(label: str) -> str:
 
 
 class MarkedName(NamedTuple):
-    """A column's name for comparison, and what it says of its values: were they measured, or asked for?
+    """A column's name for comparison, and what it says of its values: measured or commanded.
 
     Attributes:
-        key: The name with every word for measured or commanded as a word of its own.
+        key: The name with every word for measured or commanded as a separate word.
         bare: The same without these words, which columns of one quantity share.
         measured: The words for measured.
         commanded: Those for commanded.
@@ -269,7 +269,7 @@ def mark_name(label: str) -> MarkedName:
     text = max(plain, parted, key=lambda one: len(words.marked.findall(one)))  # the first of equals
     marks = frozenset(match.group() for match in words.marked.finditer(text))
     bare = key(words.marked.sub("_", text))
-    return MarkedName(text, bare, marks & words.measured_words, marks & words.commanded)
+    return MarkedName(text, bare, marks & words.measured_markers, marks & words.commanded)
 
 
 def _compiled(patterns: Sequence[str]) -> Patterns:

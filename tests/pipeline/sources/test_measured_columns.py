@@ -1,4 +1,4 @@
-"""Measured columns are read beside plain and commanded ones, or it is asked; what was passed over is told."""
+"""Measured columns are read before plain and commanded ones, or a question is raised; the rest is named."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def written(path: Path, *families: Sequence[str]) -> Path:
 
 
 def with_word(stem: str, number: str, word: str, place: str, sign: str) -> str:
-    """Return a name with a word in front, behind or inside; without a sign it begins with a capital."""
+    """Return a name with a word at its front, end or inside; without a sign it begins with a capital."""
     if not word:
         return stem + number
     if not sign:
@@ -77,20 +77,18 @@ def test_the_family_with_a_word_for_measured_is_read(
     first: bool,
     robot: bool,
 ) -> None:
-    stands, other_stands = (
+    stands, passed = (
         [with_word(stem, n, word, *style) for n in STEMS[stem]] for word, style in (done, other)
     )
-    families = (stands, other_stands) if first else (other_stands, stands)
+    families = (stands, passed) if first else (passed, stands)
     arm = "ur5e" if robot and len(stands) == 6 else None
     with TemporaryDirectory() as folder:
         log = urmpipe.ingest(written(Path(folder) / "log.csv", *families), robot=arm).log
     values = log.q if len(stands) == 6 else log.tcp_position
     assert values is not None
     assert values.tolist() == motion(len(stands), 0.0 if first else 0.1).tolist()
-    (told,) = (one for one in log.warnings if one.kind == PASSED_OVER)
-    assert (
-        told.message == f"{other_stands[0]} to {other_stands[-1]} passed over for {stands[0]} to {stands[-1]}"
-    )
+    (warning,) = (one for one in log.warnings if one.kind == PASSED_OVER)
+    assert warning.message == f"{passed[0]} to {passed[-1]} passed over for {stands[0]} to {stands[-1]}"
 
 
 LIMBS = ("boom", "stick", "bucket")
@@ -114,12 +112,12 @@ UR = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
     ],
 )  # fmt: skip
 def test_other_names_of_joints(over: str, done: str, names: Sequence[str], tmp_path: Path) -> None:
-    stands, others = ([form.format(name) for name in names] for form in (done, over))
-    for families in ((stands, others), (others, stands)):
+    stands, passed = ([form.format(name) for name in names] for form in (done, over))
+    for families in ((stands, passed), (passed, stands)):
         log = read_log([written(tmp_path / "log.csv", *families)])
         assert [one.header for one in log.columns if one.role == "joint"] == stands
         assert [one.message for one in log.warnings if one.kind == PASSED_OVER] == [
-            f"{others[0]} to {others[-1]} passed over for {stands[0]} to {stands[-1]}"
+            f"{passed[0]} to {passed[-1]} passed over for {stands[0]} to {stands[-1]}"
         ]
 
 
@@ -134,10 +132,10 @@ def test_other_names_of_joints(over: str, done: str, names: Sequence[str], tmp_p
         ("tcp_x tcp_y tcp_z", "x y z"),
     ],
 )
-def test_candidates_that_no_word_tells_apart_are_asked_about(families: Sequence[str], tmp_path: Path) -> None:
+def test_candidates_that_no_word_separates_raise_a_question(families: Sequence[str], tmp_path: Path) -> None:
     path = written(tmp_path / "log.csv", *(names.split() for names in families))
-    said = refusal(LogError, read_log, [path])
-    assert all(names.split()[0] in said for names in families) and "allowed: one" in said
+    message = refusal(LogError, read_log, [path])
+    assert all(names.split()[0] in message for names in families) and "allowed: one" in message
     joints = families[0].split()
     if "x" not in families[1].split():
         assert read_log([path], ReadOptions(joints=tuple(joints))).joints == tuple(joints)
@@ -151,13 +149,13 @@ def test_orientation_and_rates_are_those_of_what_is_read(tmp_path: Path) -> None
     )
     path = written(tmp_path / "log.csv", joints, rates, pose, done, done_rates, actual)
     log = read_log([path], ReadOptions(rotation="vector"))
-    found = {
+    result = {
         role: [c.header for c in log.columns if c.role == role]
         for role in ("joint", "rate", "position", "rotation")
     }
-    assert found == {"joint": done, "rate": done_rates, "position": actual[:3], "rotation": actual[3:]}
-    (told,) = (one.message for one in log.warnings if one.kind == PASSED_OVER)
-    assert told.split("; ") == [
+    assert result == {"joint": done, "rate": done_rates, "position": actual[:3], "rotation": actual[3:]}
+    (warning,) = (one.message for one in log.warnings if one.kind == PASSED_OVER)
+    assert warning.split("; ") == [
         "q1 to q6 passed over for q1_act to q6_act",
         "x to z passed over for x_fb to z_fb",
         "qd1 to qd6 passed over for qd1_act to qd6_act",
@@ -185,7 +183,7 @@ def test_one_family_is_read_without_a_word(names: str, tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not CASES.is_dir(), reason="the cases in ../shared/cases are not here")
 @pytest.mark.parametrize(
-    ("files", "given", "verdict"),
+    ("files", "keywords", "verdict"),
     [
         (["verdict/path.csv", "verdict/c9.csv"], {"robot": "ur5e"}, "fail"),
         (["verdict/path.csv", "verdict/c10.csv"], {"robot": "ur5e"}, "fail"),
@@ -194,12 +192,14 @@ def test_one_family_is_read_without_a_word(names: str, tmp_path: Path) -> None:
         (["reading/tcp-pair.csv"], {"sides": ("target", "actual")}, "pass"),
     ],
 )
-def test_a_verdict_is_about_what_was_done(files: list[str], given: dict[str, object], verdict: str) -> None:
-    found = urmpipe.compare(*(CASES / file for file in files), **given)  # type: ignore[arg-type]
-    assert found.verdict == verdict
-    assert found.runs[0].statistics["x"].max > 0.9e-3
-    told = [one.kind for one in found.runs[0].run.warnings]
-    assert (PASSED_OVER in told) != ("sides" in given)
+def test_a_verdict_is_about_what_was_done(
+    files: list[str], keywords: dict[str, object], verdict: str
+) -> None:
+    result = urmpipe.compare(*(CASES / file for file in files), **keywords)  # type: ignore[arg-type]
+    assert result.verdict == verdict
+    assert result.runs[0].statistics["x"].max > 0.9e-3
+    warning = [one.kind for one in result.runs[0].run.warnings]
+    assert (PASSED_OVER in warning) != ("sides" in keywords)
 
 
 def test_the_line_is_printed_and_stored_and_no_error_for_strict(
@@ -216,6 +216,6 @@ def test_the_line_is_printed_and_stored_and_no_error_for_strict(
     assert PASSED_OVER in [one.kind for one in urmpipe.read_recording(kept).warnings]  # type: ignore[attr-defined]
     (unused,) = (one for one in read_log([path]).inferences if one.what == "columns not used")
     (hint,) = unused.hints
-    found = urmpipe.compare(path, sides=hint.value, tolerance="joint=1rad")  # type: ignore[arg-type]
-    assert found.runs[0].joint_delta is not None
-    np.testing.assert_allclose(found.runs[0].joint_delta, -0.1)
+    result = urmpipe.compare(path, sides=hint.value, tolerance="joint=1rad")  # type: ignore[arg-type]
+    assert result.runs[0].joint_delta is not None
+    np.testing.assert_allclose(result.runs[0].joint_delta, -0.1)

@@ -81,7 +81,7 @@ class Column:
 
     @property
     def marked(self) -> MarkedName:
-        """Its key, and what it says of its values: were they measured, or asked for?"""
+        """Its key, and what it says of its values: measured or commanded."""
         return mark_name(self.name if key(self.name) == self.key else split_unit(self.header)[0])
 
     @property
@@ -92,7 +92,7 @@ class Column:
 
     @property
     def kind(self) -> Kind:
-        """Whether its values were measured, asked for, or nothing says so."""
+        """Whether its values were measured or commanded, as far as its name says so."""
         return kind_of(self.marked.measured, self.marked.commanded)
 
     @property

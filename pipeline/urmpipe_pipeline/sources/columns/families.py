@@ -63,14 +63,14 @@ def find_families(columns: Iterable[Column], patterns: Patterns, order: int) -> 
         matched = _match(column, patterns, order)
         if matched is None or (column.unit is not None and column.unit.order != order):
             continue
-        number, alike = matched
+        number, identity = matched
         shape = tuple(tuple(vocabulary().marked.findall(word)) for word in column.plain.split("_"))
-        family = found.setdefault((*alike, shape, None), Family(*alike))
+        family = found.setdefault((*identity, shape, None), Family(*identity))
         if number in family.columns:
             family.twins.append(column)
             if column.unit_text == family.columns[number].unit_text:
                 continue
-            family = found.setdefault((*alike, shape, column.unit_text), Family(*alike))
+            family = found.setdefault((*identity, shape, column.unit_text), Family(*identity))
         family.columns.setdefault(number, column)
     whole = [family for (*_, unit), family in found.items() if unit is None or len(family.columns) > 1]
     return sorted(whole, key=lambda family: family.rank)
@@ -87,8 +87,8 @@ def _stands_for(other: Family, family: Family) -> bool:
 
     One that is known only without its words has to have the same name.
     """
-    alike = other.shares_name(family) or (other.known and other.kind == Kind.MEASURED)
-    return other.kind < family.kind and len(other.columns) == len(family.columns) and alike
+    same = other.shares_name(family) or (other.known and other.kind == Kind.MEASURED)
+    return other.kind < family.kind and len(other.columns) == len(family.columns) and same
 
 
 def drop_unknown(found: Sequence[Family], *, lone: bool) -> list[Family]:

@@ -30,7 +30,7 @@ _LAST_NUMBER = re.compile(r"\d+(?=\D*$)")
 class NamedJoints:
     """Joint columns, why they are, the names and numbers that their rates share, and these if proved.
 
-    `others` are groups of columns that would have been the joints without these.
+    `alternatives` are groups of columns that would have been the joints without these.
     """
 
     columns: tuple[Column, ...]
@@ -38,7 +38,7 @@ class NamedJoints:
     numbers: tuple[int, ...] = ()
     names: tuple[str, ...] = ()
     rates: tuple[Column, ...] = ()
-    others: tuple[tuple[Column, ...], ...] = ()
+    alternatives: tuple[tuple[Column, ...], ...] = ()
 
 
 def numbered_alike(columns: Sequence[Column]) -> list[tuple[Column, ...]]:
@@ -96,8 +96,8 @@ def find_joints(
         free: The columns.
         file: The file, for errors.
         robot: The arm, or None.
-        half_pose: Whether a position is beside them without an orientation: three angles may be it.
-        path: Whether a position is beside them, so that it is a log without joints, too.
+        half_pose: Whether the log has a position without an orientation: three angles may be it.
+        path: Whether the log has a position, so that it may be one without joints.
 
     Raises:
         LogError: With the question which they are.
@@ -114,7 +114,7 @@ def find_joints(
     surer = [group for group in alike if kinds and group[0].kind == Kind.MEASURED < min(kinds)]
     if same or surer:
         _refuse_groups([found.columns, *surer, *same], file)
-    return replace(found, others=tuple(dict.fromkeys((*found.others, *alike))))
+    return replace(found, alternatives=tuple(dict.fromkeys((*found.alternatives, *alike))))
 
 
 def _find_numbered(free: Sequence[Column], *, lone: bool) -> list[Family]:
@@ -137,8 +137,8 @@ def _find_joints(
         by_name = named_after(free, names, "position")
         if by_name and count in (None, len(by_name)):
             whose = "the robot's" if robot and names == robot.coordinates else "known"
-            others = tuple(arm for arm in _arms(free, names) if not {*arm} & {*by_name})
-            return NamedJoints(by_name, f"{whose} joint names", names=tuple(names), others=others)
+            alternatives = tuple(arm for arm in _arms(free, names) if not {*arm} & {*by_name})
+            return NamedJoints(by_name, f"{whose} joint names", names=tuple(names), alternatives=alternatives)
         if count in (None, len(names)):
             _refuse_several_arms(free, names, file)
     by_number = _numbered(free, numbered, file, count)
@@ -156,16 +156,16 @@ def _without_number(free: Sequence[Column], file: str, count: int | None, *, hal
         _refuse_half(family, free, _not_commanded(still), file, count)
         names = tuple("_".join(w for w in c.key.split("_") if w not in words.marks) for c in family)
         evidence = "the word position or angle in their names; the order is the file's"
-        return NamedJoints(family, evidence, names=names, others=same_quantities(family, every))
+        return NamedJoints(family, evidence, names=names, alternatives=same_quantities(family, every))
     sized = tuple(c for c in still if c.unit and c.unit.quantity in ("angle", "length"))
     turning = any(c.unit and c.unit.quantity == "angle" for c in sized)
     if turning and count in (None, len(sized)) and not (half_pose and count is None and len(sized) == 3):
         return NamedJoints(
-            sized, "their units; the order is the file's", others=same_quantities(sized, every)
+            sized, "their units; the order is the file's", alternatives=same_quantities(sized, every)
         )
     if count is not None and len(still) == count:
         evidence = f"the only {count} columns left; the order is the file's"
-        return NamedJoints(tuple(still), evidence, others=same_quantities(still, every))
+        return NamedJoints(tuple(still), evidence, alternatives=same_quantities(still, every))
     return NamedJoints(())
 
 
@@ -243,7 +243,7 @@ def _arms(columns: Sequence[Column], names: Sequence[str]) -> list[tuple[Column,
     for name in names:
         for column in columns:
             if _role_beside(column, name) == "position":
-                arms.setdefault(_beside(column, name), {}).setdefault(name, column)
+                arms.setdefault(_words_around(column, name), {}).setdefault(name, column)
     return [tuple(arm[name] for name in names) for arm in arms.values() if len(arm) == len(names)]
 
 
@@ -274,8 +274,8 @@ def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> t
     return tuple(result) if len(set(result)) == len(result) else ()
 
 
-def _beside(column: Column, name: str) -> frozenset[str] | None:
-    """Return the words of a column beside the name of a joint, None without that name; they may part it."""
+def _words_around(column: Column, name: str) -> frozenset[str] | None:
+    """Return the other words of a column with the name of a joint, which they may interrupt; else None."""
     for text in (column.marked.key, column.bare):
         before, inner, behind = f"_{text}_".partition(f"_{key(name)}_")
         if inner:
@@ -286,12 +286,12 @@ def _beside(column: Column, name: str) -> frozenset[str] | None:
 
 def _role_beside(column: Column, name: str) -> str | None:
     """Return what a column says about a joint: by the words beside the joint's name in its own."""
-    beside, words = _beside(column, name), vocabulary().joint_words
-    if beside is None or beside & vocabulary().other:
+    around, words = _words_around(column, name), vocabulary().joint_words
+    if around is None or around & vocabulary().other:
         return None
     order = column.unit.order if column.unit else 0
     for role, its_order in (("acceleration", 2), ("rate", 1)):
-        if beside & words[role] or order == its_order:
+        if around & words[role] or order == its_order:
             return role
     return "position"
 
@@ -313,9 +313,9 @@ def _numbered(
         columns = tuple(column for family in best for column in family.ordered())
         return NamedJoints(columns, "their names; the order is the file's")
     family = best[0]
-    others = tuple(f.ordered() for f in found if f is not family and f.shares_name(family))
+    alternatives = tuple(f.ordered() for f in found if f is not family and f.shares_name(family))
     moving = words.joint_words["rate"] | words.joint_words["acceleration"]
-    passed = {column for group in others for column in group}
+    passed = {column for group in alternatives for column in group}
     still = [column for column in free if not column.words & moving and column not in passed]
     lowest = min(family.columns)
     first = lowest if len(family.columns) == 1 else min(lowest, 1)
@@ -330,7 +330,7 @@ def _numbered(
     if larger := _sharing_a_mark(still, family.ordered()):
         _refuse_half(family.ordered(), larger, larger, file, count)
     evidence = "their names, in the order of their numbers"
-    return NamedJoints(family.ordered(), evidence, tuple(sorted(family.columns)), others=others)
+    return NamedJoints(family.ordered(), evidence, tuple(sorted(family.columns)), alternatives=alternatives)
 
 
 def cure(missing: int, spare: Sequence[Column], count: int | None) -> tuple[Hint, Hint]:

@@ -46,7 +46,7 @@ class Pose:
         forms: What these may be; one if it is known.
         evidence: Why.
         measured: Whether it was measured from outside, in a frame of its own.
-        others: Groups of columns that would have been the position without these.
+        alternatives: Groups of columns that would have been the position without these.
     """
 
     position: tuple[Column, ...] = ()
@@ -54,7 +54,7 @@ class Pose:
     forms: tuple[RotationForm, ...] = ()
     evidence: str = "their names"
     measured: bool = False
-    others: tuple[tuple[Column, ...], ...] = ()
+    alternatives: tuple[tuple[Column, ...], ...] = ()
 
 
 def find_pose(
@@ -75,7 +75,7 @@ def find_pose(
         form: Form of the orientation, if it is told: its columns are not asked then whether they hold it.
         some: Whether it is enough that some rows hold an orientation: the others are wrong.
         lone: Whether columns are a position that are known only without their words for measured or
-            commanded: target_x beside joints is no place of the tool unless actual_x is there.
+            commanded: target_x is not where the tool was, unless the log has actual_x, too.
 
     Raises:
         LogError: If there are several positions where one is needed.
@@ -84,17 +84,17 @@ def find_pose(
     vectors = prefer_measured(every)
     if len(vectors) == 1:
         ordered = vectors[0].ordered()
-        return Pose(ordered[:3], ordered[3:], ("vector",), others=_others(vectors[0], every))
+        return Pose(ordered[:3], ordered[3:], ("vector",), alternatives=_alternatives(vectors[0], every))
     every = find_families(numeric, vocabulary().tcp_matrix, 0)
     for family in prefer_measured(every):
         pose = matrix_pose(family.ordered(), layouts, some=some)
         if pose is not None:
             same = [other for other in every if other.shares_name(family)]
-            return replace(pose, others=_others(family, same))
-    position, others = _position(numeric, file, lone=lone)
+            return replace(pose, alternatives=_alternatives(family, same))
+    position, alternatives = _position(numeric, file, lone=lone)
     measured = not position
     if measured:
-        position, others = _xyz(find_families(numeric, vocabulary().measured, 0))
+        position, alternatives = _xyz(find_families(numeric, vocabulary().measured, 0))
     if not position and (counted := _counted_pose(numeric, layouts, form)):
         return counted
     rest = [column for column in numeric if column not in position]
@@ -102,11 +102,11 @@ def find_pose(
         stem = os.path.commonprefix([column.key for column in position])  # noqa: RUF071 (names, not paths)
         stem = _OF_POSITION.sub("", stem)
         rest = [column for column in rest if stem and column.key.startswith(stem)]
-    if others:  # the orientation of another position is not that of this one
+    if alternatives:  # the orientation of another position is not that of this one
         rest, lone = [column for column in rest if column.kind == position[0].kind], True
     rotation, forms = _rotation(rest, layouts, form, some=some, lone=lone) if position else ((), ())
     own_frame = any(p.search(column.key) for column in position[:1] for p in vocabulary().measured)
-    return Pose(position, rotation, forms, measured=own_frame, others=others)
+    return Pose(position, rotation, forms, measured=own_frame, alternatives=alternatives)
 
 
 def _counted_pose(
@@ -312,10 +312,10 @@ def _xyz(
     if len(best) > 1 and file is not None:
         groups = "; ".join(listed(family.ordered()) for family in best)
         raise LogError(Finding(f"found several positions: {groups}; allowed: one x, y, z", file=file))
-    return (best[0].ordered(), _others(best[0], every)) if len(best) == 1 else ((), ())
+    return (best[0].ordered(), _alternatives(best[0], every)) if len(best) == 1 else ((), ())
 
 
-def _others(family: Family, every: Sequence[Family]) -> tuple[tuple[Column, ...], ...]:
+def _alternatives(family: Family, every: Sequence[Family]) -> tuple[tuple[Column, ...], ...]:
     """Return the columns of the other families of as many."""
     return tuple(
         other.ordered()

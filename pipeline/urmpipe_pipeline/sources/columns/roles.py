@@ -122,7 +122,11 @@ def assign(
             some=path,
             lone=path,
         )
-        about_tool = {*pose.position, *pose.rotation, *(column for group in pose.others for column in group)}
+        about_tool = {
+            *pose.position,
+            *pose.rotation,
+            *(column for group in pose.alternatives for column in group),
+        }
         free = [column for column in numeric if column not in about_tool]
         half, placed = bool(pose.position and not pose.rotation), bool(pose.position)
         found = NamedJoints(()) if path else find_joints(free, file, robot, half_pose=half, path=placed)
@@ -144,7 +148,9 @@ def assign(
     for what, group in (("rates", rates), ("accelerations", accelerations)):
         if group:
             said.append(Inference(what, ", ".join(column.name for column in group), "their names"))
-    return _with_rest(roles, [*said, *about_pose(pose)], numeric, layouts, found.others, pose.others)
+    return _with_rest(
+        roles, [*said, *about_pose(pose)], numeric, layouts, found.alternatives, pose.alternatives
+    )
 
 
 def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> None:
@@ -174,14 +180,14 @@ def _derivative(role: str, numeric: Sequence[Column], joints: NamedJoints) -> tu
     if joints.names:
         return named_after(numeric, joints.names, role)
     order = ("position", "rate", "acceleration").index(role)
-    kind, others = joints.columns[0].kind, {group[0].kind for group in joints.others}
+    kind, alternatives = joints.columns[0].kind, {group[0].kind for group in joints.alternatives}
     families = [
         family
         for family in find_families(numeric, vocabulary().joint[role], order=order)
         if set(family.columns) == set(joints.numbers)
     ]
     matching = [family for family in families if family.kind == kind]
-    if not matching and kind != Kind.COMMANDED and Kind.PLAIN not in others:
+    if not matching and kind != Kind.COMMANDED and Kind.PLAIN not in alternatives:
         matching = [family for family in families if family.kind != Kind.COMMANDED]
     best = [family for family in matching if family.rank == min(f.rank for f in matching)]
     return tuple(best[0].columns[n] for n in joints.numbers) if len(best) == 1 else ()
@@ -224,7 +230,7 @@ def _path(
     file = layouts[0].file
     pose = pose if pose.position else find_pose(numeric, layouts, file, lone=True)
     if pose.position:
-        same = [group for group in pose.others if group[0].kind == pose.position[0].kind]
+        same = [group for group in pose.alternatives if group[0].kind == pose.position[0].kind]
         if same:
             groups = "; ".join(map(listed, (pose.position, *same)))
             hint = Hint("log_map", None, 'names them: [tcp] position = ["A", "B", "C"]')
@@ -234,7 +240,7 @@ def _path(
         names = ", ".join(column.name for column in pose.position)
         said = [path_inference(names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
         roles = Roles((), (), (), pose.position, pose.rotation, pose.forms, measured=pose.measured)
-        return _with_rest(roles, said, numeric, layouts, (), pose.others)
+        return _with_rest(roles, said, numeric, layouts, (), pose.alternatives)
     _refuse_thousands(layouts, file)
     if path:
         hints = (
@@ -296,7 +302,7 @@ def _with_rest(
     said: list[Inference],
     numeric: Sequence[Column],
     layouts: Sequence[Layout],
-    *others: Sequence[tuple[Column, ...]],
+    *alternatives: Sequence[tuple[Column, ...]],
 ) -> Roles:
     """Return the roles with what is said of the columns that are not used.
 
@@ -305,11 +311,11 @@ def _with_rest(
         said: What was found out.
         numeric: All columns of numbers.
         layouts: The tables.
-        others: Groups of columns that would have been read as the joints, and as the position, without these.
+        alternatives: Groups of columns that would have been the joints, and the position, without these.
     """
     used = frozenset(roles.columns)
     rest = [column for column in numeric if column not in used]
-    pairs = list(zip((roles.joints, roles.position), others, strict=True))
+    pairs = list(zip((roles.joints, roles.position), alternatives, strict=True))
     pairs += [(one, same_quantities(one, rest)) for one in (roles.rates, roles.accelerations, roles.rotation)]
     passed = _passed_over(pairs, used)
     hints = _sides_of(passed[0]) if passed else ()
@@ -321,10 +327,10 @@ def _with_rest(
 def _passed_over(
     pairs: Sequence[tuple[tuple[Column, ...], Sequence[tuple[Column, ...]]]], used: Collection[Column]
 ) -> list[tuple[tuple[Column, ...], tuple[Column, ...]]]:
-    """Return the groups that are read, each with one that was not read for it; a column stands in one."""
+    """Return the groups that are read, each with one that was passed over for it; no column twice."""
     named, passed = set(used), []
-    for group, others in pairs:
-        for other in others:
+    for group, alternatives in pairs:
+        for other in alternatives:
             if left := tuple(column for column in other if column not in named):
                 passed.append((group, left))
                 named |= {*left}
@@ -352,7 +358,7 @@ def _sides_of(passed: tuple[tuple[Column, ...], tuple[Column, ...]]) -> tuple[Hi
     done, asked = (frozenset.intersection(*(one.words for one in group)) for group in passed)
     pair = [
         min(asked & vocabulary().commanded, default=REST),
-        min(done & vocabulary().measured_words, default=REST),
+        min(done & vocabulary().measured_markers, default=REST),
     ]
     return () if pair == [REST, REST] else (Hint("sides", pair, "compares them", call="compare"),)
 
