@@ -76,7 +76,7 @@ def test_what_changed_is_printed(folder: Path, capsys: Captured) -> None:
         "Noise: axis 0.001 mm, norm 0.001 mm, path 0.001 mm, angle 5.72958e-05 deg, joint 5.72958e-05 deg",
         "New: slack",
         "Gone: bad",
-        'tolerance  {"axis": 0.0035}  {"axis": 0.004}',
+        'tolerance  {"axis": "3.5 mm"}  {"axis": "4 mm"}',
     } <= set(lines)
 
 
