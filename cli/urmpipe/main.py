@@ -183,6 +183,8 @@ def run(arguments: Sequence[str]) -> int:
             warnings.filterwarnings(
                 "ignore", module=r"urmpipe\.commands"
             )  # a command prints those of results
+            if "--debug" not in arguments:  # behind all other filters: -W error still makes an error of it
+                warnings.simplefilter("ignore", RuntimeWarning, append=True)
             return int(cli.main(list(arguments), prog_name="urmpipe", standalone_mode=False) or 0)
     except BrokenPipeError:  # the reader of a help text left, as head does; results are told to the end
         leave_output()

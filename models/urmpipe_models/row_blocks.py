@@ -32,8 +32,9 @@ def norms(vectors: FloatArray) -> FloatArray:
         vectors: In any unit, shape (n, k).
     """
     lengths = np.empty(len(vectors))
-    for block in row_blocks(len(vectors)):
-        lengths[block] = np.linalg.norm(vectors[block], axis=1)
+    with np.errstate(over="ignore"):  # of a coordinate beyond 1e154, whose square is infinite
+        for block in row_blocks(len(vectors)):
+            lengths[block] = np.linalg.norm(vectors[block], axis=1)
     return lengths
 
 

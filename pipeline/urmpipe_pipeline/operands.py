@@ -9,6 +9,8 @@ from os.path import isdir, isfile  # of a name that no file may have Path raises
 from pathlib import Path
 from typing import TypeAlias, TypeVar
 
+import numpy as np
+
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import (
     Finding,
@@ -51,6 +53,9 @@ MADE_RUNS: tuple[type[MadeRun], ...] = (Run, SolvedTargets, PlannedPath)
 Operand: TypeAlias = Path | Held | MadeRun | Simulation
 """What stands for a run, or is read as one."""
 
+LARGEST = 1e12
+"""In [m] or [rad]: the last digit of a double beyond is 0.1 mm, and powers of it overflow in a comparison."""
+
 Given = TypeVar("Given")
 
 
@@ -89,15 +94,18 @@ def load_runs(
     read, blocks = replace(read or ReadOptions(), shared=shared), _Blocks(block)
 
     def run_of(one: tuple[Operand, tuple[str, str] | None]) -> Run:
-        """Return the run that an operand is, is recorded in, or is read as."""
+        """Return the run that an operand is, is recorded in, or is read as, with values that can be compared."""
         operand, side = one
         made = _recorded(operand, judged) if isinstance(operand, Path) and _is_recording(operand) else operand
         try:
             if isinstance(made, (Path, Held)):
-                return _read(made, replace(read, side=side), robot=robot, tsp=tsp, derivative=derivative)
-            if isinstance(made, Simulation):
-                return run_of_block(made, blocks.next(), robot)
-            return on_robot(made.as_run(), robot)
+                found = _read(made, replace(read, side=side), robot=robot, tsp=tsp, derivative=derivative)
+            elif isinstance(made, Simulation):
+                found = run_of_block(made, blocks.next(), robot)
+            else:
+                found = on_robot(made.as_run(), robot)
+            _refuse_huge(found)
+            return found
         except LogError as error:  # of several operands, each is named
             name = str(operand) if isinstance(operand, Path) else None
             raise LogError(*(replace(one, file=one.file or name) for one in error.findings)) from error
@@ -120,6 +128,20 @@ def load_runs(
     if unjudged is not None:
         unjudged += [Unjudged(name, one.findings) for name, one in named if isinstance(one, UrmpipeError)]
     return [replace(one, name=name) for name, one in named if isinstance(one, Run)]
+
+
+def _refuse_huge(run: Run) -> None:
+    """Raise a `LogError` with each column of a log that has values beyond `LARGEST`."""
+    log = run.log
+    positions = [] if log.tcp_position is None else [*zip(("x", "y", "z"), log.tcp_position.T, strict=True)]
+    faults = []
+    for name, values in (*zip(log.joints, log.q.T, strict=True), *positions):
+        rows = np.flatnonzero(np.abs(values) > LARGEST)
+        if len(rows):
+            said = f"found {values[rows[0]]:g} (in SI) and {len(rows) - 1} more, allowed: up to {LARGEST:g}"
+            faults.append(Finding(said.replace(" and 0 more", ""), row=int(rows[0]) + 1, column=name))
+    if faults:
+        raise LogError(*faults)
 
 
 def _read(

@@ -160,6 +160,65 @@ def test_values_that_would_take_all_time_or_memory_name_their_option(
     assert (ran.code, ran.out, ran.err) == (2, "", f"error: {option}{said}\n")
 
 
+HUGE = "t,q1 [rad],q2 [rad],q3 [rad],q4 [rad],q5 [rad],q6 [rad],x [m],y [m],z [m]\n"
+HUGE += "".join(f"{0.01 * k:g},0.1,{9 * k}e199,1e160,0.4,0.5,{k % 7},{k}e200,{k}e300,1e300\n" for k in range(60))
+UP_TO = "allowed: up to 1e+12"
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        (["ingest huge.csv --robot ur5e", "report huge.rrd"], ""),
+        (["ik huge.csv --robot ur5e --unit m"], ""),
+        (["compare huge.csv huge.csv --robot ur5e"], f"column q2: found 9e+199 (in SI) and 58 more, {UP_TO}"),
+        (["diagnose huge.csv huge.csv --robot ur5e"], f"column z: found 1e+300 (in SI) and 59 more, {UP_TO}"),
+        (["plan cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1 --acceleration 1e300"], "1e-09 to 1e+09 m/s2"),
+        (["plan cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1 --tsp 1e300"], "1e-09 to 1e+09 s"),
+    ],
+)  # fmt: skip
+def test_numpy_warns_of_no_huge_value(
+    urmpipe: RunCommand, tmp_path: Path, lines: list[str], said: str
+) -> None:
+    (tmp_path / "huge.csv").write_text(HUGE, encoding="utf-8")
+    for line in lines:
+        ran = urmpipe(*line.split())
+        assert said in ran.err
+        assert "an error in urmpipe" not in ran.err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("python", "words", "shown"), [((), (), 0), ((), ("--debug",), 1), (("-W", "error"), (), 1)]
+)
+def test_a_warning_of_numpy_reaches_who_debugs_alone(
+    python: tuple[str, ...], words: tuple[str, ...], shown: int
+) -> None:
+    code = (
+        "import sys, numpy as np, urmpipe.main as main;"
+        "main.cli.main = lambda *_, **__: np.zeros(1) / np.zeros(1);"
+        "main.run(sys.argv[1:])"
+    )
+    line = [sys.executable, *python, "-c", code, *words]
+    done = subprocess.run(line, capture_output=True, text=True, check=False)
+    assert done.stderr.count("RuntimeWarning: invalid value") == shown
+
+
+@pytest.mark.slow
+def test_a_stop_in_a_callback_of_python_stops_all_the_same() -> None:
+    code = (
+        "import signal, sys, time, weakref, urmpipe.main as main;"
+        "stop = lambda *_: signal.raise_signal(signal.SIGTERM);"
+        "made = [type('A', (), {})()];"
+        "kept = weakref.ref(made[0], stop);"
+        "main.cli.main = lambda *_, **__: (made.clear(), [time.sleep(0.01) for _ in range(6000)]);"
+        "main.main([])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, "error: stopped; no file is left incomplete\n")
+
+
 @given(name=st.sampled_from(sorted(COMMANDS)), at=st.integers(0, 20))
 def test_a_command_with_a_letter_missing_is_meant(name: str, at: int) -> None:
     at %= len(name)

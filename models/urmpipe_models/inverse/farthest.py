@@ -9,6 +9,7 @@ import numpy as np
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.row_blocks import norms
 
 SURE = 1e-3
 """A target is too far if it is by more than this, in [m]: the edge of the reach is left to the search."""
@@ -35,7 +36,7 @@ def too_far(chain: Chain, targets: Targets, tolerance: float | None) -> list[str
     """
     most = farthest(chain)
     first = (chain.base @ chain.joints[0].origin).translation
-    away = np.linalg.norm(targets.position - np.array(first), axis=1)
+    away = norms(targets.position - np.array(first))
     reasons = [""] * len(targets)
     for row in np.flatnonzero(away > most + SURE + math.sqrt(3.0) * (tolerance or 0.0)).tolist():
         reasons[row] = f"the target is {away[row]:.3f} m from the first joint, allowed: {most:.3f} m at most"

@@ -15,6 +15,7 @@ from urmpipe_models.names import not_among
 from urmpipe_models.orientation import matrices, quaternions
 from urmpipe_models.planning.cube import PLANES, cube_faults, cube_rows
 from urmpipe_models.planning.rows import PathRows
+from urmpipe_pipeline.planned_paths.row_checks import FARTHEST
 
 CUBE = "cube:"
 """How the text begins."""
@@ -71,7 +72,9 @@ def _values(given: Mapping[str, str], faults: list[Finding]) -> Iterator[tuple[s
         if key == PLANE:
             continue
         value = quantity(text, WRITTEN["rad" if key in ANGLE_KEYS else "m"])
-        if math.isfinite(value):
+        if key in LENGTH_KEYS and FARTHEST < abs(value) < math.inf:
+            faults.append(Finding(found=f"{key}={text}", allowed=f"up to {FARTHEST:g} m"))
+        elif math.isfinite(value):
             yield key, value
         else:
             allowed = (

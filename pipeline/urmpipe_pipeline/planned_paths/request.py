@@ -23,6 +23,9 @@ VELOCITY, ACCELERATION = 0.5, 6.0
 PERIOD = 0.005
 """From sample to sample in [s] where nothing else is given."""
 
+LEAST, LARGEST = 1e-9, 1e9
+"""Speeds, accelerations and jerks outside of this are those of no arm, and their powers leave no digits."""
+
 NANOSECOND = 1e-9
 """What times are counted in [s]."""
 
@@ -89,6 +92,9 @@ def _bad_values(timing: Timing) -> Iterator[Finding]:
             yield Finding(parameter=name, found=shown(value), allowed=f"a finite number of {unit} above 0")
         elif name == "tsp" and timing.tsp < NANOSECOND:
             yield Finding(parameter=name, found=shown(value), allowed="1e-09 s or more: times are in ns")
+        elif value is not None and not LEAST <= value <= LARGEST:
+            allowed = f"{LEAST:g} to {LARGEST:g} {unit}"
+            yield Finding(parameter=name, found=shown(value), allowed=allowed)
 
 
 def _bad_pairs(timing: Timing) -> Iterator[Finding]:

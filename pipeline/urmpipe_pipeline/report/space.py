@@ -239,4 +239,4 @@ def _scene(traces: list[Spec], positions: list[FloatArray]) -> Spec:
 def _slim(low: FloatArray, high: FloatArray) -> bool:
     """Tell whether what lies between two corners is much longer than wide or high."""
     extent = np.maximum(high - low, CLOSEST)
-    return bool(extent.max() > SLIM * np.prod(extent) ** (1.0 / 3.0))
+    return bool(extent.max() > SLIM * np.prod(np.cbrt(extent)))

@@ -92,7 +92,9 @@ def typed(values: NDArray[Any], dtype: Literal["f4", "f8"] = "f4") -> Spec:
     plotly.js reads that without parsing. Single precision (7 digits) is enough for values that are drawn;
     times take "f8", because a long log would run out of digits.
     """
-    data = base64.b64encode(np.ascontiguousarray(values, f"<{dtype}").tobytes()).decode("ascii")
+    with np.errstate(over="ignore"):  # beyond 3e38, which is infinite in single precision, nothing is drawn
+        written = np.ascontiguousarray(values, f"<{dtype}")
+    data = base64.b64encode(written.tobytes()).decode("ascii")
     spec: Spec = {"dtype": dtype, "bdata": data}
     return spec if values.ndim == 1 else spec | {"shape": ", ".join(map(str, values.shape))}
 

@@ -13,6 +13,7 @@ from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.kinematics.singularity import NEAR_SINGULAR, singularity_over_log
 from urmpipe_models.messages import Hint
+from urmpipe_models.row_blocks import norms
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.text import counted, in_words, rows_text
 
@@ -139,7 +140,7 @@ def far_warnings(
         of_file: Whether a file holds them, of which one may say the unit.
     """
     reach = longest(chain)
-    away = np.linalg.norm(targets.position - np.asarray(chain.base.translation, dtype=float), axis=1)
+    away = norms(targets.position - np.asarray(chain.base.translation, dtype=float))
     with np.errstate(invalid="ignore"):
         far = ~reached & (away > FAR * reach) & (MILLI * away <= reach)
     if far.any():

@@ -95,6 +95,7 @@ NEEDED = "allowed: all of a, r, x, y, z"
         ("cube:wall,a=0.06,r=30mm,x=0,y=0,z=0", ["found a = 0.06 m, allowed: more than 2 r = 0.06 m"]),
         ("cube:wall,a=0,r=0,x=0,y=0,z=0", ["found a = 0 m, allowed: more than 0"]),
         ("cube:wall,a=1,r=-1mm,x=0,y=0,z=0", ["found r = -0.001 m, allowed: 0 or more"]),
+        ("cube:wall,a=1,r=0.1,x=1e300,y=0,z=0", ["found x=1e300, allowed: up to 1e+09 m"]),
         (
             "cube:wall,a=1e999,r=nan,x=inf,y=1deg,z=",
             [f"found {found}, {LENGTH}" for found in ("a=1e999", "r=nan", "x=inf", "y=1deg", "z=")],

@@ -67,6 +67,7 @@ LABEL_COLOUR = "#ffffff"
 """Labels: they stand on lines of any colour."""
 
 
+@np.errstate(over="ignore", invalid="ignore")  # beyond 3e38, infinite in single precision, nothing is seen
 def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spatial3DView | None:
     """Send a scene that opens at a time in [ns] and return its view; None if there is nothing to see."""
     import rerun as rr

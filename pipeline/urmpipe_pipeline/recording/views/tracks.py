@@ -148,7 +148,7 @@ def coloured_lines(
 
 
 def dashed(strips: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-    """Return every second piece of lines in [m], shape (any, 3) each; all pieces are equally long."""
+    """Return every second piece of lines in [m], shape (any, 3) each, equally long; none of an endless line."""
     if not strips:
         return ()
     lengths = [np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(strip, axis=0), axis=1))] for strip in strips]
@@ -157,7 +157,7 @@ def dashed(strips: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
     return tuple(
         piece
         for strip, length in zip(strips, lengths, strict=True)
-        for piece in (_pieces(strip, length, dash) if dash > 0.0 else ())
+        for piece in (_pieces(strip, length, dash) if 0.0 < dash < np.inf else ())
     )
 
 

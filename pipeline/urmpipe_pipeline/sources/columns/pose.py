@@ -277,7 +277,8 @@ def _are_transforms(values: FloatArray, entries: IntArray) -> BoolArray:
 
 def have_length_1(values: FloatArray) -> BoolArray:
     """Return which rows are unit vectors; shape (n,)."""
-    return np.asarray(np.abs((values**2).sum(axis=1) - 1.0) < _UNIT_LENGTH)
+    with np.errstate(over="ignore"):  # of huge values the length is infinite
+        return np.asarray(np.abs((values**2).sum(axis=1) - 1.0) < _UNIT_LENGTH)
 
 
 def _orthogonal(r: FloatArray) -> BoolArray:
