@@ -107,9 +107,9 @@ class Instance:
             step: To the next one in [s], above 0.
 
         Raises:
-            UnitError: If the step is not above 0, does not begin where the instance stands, goes past the stop
-                time or is too long for its internal steps, or a state is not finite after it; then nothing
-                changed, but that what is fixed from the first step on stays fixed.
+            UnitError: If the step is not above 0, does not begin where the instance stands, goes past the
+                stop time or is too long for its internal steps, or a state is not finite after it; then
+                nothing changed, but that what is fixed from the first step on stays fixed.
         """
         if not (math.isfinite(time + step) and step > 0.0):
             raise UnitError(

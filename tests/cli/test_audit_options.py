@@ -120,7 +120,8 @@ def test_an_interval_is_that_of_a_joint_of_any_log(
 ) -> None:
     t = 0.01 * np.arange(50)
     heads = {
-        "q": "q1 [deg],q2 [deg]", "j": "j1 [deg],j2 [deg]", "slide": "q1 [deg],q2 [m]", "tcp": "x [m],y [m],z [m]",
+        "q": "q1 [deg],q2 [deg]", "j": "j1 [deg],j2 [deg]", "slide": "q1 [deg],q2 [m]",
+        "tcp": "x [m],y [m],z [m]",
         "both": "target_q1 [deg],target_q2 [deg],actual_q1 [deg],actual_q2 [deg]",
     }  # fmt: skip
     for name, head in heads.items():

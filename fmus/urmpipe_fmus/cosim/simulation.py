@@ -77,7 +77,8 @@ class Recorded:
         failed: Why it ended before its time, one line; None if it did not fail.
         notes: What is allowed but should be seen.
         not_finite: The scalars that had values which are not finite.
-        loop_seconds: How long the steps took, without what is prepared before the first, in [s]; 0 after a crash.
+        loop_seconds: How long the steps took in [s], without what is prepared before the first; 0 after a
+            crash.
     """
 
     t_ns: NDArray[np.int64]

@@ -29,7 +29,8 @@ SAME = 1e-6
 rotations, are one."""
 
 NEARER = 100
-"""So many starts about the network's own that find no assembly nearer to it end the search for the nearest."""
+"""So many starts about the network's own that find no nearer assembly end the search for the nearest: of 30
+rough starts of the Stewart-Gough platform, with 40 assemblies, 20 miss the nearest of two, 50 of none."""
 
 RESTARTS = 2000
 """So many starts in a row that find nothing new end a search."""
@@ -259,7 +260,7 @@ class _Found:
         return True
 
     def distances(self) -> FloatArray:
-        """Return how far each assembly is from the start, in [rad] and lengths of the mechanism, shape (n,)."""
+        """Return how far each assembly is from the start, in [rad] and lengths, shape (n,)."""
         x, start = np.array(self.kept).T, self.start[:, np.newaxis]
         apart = (x - start) / self.mechanism.column_scales[:, np.newaxis]
         turned = self.mechanism.angles
@@ -269,9 +270,7 @@ class _Found:
             apart[some] = gap_of(turn, x.shape[1])[3:]
         return np.asarray(np.linalg.norm(apart, axis=0))
 
-    def result(
-        self, every: bool, tried: int, reason: str, *, elsewhere: bool, continuum: int
-    ) -> Assembled:
+    def result(self, every: bool, tried: int, reason: str, *, elsewhere: bool, continuum: int) -> Assembled:
         """Return the nearest assembly, or every one, sorted by the distance from the start."""
         near = self.distances().round(6) if self.kept else ()
         order = [x for _, x in sorted(zip(near, self.kept, strict=True), key=lambda one: (one[0], *one[1]))]
