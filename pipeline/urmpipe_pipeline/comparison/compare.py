@@ -104,8 +104,8 @@ class CompareOptions:
         check_choice("tcp", self.tcp, get_args(Tcp))
         check_sync(self.sync)
         check_choice("align", self.align, get_args(AlignMode))
-        complete = complete_tolerance(self.tolerance, iso=self.iso is not None)
-        object.__setattr__(self, "tolerance", complete)
+        if self.iso is None:  # of a test its criteria are judged, as its cycles show them
+            object.__setattr__(self, "tolerance", complete_tolerance(self.tolerance))
 
     def _refuse_with_iso(self) -> None:
         """Raise an `OptionError` with what does not go with criteria after ISO 9283."""
