@@ -146,7 +146,7 @@ def allowed_for(quantity: str, kind: str, tolerance: Mapping[str, float]) -> flo
 def complete_tolerance(given: Mapping[str, float]) -> dict[str, float]:
     """Return a tolerance with what always holds: least shares, and an axis where no deviation is named."""
     otherwise = {} if deviations_of(given) else {"axis": DEFAULT_TOLERANCE}
-    return LEAST_SHARES | otherwise | dict(given)
+    return otherwise | deviations_of(given) | LEAST_SHARES | dict(given)
 
 
 def deviations_of(tolerance: Mapping[str, float]) -> dict[str, float]:

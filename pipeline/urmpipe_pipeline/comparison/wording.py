@@ -197,6 +197,6 @@ def tolerance_words(allowed: Mapping[str, float], joint_units: Iterable[str] = (
             if kind in LEAST_SHARES
             else " or ±".join(text.allowed(value, unit) for unit in units.get(kind, ["m"]))
         )
-        for kind, value in sorted(allowed.items(), key=lambda one: one[0] in LEAST_SHARES)
+        for kind, value in allowed.items()
         if value != LEAST_SHARES.get(kind)
     )

@@ -111,7 +111,7 @@ def find_network(
         reason=found.reason,
         warnings=(
             *_warnings(mechanism, found, mobility, every=search.every),
-            *(_branch_warnings(mechanism, search) if command == "solve" else ()),
+            *(_branch_warnings(mechanism, controls) if command == "solve" and not search.every else ()),
         ),
         provenance=provenance(f"network {command}", options, inputs),
     )
@@ -164,14 +164,14 @@ def _warnings(
         yield LogWarning("stuck-control", said)
 
 
-def _branch_warnings(mechanism: Mechanism, search: Search) -> Iterator[LogWarning]:
+def _branch_warnings(mechanism: Mechanism, controls: Mapping[str, float]) -> Iterator[LogWarning]:
     """Yield that the one assembly of loops whose controls were moved may be of another branch."""
     moved = [
-        f"{one.name} = {search.controls[one.name]:.6g} (start {one.start:.6g})"
+        f"{one.name} = {controls[one.name]:.6g} (start {one.start:.6g})"
         for one in mechanism.network.controls
-        if one.name in search.controls and search.controls[one.name] != one.start
+        if one.name in controls and controls[one.name] != one.start
     ]
-    if moved and mechanism.rows and not search.every:
+    if moved and mechanism.rows:
         said = (
             f"controls away from their start: {', '.join(moved)}: the assembly is the nearest to the start of"
             " the network, and may be of another branch than a motion from there reaches"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -99,14 +99,11 @@ def test_an_offset_is_estimated_and_what_it_leaves_out_on_both_sides_is_told(q: 
     assert (late.sync.mode, late.sync.offset, late.sync.by) == ("auto", 0.5, "position")
     assert late.statistics["norm"].max < 1e-12  # the same samples
     assert (late.left_out, late.reference_left_out) == (51, 100)
+    coverage, judged = late.shares.values()
+    assert (coverage.samples, coverage.of, coverage.verdict) == (349, 450, "fail")  # it moves elsewhere, too
+    assert (judged.samples, judged.of, judged.verdict) == (349, 399, "pass")
     assert result.warnings == (
         LogWarning("left-out", "1 of 400 samples have no reference or no value", about="log"),
-        LogWarning(
-            "not-covered",
-            "it covers 1.745 s of the 2.245 s of path (77.8 %) at the offset of 0.5 s: the rest was"
-            " not judged",
-            about="log",
-        ),
         LogWarning(
             "sync-left-out",
             "the offset of 0.5 s leaves 50 of 400 samples and 100 of 450 samples of path without the"
@@ -209,21 +206,24 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
     assert str(error.value) == "log.csv: no sample in common with path (time offset 99.0 s)"
     assert refusal(OptionError, CompareOptions, {"axis": -1.0}) == (
         "tolerance: found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in"
-        " rad (m of a joint that slides); positive"
+        " rad (m of a joint that slides); positive; coverage, judged 0 to 1"
     )
 
 
 def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
     result = compare_runs(path_run(positions_over_log(URM6, q) + 0.004), [run_of(q)])
     frame = result.to_frame()
-    assert frame["quantity"].tolist() == ["x", "y", "z", "norm", "path"]
+    assert frame["quantity"].tolist() == ["x", "y", "z", "norm", "path", "coverage", "judged"]
     assert frame["verdict"].tolist()[:3] == ["fail"] * 3
     as_dict = result.to_dict()
     assert list(as_dict)[:4] == ["schema", "verdict", "assumptions", "tolerance"]
-    assert as_dict["tolerance"] == {"axis": 0.0035}
+    assert as_dict["tolerance"] == {"axis": 0.0035, "coverage": 0.9, "judged": 0.5}
     one = as_dict["runs"][0]
     assert set(one) >= {"name", "samples", "left_out", "duration", "sync_offset", "delta", "worst",
                         "out_of_tolerance", "share_out", "verdict", "warnings"}  # fmt: skip
+    assert [one[name] for name in ("coverage", "judged")] == [
+        asdict(share) for share in result.runs[0].shares.values()
+    ]
     assert set(one["delta"]["x"]) == {
         "unit", "max", "rms", "mean", "std", "p95", "t_max", "sample_max", "tolerance", "out_of_tolerance",
         "share_out", "verdict", "samples", "missing",

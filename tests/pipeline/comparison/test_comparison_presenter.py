@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -46,7 +46,7 @@ def test_a_quantity_with_a_tolerance_is_a_check(paths: Compared) -> None:
     )
     assert shown.body.sections[1].checks == (
         Check("x", "fail", said, "bad"),
-        *(Check(name, "pass", "", "bad") for name in ("y", "z", "norm")),
+        *(Check(name, "pass", "", "bad") for name in ("y", "z", "norm", "coverage", "judged")),
     )
     assert (shown.name, shown.verdict, shown.created) == (result.name, "fail", result.provenance.created)
 
@@ -55,9 +55,9 @@ def test_the_properties_and_rows_are_the_statistics(arms: Compared) -> None:
     result = arms({"a": noisy(1), "b": noisy(2)}, tolerance={"axis": 0.001, "joint": 0.002})
     for one in result.runs:
         properties = log_section(result, one.name).properties
-        for held in one.all_statistics:
+        for held in one.quantities:
             prefix = f"joint {held.quantity}" if held.kind == "joint" else held.quantity
-            for field, value in asdict(held).items():
+            for field, value in held.fields().items():
                 assert properties[f"{prefix}.{field}"] is value or properties[f"{prefix}.{field}"] == value
         assert properties["share_out"] == one.share_out
         assert properties["speed_correlation"] == one.speed_correlation
@@ -74,30 +74,30 @@ def test_a_joint_that_is_called_x_is_not_the_axis(arms: Compared) -> None:
     deltas = np.asarray(run.joint_delta)[:, :1]
     one = replace(run, joint_statistics=renamed, joint_delta=deltas, joint_turns=(0,))
     checks = log_section(replace(result, runs=(one,)), "a").checks
-    assert [check.name for check in checks] == ["x", "y", "z", "joint x"]
+    assert [check.name for check in checks] == ["x", "y", "z", "joint x", "coverage", "judged"]
 
 
 def test_the_first_fact_is_what_decided(arms: Compared) -> None:
     result = arms({"a": noisy(1), "b": noisy(2, 0.01)}, tolerance={"joint": 0.002})
     for one in result.runs:
         section = log_section(result, one.name)
-        held, value = one.decisive, cast(Any, section.facts[0].value)
+        held, value = one.furthest, cast(Any, section.facts[0].value)
         assert (value.number, value.unit, value.limit) == (held.max, held.unit, held.tolerance)
         assert (value.used, value.verdict) == (held.used, held.verdict)
         found = facts(section)
         assert found["Time"] == held.t_max
-        assert found["Position"] == Place(tuple(one.actual[one.decided_at].tolist()))
+        assert found["Position"] == Place(tuple(one.actual[one.furthest_at].tolist()))
         assert found["r(‖Δ‖, speed)"] == one.speed_correlation
     shown = present(result)
     worst = result.worst
     assert shown.facts[0].value == Ref(worst.name, run_colour(result.runs.index(worst)))
-    assert shown.opens_at_ns == worst.t_ns[worst.decided_at]
+    assert shown.opens_at_ns == worst.t_ns[worst.furthest_at]
 
 
 def test_the_tables_hold_the_statistics_of_each_unit(arms: Compared) -> None:
     result = arms({"a": noisy(1)}, tolerance={"axis": 0.001, "joint": 0.002})
     one = result.runs[0]
-    lengths, angles = (cells(table) for table in log_section(result, "a").tables)
+    lengths, angles, shares = (cells(table) for table in log_section(result, "a").tables)
     for table, unit in ((lengths, "m"), (angles, "rad")):
         own = [held for held in one.all_statistics if held.unit == unit]
         for key in ("tolerance", "max", "t_max", "rms", "p95", "mean", "std", "share_out"):
@@ -105,6 +105,8 @@ def test_the_tables_hold_the_statistics_of_each_unit(arms: Compared) -> None:
     assert lengths["start"] == [*one.start, one.path[0]]
     joint_delta, angle = np.asarray(one.joint_delta), np.asarray(one.angle)
     assert angles["start"] == [angle[0], *joint_delta[0].tolist()]
+    for key in ("quantity", "tolerance", "value", "samples", "of"):
+        assert shares[key] == [getattr(held, key) for held in one.shares.values()], key
 
 
 def test_assumptions_stand_in_the_verdict_s_line_alone_and_among_others(paths: Compared) -> None:
@@ -126,7 +128,7 @@ def test_many_logs_are_ranked_and_keep_their_colours(paths: Compared) -> None:
     assert far["run"] == [Ref(o.name, run_colour(result.runs.index(o))) for o in result.ranking]
     assert far["max_x"] == [one.statistics["x"].max for one in result.ranking]
     assert far["share_out"] == [one.share_out for one in result.ranking]
-    assert conditions["t"] == [one.decisive.t_max for one in result.ranking]
+    assert conditions["t"] == [one.furthest.t_max for one in result.ranking]
     assert [line["Log"] for line in shown.lines] == far["run"]
     (overview,) = [one for one in shown.body.blocks() if isinstance(one, Figure)]
     for line, one in zip(overview.views[0].panels[0].lines, result.ranking, strict=True):
@@ -180,7 +182,7 @@ def test_the_plots_are_the_deviation_with_what_is_allowed(arms: Compared) -> Non
     assert path.panels[0].lines[0].values is one.path
     assert angle.panels[0].lines[0].values is one.angle
     np.testing.assert_array_equal(joints.views[0].panels[0].lines[0].values, np.asarray(one.joint_delta))
-    assert list(deviation.instants) == [one.t_ns[one.decided_at]]
+    assert list(deviation.instants) == [one.t_ns[one.furthest_at]]
 
 
 @pytest.mark.parametrize(("kind", "view"), [("axis", 0), ("path", 1), ("angle", 2)])
@@ -209,7 +211,7 @@ def test_the_scene_is_the_worst_arm_all_paths_and_what_decided(arms: Compared) -
     assert (whole.t_ns, moving.line) == (None, False)
     assert moving.position is worst.reference
     assert [path.position for path in (a, b)] == [one.actual for one in result.runs]
-    assert scene.spots[0].position == tuple(worst.actual[worst.decided_at].tolist())
+    assert scene.spots[0].position == tuple(worst.actual[worst.furthest_at].tolist())
     factor = int(larger.name.removeprefix("deviation x"))
     np.testing.assert_array_equal(
         larger.position, worst.reference + factor * (worst.actual - worst.reference)
@@ -274,7 +276,7 @@ def test_events_tell_when_what_happened(paths: Compared) -> None:
     longest = there(one.longest_out)
     found = {event.t_ns: event.level for event in log_section(result, "a").events()}
     assert found[round(there(longest.t) * 1e9)] == "error"
-    assert found[int(one.t_ns[one.decided_at])] == "error"
+    assert found[int(one.t_ns[one.furthest_at])] == "error"
 
 
 def test_no_array_of_a_motion_is_looked_into_before_it_is_shown(arms: Compared) -> None:

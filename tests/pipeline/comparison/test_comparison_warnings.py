@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -110,13 +109,14 @@ def test_a_log_that_moves_only_where_it_is_not_compared_is_told(arms: Compared) 
 
 
 def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones(paths: Compared) -> None:
-    whole, early = np.full((1000, 3), 0.001), off(44)
-    result = paths({"early": early, "whole": whole, "nearly": off(990)})
+    logs = {"early": off(44), "whole": np.full((1000, 3), 0.001), "nearly": off(990)}
+    result = paths(logs, tolerance={"coverage": 0.04})
     assert [run.name for run in result.ranking] == ["nearly", "whole", "early"]
-    assert [result.covered(run) for run in result.runs] == pytest.approx([0.044, 1.0, 0.99], abs=1e-12)
-    assert told(result) == [
-        ("not-covered", "it covers 0.215 s of the 4.995 s of path (4.4 %): the rest was not judged")
-    ]
+    assert [run.shares["coverage"].value for run in result.runs] == [0.044, 1.0, 0.99]
+    shown = "it shows 44 of 1000 samples of path (4.4 %), longest unseen: 4.775 s from t = 0.220 s"
+    assert (result.verdict, told(result)) == ("pass", [("not-covered", shown)])
+    failed = paths(logs)
+    assert (failed.verdict, told(failed)) == ("fail", [])  # the verdict says it
 
 
 def test_a_large_tolerance_without_a_unit_is_told(paths: Compared) -> None:

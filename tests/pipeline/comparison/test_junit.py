@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -69,11 +69,12 @@ def test_a_log_is_a_suite_and_a_judged_quantity_a_case(paths: Compared, tmp_path
     result = paths({"good": off(0.001), "bad": off(0.004)}, tolerance={"axis": 0.0035, "norm": 0.01})
     root = written(result, tmp_path / "verdict.xml")
     assert {name: root.get(name) for name in ("name", "tests", "failures", "errors", "time")} == {
-        "name": "against-path", "tests": "8", "failures": "1", "errors": "0", "time": "0",
+        "name": "against-path", "tests": "12", "failures": "1", "errors": "0", "time": "0",
     }  # fmt: skip
     assert [suite.get("name") for suite in root] == ["good", "bad"]
     assert [(case.get("classname"), case.get("name"), len(case)) for case in root[1].findall("testcase")] == [
         ("bad", "x", 1), ("bad", "y", 0), ("bad", "z", 0), ("bad", "norm", 0),
+        ("bad", "coverage", 0), ("bad", "judged", 0),
     ]  # fmt: skip
     failure = root[1].findall("testcase/failure")[0]
     assert (failure.get("type"), failure.text) == (
@@ -90,9 +91,9 @@ def test_the_properties_are_the_statistics_bit_for_bit(arms: Compared, tmp_path:
     suite = written(result, tmp_path / "verdict.xml")[0]
     told = {one.attrib["name"]: one.attrib["value"] for one in suite.iter("property")}
     run = result.runs[0]
-    for one in run.all_statistics:
+    for one in run.quantities:
         prefix = f"joint {one.quantity}" if one.kind == "joint" else one.quantity
-        for field, value in asdict(one).items():
+        for field, value in one.fields().items():
             text = told[f"{prefix}.{field}"]
             assert text == "" if value is None else type(value)(text) == value, (prefix, field)
     assert float(told["share_out"]) == run.share_out
@@ -110,7 +111,7 @@ def test_a_joint_that_is_called_x_is_not_the_axis(arms: Compared, tmp_path: Path
         runs=(replace(run, joint_statistics=renamed, joint_turns=(0,), joint_delta=run.joint_delta[:, :1]),),
     )
     cases = written(changed, tmp_path / "verdict.xml")[0].findall("testcase")
-    assert [case.get("name") for case in cases] == ["x", "y", "z", "joint x"]
+    assert [case.get("name") for case in cases] == ["x", "y", "z", "joint x", "coverage", "judged"]
 
 
 def test_what_is_worse_than_the_baseline_fails(paths: Compared, arms: Compared, tmp_path: Path) -> None:
@@ -152,15 +153,16 @@ def test_a_quantity_that_is_gone_fails_whatever_the_log_was_called(
 
 
 def test_the_warnings_of_a_log_stand_behind_its_cases(paths: Compared, tmp_path: Path) -> None:
-    result = paths({"short": off(0.001, 50), "long": off(0.001)}, tolerance={"norm": 0.15})
+    logs, half = {"short": off(0.001, 50), "long": off(0.001)}, {"coverage": 0.5}
+    result = paths(logs, tolerance={"norm": 0.15, **half})
     told = [suite.findtext("system-out") for suite in written(result, tmp_path / "verdict.xml")]
-    covered = "it covers 0.245 s of the 0.495 s of path (50.0 %)"
+    seen = "it shows 50 of 100 samples of path (50.0 %), longest unseen: 0.245 s from t = 0.250 s"
     for_all = "large-tolerance: a tolerance of 150 mm (norm) accepts any deviation: 0.15 is in m;"
     for_all += ' tolerance="norm=0.15mm" if mm was meant; tolerance="norm=0.15m" if not'
-    assert told == [f"not-covered: short: {covered}: the rest was not judged\n{for_all}", for_all]
-    result = paths({"short": off(0.001, 50), "long": off(0.001)})
+    assert told == [f"not-covered: short: {seen}\n{for_all}", for_all]
+    result = paths(logs, tolerance=half)
     told = [suite.findtext("system-out") for suite in written(result, tmp_path / "verdict.xml")]
-    assert told == [f"not-covered: short: {covered}: the rest was not judged", None]
+    assert told == [f"not-covered: short: {seen}", None]
 
 
 def test_what_could_not_be_compared_takes_the_place_of_a_verdict_from_before(

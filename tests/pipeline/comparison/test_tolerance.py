@@ -11,13 +11,20 @@ from hypothesis import strategies as st
 from asserting import refusal
 from urmpipe_models.errors import OptionError
 from urmpipe_models.measure_units import DEGREE
-from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for, check_tolerance, parse_tolerance
+from urmpipe_pipeline.comparison.tolerance import (
+    LEAST_SHARES,
+    UNITS,
+    allowed_for,
+    check_tolerance,
+    parse_tolerance,
+)
 
-ALLOWED = (
+NOISE = (
     "allowed: a length in m, or axis=, x=, y=, z=, norm=, path= (m, mm, um), angle=, joint= (rad, mrad, deg;"
     " m of a joint that slides)"
 )
 
+ALLOWED = f"{NOISE}, coverage=, judged= (least shares, %)"
 
 NUMBERS = (
     "allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in rad (m of a joint that slides)"
@@ -41,6 +48,7 @@ NUMBERS = (
         ),
         ("path=0.1mm,angle=10mrad,joint=2mrad", {"path": 1e-4, "angle": 0.01, "joint": 0.002}),
         ("angle=0.5deg", {"angle": math.pi / 360}),
+        ("1mm,coverage=40%,judged=0", {"axis": 0.001, "coverage": 0.4, "judged": 0.0}),
         ("±3.5mm,norm=+-5mm", {"axis": 0.0035, "norm": 0.005}),
     ],
 )
@@ -48,7 +56,7 @@ def test_what_is_written_is_found_in_si(text: str, found: dict[str, float]) -> N
     assert parse_tolerance(text) == found
 
 
-@given(st.floats(1e-9, 1e3), st.sampled_from(sorted(UNITS)))
+@given(st.floats(1e-9, 1e3), st.sampled_from(sorted(UNITS.keys() - LEAST_SHARES)))
 def test_a_number_in_si_comes_back_bit_for_bit(value: float, kind: str) -> None:
     unit = UNITS[kind].removesuffix("1")  # a share has none
     value = value if unit else min(value, 1.0)
@@ -105,6 +113,7 @@ def test_a_degree_is_that_of_pi() -> None:
         ("±±1mm", "'±±1mm'"),
         ("joint=2mm", "'joint=2mm'"),  # of joints that turn it would be 2 mrad
         ("a=b=1", "'a=b=1'"),
+        ("coverage=90", "'coverage=90'"),  # a share: 90% or 0.9
     ],
 )
 def test_what_is_no_tolerance_is_one_line(part: str, said: str) -> None:
@@ -125,13 +134,13 @@ def test_an_angle_alone_and_a_decimal_comma_are_told_how_to_be_written() -> None
 
 def test_everything_that_is_wrong_is_told_at_once() -> None:
     with pytest.raises(OptionError) as error:
-        parse_tolerance("1mm, foo=2, axis=3mm,norm=x,,norm=4mm,norm=5mm,angle= 1", "noise")
+        parse_tolerance("1mm, foo=2, axis=3mm,norm=x,,norm=4mm,norm=5mm,angle= 1", "noise", zero=True)
     assert [str(one) for one in error.value.findings] == [
-        f"noise: found 'foo=2', {ALLOWED}",
-        f"noise: found 'axis=3mm' twice, {ALLOWED}",
-        f"noise: found 'norm=x', {ALLOWED}",
-        f"noise: found '', {ALLOWED}",
-        f"noise: found 'norm=5mm' twice, {ALLOWED}",
+        f"noise: found 'foo=2', {NOISE}",
+        f"noise: found 'axis=3mm' twice, {NOISE}",
+        f"noise: found 'norm=x', {NOISE}",
+        f"noise: found '', {NOISE}",
+        f"noise: found 'norm=5mm' twice, {NOISE}",
         "noise: found angle= 1, allowed: a unit: angle=1deg or angle=1rad",
     ]
 
@@ -144,10 +153,10 @@ def test_a_tolerance_in_numbers_is_checked_whole() -> None:
     check_tolerance({"axis": 1, "joint": 0.1})
     check_tolerance({"axis": 0.0}, zero=True)
     with pytest.raises(OptionError) as error:
-        check_tolerance({"foo": 1.0, "axis": 0.0, "norm": math.nan, "path": "1mm"})  # type: ignore[dict-item]
+        check_tolerance({"foo": 1.0, "axis": 0.0, "norm": math.nan, "path": "1mm", "judged": 1.1})  # type: ignore[dict-item]
     assert [str(one) for one in error.value.findings] == [
-        f"tolerance: found {found}, {NUMBERS}; positive"
-        for found in ("foo=1.0", "axis=0.0", "norm=nan", "path=1mm")
+        f"tolerance: found {found}, {NUMBERS}; positive; coverage, judged 0 to 1"
+        for found in ("foo=1.0", "axis=0.0", "norm=nan", "path=1mm", "judged=1.1")
     ]
     assert refusal(OptionError, check_tolerance, {}) == f"tolerance: found nothing, {NUMBERS}"
 

@@ -196,7 +196,7 @@ def test_a_comparison_is_a_struct_with_a_cell_a_log(comparison: Comparison, tmp_
     path = write(comparison, tmp_path / "a.mat", "mat")
     struct = loadmat(path, simplify_cells=True)["comparison"]
     assert struct["verdict"] == comparison.verdict
-    assert struct["tolerance"] == {"axis": 0.0035}
+    assert struct["tolerance"] == comparison.tolerance
     for found, run in zip(struct["runs"], comparison.runs, strict=True):
         assert found["name"] == run.name
         np.testing.assert_array_equal(found["delta"], run.delta)
