@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from four_logs import ALLOWED, Captured, compare, lay_logs, names, read_lines, recorded, said
+from four_logs import NOISE, Captured, compare, lay_logs, names, read_lines, recorded, said
 from urmpipe.main import run
 from urmpipe_pipeline.comparison.baseline_section import since_words
 
@@ -146,7 +146,7 @@ def test_a_baseline_is_the_recording_of_a_comparison(capsys: Captured) -> None:
         "error: --noise: found no baseline, allowed: with an earlier comparison; --baseline RUN.rrd sets one"
     )
     assert compare("good.csv", "--baseline", "good.rrd", "--noise", "-1", "-q") == 2
-    assert said(capsys) == f"error: --noise: found '-1', {ALLOWED}"
+    assert said(capsys) == f"error: --noise: found '-1', {NOISE}"
 
 
 @pytest.mark.slow

@@ -23,6 +23,7 @@ from urmpipe.main import cli, run
 from urmpipe.options.comparing import SYNC
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison.deviation import Statistics
+from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES
 
 
 @pytest.fixture(autouse=True)
@@ -90,10 +91,10 @@ def in_json_of(told: dict[str, Any], one: Statistics) -> dict[str, Any]:
 @pytest.mark.slow
 def test_what_is_given_replaces_the_default_tolerance_whole(capsys: Captured) -> None:
     assert compare("bad.csv", "--json") == 1
-    assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.0035}
+    assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.0035, **LEAST_SHARES}
     assert compare("bad.csv", "--tolerance", "angle=5deg", "--json") == 0
     told = json.loads(capsys.readouterr().out)
-    assert told["tolerance"] == {"angle": np.radians(5.0)}
+    assert told["tolerance"] == {"angle": np.radians(5.0), **LEAST_SHARES}
     assert told["runs"][0]["delta"]["x"]["verdict"] is None
 
 
@@ -113,7 +114,7 @@ def test_all_that_is_wrong_with_a_tolerance_is_told_at_once(capsys: Captured) ->
         ("[compare]\ntolerance = 0.002", {"axis": 0.002}),
         ("tolerance = '2mm,norm=3mm'", {"axis": 0.002, "norm": 0.003}),
         ("[compare]\ntolerance = {axis = 0.002, angle = '10mrad'}", {"axis": 0.002, "angle": 0.01}),
-        ("tolerance = {x = 0.002}", {"x": 0.002}),
+        ("tolerance = {x = 0.002, coverage = '40%'}", {"x": 0.002, "coverage": 0.4}),
         ("[compare.tolerance]\npath = '1mm'", {"path": 0.001}),
     ],
 )
@@ -122,7 +123,7 @@ def test_a_lab_says_its_tolerance_as_text_or_as_a_table(
 ) -> None:
     (folder / "urmpipe.toml").write_text(text)
     compare("good.csv", "--json")
-    assert json.loads(capsys.readouterr().out)["tolerance"] == tolerance
+    assert json.loads(capsys.readouterr().out)["tolerance"] == LEAST_SHARES | tolerance
 
 
 def test_a_lab_says_its_noise_for_the_calls_that_have_a_baseline(folder: Path, capsys: Captured) -> None:
@@ -221,14 +222,14 @@ def test_a_path_held_against_a_log_is_not_said_to_have_joints(capsys: Captured) 
     assert run(["compare", "good.csv", "asked.csv", "--robot", "ur5e"]) == 1
     first = capsys.readouterr().out.splitlines()[0]
     said = "FAIL  asked out of tolerance against good, by the joints of the reference"
-    assert first == f"{said}; only 39.5 % of the reference was judged"
+    assert first == f"{said}; coverage 39.5 % of 90 % needed, longest unseen: 0.600 s from t = 0.395 s"
     assert run(["compare", "asked.csv", "good.csv", "--robot", "ur5e"]) == 1
     assert capsys.readouterr().out.splitlines()[0] == "FAIL  good out of tolerance against asked"
 
 
 def test_tolerances_add_up(capsys: Captured) -> None:
     assert compare("good.csv", "--tolerance", "axis=1mm", "--tolerance", "norm=2mm", "--json") == 0
-    assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.001, "norm": 0.002}
+    assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.001, "norm": 0.002, **LEAST_SHARES}
     assert compare("good.csv", "--tolerance", "axis=1mm", "--tolerance", "axis=2mm") == 2
 
 

@@ -54,7 +54,7 @@ def test_the_others_are_judged_and_all_outputs_name_the_log_that_is_not(capsys: 
         for case in ET.parse("v.xml").iter("testcase")
     ]
     assert cases == [
-        *(("good", axis, []) for axis in "xyz"),
+        *(("good", name, []) for name in (*"xyz", "coverage", "judged")),
         *(("broken", f"can be compared ({k + 1})", [("error", WRONG[k])]) for k in range(2)),
         ("missing", "can be compared (1)", [("error", MISSING)]),
     ]
@@ -97,12 +97,13 @@ def test_a_log_that_cannot_be_held_against_the_reference_is_not_judged() -> None
 def test_with_strict_a_log_with_a_warning_is_not_judged() -> None:
     half = read_lines("good.csv")[:80]
     Path("half.csv").write_text("".join(half), encoding="utf-8")
-    result = urmpipe.compare("wanted.csv", ["half.csv", "good.csv"], "ur5e", keep_going=True, strict=True)
+    options = {"robot": "ur5e", "tolerance": "coverage=30%", "keep_going": True, "strict": True}
+    result = urmpipe.compare("wanted.csv", ["half.csv", "good.csv"], **options)
     (lost,) = result.unjudged
     assert ([one.name for one in result.runs], lost.name) == (["good"], "half")
     assert [str(one) for one in lost.errors] == [
         "strict: found 1 warning, allowed: none",
-        "half: it covers 0.390 s of the 0.995 s of wanted (39.5 %): the rest was not judged",
+        "half: it shows 79 of 200 samples of wanted (39.5 %), longest unseen: 0.600 s from t = 0.395 s",
     ]
 
 

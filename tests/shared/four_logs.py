@@ -17,10 +17,14 @@ from urmpipe_pipeline.results import read_recording
 
 Captured = pytest.CaptureFixture[str]
 
-ALLOWED = (
+NOISE = (
     "allowed: a length in m, or axis=, x=, y=, z=, norm=, path= (m, mm, um), angle=, joint= (rad, mrad, deg;"
     " m of a joint that slides)"
 )
+"""What a noise may be."""
+
+ALLOWED = f"{NOISE}, coverage=, judged= (least shares, %)"
+"""What a tolerance may be."""
 
 
 def lay_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:

@@ -70,7 +70,8 @@ TOLERANCE_OPTION = option(
     help="Largest allowed deviation on each axis, such as 3.5mm, or per kind, such as"
     " axis=3.5mm,norm=5mm,angle=0.5deg. Kinds: axis, x, y, z, norm, path (m, mm, um), angle, joint (rad,"
     " mrad, deg; m for sliding joints). A number alone is in m or rad; lengths from 0.02 and angles above 0.2"
-    " need their unit. It replaces the default completely: kinds that are not named are not judged.",
+    " need their unit. They replace the default completely: kinds that are not named are not judged. Least"
+    " shares to be seen: coverage of the reference (90% if not named), judged of the log's motion (50%).",
 )
 TCP_OPTION = option(
     Heading.COMPARED,

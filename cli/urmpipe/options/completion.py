@@ -78,14 +78,15 @@ def units(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[C
 def tolerances(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Return the completions of KIND=VALUE,...: kinds, those of ISO 9283 behind --iso, and units."""
     from urmpipe_models.measure_units import WRITTEN
-    from urmpipe_pipeline.comparison.tolerance import DEVIATIONS, UNITS
+    from urmpipe_pipeline.comparison.tolerance import DEVIATIONS, LEAST_SHARES, UNITS
 
     before, comma, last = incomplete.rpartition(",")
     if number := BEGUN.fullmatch(last):
         allowed = filter(None, WRITTEN.get(UNITS.get(last.partition("=")[0], ""), {}))
         return items(allowed, number["unit"], f"{before}{comma}{number['number']}")
-    criteria = [kind for kind in UNITS if kind not in DEVIATIONS]
-    kinds = criteria if ctx.params.get("iso") else DEVIATIONS
+    deviations = DEVIATIONS if param.name == "noise" else (*DEVIATIONS, *LEAST_SHARES)
+    criteria = [kind for kind in UNITS if kind not in (*DEVIATIONS, *LEAST_SHARES)]
+    kinds = criteria if ctx.params.get("iso") else deviations
     return _one_more([f"{kind}=" for kind in kinds], incomplete)
 
 

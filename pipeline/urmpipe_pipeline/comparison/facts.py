@@ -38,8 +38,6 @@ def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
         if not furthest.missing and one.run.timed:
             yield Fact("Data row", Value(one.row(furthest)), page=False)
         yield Fact("Position", place_of(one, furthest), page=False)
-    else:
-        yield Fact(size_of(furthest), largest(furthest), page=False)
     yield from _furthest_joint(one)
     yield from (replace(fact, page=False) for fact in _undiagnosed(one))
 
@@ -67,23 +65,23 @@ def share_value(one: Share | None) -> Value | None:
 
 def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     """Yield what is to be known of a compared log, what decided first."""
-    held = one.furthest
-    if isinstance(one.decisive, Share):
-        yield Fact(one.decisive.quantity, share_value(one.decisive), brief=False, page=False)
-    yield Fact(size_of(held), largest(held), used_words(held), brief=False, page=False)
-    timed = one.run.timed
-    if timed:
-        yield Fact("Time", Value(held.t_max, "s"), brief=False, page=False)
+    held, timed = one.decisive, one.run.timed
+    if isinstance(held, Share):
+        yield Fact(held.quantity, share_value(held), brief=False, page=False)
+    else:
+        yield Fact(size_of(held), largest(held), used_words(held), brief=False, page=False)
+        if timed:
+            yield Fact("Time", Value(held.t_max, "s"), brief=False, page=False)
+        yield Fact("Data row", Value(one.row(held)), brief=False)
+        yield Fact("Position", place_of(one, held), brief=False)
     ranked = len(result.runs) > 1  # a table at the top of the page has the log's verdict
-    yield Fact("Data row", Value(one.row(held)), brief=False)
-    yield Fact("Position", place_of(one, held), brief=False)
     yield from (replace(fact, brief=False) for fact in _furthest_joint(one))
     compared = f"{text.counted(len(one.sample), 'sample')} over {text.seconds(one.duration)} s"
     yield Fact("Compared", compared if timed else f"{text.counted(len(one.sample), 'pose')}, row by row")
     for share in one.shares.values():
         seen = f"{share.samples} of {text.counted(share.of, 'sample')}"
         name, words = share.quantity.capitalize(), f"{MEANING[share.quantity]}: {seen}"
-        yield Fact(name, share_value(share), words, share in one.partly, page=not ranked)
+        yield Fact(name, share_value(share), words, share in one.partly, page=False)
     yield _left_out(one, len(result.reference.t_ns))
     yield from _out_of_tolerance(one, ranked=ranked)
     if timed:
@@ -108,12 +106,13 @@ def _why(one: Deviation, result: Comparison) -> Iterator[Fact]:
 
 
 def _undiagnosed(one: Deviation) -> Iterator[Fact]:
-    """Yield what says why a log is out of tolerance.
+    """Yield what says why a log deviates by more than its tolerance.
 
     Nothing if that is known, with an alignment, or where a diagnosis finds nothing: in one pose, or in few.
     """
     told = len(one.sample) >= LEAST_SAMPLES and not rests(one)
-    if one.verdict == "fail" and one.diagnosis is None and one.alignment.mode == "none" and told:
+    failed = one.furthest.verdict == "fail"
+    if failed and one.diagnosis is None and one.alignment.mode == "none" and told:
         yield Fact("Cause", Advice(hints=(Hint("diagnose", True, "says why"),)))
 
 

@@ -184,10 +184,11 @@ def _deviation(one: Deviation) -> Figure:
         )
         said += " pose; angle is that between the two orientations."
     over = "time" if one.run.timed else "the rows"
+    dotted = "what decided the verdict" if isinstance(one.decisive, Statistics) else "where it deviates most"
     return Figure(
         f"Deviation over {over}",
-        f"{said} Dashed: the tolerance; tinted: out of it. Diamonds: the largest value of each. Dotted: what"
-        " decided the verdict.",
+        f"{said} Dashed: the tolerance; tinted: out of it. Diamonds: the largest value of each. Dotted:"
+        f" {dotted}.",
         f"Deviation of {one.name} from the reference over {over}. Largest absolute values: {largest}."
         f" {_out_words(one)}",
         tuple(views),

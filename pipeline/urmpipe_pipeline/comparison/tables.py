@@ -185,7 +185,7 @@ def statistics_tables(one: Deviation, *, ranked: bool = False) -> Iterator[Table
             yield Table(f"Statistics of {about}", tuple(columns), note)
     if one.shares:
         note = " ".join(f"{name.capitalize()}: share {MEANING[name]}." for name in one.shares)
-        yield Table("How much was judged", _shares(one), note)
+        yield Table("How much was judged", _shares(one), note, brief=False)
 
 
 def _shares(one: Deviation) -> tuple[Column, ...]:

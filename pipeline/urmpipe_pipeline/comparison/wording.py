@@ -11,7 +11,7 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share, Statistics, Stretch
 from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES
-from urmpipe_pipeline.presentation.digits import held
+from urmpipe_pipeline.presentation.digits import held, written
 from urmpipe_pipeline.presentation.section import Value
 from urmpipe_pipeline.provenance import defaults_words
 
@@ -61,9 +61,9 @@ def _part(one: Comparison) -> str:
     partly = [run for run in one.runs if run.partly]
     if len(partly) > NAMED:
         return f"; coverage or judged below 99 % in {len(partly)} logs"
-    whose = " of {}" if len(one.runs) > 1 else ""
+    several = len(one.runs) > 1
     return "".join(
-        f"; {share_words(share)}{whose.format(run.name)}" for run in partly for share in run.partly
+        f"; {share_words(share, run.name if several else '')}" for run in partly for share in run.partly
     )
 
 
@@ -78,15 +78,16 @@ def _clocks(one: Comparison) -> str:
     return f"; clocks{some} by their stamps"
 
 
-def share_words(one: Share) -> str:
-    """Return a share, and if it is too small what was not seen.
+def share_words(one: Share, whose: str = "") -> str:
+    """Return a share, of one of several logs with its name, and if it is too small what was not seen.
 
-    As in "coverage 0.5 % of 90 % needed, nothing seen for 3.970 s from t = 0.010 s".
+    As in "coverage 0.5 % of 90 % needed, longest unseen: 3.970 s from t = 0.010 s".
     """
-    if one.verdict != "fail" or one.tolerance is None:
-        return f"{one.quantity} {text.percent(one.value)}"
-    said = f"{one.quantity} {text.percent(one.value)} of {text.percent(one.tolerance)} needed"
-    return said if one.unseen is None else f"{said}, longest unseen: {stretch_words(one.unseen)}"
+    of = f" of {whose}" if whose else ""
+    if one.verdict != "fail":
+        return f"{one.quantity}{of} {text.percent(one.value)}"
+    said = f"{one.quantity}{of} {held(Value(one.value, '%', one.tolerance, least=True))}"
+    return said if whose or one.unseen is None else f"{said}, longest unseen: {stretch_words(one.unseen)}"
 
 
 def symbol(one: Statistics | Share | DeltaVerdict) -> str:
@@ -193,7 +194,7 @@ def tolerance_words(allowed: Mapping[str, float], joint_units: Iterable[str] = (
     units = {"angle": ["rad"], "joint": sorted(set(joint_units), reverse=True)}
     return ", ".join(
         words[kind].format(
-            text.percent(value)
+            written(Value(value, "%", given=True), unit=True)
             if kind in LEAST_SHARES
             else " or ±".join(text.allowed(value, unit) for unit in units.get(kind, ["m"]))
         )

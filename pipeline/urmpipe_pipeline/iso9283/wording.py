@@ -91,7 +91,7 @@ def criteria_words(criteria: Sequence[Criterion]) -> str:
 
 
 def tolerance_words(tolerance: Mapping[str, float]) -> str:
-    """Return what is allowed of each criterion: "AP 0.4 mm, AV 5.0 %"."""
+    """Return what is allowed of each criterion: "AP 0.4 mm, AV 5 %"."""
     allowed = (
         (name, Value(None, shown_unit(UNITS[name]), limit))
         for name, limit in tolerance.items()

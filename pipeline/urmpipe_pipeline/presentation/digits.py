@@ -86,7 +86,7 @@ def _digits(value: Value, number: float) -> str:
         exact = value.given and math.isfinite(number)
         return text.limit(number, value.unit) if exact else text.number(number, value.unit, value.limit)
     if value.unit == "%":
-        return _percent(number, value.limit)
+        return f"{100.0 * number:.6g} %" if value.given else _percent(number, value.limit)
     if value.unit == "1":
         return f"{round(number, 3) + 0.0:.3f}"  # + 0.0: no -0.000
     if value.unit == "s":

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from asserting import refusal
+from four_logs import ALLOWED, NOISE
 from urmpipe_models.errors import OptionError
 from urmpipe_models.measure_units import DEGREE
 from urmpipe_pipeline.comparison.tolerance import (
@@ -18,13 +19,6 @@ from urmpipe_pipeline.comparison.tolerance import (
     check_tolerance,
     parse_tolerance,
 )
-
-NOISE = (
-    "allowed: a length in m, or axis=, x=, y=, z=, norm=, path= (m, mm, um), angle=, joint= (rad, mrad, deg;"
-    " m of a joint that slides)"
-)
-
-ALLOWED = f"{NOISE}, coverage=, judged= (least shares, %)"
 
 NUMBERS = (
     "allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in rad (m of a joint that slides)"

@@ -187,8 +187,7 @@ def test_a_share_is_shown_in_percent_and_a_speed_in_m_per_s() -> None:
     away, fast = judged("AV", None, -0.05, 3, {"AV": 0.1}), judged("FV", None, 0.002, 3, {})
     assert (there(value_of(away)).unit, there(value_of(fast)).unit) == ("%", "m/s")
     assert (
-        tolerance_words({"AP": 4e-4, "AV": 0.05, "AP_rz": math.pi / 180})
-        == "AP 0.4 mm, AV 5.0 %, AP_rz 1 deg"
+        tolerance_words({"AP": 4e-4, "AV": 0.05, "AP_rz": math.pi / 180}) == "AP 0.4 mm, AV 5 %, AP_rz 1 deg"
     )
     near = judged("AP", None, 1e-6, 3, {"AP": 1.1e-6})
     assert worst_first([away, fast, near]) == [near, away, fast]
