@@ -94,31 +94,26 @@ def load_runs(
     read, blocks = replace(read or ReadOptions(), shared=shared), _Blocks(block)
 
     def run_of(one: tuple[Operand, tuple[str, str] | None]) -> Run:
-        """Return the run that an operand is, is recorded in, or is read as, with values that can be compared."""
+        """Return the run that an operand is, has recorded, or is read as, with values to compare."""
         operand, side = one
         made = _recorded(operand, judged) if isinstance(operand, Path) and _is_recording(operand) else operand
         try:
             if isinstance(made, (Path, Held)):
-                found = _read(made, replace(read, side=side), robot=robot, tsp=tsp, derivative=derivative)
-            elif isinstance(made, Simulation):
-                found = run_of_block(made, blocks.next(), robot)
-            else:
-                found = on_robot(made.as_run(), robot)
-            _refuse_huge(found)
-            return found
+                return _refuse_huge(_read(made, replace(read, side=side), robot, tsp, derivative))
+            if isinstance(made, Simulation):
+                return _refuse_huge(run_of_block(made, blocks.next(), robot))
+            return _refuse_huge(on_robot(made.as_run(), robot))
         except LogError as error:  # of several operands, each is named
             name = str(operand) if isinstance(operand, Path) else None
             raise LogError(*(replace(one, file=one.file or name) for one in error.findings)) from error
 
     if sides is not None:
         _refuse_sides(operands, sides)
-    each = [(operand, None) for operand in operands]
-    if sides is not None:
         both = for_each(run_of, [(operands[0], one) for one in (sides, sides[::-1])])
         blocks.refuse_unused()
         _refuse_unturned(read, both)
         return _on_one_arm(both)
-    found = for_each(run_of, each) if unjudged is None else _runs_or_errors(run_of, each)
+    found = (for_each if unjudged is None else _runs_or_errors)(run_of, [(one, None) for one in operands])
     blocks.refuse_unused()
     runs = [one for one in found if isinstance(one, Run)]
     if shared and len(runs) == len(found):
@@ -130,8 +125,8 @@ def load_runs(
     return [replace(one, name=name) for name, one in named if isinstance(one, Run)]
 
 
-def _refuse_huge(run: Run) -> None:
-    """Raise a `LogError` with each column of a log that has values beyond `LARGEST`."""
+def _refuse_huge(run: Run) -> Run:
+    """Return a run; raise a `LogError` with each column of its log that has values beyond `LARGEST`."""
     log = run.log
     positions = [] if log.tcp_position is None else [*zip(("x", "y", "z"), log.tcp_position.T, strict=True)]
     faults = []
@@ -142,6 +137,7 @@ def _refuse_huge(run: Run) -> None:
             faults.append(Finding(said.replace(" and 0 more", ""), row=int(rows[0]) + 1, column=name))
     if faults:
         raise LogError(*faults)
+    return run
 
 
 def _read(

@@ -161,7 +161,9 @@ def test_values_that_would_take_all_time_or_memory_name_their_option(
 
 
 HUGE = "t,q1 [rad],q2 [rad],q3 [rad],q4 [rad],q5 [rad],q6 [rad],x [m],y [m],z [m]\n"
-HUGE += "".join(f"{0.01 * k:g},0.1,{9 * k}e199,1e160,0.4,0.5,{k % 7},{k}e200,{k}e300,1e300\n" for k in range(60))
+HUGE += "".join(
+    f"{0.01 * k:g},0.1,{9 * k}e199,1e160,0.4,0.5,{k % 7},{k}e200,{k}e300,1e300\n" for k in range(60)
+)
 UP_TO = "allowed: up to 1e+12"
 
 

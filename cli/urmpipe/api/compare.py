@@ -116,7 +116,7 @@ def compare(
         derivative: How a log is differentiated: central or savgol.
         tolerance: Largest deviation allowed of an axis in [m], or in [m] and [rad] by kind, or as a text with
             units, such as "axis=3.5mm,angle=0.5deg"; default: 3.5 mm an axis. Likewise the least shares to be
-            seen: coverage of the reference (0.9) and judged of the log's motion (0.5). With `iso` of criteria,
+            seen: coverage of the reference (0.9), judged of the log's motion (0.5). With `iso` of criteria,
             such as "AP=0.4mm,AV=5%"; default: none.
         tcp: Where a log was: fk or recorded.
         sync: How the clocks are put together: stamps, start, auto, or t_reference - t_log in [s]; default:

@@ -129,7 +129,7 @@ def _compiled(unit: Unit, files: Mapping[str, bytes], target: str, command: Sequ
 
 
 def _run(unit: Unit, target: str, command: Sequence[str], folder: str) -> None:
-    """Run a compiler in a folder, which also takes its temporary files; whatever ends the run ends it, too."""
+    """Run a compiler in a folder that takes its temporary files; whatever ends the run ends it, too."""
     pipe, kept_inside = subprocess.PIPE, dict.fromkeys(TEMPORARY, folder)
     try:
         process = subprocess.Popen(
@@ -143,7 +143,7 @@ def _run(unit: Unit, target: str, command: Sequence[str], folder: str) -> None:
             out, err = process.communicate()
         finally:
             end_group(process)
-            process.communicate()  # until each process that it started has closed its output, and so has ended
+            process.communicate()  # until each process that it started has closed its output
     if process.returncode:
         said = (err or out).splitlines()[-LINES_OF_AN_ERROR:]
         raise FmuError(

@@ -7,7 +7,6 @@ from typing import Any
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import UnitError, shown
 
-
 MOST = 1000
 """Most of what an option counts: as many as the links of a robot; each adds variables, equations and C."""
 

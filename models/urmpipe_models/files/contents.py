@@ -1,4 +1,4 @@
-"""Files that describe something, read whole if they are of a size that people write; what is no file; permissions."""
+"""Files of a size that people write, read whole; what is no file; permissions."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def read_contents(path: Path, error: type[UrmpipeError], suffixes: Collection[st
         suffixes: How files of its kind end, to say which may be meant by one that is not there.
 
     Raises:
-        UrmpipeError: `error`, if there is no such file, it cannot be read, it is a folder, a pipe or a device,
+        UrmpipeError: `error`, if there is no such file, it cannot be read, it is a folder, pipe or device,
             or it is larger than `LARGEST`.
     """
     if "\0" in str(path):
@@ -50,7 +50,7 @@ def read_contents(path: Path, error: type[UrmpipeError], suffixes: Collection[st
 
 
 def other_than_file(mode: int) -> str:
-    """Return what has a name without being a file: "a folder", or "a named pipe", on which reading may never end.
+    """Return what is no file: "a folder", or "a named pipe", on which reading may never end.
 
     Args:
         mode: Its `st_mode`; of a file nothing is returned.

@@ -9,7 +9,6 @@ from numbers import Integral, Real
 
 from urmpipe_models.errors import Finding, shown
 
-
 MOST_RESTARTS = 10_000
 """Most random starts: so many take minutes for one target already."""
 

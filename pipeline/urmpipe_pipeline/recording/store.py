@@ -155,7 +155,8 @@ class Store:
         except (RuntimeError, ValueError) as error:
             raise self.error(
                 "found a recording that was cut off (no footer), allowed: a whole one;"
-                f" what is left of it can be looked at after: rerun rrd optimize {pasted(self.path)} -o mended.rrd"
+                " what is left of it can be looked at after:"
+                f" rerun rrd optimize {pasted(self.path)} -o mended.rrd"
             ) from error
 
     def _metadata(self) -> str:

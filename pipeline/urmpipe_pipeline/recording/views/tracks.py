@@ -148,7 +148,7 @@ def coloured_lines(
 
 
 def dashed(strips: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-    """Return every second piece of lines in [m], shape (any, 3) each, equally long; none of an endless line."""
+    """Return every second piece, equally long, of lines in [m], shape (any, 3); none of an endless line."""
     if not strips:
         return ()
     lengths = [np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(strip, axis=0), axis=1))] for strip in strips]
