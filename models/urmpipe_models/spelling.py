@@ -74,7 +74,7 @@ ARGUMENTS = ("path",)
 _QUOTES = "'\u2018\u2019\u201a\u201b"
 """What PowerShell takes for a single quote."""
 
-_PARTING = frozenset(_QUOTES + " \t\"\u201c\u201d\u201e&()[]{},;=@#$`^!+%~|<>")
+_PARTING = frozenset(_QUOTES + ' \t"\u201c\u201d\u201e&()[]{},;=@#$`^!+%~|<>')
 """What PowerShell or cmd reads as more than a letter of a word."""
 
 _BARE = re.compile("[A-Za-z0-9_-]+")

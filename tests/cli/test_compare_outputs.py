@@ -222,7 +222,9 @@ def test_a_path_held_against_a_log_is_not_said_to_have_joints(capsys: Captured) 
     assert run(["compare", "good.csv", "asked.csv", "--robot", "ur5e"]) == 1
     first = capsys.readouterr().out.splitlines()[0]
     said = "FAIL  asked out of tolerance against good, by the joints of the reference"
-    assert first == f"{said}; coverage 39.5 % of 90 % needed, longest unseen: 0.600 s from t = 0.395 s"
+    assert first == (
+        f"{said}; coverage 39.5 % of 90 % needed, longest unseen: 0.600 s from t = 0.395 s of the reference"
+    )
     assert run(["compare", "asked.csv", "good.csv", "--robot", "ur5e"]) == 1
     assert capsys.readouterr().out.splitlines()[0] == "FAIL  good out of tolerance against asked"
 

@@ -97,13 +97,15 @@ def test_a_log_that_cannot_be_held_against_the_reference_is_not_judged() -> None
 def test_with_strict_a_log_with_a_warning_is_not_judged() -> None:
     half = read_lines("good.csv")[:80]
     Path("half.csv").write_text("".join(half), encoding="utf-8")
-    options = {"robot": "ur5e", "tolerance": "coverage=30%", "keep_going": True, "strict": True}
-    result = urmpipe.compare("wanted.csv", ["half.csv", "good.csv"], **options)
+    result = urmpipe.compare(
+        "wanted.csv", ["half.csv", "good.csv"], "ur5e", tolerance="coverage=30%", keep_going=True, strict=True
+    )
     (lost,) = result.unjudged
     assert ([one.name for one in result.runs], lost.name) == (["good"], "half")
     assert [str(one) for one in lost.errors] == [
         "strict: found 1 warning, allowed: none",
-        "half: it shows 79 of 200 samples of wanted (39.5 %), longest unseen: 0.600 s from t = 0.395 s",
+        "half: it shows 79 of 200 samples of wanted (39.5 %), longest unseen: 0.600 s from t = 0.395 s"
+        " of the reference",
     ]
 
 

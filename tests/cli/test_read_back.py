@@ -234,9 +234,9 @@ def test_names_that_a_spreadsheet_would_run_leave_behind_an_apostrophe_and_come_
     urmpipe.compare("=log.csv", log, joints=names, csv="statistics.csv", **told)
     urmpipe.export("log.rrd", "file.csv", rows="file")
     urmpipe.export("log.rrd", "grid.csv")
-    for file in Path().glob("[!=]*.csv"):
-        for cell in (cell for row in csv.reader(file.open(encoding="utf-8", newline="")) for cell in row):
-            assert cell[:1] not in tuple("=+-@") or re.fullmatch(r"-[0-9.e-]+", cell), (file, cell)
+    for path in Path().glob("[!=]*.csv"):
+        for cell in (cell for row in csv.reader(path.open(encoding="utf-8", newline="")) for cell in row):
+            assert cell[:1] not in tuple("=+-@") or re.fullmatch(r"-[0-9.e-]+", cell), (path, cell)
     again = urmpipe.ingest("file.csv", joints=names, **told)
     np.testing.assert_array_equal(again.q, log.q)
     assert again.log.joints == log.log.joints == urmpipe.ingest("grid.csv", "urm6").log.joints

@@ -102,9 +102,10 @@ def test_a_part_of_the_reference_that_an_offset_leaves_out_is_a_doubt(
     wanted = write_piece(tmp_path / "wanted.csv", 0, 300)
     late = write_piece(tmp_path / "late.csv", 100, 200)
     assert urmpipe.compare(wanted, [late], robot="ur5e", sync=sync, strict=True).verdict == "fail"
-    given = {"robot": "ur5e", "sync": sync, "tolerance": "coverage=60%"}
+    given: dict[str, Any] = {"robot": "ur5e", "sync": sync, "tolerance": "coverage=60%"}
     result = urmpipe.compare(wanted, [late], **given)
-    said = "it shows 200 of 300 samples of wanted (66.7 %), longest unseen: 0.495 s from t = -0.500 s"
+    said = "it shows 200 of 300 samples of wanted (66.7 %), longest unseen: 0.495 s from t = 0.000 s"
+    said += " of the reference"
     assert [(one.kind, one.message) for one in result.warnings] == [("not-covered", said)]
     with pytest.raises(LogError) as error:
         urmpipe.compare(wanted, [late], **given, strict=True)

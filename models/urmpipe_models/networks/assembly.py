@@ -276,9 +276,8 @@ class _Found:
         order = [x for _, x in sorted(zip(near, self.kept, strict=True), key=lambda one: (one[0], *one[1]))]
         order = order if every else order[:1]
         nearest = order[0] if order else self._turned(self._nearest[:, np.newaxis])[:, 0]
-        every = np.array(order).T.reshape(len(self.start), -1)
         return Assembled(
-            every,
+            np.array(order).T.reshape(len(self.start), -1),
             tuple(assembly_at(self.mechanism, x) for x in order),
             None if order else assembly_at(self.mechanism, nearest),
             nearest,

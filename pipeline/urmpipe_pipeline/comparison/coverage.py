@@ -83,7 +83,7 @@ def measure_shares(
         shown |= _resting(asked_ns, asked, matched, limits)
     rows = np.arange(len(shown))
     moved = _judged_motion(log, own, judged, limits)
-    coverage = _share("coverage", float(np.mean(shown)), shown, rows, asked_ns, tolerance, timed=timed)
+    coverage = _share("coverage", float(np.mean(shown)), shown, rows, reference.t_ns, tolerance, timed=timed)
     whole = _share("judged", moved, judged, own, log.t_ns[own], tolerance, timed=timed)
     return {one.quantity: one for one in (coverage, whole)}
 

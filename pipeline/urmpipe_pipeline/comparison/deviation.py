@@ -101,7 +101,7 @@ class Stretch:
     Attributes:
         samples: How many.
         sample: The first of them, by its row of the log from 0; of coverage by that of the reference.
-        t: When it begins, in [s] of the log; None without times.
+        t: When it begins, in [s] of the log, of coverage in [s] of the reference; None without times.
         duration: From its first to its last sample in [s]; None without times.
     """
 

@@ -117,7 +117,7 @@ def _conditions(result: Comparison, names: Heads[Deviation]) -> Iterator[Column]
 
 
 def _decided_t(one: Deviation) -> float | None:
-    """Return when the verdict was decided in [s] of the log: of a share where most was unseen."""
+    """Return when the verdict was decided in [s]: of a share where most was unseen."""
     held = one.decisive
     return held.t_max if isinstance(held, Statistics) else held.unseen.t if held.unseen else None
 

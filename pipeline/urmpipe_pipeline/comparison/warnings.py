@@ -14,7 +14,7 @@ from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share
 from urmpipe_pipeline.comparison.matching import by_kinematics, joint_order
 from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
 from urmpipe_pipeline.comparison.trajectory import Trajectory, extent
-from urmpipe_pipeline.comparison.wording import stretch_words
+from urmpipe_pipeline.comparison.wording import unseen_words
 from urmpipe_pipeline.diagnosis.sides import AT_REST, Side
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
@@ -69,8 +69,7 @@ def left_out_warnings(one: Deviation, reference: Trajectory) -> Iterator[LogWarn
 def _covered(coverage: Share, reference: Trajectory) -> str:
     """Say how many samples of the reference a log shows, and where most are unseen."""
     said = f"it shows {coverage.samples} of {text.counted(coverage.of, 'sample')} of {reference.name}"
-    unseen = "" if coverage.unseen is None else f", longest unseen: {stretch_words(coverage.unseen)}"
-    return f"{said} ({text.percent(coverage.value)}){unseen}"
+    return f"{said} ({text.percent(coverage.value)}){unseen_words(coverage)}"
 
 
 def _beyond(one: Deviation, reference: Trajectory) -> int:

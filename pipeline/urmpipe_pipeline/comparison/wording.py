@@ -81,13 +81,19 @@ def _clocks(one: Comparison) -> str:
 def share_words(one: Share, whose: str = "") -> str:
     """Return a share, of one of several logs with its name, and if it is too small what was not seen.
 
-    As in "coverage 0.5 % of 90 % needed, longest unseen: 3.970 s from t = 0.010 s".
+    As in "coverage 0.5 % of 90 % needed, longest unseen: 3.970 s from t = 0.010 s of the reference".
     """
     of = f" of {whose}" if whose else ""
     if one.verdict != "fail":
         return f"{one.quantity}{of} {text.percent(one.value)}"
     said = f"{one.quantity}{of} {held(Value(one.value, '%', one.tolerance, least=True))}"
-    return said if whose or one.unseen is None else f"{said}, longest unseen: {stretch_words(one.unseen)}"
+    return said if whose else f"{said}{unseen_words(one)}"
+
+
+def unseen_words(one: Share) -> str:
+    """Return where most was unseen, as ", longest unseen: 3.970 s from t = 0.010 s of the reference"."""
+    side = "reference" if one.quantity == "coverage" else "log"
+    return "" if one.unseen is None else f", longest unseen: {stretch_words(one.unseen)} of the {side}"
 
 
 def symbol(one: Statistics | Share | DeltaVerdict) -> str:
@@ -134,8 +140,7 @@ def decided_words(one: Statistics | Share) -> str:
     As in "|Δx| = 4.2000 mm of 3.5 mm allowed (1.2 times the tolerance) at t = 1.250 s".
     """
     if isinstance(one, Share):
-        unseen = "" if one.unseen is None else f"; longest unseen: {stretch_words(one.unseen)}"
-        return f"{amount_words(one)} ({one.samples} of {text.counted(one.of, 'sample')}){unseen}"
+        return f"{amount_words(one)} ({one.samples} of {text.counted(one.of, 'sample')}){unseen_words(one)}"
     lacks = one.tolerance is not None and one.missing
     used = used_words(one)
     return amount_words(one) if lacks else f"{amount_words(one)}{f' ({used})' if used else ''} {when(one)}"

@@ -92,7 +92,7 @@ def _bad_values(timing: Timing) -> Iterator[Finding]:
             yield Finding(parameter=name, found=shown(value), allowed=f"a finite number of {unit} above 0")
         elif name == "tsp" and timing.tsp < NANOSECOND:
             yield Finding(parameter=name, found=shown(value), allowed="1e-09 s or more: times are in ns")
-        elif value is not None and not LEAST <= value <= LARGEST:
+        elif value is not None and not LEAST <= float(value) <= LARGEST:
             allowed = f"{LEAST:g} to {LARGEST:g} {unit}"
             yield Finding(parameter=name, found=shown(value), allowed=allowed)
 

@@ -114,6 +114,7 @@ def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones(paths: Compa
     assert [run.name for run in result.ranking] == ["nearly", "whole", "early"]
     assert [run.shares["coverage"].value for run in result.runs] == [0.044, 1.0, 0.99]
     shown = "it shows 44 of 1000 samples of path (4.4 %), longest unseen: 4.775 s from t = 0.220 s"
+    shown += " of the reference"
     assert (result.verdict, told(result)) == ("pass", [("not-covered", shown)])
     failed = paths(logs)
     assert (failed.verdict, told(failed)) == ("fail", [])  # the verdict says it

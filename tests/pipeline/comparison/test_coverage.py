@@ -79,7 +79,7 @@ def is_shown(t: int, reference: Rows, judged: Rows, usual: float, tolerance: flo
         return near <= 0.9 * usual and all(np.abs(p - q).max() <= tolerance for p, q in line)
     end, value = judged[0 if after else -1]
     beyond = [np.abs(p - value).max() for s, p in reference if (s < end if after else s > end)]
-    return max(beyond) <= tolerance < max(np.abs(p - value).max() for _, p in reference)
+    return bool(max(beyond) <= tolerance < max(np.abs(p - value).max() for _, p in reference))
 
 
 def defined_shares(reference: Rows, log: Rows, tolerance: float) -> tuple[float, float]:
@@ -98,9 +98,9 @@ def defined_shares(reference: Rows, log: Rows, tolerance: float) -> tuple[float,
 def damaged(draw: st.DrawFn) -> tuple[pd.DataFrame, pd.DataFrame, float]:
     """A reference and a log of other periods, with rows that are deleted, emptied, late or beyond it."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
-    t = draw(st.sampled_from([0.004, 0.01, 0.03])) * np.arange(draw(st.integers(8, 60)))
+    t = draw(st.sampled_from([0.004, 0.01, 0.03])) * np.arange(draw(st.integers(8, 60)), dtype=np.float64)
     asked = table(t, path_of(t, draw(st.sampled_from([0.0, 0.05]))))
-    own = draw(st.sampled_from([0.004, 0.01, 0.05])) * np.arange(draw(st.integers(4, 60)))
+    own = draw(st.sampled_from([0.004, 0.01, 0.05])) * np.arange(draw(st.integers(4, 60)), dtype=np.float64)
     own[1:] += rng.uniform(-0.3, 0.3, len(own) - 1) * own[1] * draw(st.sampled_from([0.0, 1.0]))
     done = table(own, path_of(own) * draw(st.sampled_from([0.0, 1.0, 1.1])))
     for side in (asked, done):
@@ -136,7 +136,7 @@ def test_a_pass_promises_the_undamaged_truth_on_the_share_that_it_names(
     seed: int, deleted: float, emptied: float, jitter: float, least: float
 ) -> None:
     rng = np.random.default_rng(seed)
-    t = 0.01 * np.arange(200)
+    t = 0.01 * np.arange(200, dtype=np.float64)
     wrong = np.zeros(len(t))
     for start in rng.integers(2, 190, rng.integers(0, 4)):
         wrong[start : start + rng.integers(1, 80)] = 0.01  # out of tolerance
@@ -164,12 +164,12 @@ def test_no_well_made_pair_fails_by_its_shares() -> None:
         lasts, rest = rng.uniform(1.5, 2.5), rng.choice([0.0, 1.0])
         sides = []
         for period, longer in zip(periods, (0.0, rng.uniform(0.0, 0.2)), strict=True):
-            t = np.arange(0.0, lasts * (1.0 + longer), period)
+            t = np.arange(0.0, lasts * (1.0 + longer), period, dtype=np.float64)
             t[1:] += period * rng.uniform(-1 / 3, 1 / 3, len(t) - 1)
             kept = rng.random(len(t)) >= rng.uniform(0.0, 0.02)
             kept[[0, -1]] = True
             sides.append(path_at(t[kept], path_of(t[kept], rest)))
-        shares = compare_runs(*sides[:1], sides[1:]).runs[0].shares
+        shares = compare_runs(sides[0], sides[1:]).runs[0].shares
         assert all(one.verdict == "pass" for one in shares.values()), (periods, shares)
 
 
@@ -177,7 +177,7 @@ def test_no_well_made_pair_fails_by_its_shares() -> None:
 def test_what_was_not_seen_is_no_pass_wherever_a_verdict_is_read(
     kept: list[int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    t = 0.02 * np.arange(100)
+    t = 0.02 * np.arange(100, dtype=np.float64)
     asked, done, junit, csv = (tmp_path / name for name in ("asked.csv", "done.csv", "v.xml", "v.csv"))
     table(t, path_of(t)).to_csv(asked, index=False)
     table(t[kept], path_of(t[kept])).to_csv(done, index=False)
@@ -186,24 +186,25 @@ def test_what_was_not_seen_is_no_pass_wherever_a_verdict_is_read(
     assert f"coverage {len(kept)}.0 % of 90" in (said := "".join(capsys.readouterr()))
     assert "needed, longest unseen: " in said
     assert 'message="coverage = ' in junit.read_text()
-    rows = pd.read_csv(csv).set_index("quantity")
-    assert rows.loc["coverage", ["value", "tolerance", "verdict"]].tolist() == [len(kept) / 100, 0.9, "fail"]
+    rows = {row["quantity"]: row for row in pd.read_csv(csv).to_dict("records")}
+    found = [rows["coverage"][key] for key in ("value", "tolerance", "verdict")]
+    assert found == [len(kept) / 100, 0.9, "fail"]
     assert run([*arguments, "-q", "--tolerance", "coverage=1%"]) == 0
 
 
 @pytest.mark.parametrize("tolerance", ["joint=0.1deg", "angle=0.1deg", "norm=1mm", "x=1mm", "path=1mm"])
 def test_whatever_is_judged_the_shares_are_of_it(tolerance: str) -> None:
-    t = 0.01 * np.arange(200)
+    t = 0.01 * np.arange(200, dtype=np.float64)
     q = np.column_stack([0.3 * np.sin(t + k) for k in range(6)])
-    logs = [urmpipe.ingest(t=at, q=q[rows], robot="ur5e", output=None) for at, rows in
-            ((t, slice(None)), (t[:120], slice(120)))]  # fmt: skip
-    one = urmpipe.compare(*logs, tolerance=tolerance).runs[0]
+    whole, part = (urmpipe.ingest(t=t[:end], q=q[:end], robot="ur5e") for end in (200, 120))
+    one = urmpipe.compare(whole, part, tolerance=tolerance).runs[0]
     assert (one.shares["coverage"].value, one.shares["judged"].value) == (0.6, 1.0)
     assert (one.verdict, one.decisive) == ("fail", one.shares["coverage"])
-    longer = urmpipe.compare(logs[1], logs[0], tolerance=f"{tolerance},judged=40%").runs[0]
+    longer = urmpipe.compare(part, whole, tolerance=f"{tolerance},judged=40%").runs[0]
     assert longer.shares["coverage"].value == 1.0 and longer.verdict == "pass"
-    tcp = logs[0].tcp
-    lengths = np.linalg.norm(np.diff(logs[0].q if "joint" in tolerance else tcp.position, axis=0), axis=1)
+    tcp = whole.tcp
+    assert tcp is not None
+    lengths = np.linalg.norm(np.diff(whole.q if "joint" in tolerance else tcp.position, axis=0), axis=1)
     if "angle" in tolerance:
         quat = quaternions(tcp.euler_zyx, "zyx")
         lengths = angle_between(quat[1:], quat[:-1])

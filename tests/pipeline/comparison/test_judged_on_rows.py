@@ -172,7 +172,7 @@ def test_a_recording_that_was_judged_on_the_grid_names_the_row_of_the_log() -> N
     (one,) = compare_runs(path(on_grid.t, wanted), [on_grid]).runs
     earlier = replace(one, run=replace(run, rows=None))
     nearest = int(np.argmin(np.abs(run.log.t_ns - run.t_ns[150])))
-    assert earlier.row(one.decisive) == nearest + 1 != 151
+    assert earlier.row(one.furthest) == nearest + 1 != 151
 
 
 def before_rows(result: Comparison) -> Comparison:

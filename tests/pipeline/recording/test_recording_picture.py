@@ -328,7 +328,7 @@ def test_view_opens_where_the_verdict_was_decided_and_at_a_row_where_there_are_n
     make_comparison: MakeComparison, make_solved: MakeSolved, tmp_path: Path
 ) -> None:
     comparison = make_comparison()
-    decided = round(comparison.worst.decisive.t_max * 1e9)
+    decided = round(comparison.worst.furthest.t_max * 1e9)
     for result, wanted in ((comparison, ("t", decided)), (make_solved(timed=False), ("row", 3))):
         path = write_recording(result, tmp_path / "opened.rrd")
         with open_window(path, openings([path])[path], headless=True) as (process, client):
