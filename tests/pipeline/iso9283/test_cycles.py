@@ -121,7 +121,7 @@ def test_once_along_an_open_path_is_one_cycle(tmp_path: Path) -> None:
     reference = written(tmp_path / "open.csv", resting(OPEN))
     result = run(reference, written(tmp_path / "log.csv", resting(OPEN)))
     assert rows(result) == [(1, len(OPEN) + 2 * REST)]
-    assert [one.kind for one in result.warnings] == ["same-data"]
+    assert kinds(result) == [("same-data", None)]
 
 
 @pytest.mark.slow
