@@ -106,7 +106,7 @@ def test_a_tolerance_decides_the_exit_code() -> None:
 def test_json_has_the_cycles_and_every_criterion(capsys: Captured) -> None:
     told = answer(capsys, *FILES, "--tolerance", "AP=0.4mm")["iso"]
     assert isinstance(told, dict)
-    assert sorted(told) == ["criteria", "cycles", "poses", "reference_rows"]
+    assert sorted(told) == ["criteria", "cycles", "failed_cycles", "poses", "reference_rows"]
     assert told["poses"] == 1
     for k, one in enumerate(told["cycles"], 1):
         assert (one["name"], one["row"], one["last_row"]) == (f"cycle{k}", 1, 601)

@@ -194,10 +194,11 @@ def compare(
     written = {"JUnit": options["junit"], "Statistics": options["csv"]}
     terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces, written))
     terminal.tell_failure(result)
-    if result.unjudged:
-        print_findings([error for log in result.unjudged for error in log.errors], as_json=False)
-        return 2
-    return 1 if result.verdict == "fail" else 0
+    if result.errors:
+        print_findings(result.errors, as_json=False)
+    if result.verdict == "fail" and not result.unjudged:
+        return 1
+    return 2 if result.errors else 0
 
 
 def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) -> None:

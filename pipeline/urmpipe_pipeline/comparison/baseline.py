@@ -10,7 +10,6 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.transform import Transform, rpy_of
-from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.change import (
     Absent,
     BaselineComparison,
@@ -115,14 +114,18 @@ def _tests(now: Comparison, before: Comparison, noise: Mapping[str, float]) -> B
         raise OptionError(Finding(parameter="baseline", found=found, allowed=allowed))
     tests = before.iso, now.iso
     old, new = ({one.name: one for one in side.overall if one.value is not None} for side in tests)
-    counts = [text.counted(len(side.cycles), "cycle") for side in tests]
+    counts = [side.cycle_count for side in tests]
+    failed = now.iso.failed_cycles if len(now.iso.failed_cycles) > len(before.iso.failed_cycles) else ()
     return BaselineComparison(
         name=before.name,
         recording=before.recording,
         noise=noise,
         changes=(),
         new=tuple(Absent(now.name, name) for name in new if name not in old),
-        gone=tuple(Absent(now.name, name) for name in old if name not in new),
+        gone=(
+            *(Absent(now.name, name) for name in old if name not in new),
+            *(Absent(now.name, cycle.name) for cycle in failed),
+        ),
         differences=(
             *_differing(_made(before), _made(now)),
             *_differing({"cycles": counts[0]}, {"cycles": counts[1]}),

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.display import line_of, number_of
+from urmpipe_models.errors import Finding
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics, Verdict
 from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.comparison.unjudged import Unjudged
 from urmpipe_pipeline.iso9283.result import IsoTest
+from urmpipe_pipeline.iso9283.wording import not_judged_findings
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
@@ -80,15 +82,20 @@ class Comparison(Result):
     def verdict(self) -> Verdict | None:
         """Pass if every log passes and, where there is a baseline, nothing is worse than there.
 
-        Of a test after ISO 9283 its criteria count; None if none of them has a tolerance, without a baseline.
-        None, too, if a log could not be judged, and nothing else failed.
+        Of a test after ISO 9283 its criteria and failed cycles count; None if no criterion has a tolerance,
+        without a baseline. None, too, if a log or a criterion could not be judged, and nothing else failed.
         """
-        if self.iso is not None and self.iso.verdict is None:
-            return None if self.baseline is None else self.baseline.verdict
         kept = self.baseline is None or self.baseline.verdict == "pass"
         if not (self.within_tolerance and kept):
             return "fail"
-        return None if self.unjudged else "pass"
+        measured = self.iso is not None and self.iso.verdict is None and self.baseline is None
+        return None if measured or self.errors else "pass"
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        """Why some logs, or some criteria after ISO 9283, have no verdict."""
+        criteria = () if self.iso is None else not_judged_findings(self.iso)
+        return (*(error for log in self.unjudged for error in log.errors), *criteria)
 
     def warnings_of(self, run: Deviation) -> tuple[LogWarning, ...]:
         """Return the warnings of a log: those from before, and what the comparison says of it."""
@@ -136,8 +143,7 @@ class Comparison(Result):
             worst = (
                 f"{one.name} {one.value:.4g} {one.unit}" for one in self.iso.overall if one.value is not None
             )
-            cycles = number_of(len(self.iso.cycles), "cycle")
-            return line_of(f"{self.name}: {self.verdict or 'not judged'}", cycles, *worst)
+            return line_of(f"{self.name}: {self.verdict or 'not judged'}", self.iso.cycle_count, *worst)
         logs = (f"{one.name} {one.verdict} ({_decided(one)})" for one in reversed(self.ranking))
         failed = sum(one.verdict == "fail" for one in self.runs)
         share = f" ({failed} of {len(self.runs)} logs)" if failed and len(self.runs) > 1 else ""
@@ -150,8 +156,7 @@ class Comparison(Result):
     def _notes(self) -> list[str]:
         """Return what is to be known of it, and of its logs."""
         of_logs = [one.of(run.name) for run in self.runs for one in run.run.warnings]
-        errors = [one for log in self.unjudged for one in log.errors]
-        return [str(one) for one in (*errors, *self.warnings, *of_logs)]
+        return [str(one) for one in (*self.errors, *self.warnings, *of_logs)]
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a log and quantity, as `rows`."""

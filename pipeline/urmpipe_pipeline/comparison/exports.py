@@ -78,21 +78,19 @@ def delta_table(comparison: Comparison) -> ExportTable:
 
 
 def criteria_table(test: IsoTest) -> ExportTable:
-    """Return a row a criterion and place of a test after ISO 9283, in SI; what is not there is NaN or empty.
+    """Return a row a criterion and place of a test after ISO 9283, then a failed cycle, in SI.
 
-    Each row has its own unit: 1 of a share.
+    What is not there is NaN or empty. Each row has its own unit: 1 of a share.
     """
+    rows = list(test.rows())
     texts = {
-        name: np.array([str(getattr(one, name) or "") for one in test.criteria])
-        for name in ("name", "at", "unit", "verdict")
+        name: np.array([str(row[name] or "") for row in rows]) for name in ("name", "at", "unit", "verdict")
     }
     numbers = {
-        name: np.array(
-            [math.nan if (value := getattr(one, name)) is None else value for one in test.criteria]
-        )
+        name: np.array([math.nan if row[name] is None else row[name] for row in rows])
         for name in ("value", "tolerance")
     }
-    every = texts | numbers | {"cycles": np.array([one.cycles for one in test.criteria])}
+    every = texts | numbers | {"cycles": np.array([row["cycles"] for row in rows])}
     columns = (ExportColumn(name, "", every[name]) for name in COLUMNS)
     return ExportTable(tuple(columns), None)
 

@@ -12,23 +12,28 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.matching import lacking, match, wanted_rows
 from urmpipe_pipeline.comparison.measure import measure
+from urmpipe_pipeline.comparison.nearest_path import distance_from_path
 from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.trajectory import Sync, Trajectory
 from urmpipe_pipeline.diagnosis.sides import Side
 from urmpipe_pipeline.iso9283.command_path import Bend, Stop
+from urmpipe_pipeline.iso9283.criteria import fewest_cycles
 from urmpipe_pipeline.iso9283.cycles import FoundCycles, check_cycles, find_cycles, first_cycle
 from urmpipe_pipeline.iso9283.likeness import alike
 from urmpipe_pipeline.iso9283.measure import Command, Followed, Marks, follow, marks_of
 from urmpipe_pipeline.iso9283.measure import measure as measure_criteria
 from urmpipe_pipeline.iso9283.motion import Motion, motion_of
 from urmpipe_pipeline.iso9283.poses import Poses
-from urmpipe_pipeline.iso9283.result import Cycle, IsoTest
+from urmpipe_pipeline.iso9283.result import Cycle, FailedCycle, IsoTest
 from urmpipe_pipeline.iso9283.spread import angles
+from urmpipe_pipeline.iso9283.wording import failed_words
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.ingest import EULER_SINGULAR
 from urmpipe_pipeline.runs.part import part_of
 
-UNLIKE = "sync-unlike"
+FAILED = "failed-cycle"
+
+RETURN = "return-path"
 
 CUT = "cut-cycle"
 
@@ -113,6 +118,8 @@ def judge_cycles(
 ) -> JudgedCycles:
     """Return what the cycles of a test tell: n logs, or one in which the motion repeats.
 
+    A cycle that does not follow the reference is a failed one, of which no criterion is.
+
     Args:
         asked: The reference.
         done: The logs, at least one.
@@ -122,36 +129,40 @@ def judge_cycles(
         tolerance: Largest absolute values allowed, by criterion.
 
     Raises:
-        LogError: If no cycle follows the reference, or a criterion with a tolerance has no value.
+        LogError: If no cycle follows the reference, or a criterion with a tolerance has no value, however
+            many cycles there are.
         OptionError: If rows are given for the cycles of several logs, or are wrong.
     """
     asked, rows = _once(asked) if len(done) == 1 else (asked, None)
     command = _motion(asked)
     candidates, told = _candidates(command, done, options)
     marks = marks_of(Command(command, options.targets, options.bends, options.stops, options.planes))
-    kept, left_out = _followed(command, marks, candidates, asked.run.name)
+    kept, failed = _followed(command, marks, candidates, asked.run.name)
     if not kept and marks.path is not None and len(marks.poses) and options.targets is None:
         marks = replace(marks, poses=Poses(np.empty((0, 3)), None))
         kept, others = _followed(command, marks, candidates, asked.run.name)
         if kept:
+            failed = others
             said = f"no cycle rests where {asked.run.name} does: poses are not judged"
-            left_out = [*others, LogWarning(NO_RESTS, said)]
+            told.append(LogWarning(NO_RESTS, said))
+    unlike = [LogWarning(FAILED, failed_words(one), row=one.row, about=one.name) for one in failed]
     if not kept:
-        raise LogError(*(one.as_finding() for one in (*told, *left_out)))
+        raise LogError(*(one.as_finding() for one in (*told, *unlike)))
     found = measure_criteria(marks, [one for _, one in kept], options.band, tolerance)
     clocks = [_sync(sync, one, asked.run.timed) for _, one in kept]
     cycles = tuple(
         Cycle(one.side.run.name, one.first + 1, one.last + 1, clock.offset if one.motion.timed else None)
         for (one, _), clock in zip(kept, clocks, strict=True)
     )
-    test = IsoTest(cycles, found.criteria, found.poses, found.path, options.band, rows)
+    test = IsoTest(cycles, found.criteria, found.poses, found.path, options.band, rows, tuple(failed))
     _refuse_unvalued(test, tolerance)
     deviations = tuple(
         _deviation(asked, one.side, clock) for (one, _), clock in zip(kept, clocks, strict=True)
     )
     motions = [one.motion for one, _ in kept]
     doubts = [*_few(test), *_trembling(motions, test), *_angles(command, motions, test)]
-    return JudgedCycles(asked.trajectory, deviations, test, (*told, *left_out, *doubts))
+    open_failures = () if tolerance else unlike  # with a tolerance the verdict names them
+    return JudgedCycles(asked.trajectory, deviations, test, (*told, *open_failures, *doubts))
 
 
 def _once(asked: Side) -> tuple[Side, tuple[int, int] | None]:
@@ -177,7 +188,7 @@ def _motion(side: Side) -> Motion:
 def _candidates(
     command: Motion, done: Sequence[Side], options: IsoOptions
 ) -> tuple[list[_Candidate], list[LogWarning]]:
-    """Return what may be cycles, and what was left out of one log."""
+    """Return every whole cycle, and what was left out of one log."""
     if len(done) > 1:
         if options.cycles is not None:
             found = f"rows of cycles and {len(done)} logs, each of which is a cycle"
@@ -198,7 +209,7 @@ def _candidates(
         raise LogError(lacking(side.run, said))
     of_log = FoundCycles(
         *(tuple((int(whole.row[a]), int(whole.row[b])) for a, b in some)
-          for some in (seen.rows, seen.cut, seen.other))
+          for some in (seen.rows, seen.cut, seen.returns))
     )  # fmt: skip
     if len(of_log.rows) == 1 and not of_log.cut:
         return [_Candidate(side, whole, 0, side.run.log.rows - 1)], []
@@ -232,28 +243,38 @@ def _left_out(name: str, found: FoundCycles) -> Iterator[LogWarning]:
     for first, last in found.cut:
         said = f"rows {first + 1} to {last + 1} are not a whole cycle and are left out"
         yield LogWarning(CUT, said, row=first + 1, about=name)
-    if found.other:
-        first, last = found.other[0]
-        said = f"rows {first + 1} to {last + 1}, between two cycles, are another motion, and left out"
-        more = len(found.other) - 1
-        said += f"; so are {more} more such stretches" if more else ""
-        yield LogWarning(UNLIKE, said, row=first + 1, about=name)
+    if found.returns:
+        first, last = found.returns[0]
+        said = f"rows {first + 1} to {last + 1}, between two cycles, lead back to the start and are left out"
+        more = len(found.returns) - 1
+        said += f"; so do {more} more such stretches" if more else ""
+        yield LogWarning(RETURN, said, row=first + 1, about=name)
 
 
 def _followed(
     command: Motion, marks: Marks, candidates: Sequence[_Candidate], reference: str
-) -> tuple[list[tuple[_Candidate, Followed]], list[LogWarning]]:
-    """Return the cycles that follow the command, and what is to be told of the others."""
-    kept, told = [], []
+) -> tuple[list[tuple[_Candidate, Followed]], list[FailedCycle]]:
+    """Return the cycles that follow the command, and the others."""
+    kept, failed = [], []
     for one in candidates:
         moves = marks.path is not None
         unlike = moves and not (one.motion.timed and len(one.motion) > 1 and alike(command, one.motion))
         found = f"its path differs from that of {reference}" if unlike else follow(marks, one.motion)
         if isinstance(found, str):
-            told.append(LogWarning(UNLIKE, f"left out: {found}", about=one.side.run.name))
+            distance = _largest_distance(command, one.motion)
+            failed.append(FailedCycle(one.side.run.name, one.first + 1, one.last + 1, distance, found))
         else:
             kept.append((one, found))
-    return kept, told
+    return kept, failed
+
+
+def _largest_distance(command: Motion, cycle: Motion) -> float | None:
+    """Return the largest distance of a cycle from a command's path in [m]; of still poses from its poses."""
+    known = cycle.position[np.isfinite(cycle.position).all(axis=1)]
+    if not len(known):
+        return None
+    joined = np.full(len(command) - 1, command.timed)
+    return float(distance_from_path(known, command.position, joined).max())
 
 
 def _sync(option: SyncOption, cycle: Followed, timed: bool) -> Sync:
@@ -274,11 +295,14 @@ def _deviation(asked: Side, done: Side, sync: Sync) -> Deviation:
 
 
 def _refuse_unvalued(test: IsoTest, tolerance: Mapping[str, float]) -> None:
-    """Raise a `LogError` with each criterion that has a tolerance and no value."""
+    """Raise a `LogError` with each criterion that has a tolerance and no value, if more cycles gave it none.
+
+    A criterion that only lacks cycles is not judged, and the others are.
+    """
     values = {one.name: one.value for one in test.overall}
     count = text.counted(len(test.cycles), "cycle")
     lacks = [name for name in tolerance if values.get(name) is None]
-    if lacks:
+    if any(name not in values or len(test.cycles) >= fewest_cycles(name) for name in lacks):
         known = ", ".join(name for name, value in values.items() if value is not None)
         allowed = f"criteria of this test: {known}"
         found = [f"{name}, which {count} of this motion cannot determine" for name in lacks]

@@ -22,6 +22,7 @@ from urmpipe_pipeline.iso9283.tables import (
     criteria_rows,
     criteria_tables,
     cycles_table,
+    failed_table,
     leg_table,
     plane_table,
     pose_tables,
@@ -31,7 +32,10 @@ from urmpipe_pipeline.iso9283.wording import (
     check_words,
     criteria_words,
     decisive,
+    failed_cycles_words,
+    failed_words,
     meaning,
+    not_judged_findings,
     overall_of,
     tolerance_words,
     value_of,
@@ -69,7 +73,7 @@ def present_test(result: Comparison, test: IsoTest) -> Presentation:
         verdict=result.verdict,
         facts=(*_decisive_facts(test), *_against(result, test)),
         body=_body(result, test),
-        word="" if result.verdict else "measured",
+        word="" if result.verdict else "incomplete" if test.not_judged else "measured",
         scene=partial(iso_scene, result, test),
         lines=(_line(result, test),),
         rows=partial(criteria_rows, test),
@@ -78,16 +82,23 @@ def present_test(result: Comparison, test: IsoTest) -> Presentation:
 
 
 def headline(result: Comparison, test: IsoTest) -> str:
-    """Return which criteria are out of tolerance, or how close to it the cycles come; and against what."""
-    who, against = _cycles(result, test), f"against {result.reference.name}"
+    """Return which cycles failed, which criteria are out of tolerance or how close to it; against what."""
+    against = f"against {result.reference.name}"
     worst = decisive(test)
     failed = [one for one in worst_first(test.overall) if one.verdict == "fail"]
     if worst is None:
-        said = f"{who} {against}: no criterion is judged, none has a tolerance"
+        said = f"{against}: no criterion is judged, none has a tolerance"
     elif failed:
-        said = f"{who} out of tolerance {against}: {criteria_words(failed)}"
+        said = f"out of tolerance {against}: {criteria_words(failed)}"
     else:
-        said = f"{who} within tolerance {against}: {amount_words(worst)}"
+        said = f"within tolerance {against}: {amount_words(worst)}"
+    if test.failed_cycles:
+        count = text.counted(len(test.failed_cycles), "cycle")
+        named = failed_cycles_words(test.failed_cycles)
+        said = f"followed {result.reference.name}; {count} failed: {named}; {said}"
+    said = f"{_cycles(result, test)} {said}"
+    if test.not_judged:
+        said += f"; not judged: {', '.join(one.name for one in test.not_judged)}"
     if result.baseline is not None:
         worse = f"{'and' if failed else 'but'} worse" if result.baseline.verdict == "fail" else "not worse"
         said += f", {worse} than the baseline {result.baseline.name}"
@@ -96,7 +107,7 @@ def headline(result: Comparison, test: IsoTest) -> str:
 
 def _cycles(result: Comparison, test: IsoTest) -> str:
     """Return how many cycles there are, and of which log if they are of one."""
-    count = text.counted(len(test.cycles), "cycle")
+    count = test.cycle_count
     files = {one.run.log.files for one in result.runs}
     name = result.name.removesuffix(f"-against-{result.reference.name}")
     return f"{count} of {name}" if len(files) == 1 and name else count
@@ -104,8 +115,10 @@ def _cycles(result: Comparison, test: IsoTest) -> str:
 
 def _decisive_facts(test: IsoTest) -> Iterator[Fact]:
     """Yield which criterion decided, how much of its tolerance it uses up, and where."""
+    if test.failed_cycles:
+        yield Fact("Failed cycles", Value(len(test.failed_cycles)))
     one = decisive(test)
-    if one is not None:
+    if one is not None and (one.verdict == "fail" or not test.failed_cycles):
         used = text.portion(one.used or 0.0)
         yield Fact("Decided by", f"{amount_words(one)} ({used} the tolerance)", meaning(one.name))
         yield Fact("Where", where(test, one))
@@ -115,7 +128,7 @@ def _against(result: Comparison, test: IsoTest) -> Iterator[Fact]:
     """Yield what is worse than a baseline, how much was tested, against what, and what is allowed."""
     since = result.baseline
     yield from worse_facts(since) if since is not None and since.verdict == "fail" else ()
-    parts = [text.counted(len(test.cycles), "cycle")]
+    parts = [test.cycle_count]
     parts += [text.counted(len(test.poses.command), "pose")] if test.poses is not None else []
     parts += [text.counted(len(test.path.s), "plane")] if test.path is not None else []
     yield Fact("After ISO 9283", text.enumerated(parts))
@@ -160,6 +173,22 @@ def _files(result: Comparison) -> Iterator[Block]:
 def _sections(test: IsoTest) -> Iterator[Section]:
     """Yield a section about each part that there is of a test."""
     poses, path = test.poses, test.path
+    if test.failed_cycles:
+        yield Section(
+            "Failed cycles",
+            test.verdict and "fail",
+            (
+                Fact(
+                    "Failed",
+                    f"{len(test.failed_cycles)} of {len(test.failed_cycles) + len(test.cycles)}",
+                    brief=False,
+                ),
+            ),
+            (failed_table(test),),
+            checks=tuple(_failed_checks(test)),
+        )
+    if test.not_judged:
+        yield Section("Criteria without a verdict", errors=tuple(not_judged_findings(test)))
     if poses is not None:
         facts = (
             Fact("Poses", Value(len(poses.command)), brief=False),
@@ -215,6 +244,12 @@ def _section(
     )
 
 
+def _failed_checks(test: IsoTest) -> Iterator[Check]:
+    if test.verdict == "fail":
+        for cycle in test.failed_cycles:
+            yield Check(cycle.name, "fail", failed_words(cycle), kind="failed-cycle")
+
+
 def _checks(test: IsoTest, criteria: Iterable[Criterion]) -> Iterator[Check]:
     """Yield a check for each criterion that has a tolerance."""
     for one in criteria:
@@ -236,6 +271,7 @@ def _line(result: Comparison, test: IsoTest) -> Mapping[str, Cell]:
         "Reference": result.reference.name,
         "Verdict": Judged(result.verdict),
         "Cycles": Value(len(test.cycles)),
+        "Failed cycles": Value(len(test.failed_cycles)) if test.failed_cycles else None,
         "Assuming": "; ".join(result.assumptions),
         **{one.name: value_of(one) for one in test.overall},
     }

@@ -32,6 +32,13 @@ MEANING: dict[str, str] = {
 """What they are called in words; those of one angle are called as those of the position."""
 
 
+def fewest_cycles(name: str) -> int:
+    """Return of how many cycles a criterion is defined: two have a spread, and two tenths of 11 have one."""
+    if name == "dRP":
+        return 11
+    return 2 if name.partition("_")[0] in ("RP", "RD", "RT", "RV", "dAP") else 1
+
+
 @dataclass(frozen=True, slots=True)
 class Criterion:
     """The value of one criterion.

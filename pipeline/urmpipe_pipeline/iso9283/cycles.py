@@ -1,8 +1,13 @@
-"""The cycles of a log in which a motion repeats: found by its returns to the start, or said."""
+"""The cycles of a log in which a motion repeats, whether they follow the command or not.
+
+`find_cycles`: cycles like the command, by visits to its start and its end; around them whole cycles that are
+unlike it, by the length of the path (`_UnlikeCycles`); what is left before the first and behind the last.
+`parse_cycles`, `check_cycles`: cycles that a person chose.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -10,7 +15,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import Finding, OptionError
-from urmpipe_pipeline.iso9283.likeness import ALIKE, apart, outline
+from urmpipe_pipeline.iso9283.likeness import ALIKE, apart, outline, path_length
 from urmpipe_pipeline.iso9283.motion import Motion
 
 AT_START = 0.1
@@ -22,6 +27,23 @@ AWAY = 2.0
 LOOKED_AT = 8
 """Returns that are tried as the end of a cycle: a path may come by its start on the way."""
 
+WHOLE = 0.8
+"""What goes on for this share of a cycle's path and time is no run-in but a cycle, displaced or on another
+path. Equal cycles differ by a few percent; a fast way to the start is none, however long."""
+
+RETURNED = 0.55
+"""A motion that is back at the start after this share of a cycle's time ends a cycle there. A figure eight
+crosses its start earlier."""
+
+SNAP = 0.3
+"""A cycle ends in the rest that is no further than this share of its path from where its length ends."""
+
+STOPPED = 0.1
+"""A cycle that rests on its way for longer than the command ever does, by this share of its time, stopped."""
+
+COMPLETE = 0.995
+"""A part of a cycle has a path no longer than this share of it: rows nearer to its end are at its end."""
+
 ALLOWED = "rows from 1 as FIRST:LAST, both ends included, separated by commas, such as 1:1477,1478:2955"
 
 
@@ -30,23 +52,23 @@ class FoundCycles:
     """The rows of the cycles in a motion.
 
     Attributes:
-        rows: The first and the last row of each, from 0.
+        rows: The first and the last row of each whole cycle, from 0, like the command or not.
         cut: The rows before the first and behind the last one that are no whole cycle: first and last row.
-        other: The rows in between in which the motion is another one.
+        returns: The rows between two cycles that lead from the command's end to its start.
     """
 
     rows: tuple[tuple[int, int], ...]
     cut: tuple[tuple[int, int], ...] = ()
-    other: tuple[tuple[int, int], ...] = ()
+    returns: tuple[tuple[int, int], ...] = ()
 
 
 def find_cycles(command: Motion, motion: Motion) -> FoundCycles:
-    """Return the cycles of a motion that repeats, by its returns to where the command starts.
+    """Return the cycles of a motion that repeats, if one of them is like the command; else none.
 
-    A cycle goes from a visit of the command's start to a visit of its end, and its path is like the
-    command's; of several such ends the one that is most alike. It is cut in the middle of the visits: inside
-    the rest, if it rests there. A motion that is one cycle as a whole is that, and any beside a command that
-    rests all the time.
+    A cycle like the command goes from a visit of its start to a visit of its end along its path; of several
+    such ends the one that is most alike. It is cut in the middle of the visits: inside the rest, if it rests
+    there. What is as long as a cycle around these, on whatever path, is a cycle too. A motion that is one
+    cycle as a whole is that, and any beside a command that rests all the time.
 
     Args:
         command: The motion that was asked for, once.
@@ -70,7 +92,12 @@ def find_cycles(command: Motion, motion: Motion) -> FoundCycles:
     if not found:
         whole = apart(wanted, outline(motion, extent)) <= ALIKE * extent
         return FoundCycles(((0, len(motion) - 1),) if whole else ())
-    return _told(motion, found, extent)
+    outside = (0, found[0][0]), (found[-1][1], len(motion) - 1)
+    moves = any(_stretched(motion, rows, AWAY * AT_START * extent) for rows in outside)
+    if moves or any(before[1] < after[0] for before, after in pairwise(found)):
+        unlike = _UnlikeCycles(command, motion, wanted, starts, found, closed=closed)
+        found = sorted([*found, *unlike.rows()])
+    return _without_shared_rows(motion, found, extent)
 
 
 def _end(motion: Motion, start: int, ends: Sequence[int], wanted: FloatArray, extent: float) -> int | None:
@@ -109,22 +136,208 @@ def first_cycle(motion: Motion) -> tuple[int, int] | None:
     return None
 
 
-def _told(motion: Motion, found: Sequence[tuple[int, int]], extent: float) -> FoundCycles:
+class _UnlikeCycles:
+    """The whole cycles of a motion that are unlike the command, found from those that are like it.
+
+    They begin and end at visits of the command's start, else after the path of a cycle, in a rest if one is
+    near: the length of a path stays the same if it is displaced or mirrored, at any speed.
+    """
+
+    def __init__(
+        self,
+        command: Motion,
+        motion: Motion,
+        wanted: FloatArray,
+        starts: Sequence[int],
+        like: Sequence[tuple[int, int]],
+        *,
+        closed: bool,
+    ) -> None:
+        self.motion, self.extent, self.wanted = motion, command.extent, wanted
+        self.starts, self.like, self.closed = starts, like, closed
+        self.rests = [(rest.first + rest.last) // 2 for rest in motion.rests]
+        self.longest_rest = max(
+            (command.t[rest.last] - command.t[rest.first] for rest in command.rests), default=0.0
+        )
+        first, last = np.array(like).T
+        self.path = path_length(motion, self.extent, int(np.median(last - first)))
+        self.length = float(np.median(self.path[last] - self.path[first]))
+        self.duration = float(np.median([self._lasts(*rows) for rows in like]))
+        direct = float(np.linalg.norm(command.position[-1] - command.position[0]))
+        way_back = float(np.min(self.path[first[1:]] - self.path[last[:-1]], initial=np.inf))
+        if way_back > self.length + direct:  # no two neighbours are like the command
+            way_back = direct
+        self.way_back = 0.0 if closed else way_back
+
+    def rows(self) -> list[tuple[int, int]]:
+        """Return the first and the last row of each."""
+        found = [*self._before(self.like[0][0]), *self._behind(self.like[-1][1])]
+        for (_, first), (last, _) in pairwise(self.like):
+            found += self._between(first, last)
+        return [(first, self._cycle_end(first, last)) for first, last in found if first < last]
+
+    def _before(self, here: int) -> list[tuple[int, int]]:
+        bounds = self._returns(here, 0)
+        found = [rows for pair in pairwise(bounds) for rows in self._cut_up(*pair)]
+        if not self._is_cut(bounds[-1], 0):
+            found += self._step(bounds[-1], 0, 0.0)
+        return found
+
+    def _between(self, first: int, here: int) -> list[tuple[int, int]]:
+        bounds = self._returns(here, first)
+        if not self.closed:
+            found = self._step(bounds[-1], first, -self.way_back)
+        else:
+            found = []
+            if len(bounds) > 1 and self._lasts(first, bounds[-1]) < RETURNED * self.duration:
+                bounds.pop()
+            if bounds[-1] > first:
+                bounds.append(first)
+        return found + [rows for pair in pairwise(bounds) for rows in self._cut_up(*pair)]
+
+    def _behind(self, here: int) -> list[tuple[int, int]]:
+        end = len(self.motion) - 1
+        found: list[tuple[int, int]] = []
+        if not self.closed:
+            back = next((row for row in self.starts if row > here), None)
+            if back is not None:
+                found += self._step(back, here, -self.way_back)
+            here = self._row_at(self.path[here] + self.way_back) if back is None else back
+        bounds = self._returns(here, end)
+        found += [rows for pair in pairwise(bounds) for rows in self._cut_up(*pair)]
+        here = bounds[-1]
+        if stop := self._stop_behind(here, end):
+            found.append((here, stop))
+            here = stop
+        return found if self._is_cut(here, end) else found + self._step(here, end, self.way_back)
+
+    def _returns(self, here: int, limit: int) -> list[int]:
+        """Return a row and those towards another at which the motion is back at the start, in this order."""
+        bounds = [here]
+        for row in sorted(_rows_ahead(self.starts, here, limit), key=lambda row: abs(row - here)):
+            if self._is_cut(bounds[-1], limit):
+                break
+            if self._lasts(bounds[-1], row) >= RETURNED * self.duration:
+                bounds.append(row)
+        return bounds
+
+    def _cut_up(self, here: int, limit: int) -> list[tuple[int, int]]:
+        """Return the cycles from one return to the start to another: at least one."""
+        first, last = sorted((here, limit))
+        found = []
+        if (stop := self._stop_behind(first, last)) and self._count(self._length(stop, last), np.inf):
+            found, first = [(first, stop)], stop
+        length = self._length(first, last)
+        count = max(self._count(length, self._lasts(first, last)), 1)
+        bounds = [*self._bounds(last, first, count - 1, length / count), first]
+        return [*found, *((start, end) for end, start in pairwise(bounds))]
+
+    def _step(self, here: int, limit: int, more: float) -> list[tuple[int, int]]:
+        """Return the whole cycles from a return to the start on, towards a row where none needs to end.
+
+        Args:
+            here: The return to the start.
+            limit: The last row that may be in a cycle.
+            more: What the path there has less in [m] than that of cycles with their ways back.
+        """
+        count = self._count(self._length(here, limit) + more, self._lasts(here, limit))
+        bounds = self._bounds(here, limit, count, self.length + self.way_back)
+        return [(min(pair), max(pair)) for pair in pairwise(bounds)]
+
+    def _count(self, length: float, lasts: float) -> int:
+        """Return how many cycles a path in [m] has room for that lasts so long in [s]."""
+        by_path = (length + (1.0 - WHOLE) * self.length) / (self.length + self.way_back)
+        return max(int(min(by_path, lasts / (WHOLE * self.duration))), 0)
+
+    def _bounds(self, here: int, limit: int, count: int, length: float) -> list[int]:
+        """Return a row and so many towards another, each a path in [m] further, or in a rest near there."""
+        bounds = [here]
+        for _ in range(count):
+            target = self.path[bounds[-1]] + (length if limit > here else -length)
+            rest = self._rest_near(target, bounds[-1], limit)
+            row = self._row_at(target) if rest is None else rest
+            bounds.append(min(row, limit) if limit > here else max(row, limit))
+        return bounds
+
+    def _cycle_end(self, first: int, limit: int) -> int:
+        """Return the last row of a cycle, without the way back to the next one's start."""
+        target = self.path[first] + self.length
+        if self.closed or target >= self.path[limit]:
+            return limit
+        rest = self._rest_near(target, first, limit)
+        return self._row_at(target) if rest is None else rest
+
+    def _rest_near(self, target: float, here: int, limit: int) -> int | None:
+        """Return a row amid the rest at which the length of the path is nearest to one in [m]."""
+        rests = _rows_ahead(self.rests, here, limit)
+        near = min(rests, key=lambda row: abs(self.path[row] - target), default=None)
+        return near if near is not None and abs(self.path[near] - target) <= SNAP * self.length else None
+
+    def _row_at(self, length: float) -> int:
+        return int(np.clip(np.searchsorted(self.path, length), 0, len(self.path) - 1))
+
+    def _length(self, first: int, last: int) -> float:
+        return abs(float(self.path[last] - self.path[first]))
+
+    def _lasts(self, here: int, limit: int) -> float:
+        """Return the time from the rest about one row to the rest about another in [s]."""
+        first, last = sorted((here, limit))
+        leaves, arrives = self._leaves(first), self._row_at(self.path[last])
+        return max(float(self.motion.t[arrives] - self.motion.t[leaves]), 0.0)
+
+    def _leaves(self, row: int) -> int:
+        return int(np.searchsorted(self.path, self.path[row], side="right")) - 1
+
+    def _stop_behind(self, first: int, last: int) -> int | None:
+        """Return the last row of a rest in which a cycle stopped on its way, for as long as a cycle takes."""
+        t = self.motion.t
+        for rest in self.motion.rests:
+            long = t[rest.last] - t[rest.first] > self.longest_rest + STOPPED * self.duration
+            late = t[rest.last] - t[self._leaves(first)] > (1.0 - STOPPED) * self.duration
+            if first < rest.first < rest.last <= last and long and late:
+                return rest.last if self._follows(first, rest.first, of_end=False) else None
+        return None
+
+    def _is_cut(self, here: int, limit: int) -> bool:
+        """Return whether the rows from one to an end of the log are a cycle that the log cuts there."""
+        if limit == 0:
+            first, last = 0, self._row_at(self.path[here] - self.way_back)
+        elif limit == len(self.motion) - 1:
+            first, last = here, limit
+        else:
+            return False
+        return self._follows(first, last, of_end=limit == 0)
+
+    def _follows(self, first: int, last: int, *, of_end: bool) -> bool:
+        """Return whether rows follow a part of the command: its end or its start."""
+        length = self.path[last] - self.path[first]
+        if not AWAY * AT_START * self.extent < length < COMPLETE * self.length:
+            return False
+        count = max(round(len(self.wanted) * length / self.length), 2)
+        part = self.wanted[-count:] if of_end else self.wanted[:count]
+        return apart(part, outline(self.motion.part(first, last, ""), self.extent)) <= AT_START * self.extent
+
+
+def _rows_ahead(rows: Iterable[int], here: int, limit: int) -> list[int]:
+    """Return the rows between one, without it, and another, with it, that stands on either side."""
+    return [row for row in rows if here < row <= limit or limit <= row < here]
+
+
+def _without_shared_rows(motion: Motion, found: Sequence[tuple[int, int]], extent: float) -> FoundCycles:
     """Return cycles so that no two share a row, and the rows that are in none though the arm moves there."""
     rows = [
         (first, last - 1 if k + 1 < len(found) and found[k + 1][0] == last else last)
         for k, (first, last) in enumerate(found)
     ]
-    between = [(a[1] + 1, b[0] - 1) for a, b in pairwise(rows)]
-    first, last = (0, rows[0][0] - 1), (rows[-1][1] + 1, len(motion) - 1)
-    moved = AWAY * AT_START * extent
-    whole = [_stretched(motion, one, moved) for one in (first, last)]
-    if not whole[0]:
+    returns = tuple((a[1] + 1, b[0] - 1) for a, b in pairwise(rows) if a[1] + 1 < b[0])
+    ends = (0, rows[0][0] - 1), (rows[-1][1] + 1, len(motion) - 1)
+    moving = [_stretched(motion, one, AT_START * extent) for one in ends]
+    if not moving[0]:
         rows[0] = (0, rows[0][1])
-    if not whole[1]:
+    if not moving[1]:
         rows[-1] = (rows[-1][0], len(motion) - 1)
-    cut = tuple(one for one, left in zip((first, last), whole, strict=True) if left)
-    return FoundCycles(tuple(rows), cut, tuple(one for one in between if one[1] >= one[0]))
+    cut = tuple(one for one, left in zip(ends, moving, strict=True) if left)
+    return FoundCycles(tuple(rows), cut, returns)
 
 
 def _stretched(motion: Motion, rows: tuple[int, int], moved: float) -> bool:
@@ -144,19 +357,28 @@ def _visits(motion: Motion, place: FloatArray, extent: float) -> list[int]:
         return []
     state = state[known[np.maximum(np.searchsorted(known, np.arange(len(state)), side="right") - 1, 0)]]
     edges = np.flatnonzero(np.diff(np.concatenate(([-1], state, [-1])))).reshape(-1, 2)
-    return [_amid(motion, first, last, far) for first, last in edges.tolist()]
+    rows = [_amid(motion, first, last, far, AT_START * extent) for first, last in edges.tolist()]
+    return [row for row in rows if 0 < row < len(motion) - 1 or _reaches(motion, row, far[row])]
 
 
-def _amid(motion: Motion, first: int, last: int, far: FloatArray) -> int:
-    """Return the row amid the longest rest of a visit, else the row that is nearest.
+def _reaches(motion: Motion, row: int, far: float) -> bool:
+    """Return whether a motion reaches a place that is so far away in [m] at an end of the log, or is cut."""
+    step = np.linalg.norm(np.diff(motion.position[:2] if row == 0 else motion.position[-2:], axis=0))
+    return bool(motion.slow[0 if row == 0 else -1] or far <= 1.5 * step)
+
+
+def _amid(motion: Motion, first: int, last: int, far: FloatArray, near: float) -> int:
+    """Return the row amid the longest rest at the place of a visit, else the row that is nearest.
 
     Args:
         motion: The motion.
         first: The first row of the visit.
         last: The row behind its last one.
         far: Distance of each row of the motion from the place in [m], shape (n,).
+        near: What is no further away in [m] is at the place.
     """
     spans = [(max(one.first, first), min(one.last, last - 1)) for one in motion.rests]
+    spans = [one for one in spans if one[0] < one[1] and far[(one[0] + one[1]) // 2] <= near]
     longest = max(spans, key=lambda one: one[1] - one[0], default=(0, 0))
     if longest[1] > longest[0]:
         return (longest[0] + longest[1]) // 2

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_pipeline.gaps import GAP
 from urmpipe_pipeline.iso9283.motion import Motion, apart_rows
 
 POINTS = 150
@@ -19,6 +22,9 @@ STEP = 0.01
 SURE = 8.0
 """Steps are no shorter than so many standard deviations of the noise."""
 
+JUMP = 10.0
+"""No arm goes so many times as far from one row to the next as it mostly does while it moves."""
+
 ALIKE = 0.2
 """Paths are alike if no point is further away than this share of the command's extent. Half of a square, its
 other way round and the next of its corners are half an extent away or more."""
@@ -31,14 +37,54 @@ def outline(motion: Motion, extent: float) -> FloatArray:
         motion: The motion.
         extent: That of the command in [m].
     """
-    block = max(len(motion) // BLOCKS, 1)
+    _, path = _vertices(motion, extent, len(motion))
+    along = _arc_length(path)
+    at = np.linspace(0.0, along[-1], POINTS)
+    return np.column_stack([np.interp(at, along, values) for values in path.T])
+
+
+def path_length(motion: Motion, extent: float, rows: int) -> FloatArray:
+    """Return the length of the path up to each row in [m], shape (n,); noise and rests add nothing.
+
+    A jump adds as much as a step of the path, so that it begins and ends a rest as any way does.
+
+    Args:
+        motion: The motion, perhaps of many cycles.
+        extent: That of the command in [m].
+        rows: Rows of one cycle, by which noise is averaged.
+    """
+    steps = np.diff(motion.position, axis=0)
+    longest = np.where(jumps(motion), 2.0 * STEP * extent, np.inf)
+    length = np.linalg.norm(steps, axis=1)
+    steps *= np.minimum(longest / np.where(length > 0.0, length, 1.0), 1.0)[:, np.newaxis]
+    joined = motion.position[0] + np.vstack((np.zeros((1, 3)), steps.cumsum(axis=0)))
+    first, path = _vertices(replace(motion, position=joined), extent, rows)
+    return _arc_length(path)[np.searchsorted(first, np.arange(len(motion)), side="right") - 1]
+
+
+def _vertices(motion: Motion, extent: float, rows: int) -> tuple[IntArray, FloatArray]:
+    """Return the rows, shape (k,), and the places in [m], shape (k, 3), at which a path has gone one step."""
+    block = max(rows // BLOCKS, 1)
     first = np.arange(0, len(motion), block)
     sizes = np.diff(np.append(first, len(motion)))[:, np.newaxis]
     place = np.add.reduceat(motion.position, first, axis=0) / sizes
-    path = place[apart_rows(place, max(STEP * extent, SURE * motion.noise / np.sqrt(block)))]
-    along = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))))
-    at = np.linspace(0.0, along[-1], POINTS)
-    return np.column_stack([np.interp(at, along, values) for values in path.T])
+    kept = apart_rows(place, max(STEP * extent, SURE * motion.noise / np.sqrt(block)))
+    return first[kept], place[kept]
+
+
+def _arc_length(path: FloatArray) -> FloatArray:
+    return np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))))
+
+
+def jumps(motion: Motion) -> BoolArray:
+    """Return whether a motion goes as far as no arm does from one row to the next, shape (n - 1,).
+
+    A step over a gap, where rows are missing, is no jump.
+    """
+    if motion.slow.all():
+        return np.zeros(len(motion.slow), np.bool_)
+    dt, step = np.diff(motion.t), np.linalg.norm(np.diff(motion.position, axis=0), axis=1)
+    return np.asarray((dt <= GAP * np.median(dt)) & (step > JUMP * np.median(step[~motion.slow])))
 
 
 def apart(first: FloatArray, second: FloatArray) -> float:

@@ -14,7 +14,7 @@ from urmpipe_pipeline.iso9283.command_path import Bend, CommandPath, Stations, S
 from urmpipe_pipeline.iso9283.corners import CornerPath, corner_path, mean_path
 from urmpipe_pipeline.iso9283.criteria import UNITS, Criterion, judged
 from urmpipe_pipeline.iso9283.crossings import Crossings, crossings
-from urmpipe_pipeline.iso9283.likeness import ALIKE
+from urmpipe_pipeline.iso9283.likeness import ALIKE, jumps
 from urmpipe_pipeline.iso9283.motion import Motion, Rest
 from urmpipe_pipeline.iso9283.pose_criteria import Found, angle_criteria, pose_criteria
 from urmpipe_pipeline.iso9283.poses import Poses, attained, poses_of
@@ -130,6 +130,10 @@ def marks_of(command: Command) -> Marks:
 
 def follow(marks: Marks, cycle: Motion) -> Followed | str:
     """Return a cycle beside the command, or why it does not follow that to its end."""
+    if marks.path is not None:
+        steps = np.linalg.norm(np.diff(cycle.position, axis=0), axis=1)[jumps(cycle)]
+        if steps.max(initial=0.0) > ALIKE * marks.path.motion.extent:
+            return f"it jumps {steps.max() * 1e3:.0f} mm from one row to the next"
     rests = attained(cycle, marks.poses, marks.reach)
     if isinstance(rests, int):
         return f"it does not rest at pose {rests + 1}"

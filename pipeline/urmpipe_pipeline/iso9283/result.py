@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline import text
 from urmpipe_pipeline.iso9283.corners import CornerPath
 from urmpipe_pipeline.iso9283.criteria import Criterion, overall_verdict
 from urmpipe_pipeline.iso9283.speeds import LegSpeed
@@ -29,6 +30,25 @@ class Cycle:
     row: int
     last_row: int
     sync_offset: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class FailedCycle:
+    """A whole cycle that does not follow the command; no criterion rests on it.
+
+    Attributes:
+        name: What it is called.
+        row: Its first row in its log, from 1.
+        last_row: Its last row in its log, from 1.
+        distance: Its largest distance from the command's path in [m]; None if it has no place.
+        reason: What it does instead, behind its name.
+    """
+
+    name: str
+    row: int
+    last_row: int
+    distance: float | None
+    reason: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,13 +113,14 @@ class IsoTest:
     """Accuracy and repeatability of a motion that was repeated, after ISO 9283.
 
     Attributes:
-        cycles: The cycles that were judged.
+        cycles: The cycles that follow the command, and that the criteria are of.
         criteria: Every criterion, over all and where it is, in the order of `criteria.UNITS`.
         poses: The poses; None if the command rests nowhere.
         path: The path; None of still poses, and where nothing moves.
         band: Half of the width of the band that poses are stabilised in, in [m].
         reference_rows: The rows of the reference, from 1, that are the command of each cycle, where that
             repeats itself; None: all.
+        failed_cycles: The whole cycles that do not follow the command: with a tolerance, the test fails.
     """
 
     cycles: tuple[Cycle, ...]
@@ -108,6 +129,13 @@ class IsoTest:
     path: CutPath | None
     band: float
     reference_rows: tuple[int, int] | None = None
+    failed_cycles: tuple[FailedCycle, ...] = ()
+
+    @property
+    def cycle_count(self) -> str:
+        """How many cycles follow the command, of how many if not all do: "9 of 10 cycles"."""
+        count = text.counted(len(self.cycles) + len(self.failed_cycles), "cycle")
+        return f"{len(self.cycles)} of {count}" if self.failed_cycles else count
 
     @property
     def overall(self) -> tuple[Criterion, ...]:
@@ -126,18 +154,34 @@ class IsoTest:
 
     @property
     def verdict(self) -> Literal["pass", "fail"] | None:
-        """Fail if a criterion is out of its tolerance; None if none has one."""
-        return overall_verdict(one.verdict for one in self.overall)
+        """Fail if a criterion is out of its tolerance or a cycle failed; None if none has a tolerance.
+
+        None, too, if nothing failed and a criterion with a tolerance needs more cycles.
+        """
+        if self.failed_cycles and any(criterion.tolerance is not None for criterion in self.overall):
+            return "fail"
+        verdict = overall_verdict(one.verdict for one in self.overall)
+        return None if verdict == "pass" and self.not_judged else verdict
+
+    @property
+    def not_judged(self) -> tuple[Criterion, ...]:
+        """The criteria with a tolerance that need more cycles than there are."""
+        return tuple(one for one in self.overall if one.tolerance is not None and one.value is None)
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """Yield one row a criterion and place, as JSON has it."""
+        """Yield one row per criterion and place, as JSON has it, then one per failed cycle."""
         yield from (asdict(one) for one in self.criteria)
+        verdict = self.verdict and "fail"
+        for cycle in self.failed_cycles:
+            where = f"rows {cycle.row} to {cycle.last_row}"
+            yield asdict(Criterion(cycle.name, where, cycle.distance, "m", 1, verdict=verdict))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the object `iso` of `urmpipe compare --json`."""
         return {
             "cycles": [asdict(one) for one in self.cycles],
+            "failed_cycles": [asdict(one) for one in self.failed_cycles],
             "poses": 0 if self.poses is None else len(self.poses.command),
             "reference_rows": None if self.reference_rows is None else list(self.reference_rows),
-            "criteria": list(self.rows()),
+            "criteria": [asdict(one) for one in self.criteria],
         }

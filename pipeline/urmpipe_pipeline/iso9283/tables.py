@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.iso9283.criteria import ANGLES, UNITS, Criterion
-from urmpipe_pipeline.iso9283.result import CutPath, Cycle, IsoTest
+from urmpipe_pipeline.iso9283.result import CutPath, Cycle, FailedCycle, IsoTest
 from urmpipe_pipeline.iso9283.wording import meaning, names_of, tolerance_of, value_of, where, worst_first
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, rows_table, spot_at
 from urmpipe_pipeline.presentation.section import Cell, Column, Judged, Place, Table, Value
@@ -49,7 +49,7 @@ def _brief(columns: Sequence[Column], less: set[str]) -> tuple[Column, ...]:
 
 
 def criteria_rows(test: IsoTest) -> Table:
-    """Return what `--csv` writes: a row a criterion and place, in SI units, 1 of a share."""
+    """Return what `--csv` writes: a row a criterion and place, then a failed cycle, in SI units."""
     return rows_table("Criteria", COLUMNS, test.rows())
 
 
@@ -63,6 +63,19 @@ def cycles_table(test: IsoTest) -> Table:
     }
     note = "Offset: time of the reference minus time of the cycle."
     return Table("Cycles", columns_of(test.cycles, heads), note, brief=False, folded=len(test.cycles) > 1)
+
+
+def failed_table(test: IsoTest) -> Table:
+    """Return the cycles that failed: their rows, how far from the command they are, and why."""
+    heads: Heads[FailedCycle] = {
+        "name": ("Cycle", lambda one: one.name),
+        "row": ("first row", lambda one: Value(one.row)),
+        "last_row": ("last row", lambda one: Value(one.last_row)),
+        "distance": ("largest distance", lambda one: Value(one.distance, "m")),
+        "reason": ("Reason", lambda one: one.reason),
+    }
+    note = "Distance: from the path of the command. No criterion is of these cycles."
+    return Table("Failed cycles", columns_of(test.failed_cycles, heads), note)
 
 
 def pose_tables(test: IsoTest) -> Iterator[Table]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from urmpipe_pipeline.iso9283.criteria import MEANING, UNITS, Criterion
-from urmpipe_pipeline.iso9283.result import IsoTest
+from urmpipe_models.errors import Finding
+from urmpipe_pipeline.iso9283.criteria import MEANING, UNITS, Criterion, fewest_cycles
+from urmpipe_pipeline.iso9283.result import FailedCycle, IsoTest
 from urmpipe_pipeline.presentation.digits import allowed_words, held, written
 from urmpipe_pipeline.presentation.section import Value
 
@@ -18,7 +19,7 @@ PARTS = {
 """The parts of a test, and the criteria of each; those of an angle belong to that of the position."""
 
 NAMED = 3
-"""Criteria that a headline names; more are only counted."""
+"""Criteria, and failed cycles, that a headline names; more are only counted."""
 
 
 def meaning(name: str) -> str:
@@ -98,6 +99,34 @@ def tolerance_words(tolerance: Mapping[str, float]) -> str:
         if name in UNITS
     )
     return ", ".join(f"{name} {allowed_words(value)}" for name, value in allowed)
+
+
+def failed_words(cycle: FailedCycle) -> str:
+    """Return which rows a failed cycle has, how far from the command it is, and why it failed."""
+    return f"{_rows_and_distance(cycle)}: {cycle.reason}"
+
+
+def failed_cycles_words(cycles: Sequence[FailedCycle]) -> str:
+    """Return which cycles failed; of many the first, and how many more there are."""
+    more = f" and {len(cycles) - NAMED} more" if len(cycles) > NAMED else ""
+    return ", ".join(f"{one.name} ({_rows_and_distance(one)})" for one in cycles[:NAMED]) + more
+
+
+def _rows_and_distance(cycle: FailedCycle) -> str:
+    rows = f"rows {cycle.row} to {cycle.last_row}"
+    return rows if cycle.distance is None else f"{rows}, up to {amount(cycle.distance, 'm')} off the path"
+
+
+def not_judged_findings(test: IsoTest) -> list[Finding]:
+    """Return why criteria with a tolerance have no verdict: they need more cycles than there are."""
+    return [
+        Finding(
+            parameter="tolerance",
+            found=f"{one.name} of {test.cycle_count}: not judged",
+            allowed=f"{one.name} of {fewest_cycles(one.name)} cycles or more",
+        )
+        for one in test.not_judged
+    ]
 
 
 def amount(value: float | None, unit: str, *, signed: bool = False) -> str:

@@ -88,7 +88,7 @@ def test_all_are_found_with_noise_but_a_cut_one(way: str, whole: int, tmp_path: 
         assert end[0] <= last - 1 + cut <= end[1]
     assert kinds(result)[0] == ("cut-cycle", 1)
     others = [kind for kind, _ in kinds(result)[1:] if kind != "noisy-speed"]  # 0.1 mm from row to row
-    assert others == ([] if back is None else ["sync-unlike"])  # the returns, told once
+    assert others == ([] if back is None else ["return-path"])  # told once
     # RP of means of 50 rows or more of noise of 0.1 mm: 3.616 . 0.1 mm/7; twice that is chance of 1e-9
     assert value(judged(result), "RP") < 2.0 * 3.616 * 1e-4 / np.sqrt(50.0)
     assert value(judged(result), "AP") < 1e-4 * 6.0 / np.sqrt(50.0 * whole)  # chi with 3 degrees: 1e-7
@@ -125,16 +125,21 @@ def test_once_along_an_open_path_is_one_cycle(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("other", [OTHER, SQUARE_PATH[::-1]], ids=["another path", "the other way round"])
-def test_another_motion_between_cycles_is_left_out_and_told(
-    other: FloatArray, tmp_path: Path, square: Path
+@pytest.mark.parametrize(
+    ("other", "far"),  # its middle is 0.1 m inside of the square and 0.2 m above
+    [(OTHER, np.hypot(0.1, 0.2)), (SQUARE_PATH[::-1], 0.0)],
+    ids=["another path", "the other way round"],
+)
+def test_another_motion_between_cycles_is_a_failed_cycle(
+    other: FloatArray, far: float, tmp_path: Path, square: Path
 ) -> None:
     parts = [resting(one) for one in (SQUARE_PATH, SQUARE_PATH, other, SQUARE_PATH)]
     result = run(square, written(tmp_path / "log.csv", np.concatenate(parts)))
     assert len(rows(result)) == 3
-    ((kind, row),) = kinds(result)
-    assert kind == "sync-unlike" and row is not None and 2 * ROWS - REST < row <= 2 * ROWS + REST
-    assert "another motion" in str(result.warnings[0])
+    (failed,) = judged(result).failed_cycles
+    assert failed.name == "cycle 3" and 2 * ROWS - REST < failed.row <= 2 * ROWS + REST
+    assert kinds(result) == [("failed-cycle", failed.row)]
+    assert failed.distance == pytest.approx(far, abs=1e-12) and "differs from that of square" in failed.reason
     # Each cycle is the command itself: what is left out moves no clock. Of coordinates below 1 m.
     assert max(float(np.abs(one.delta).max()) for one in result.runs) < 1e-12
 
@@ -199,11 +204,15 @@ def test_rows_of_several_logs_are_refused(square: Path, thrice: Path) -> None:
     assert "cycles" in said and "one log" in said
 
 
-def test_a_log_of_another_motion_is_left_out_and_told(tmp_path: Path, square: Path) -> None:
+def test_a_log_of_another_motion_is_a_failed_cycle(tmp_path: Path, square: Path) -> None:
     done = logs(tmp_path, [resting(one) for one in (SQUARE_PATH, OTHER, SQUARE_PATH, SQUARE_PATH[:320])])
     result = run(square, done)
     assert [one.name for one in judged(result).cycles] == ["cycle1", "cycle3"]
-    unlike = [one for one in result.warnings if one.kind == "sync-unlike"]
+    failed = judged(result).failed_cycles
+    assert [(one.name, one.row, one.last_row) for one in failed] == [
+        ("cycle2", 1, len(resting(OTHER))), ("cycle4", 1, 320 + 2 * REST)
+    ]  # fmt: skip
+    unlike = [one for one in result.warnings if one.kind == "failed-cycle"]
     assert [one.about for one in unlike] == ["cycle2", "cycle4"]
     assert [one.name for one in result.runs] == ["cycle1", "cycle3"]
 
