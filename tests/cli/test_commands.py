@@ -224,7 +224,7 @@ def test_bad_input_is_named_by_line_and_column_and_outputs_stay(
 def test_a_tolerance_may_have_its_unit_and_decides(urmpipe: RunCommand) -> None:
     passing = urmpipe(*COMPARE_FEW, "--tolerance", "2.4mm", "--json", "-o", "a.rrd")
     assert passing.code == 0
-    assert json.loads(passing.out)["tolerance"] == {"axis": 0.0024}
+    assert json.loads(passing.out)["tolerance"] == {"axis": 0.0024, "coverage": 0.9, "judged": 0.5}
     assert urmpipe(*COMPARE_FEW, "--tolerance", "0.0023", "-o", "b.rrd").code == 1
     wrong = urmpipe(*COMPARE_FEW, "--tolerance", "3 inch")
     assert wrong.code == 2

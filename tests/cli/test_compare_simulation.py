@@ -36,7 +36,7 @@ def begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Path and log in the working folder, for somewhat longer than the simulation."""
     for name in (PATH, LOG):
         rows = (LOGS / name).read_text(encoding="utf-8").splitlines(keepends=True)
-        (tmp_path / name).write_text("".join(rows[:150]), encoding="utf-8")
+        (tmp_path / name).write_text("".join(rows[:108]), encoding="utf-8")
     monkeypatch.chdir(tmp_path)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import xml.etree.ElementTree as ET
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -97,9 +98,8 @@ def test_a_log_that_cannot_be_held_against_the_reference_is_not_judged() -> None
 def test_with_strict_a_log_with_a_warning_is_not_judged() -> None:
     half = read_lines("good.csv")[:80]
     Path("half.csv").write_text("".join(half), encoding="utf-8")
-    result = urmpipe.compare(
-        "wanted.csv", ["half.csv", "good.csv"], "ur5e", tolerance="coverage=30%", keep_going=True, strict=True
-    )
+    judge = partial(urmpipe.compare, "wanted.csv", robot="ur5e", keep_going=True, strict=True)
+    result = judge(["half.csv", "good.csv"], tolerance="coverage=30%")
     (lost,) = result.unjudged
     assert ([one.name for one in result.runs], lost.name) == (["good"], "half")
     assert [str(one) for one in lost.errors] == [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -101,14 +102,14 @@ def test_a_part_of_the_reference_that_an_offset_leaves_out_is_a_doubt(
 ) -> None:
     wanted = write_piece(tmp_path / "wanted.csv", 0, 300)
     late = write_piece(tmp_path / "late.csv", 100, 200)
-    assert urmpipe.compare(wanted, [late], robot="ur5e", sync=sync, strict=True).verdict == "fail"
-    given: dict[str, Any] = {"robot": "ur5e", "sync": sync, "tolerance": "coverage=60%"}
-    result = urmpipe.compare(wanted, [late], **given)
+    judge = partial(urmpipe.compare, wanted, [late], robot="ur5e", sync=sync)
+    assert judge(strict=True).verdict == "fail"
+    result = judge(tolerance="coverage=60%")
     said = "it shows 200 of 300 samples of wanted (66.7 %), longest unseen: 0.495 s from t = 0.000 s"
     said += " of the reference"
     assert [(one.kind, one.message) for one in result.warnings] == [("not-covered", said)]
     with pytest.raises(LogError) as error:
-        urmpipe.compare(wanted, [late], **given, strict=True)
+        judge(tolerance="coverage=60%", strict=True)
     (told,) = error.value.findings[1:]
     assert (told.kind, told.about, told.message) == ("not-covered", "late", said)
 

@@ -147,7 +147,7 @@ def _resting(t_ns: IntArray, asked: _Values, matched: Matched, limits: _Limits) 
 
 
 def usual_period(t_ns: IntArray) -> float:
-    """Return the median of the positive steps between times in [ns]; 0 without any."""
+    """Return the median of the positive steps between times in [ns], shape (n,); 0 without any."""
     steps = np.diff(t_ns)
     steps = steps[steps > 0]
     return float(np.median(steps)) if len(steps) else 0.0
