@@ -29,8 +29,8 @@ SAME = 1e-6
 rotations, are one."""
 
 NEARER = 100
-"""So many starts about the network's own that find no nearer assembly end the search for the nearest: of 30
-rough starts of the Stewart-Gough platform, with 40 assemblies, 20 miss the nearest of two, 50 of none."""
+"""So many starts about the network's own that find no nearer assembly end the search for the nearest. From 30
+rough starts of the Stewart-Gough platform, which has 40 assemblies, 20 missed the nearest twice, 50 never."""
 
 RESTARTS = 2000
 """So many starts in a row that find nothing new end a search."""
@@ -56,7 +56,7 @@ class Assembled:
         nearest: What comes nearest to closing where nothing closes.
         x_nearest: Its variables in [m] and [rad], shape (variables,); of the first assembly if there is one.
         gaps: What does not close there, the largest first.
-        tried: How many starts were tried, the network's own counted.
+        tried: How many starts were tried until one closed, or for every assembly, the network's own counted.
         reason: Why the search ended.
         elsewhere: Whether only a random start closed, not the network's own.
         continuum: Of how many dimensions the assemblies are where controls and idle spins are held; 0: apart.
@@ -111,7 +111,7 @@ def assemble(
         tried, reason = _search(found, False, restarts, rng, progress)
     continuum = _continuum(mechanism, found.kept[0]) if found.kept else 0
     if found.kept and not continuum:
-        tried += _seek_nearer(found, min(restarts, NEARER), seed)
+        _seek_nearer(found, min(restarts, NEARER), seed)
         if every:
             more, reason = _search(found, True, restarts, rng, progress)
             tried += more - 1
@@ -153,22 +153,17 @@ def start_with(mechanism: Mechanism, controls: Mapping[str, float]) -> FloatArra
     return start
 
 
-def _seek_nearer(found: _Found, count: int, seed: int) -> int:
-    """Try so many random starts nearer to the network's own than what was found, again after each success.
-
-    Returns:
-        How many starts were tried.
-    """
-    mechanism, rng, tried, before = found.mechanism, np.random.default_rng(seed), 0, math.inf
-    while count and (now := float(found.distances().min())) < before - SAME:
-        before, tried = now, tried + count
+def _seek_nearer(found: _Found, count: int, seed: int) -> None:
+    """Try so many random starts nearer to the network's own than what was found, again after each success."""
+    mechanism, rng, before = found.mechanism, np.random.default_rng(seed), math.inf
+    while count and SAME < (now := float(found.distances().min())) < before - SAME:
+        before = now
         way = rng.normal(size=(len(mechanism.free), count))
         way *= now * rng.uniform(size=count) / np.linalg.norm(way, axis=0)
         starts = np.repeat(found.start[:, np.newaxis], count, axis=1)
         starts[mechanism.free] += way * mechanism.column_scales[mechanism.free, np.newaxis]
         for _ in found.add(descend(mechanism, starts, mechanism.free, patient=False)):
             pass
-    return tried
 
 
 def _search(

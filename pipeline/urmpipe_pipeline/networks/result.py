@@ -40,7 +40,7 @@ class NetworkResult(Result):
         gaps: What does not close there, the largest first.
         mobility: Of the first assembly; None without.
         every: Whether all assemblies were requested.
-        tried: How many starts were tried.
+        tried: How many starts were tried until one closed, or for every assembly.
         reason: Why the search ended.
         warnings: What a person should know.
         provenance: How to repeat it.

@@ -329,7 +329,7 @@ def test_the_assembly_is_the_nearer_one_of_both_of_a_four_bar(
 ) -> None:
     a, b, c, d = links
     p, q = a * np.array([math.cos(crank), math.sin(crank)]), np.array([d, 0.0])
-    assume(1.01 * abs(b - c) < np.linalg.norm(q - p) < 0.99 * (b + c))  # both are apart
+    assume(0.01 + abs(b - c) < np.linalg.norm(q - p) < 0.99 * (b + c))  # both are apart
     both = []
     for sign in (1.0, -1.0):
         end = circles(p, b, q, c, sign)
