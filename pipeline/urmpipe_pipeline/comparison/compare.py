@@ -104,7 +104,7 @@ class CompareOptions:
         check_choice("tcp", self.tcp, get_args(Tcp))
         check_sync(self.sync)
         check_choice("align", self.align, get_args(AlignMode))
-        if self.iso is None:  # of a test its criteria are judged, as its cycles show them
+        if self.iso is None:  # of a test the criteria are judged, and of each cycle the shares
             object.__setattr__(self, "tolerance", complete_tolerance(self.tolerance))
 
     def _refuse_with_iso(self) -> None:

@@ -9,14 +9,17 @@ import numpy as np
 
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.coverage import measure_shares
+from urmpipe_pipeline.comparison.deviation import Deviation, Share
 from urmpipe_pipeline.comparison.matching import lacking, match, wanted_rows
 from urmpipe_pipeline.comparison.measure import measure
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
 from urmpipe_pipeline.comparison.sync import SyncOption
+from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES, deviations_of
 from urmpipe_pipeline.comparison.trajectory import Sync, Trajectory
+from urmpipe_pipeline.comparison.wording import share_words
 from urmpipe_pipeline.diagnosis.sides import Side
-from urmpipe_pipeline.iso9283.command_path import Bend, Stop
+from urmpipe_pipeline.iso9283.command_path import Bend, Stations, Stop
 from urmpipe_pipeline.iso9283.criteria import fewest_cycles
 from urmpipe_pipeline.iso9283.cycles import FoundCycles, check_cycles, find_cycles, first_cycle
 from urmpipe_pipeline.iso9283.likeness import alike
@@ -118,7 +121,8 @@ def judge_cycles(
 ) -> JudgedCycles:
     """Return what the cycles of a test tell: n logs, or one in which the motion repeats.
 
-    A cycle that does not follow the reference is a failed one, of which no criterion is.
+    A cycle that does not follow the reference, or shows too little of it, is a failed one, of which no
+    criterion is.
 
     Args:
         asked: The reference.
@@ -126,7 +130,7 @@ def judge_cycles(
         options: How they are evaluated.
         sync: How the clock of each cycle is put together with the reference's; auto goes by the planes that
             both cross.
-        tolerance: Largest absolute values allowed, by criterion.
+        tolerance: Largest absolute values allowed, by criterion; least shares of a cycle, 0..1.
 
     Raises:
         LogError: If no cycle follows the reference, or a criterion with a tolerance has no value, however
@@ -137,10 +141,12 @@ def judge_cycles(
     command = _motion(asked)
     candidates, told = _candidates(command, done, options)
     marks = marks_of(Command(command, options.targets, options.bends, options.stops, options.planes))
-    kept, failed = _followed(command, marks, candidates, asked.run.name)
+    least = {name: tolerance.get(name, share) for name, share in LEAST_SHARES.items()}
+    tolerance = deviations_of(tolerance)
+    kept, failed = _followed(command, marks, candidates, asked, least)
     if not kept and marks.path is not None and len(marks.poses) and options.targets is None:
         marks = replace(marks, poses=Poses(np.empty((0, 3)), None))
-        kept, others = _followed(command, marks, candidates, asked.run.name)
+        kept, others = _followed(command, marks, candidates, asked, least)
         if kept:
             failed = others
             said = f"no cycle rests where {asked.run.name} does: poses are not judged"
@@ -148,18 +154,19 @@ def judge_cycles(
     unlike = [LogWarning(FAILED, failed_words(one), row=one.row, about=one.name) for one in failed]
     if not kept:
         raise LogError(*(one.as_finding() for one in (*told, *unlike)))
-    found = measure_criteria(marks, [one for _, one in kept], options.band, tolerance)
-    clocks = [_sync(sync, one, asked.run.timed) for _, one in kept]
+    found = measure_criteria(marks, [one for _, one, _ in kept], options.band, tolerance)
+    clocks = [_sync(sync, one, asked.run.timed) for _, one, _ in kept]
     cycles = tuple(
         Cycle(one.side.run.name, one.first + 1, one.last + 1, clock.offset if one.motion.timed else None)
-        for (one, _), clock in zip(kept, clocks, strict=True)
+        for (one, _, _), clock in zip(kept, clocks, strict=True)
     )
     test = IsoTest(cycles, found.criteria, found.poses, found.path, options.band, rows, tuple(failed))
     _refuse_unvalued(test, tolerance)
     deviations = tuple(
-        _deviation(asked, one.side, clock) for (one, _), clock in zip(kept, clocks, strict=True)
+        replace(_deviation(asked, one.side, clock), shares=shares)
+        for (one, _, shares), clock in zip(kept, clocks, strict=True)
     )
-    motions = [one.motion for one, _ in kept]
+    motions = [one.motion for one, _, _ in kept]
     doubts = [*_few(test), *_trembling(motions, test), *_angles(command, motions, test)]
     open_failures = () if tolerance else unlike  # with a tolerance the verdict names them
     return JudgedCycles(asked.trajectory, deviations, test, (*told, *open_failures, *doubts))
@@ -252,20 +259,41 @@ def _left_out(name: str, found: FoundCycles) -> Iterator[LogWarning]:
 
 
 def _followed(
-    command: Motion, marks: Marks, candidates: Sequence[_Candidate], reference: str
-) -> tuple[list[tuple[_Candidate, Followed]], list[FailedCycle]]:
-    """Return the cycles that follow the command, and the others."""
+    command: Motion, marks: Marks, candidates: Sequence[_Candidate], asked: Side, least: Mapping[str, float]
+) -> tuple[list[tuple[_Candidate, Followed, dict[str, Share]]], list[FailedCycle]]:
+    """Return the cycles that follow the command and show it, with their shares, and the others."""
     kept, failed = [], []
     for one in candidates:
         moves = marks.path is not None
         unlike = moves and not (one.motion.timed and len(one.motion) > 1 and alike(command, one.motion))
-        found = f"its path differs from that of {reference}" if unlike else follow(marks, one.motion)
+        found = f"its path differs from that of {asked.run.name}" if unlike else follow(marks, one.motion)
+        shares = {} if isinstance(found, str) else _shares(asked, one, found, marks.stations, least)
+        small = [share_words(share) for share in shares.values() if share.verdict == "fail"]
+        if small:
+            found = "; ".join(small)
         if isinstance(found, str):
             distance = _largest_distance(command, one.motion)
             failed.append(FailedCycle(one.side.run.name, one.first + 1, one.last + 1, distance, found))
         else:
-            kept.append((one, found))
+            kept.append((one, found, shares))
     return kept, failed
+
+
+def _shares(
+    asked: Side, one: _Candidate, followed: Followed, planes: Stations | None, least: Mapping[str, float]
+) -> dict[str, Share]:
+    """Return how much of the command a cycle shows, its clock set to the command's at each plane."""
+    reference, cycle = wanted_rows(asked, one.side), one.side.trajectory
+    if planes is not None and followed.crossed is not None:
+        crossed, rising = np.unique(np.maximum.accumulate(followed.crossed.t), return_index=True)
+        known = planes.t[rising]
+        t = np.interp(cycle.t, crossed, known)
+        t += np.minimum(cycle.t - crossed[0], 0.0) + np.maximum(cycle.t - crossed[-1], 0.0)
+        cycle = replace(cycle, t_ns=np.rint(1e9 * t).astype(np.int64))
+    matched = match(reference, cycle, Sync())
+    if not len(matched.sample):
+        return {}
+    return measure_shares(reference, cycle, matched, least, timed=asked.run.timed)
 
 
 def _largest_distance(command: Motion, cycle: Motion) -> float | None:

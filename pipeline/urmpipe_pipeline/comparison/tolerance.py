@@ -91,7 +91,7 @@ def parse_tolerance(
             of_what = ("angle", "joint") if angle else ()
             hints = tuple(Hint(parameter, f"{one}={part.strip()}", "specifies the kind") for one in of_what)
             said = f"{shown(part.strip())}{twice}"
-            allowed = ALLOWED_CRITERIA if iso else ALLOWED if zero else ALLOWED + ALLOWED_SHARES
+            allowed = (ALLOWED_CRITERIA if iso else ALLOWED) + ("" if zero else ALLOWED_SHARES)
             faults.append(Finding(parameter=parameter, found=said, allowed=allowed, hints=hints))
             continue
         named.update(kinds)
@@ -123,9 +123,9 @@ def check_tolerance(
         zero: Whether it is a noise: 0 is allowed, and no share.
         iso: Whether criteria after ISO 9283 are judged, which need none; else deviations; None: of either.
     """
-    sign = "0 or positive" if zero else "positive" if iso else "positive; coverage, judged 0 to 1"
+    sign = "0 or positive" if zero else "positive; coverage, judged 0 to 1"
     allowed = ALLOWED_CRITERIA if iso else ALLOWED_NUMBERS
-    kinds = UNITS if iso is None else CRITERIA if iso else (*DEVIATIONS, *LEAST_SHARES)
+    kinds = UNITS if iso is None else (*(CRITERIA if iso else DEVIATIONS), *LEAST_SHARES)
     faults = [
         Finding(parameter=parameter, found=f"{kind}={value}", allowed=f"{allowed}; {sign}")
         for kind, value in tolerance.items()
