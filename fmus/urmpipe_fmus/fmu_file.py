@@ -14,7 +14,6 @@ from typing import Any
 from xml.parsers import expat
 
 from urmpipe_models.errors import Finding, FmuError, shown
-from urmpipe_models.files.contents import other_than_file
 from urmpipe_models.files.missing import meant_by
 
 DESCRIPTION = "modelDescription.xml"
@@ -127,9 +126,13 @@ def _description(path: Path) -> tuple[bytes, tuple[str, ...]]:
     if "\0" in str(path):
         raise FmuError(f"found {shown(str(path))}, allowed: the name of a file")
     try:
-        # A pipe would be waited for, and Windows only says that folders may not be read.
-        if other := other_than_file(path.stat().st_mode):
-            raise _refused(path, f"found {other}, allowed: {AN_FMU}")
+        kind = path.stat().st_mode
+        if not stat.S_ISREG(
+            kind
+        ):  # a pipe would be waited for, and Windows only says that folders may not be read
+            raise _refused(
+                path, f"found a {'folder' if stat.S_ISDIR(kind) else 'pipe or device'}, allowed: {AN_FMU}"
+            )
         with zipfile.ZipFile(path) as archive:
             faults = [*_size_faults(path, archive.infolist()), *_entry_faults(archive.infolist())]
             if faults:

@@ -196,7 +196,10 @@ def pasted(word: object, platform: str = sys.platform) -> str:
 
 
 def python_command(code: str) -> str:
-    """Return the command that runs a line of Python, in which texts stand as `repr` writes them."""
-    if sys.platform != "win32" and not set(code) & {'"', "\\"}:
-        code = code.replace("'", '"')  # in the single quotes of a shell it reads more easily so
-    return f"python -c {pasted(code)}"
+    """Return the command that runs a line of Python, in which texts stand as `repr` writes them.
+
+    It stands in double quotes, as cmd, too, reads it, unless a name in it has what a shell reads in these.
+    """
+    return (
+        f"python -c {pasted(code)}" if set(code) & set('"$`!\\\u201c\u201d\u201e') else f'python -c "{code}"'
+    )

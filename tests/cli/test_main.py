@@ -133,21 +133,21 @@ def test_wrong_use_is_one_line_that_says_what_is_allowed(urmpipe: RunCommand, li
     [
         (
             "compare LOG LOG --iso --planes 1000000000",
-            "planes: found 1000000000, allowed: a whole number, 1 to 10000",
+            "planes: found 1000000000, allowed: 10000 at most",
         ),
         (
             "ik PATH --robot urm6 --unit m --restarts 10001",
-            "restarts: found 10001, allowed: a whole number, 0 to 10000",
+            "restarts: found 10001, allowed: 10000 at most",
         ),
         (
             "network solve four-bar --restarts 1000000000",
-            "restarts: found 1000000000, allowed: a whole number, 0 to 200000",
+            "restarts: found 1000000000, allowed: 200000 at most",
         ),
-        ("simulate one-drive --duration 1e300", "duration: found 1e+300 s, allowed: above 0, below 1e+09"),
-        ("ingest LOG --tsp 1e-300", "tsp: found 1e-300 s, allowed: a time from 1e-09 s to below 1e+09 s"),
+        ("simulate one-drive --duration 1e300", "duration: found 1e+300 s, allowed: below 1e+09 s"),
+        ("ingest LOG --tsp 1e-300", "tsp: found 1e-300 s, allowed: 1e-09 s or more: times are in ns"),
         (
             "fmu build repolarizer -s joints=1001",
-            "unit repolarizer: option joints: found 1001, allowed: an integer, 1 to 1000",
+            "unit repolarizer: option joints: found 1001, allowed: 1000 at most",
         ),
     ],
 )

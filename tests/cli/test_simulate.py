@@ -410,8 +410,8 @@ def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:
 
 def test_a_step_and_a_duration_are_positive(following: Path) -> None:
     assert refusal(following, step=float("nan"), duration=0.0) == [
-        "step: found nan s, allowed: above 0, below 1e+09",
-        "duration: found 0 s, allowed: above 0, below 1e+09",
+        "step: found nan s, allowed: above 0",
+        "duration: found 0 s, allowed: above 0",
     ]
 
 

@@ -21,6 +21,7 @@ HANGS = 120.0
 COMMAND = [sys.executable, "-P", "-m", "urmpipe"]
 
 NO_RECORDING = "found no recording of urmpipe, allowed: a .rrd that ingest, compare or simulate wrote"
+PIPE = "found a pipe or a device, allowed: a recording (.rrd) that urmpipe wrote"
 
 
 @pytest.mark.slow
@@ -31,9 +32,9 @@ NO_RECORDING = "found no recording of urmpipe, allowed: a .rrd that ingest, comp
         ("export pipe.rrd", f"pipe.rrd: {NO_RECORDING}"),
         ("compare LOG --robot urm6 --baseline pipe.rrd", f"pipe.rrd: {NO_RECORDING}"),
         ("report folder.rrd", f"folder.rrd: {NO_RECORDING}"),
-        ("view pipe.rrd", "pipe.rrd: found a named pipe, allowed: a recording (.rrd) that urmpipe wrote"),
-        ("view socket.rrd", "socket.rrd: found a socket, allowed: a recording (.rrd) that urmpipe wrote"),
-        ("fmu build pipe.py", "pipe.py: found a named pipe, allowed: a file"),
+        ("view pipe.rrd", f"pipe.rrd: {PIPE}"),
+        ("view socket.rrd", f"socket.rrd: {PIPE}"),
+        ("fmu build pipe.py", "pipe.py: found a pipe or a device, allowed: a file"),
     ],
 )  # fmt: skip
 def test_what_is_no_file_is_one_line(words: str, said: str, tmp_path: Path) -> None:

@@ -132,10 +132,15 @@ def _check_times(**given: float | None) -> None:
     """
     wrong = {name: value for name, value in given.items() if value is not None and not 0.0 < value < LONGEST}
     if wrong:
-        allowed = f"above 0, below {LONGEST:g}"
-        raise OptionError(
-            *(Finding(parameter=name, found=f"{value:g} s", allowed=allowed) for name, value in wrong.items())
+        faults = (
+            Finding(
+                parameter=name,
+                found=f"{value:g} s",
+                allowed=f"below {LONGEST:g} s" if value > 0 else "above 0",
+            )
+            for name, value in wrong.items()
         )
+        raise OptionError(*faults)
 
 
 def _files(system: System) -> list[Path]:

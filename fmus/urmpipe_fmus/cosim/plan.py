@@ -213,19 +213,23 @@ def _count(step: float, length: float, faults: list[Finding]) -> int:
             )
         )
         return 0
-    another_end, another_step = (Hint(name, None, "sets another") for name in ("duration", "step"))
     if step < NANOSECOND:
-        found = f"found {step:g} s, allowed: from 1e-09 s, as times are in ns"
-        faults.append(Finding(found, about="system.step", hints=(another_step,)))
+        faults.append(
+            Finding(f"found {step:g} s, allowed: from 1e-09 s, as times are in ns", about="system.step")
+        )
         return 0
     if length / step > MOST_STEPS:
         found = f"found {length:g} s in steps of {step:g} s, allowed: {MOST_STEPS:.0e} steps at most"
-        faults.append(Finding(found, about="system.duration", hints=(another_end, another_step)))
+        hints = tuple(Hint(name, None, "sets another") for name in ("duration", "step"))
+        faults.append(Finding(found, about="system.duration", hints=hints))
         return 0
     count = math.floor((length + NANOSECOND) / step)
     if count < 1:
-        found = f"found {step:g} s, allowed: no more than the duration, {length:g} s"
-        faults.append(Finding(found, about="system.step", hints=(another_step, another_end)))
+        faults.append(
+            Finding(
+                f"found {step:g} s, allowed: no more than the duration, {length:g} s", about="system.step"
+            )
+        )
     return count
 
 

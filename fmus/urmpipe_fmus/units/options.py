@@ -28,7 +28,8 @@ def whole_number(unit: str, option: str, value: Any) -> int:
         UnitError: If it is no integer from 1 to `MOST`.
     """
     if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST:
-        allowed = f"an integer, 1 to {MOST}"
+        too_many = isinstance(value, int) and value > MOST
+        allowed = f"{MOST} at most" if too_many else "an integer, 1 or more"
         raise UnitError(f"unit {unit}: option {option}: found {shown(value)}, allowed: {allowed}")
     return value
 

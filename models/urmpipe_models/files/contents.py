@@ -1,4 +1,4 @@
-"""Files of a size that people write, read whole; what is no file; permissions."""
+"""Files that describe something, read whole up to a size; and permissions of files."""
 
 from __future__ import annotations
 
@@ -13,14 +13,6 @@ from urmpipe_models.files.missing import meant_by
 LARGEST = 10e6
 """Bytes of a description: the largest arms that are published take a hundredth of it."""
 
-_OTHERS = {
-    stat.S_IFDIR: "a folder",
-    stat.S_IFIFO: "a named pipe",
-    stat.S_IFSOCK: "a socket",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-}
-
 
 def read_contents(path: Path, error: type[UrmpipeError], suffixes: Collection[str]) -> bytes:
     """Return what stands in a file.
@@ -31,15 +23,15 @@ def read_contents(path: Path, error: type[UrmpipeError], suffixes: Collection[st
         suffixes: How files of its kind end, to say which may be meant by one that is not there.
 
     Raises:
-        UrmpipeError: `error`, if there is no such file, it cannot be read, it is a folder, pipe or device,
-            or it is larger than `LARGEST`.
+        UrmpipeError: `error`, if there is no such file, it cannot be read, it is a pipe or a device, on which
+            reading may never end, or it is larger than `LARGEST`.
     """
     if "\0" in str(path):
         raise error(f"found {shown(str(path))}, allowed: the name of a file")
     try:
         found = path.stat()
-        if other := other_than_file(found.st_mode):
-            raise error(Finding(f"found {other}, allowed: a file", str(path)))
+        if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
+            raise error(Finding("found a pipe or a device, allowed: a file", str(path)))
         if found.st_size > LARGEST:
             size = f"found {found.st_size / 1e6:.4g} MB, allowed: {LARGEST / 1e6:g} MB at most"
             raise error(Finding(size, str(path)))
@@ -47,15 +39,6 @@ def read_contents(path: Path, error: type[UrmpipeError], suffixes: Collection[st
     except OSError as fault:
         meant = meant_by(path, suffixes) if isinstance(fault, FileNotFoundError) else ""
         raise error(Finding(f"cannot be read: {fault.strerror}{meant}", str(path))) from fault
-
-
-def other_than_file(mode: int) -> str:
-    """Return what is no file: "a folder", or "a named pipe", on which reading may never end.
-
-    Args:
-        mode: Its `st_mode`; of a file nothing is returned.
-    """
-    return _OTHERS.get(stat.S_IFMT(mode), "")
 
 
 def keep_permissions(part: Path, path: Path) -> None:

@@ -37,10 +37,11 @@ class Search:
         elif self.tolerance is not None and not 0.0 < self.tolerance < math.inf:
             found = f"{self.tolerance:g} m"
             yield Finding(parameter="tolerance", found=found, allowed="more than 0, finite")
-        for name, value, most in (("restarts", self.restarts, MOST_RESTARTS), ("seed", self.seed, math.inf)):
-            if not isinstance(value, Integral) or not 0 <= value <= most:
-                allowed = "a whole number, 0 or more" if most == math.inf else f"a whole number, 0 to {most}"
-                yield Finding(parameter=name, found=shown(value), allowed=allowed)
+        for name, value in (("restarts", self.restarts), ("seed", self.seed)):
+            if not isinstance(value, Integral) or value < 0:
+                yield Finding(parameter=name, found=shown(value), allowed="a whole number, 0 or more")
+            elif name == "restarts" and value > MOST_RESTARTS:
+                yield Finding(parameter=name, found=shown(value), allowed=f"{MOST_RESTARTS} at most")
 
 
 USUAL_SEARCH = Search()

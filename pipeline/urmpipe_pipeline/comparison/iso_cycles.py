@@ -81,7 +81,7 @@ class IsoOptions:
     def __post_init__(self) -> None:
         faults = []
         if not 1 <= self.planes <= MOST_PLANES:
-            allowed = f"a whole number, 1 to {MOST_PLANES}"
+            allowed = "1 or more" if self.planes < 1 else f"{MOST_PLANES} at most"
             faults.append(Finding(parameter="planes", found=str(self.planes), allowed=allowed))
         if not 0.0 < self.band < np.inf:
             faults.append(Finding(parameter="band", found=f"{self.band:g}", allowed="a positive length in m"))

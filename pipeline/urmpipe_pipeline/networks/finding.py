@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
@@ -57,10 +56,11 @@ class Search:
                 yield Finding(
                     parameter="controls", found=f"{name} = {shown(value)}", allowed="a finite number"
                 )
-        for key, count, most in (("restarts", self.restarts, MOST_STARTS), ("seed", self.seed, math.inf)):
-            if not isinstance(count, Integral) or not 0 <= count <= most:
-                allowed = "a whole number, 0 or more" if most == math.inf else f"a whole number, 0 to {most}"
-                yield Finding(parameter=key, found=shown(count), allowed=allowed)
+        for key, count in (("restarts", self.restarts), ("seed", self.seed)):
+            if not isinstance(count, Integral) or count < 0:
+                yield Finding(parameter=key, found=shown(count), allowed="a whole number, 0 or more")
+            elif key == "restarts" and count > MOST_STARTS:
+                yield Finding(parameter=key, found=shown(count), allowed=f"{MOST_STARTS} at most")
 
 
 def find_network(

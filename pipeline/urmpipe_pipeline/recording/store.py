@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import IntArray
 from urmpipe_models.errors import Finding, RecordingError
-from urmpipe_models.files.contents import other_than_file
 from urmpipe_models.files.missing import meant_by
 from urmpipe_models.spelling import pasted
 from urmpipe_pipeline.recording.identity import APPLICATION_ID, is_recording, open_reader, our_entries
@@ -136,8 +135,8 @@ class Store:
     def _open(self) -> LazyStore:
         """Return the store of the recording that urmpipe wrote."""
         if not self.path.is_file():
-            other = other_than_file(self.path.stat().st_mode) if self.path.exists() else ""
-            found = other or f"no such file{meant_by(self.path, ('.rrd',))}"
+            special = self.path.exists() and not self.path.is_dir()
+            found = "a pipe or a device" if special else f"no such file{meant_by(self.path, ('.rrd',))}"
             raise self.error(f"found {found}, allowed: a recording (.rrd) that urmpipe wrote")
         if not is_recording(self.path):
             raise self.error("found no Rerun recording, allowed: a recording (.rrd) that urmpipe wrote")

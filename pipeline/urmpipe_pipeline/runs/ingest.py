@@ -158,7 +158,9 @@ def _of_poses(log: JointLog, robot: Chain | None, made: Provenance, told: Sequen
 def _refuse_senseless(tsp: float | None, derivative: str | None) -> None:
     """Raise an `OptionError` for a period or a method that makes no sense."""
     if tsp is not None and not SHORTEST_TSP <= tsp < LONGEST_TSP:
-        allowed = f"a time from {SHORTEST_TSP:g} s to below {LONGEST_TSP:g} s"
+        allowed = f"a positive time below {LONGEST_TSP:g} s"
+        if 0 < tsp < SHORTEST_TSP:
+            allowed = f"{SHORTEST_TSP:g} s or more: times are in ns"
         raise OptionError(Finding(parameter="tsp", found=f"{tsp:g} s", allowed=allowed))
     if derivative is not None:
         check_choice("derivative", derivative, get_args(Method))

@@ -131,8 +131,10 @@ def _holds(line: str, columns: Sequence[Any], row: int, delimiter: str) -> bool:
 
 
 def _same(cell: str, value: Any) -> bool:
-    if isinstance(value, str):
+    if isinstance(value, np.str_):
         return cell == csv_text(value)
+    if isinstance(value, str):  # a time, as it was written
+        return cell == value
     try:
         return float(cell or "nan") == value or (cell == "" and bool(np.isnan(value)))
     except ValueError:

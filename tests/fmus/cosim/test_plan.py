@@ -204,18 +204,16 @@ def test_the_duration_is_told_by_the_system_or_by_the_caller_or_by_the_longest_l
         "system.duration: not found, and no log tells it, allowed: a number above 0, in s;"
         " duration=SECONDS sets it"
     ]
-    another_step, another_end = "step=SECONDS sets another", "duration=SECONDS"
     assert told({"a": TROUBLE}, step=1e-10) == [
-        f"system.step: found 1e-10 s, allowed: from 1e-09 s, as times are in ns; {another_step}"
+        "system.step: found 1e-10 s, allowed: from 1e-09 s, as times are in ns"
     ]
     assert told({"a": TROUBLE}, duration=0.05) == [
-        "system.step: found 0.1 s, allowed: no more than the duration, 0.05 s;"
-        f" {another_step.replace(' ', f' or {another_end} ', 1)}"
+        "system.step: found 0.1 s, allowed: no more than the duration, 0.05 s"
     ]
     for long in (1.001e7, 1e308):
         assert told({"a": TROUBLE}, duration=long) == [
             f"system.duration: found {long:g} s in steps of 0.1 s, allowed: 1e+08 steps at most;"
-            f" {another_end} or {another_step}"
+            " duration=SECONDS or step=SECONDS sets another"
         ]
 
 

@@ -164,7 +164,7 @@ def test_binaries_are_never_looked_for_outside_of_the_fmu(tmp_path: Path, name: 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
 def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "m.fmu")
-    said = "found a named pipe, allowed: an FMU, such as urmpipe fmu build makes of a unit"
+    said = "found a pipe or device, allowed: an FMU, such as urmpipe fmu build makes of a unit"
     assert refusal(FmuError, check_fmu, tmp_path / "m.fmu") == f"{tmp_path / 'm.fmu'}: {said}"
 
 

@@ -52,7 +52,7 @@ def test_the_columns_are_outputs_by_the_callers_names_that_depend_on_time() -> N
 @pytest.mark.parametrize(
     ("columns", "said"),
     [
-        ([["q", "rad", 0]], "option columns: q: size: found 0, allowed: an integer, 1 to 1000"),
+        ([["q", "rad", 0]], "option columns: q: size: found 0, allowed: an integer, 1 or more"),
         ([["q", "rad", 2]], "option columns: found 2 columns, allowed: 3 of the table"),
         (
             [["q", "rad", 3, "Angles", 5]],

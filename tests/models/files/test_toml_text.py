@@ -71,7 +71,7 @@ def test_what_cannot_be_read_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyP
     os.mkfifo("pipe.toml")
     for name, said in (
         ("a.toml", "a.toml:2: byte 6 is not UTF-8; allowed: TOML in UTF-8"),
-        ("pipe.toml", "pipe.toml: found a named pipe, allowed: a file"),
+        ("pipe.toml", "pipe.toml: found a pipe or a device, allowed: a file"),
         ("a\0b.toml", "found 'a\\x00b.toml', allowed: the name of a file"),
         ("b.toml", "b.toml: cannot be read: No such file or directory"),
     ):

@@ -63,7 +63,7 @@ def test_a_pipe_that_brings_too_much(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_is_no_file(tmp_path: Path) -> None:
     """Nothing of them is opened, which could wait for ever."""
     os.mkfifo(pipe := tmp_path / "pipe.csv")
-    assert refusal(LogError, read_log, [pipe]) == f"{pipe}: found a named pipe, {KEPT}"
+    assert refusal(LogError, read_log, [pipe]) == f"{pipe}: found a pipe with a name, {KEPT}"
     zero = Path("/dev/zero")
     assert refusal(LogError, read_log, [zero]) == f"/dev/zero: found a device, {KEPT}"
     with socket.socket(socket.AF_UNIX) as there:

@@ -18,7 +18,6 @@ from select import select
 from tempfile import TemporaryFile
 
 from urmpipe_models.errors import Finding, LogError, shown
-from urmpipe_models.files.contents import other_than_file
 
 WAITS_S = (5.0, 55.0)
 """Seconds without a byte after which a pipe that brings nothing is named, and those until it is given up."""
@@ -27,6 +26,12 @@ MOST_PIPED = 4 << 30
 """Bytes of a pipe that are kept: one that never ends would fill the disk."""
 
 _OWN = re.compile(r"/(?:dev|proc/self)/fd/(\d{1,9})|/dev/stdin")
+_KINDS = {
+    stat.S_IFIFO: "a pipe with a name",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
 
 State = tuple[int, ...]
 
@@ -38,12 +43,11 @@ def made_regular(path: Path) -> None:
         LogError: If it is neither such a pipe nor a file or folder, or brings nothing, or too much.
     """
     state = _state(path)
-    other = "" if state is None or stat.S_ISDIR(state[0]) else other_than_file(state[0])
-    if state is None or not other:
+    if state is None or stat.S_IFMT(state[0]) not in _KINDS:
         return
     own = _OWN.fullmatch(str(path))
     if own is None or stat.S_IFMT(state[0]) not in (stat.S_IFIFO, stat.S_IFSOCK):
-        found = f"found {other}, allowed: a file, which can be read more than once"
+        found = f"found {_KINDS[stat.S_IFMT(state[0])]}, allowed: a file, which can be read more than once"
         raise LogError(Finding(found, str(path)))
     number = int(own[1] or 0)
     try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shlex
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -196,12 +195,12 @@ def judge(paths: Sequence[Path], truth: Truth, options: ReadOptions, robot: Chai
 
 def commanded(paths: Sequence[Path], first: Reading) -> Path | None:
     """Return what the printed command makes of a file whose format is not read; None if there is none."""
-    told = re.search(r"python -c ('.*')", str(first.came)) if first.log is None else None
+    told = re.search(r'python -c "(.*)"', str(first.came)) if first.log is None else None
     if told is None:
         return None
     folder = paths[0].parent
     before = set(folder.iterdir())
-    subprocess.run([sys.executable, "-c", *shlex.split(told[1])], cwd=folder, check=False, timeout=60)
+    subprocess.run([sys.executable, "-c", told[1].replace('\\"', '"')], cwd=folder, check=False, timeout=60)
     return next(iter(set(folder.iterdir()) - before), None)
 
 
