@@ -1,6 +1,6 @@
 """How much of a motion a verdict rests on: two shares, judged like a deviation.
 
-`coverage` is the share of the reference's samples that the log shows, `judged` the share of the log's own
+`coverage` is the share of the reference's samples that the log shows, `judged` the share of the log's
 motion that lies in judged samples. Samples are the rows of a side that have a value; a judged sample is a row
 of the log that was compared, at its time on the reference's clock.
 
@@ -10,12 +10,12 @@ A reference sample is shown
 2. if a judged sample is no further than 0.9 of the log's period, and between the judged samples before and
    after it the reference departs from the straight line between its values at these two by no more than the
    tolerance (a sparse log of a quick motion shows only its own rows); or
-3. if it lies before the first judged sample or behind the last, and the reference, which moves elsewhere,
+3. if it lies before the first judged sample or after the last, and the reference, which moves elsewhere,
    rests there: it stays within the tolerance of its value at that judged sample.
 
 Periods are medians of the positive steps. Motion is the length of the log's path (of its joints where these
-alone are compared), counted in steps of at least the tolerance, so that noise at rest is none. A step counts
-as judged if the row that completes it is. Of a log that rests, samples are counted.
+alone are compared), counted in steps of at least the tolerance, so that noise at rest does not count. A step
+counts as judged if the row that completes it is. Of a log that rests, samples are counted.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ class _Limits(NamedTuple):
 
 
 class _Values(NamedTuple):
-    """Positions [m], orientations x, y, z, w [-] and joints [rad] or [m] of some samples, one a row."""
+    """Positions [m], orientations x, y, z, w [-] and joints [rad] or [m] of samples, a row each."""
 
     position: FloatArray
     quat: FloatArray | None
     q: FloatArray | None
 
     def at(self, rows: IntArray) -> _Values:
-        quat, q = (None if one is None else one[rows] for one in (self.quat, self.q))
+        quat, q = (None if part is None else part[rows] for part in (self.quat, self.q))
         return _Values(self.position[rows], quat, q)
 
 
@@ -72,20 +72,22 @@ def measure_shares(
     """
     reference = reference.rows_with_value()
     limits, shift = _limits(tolerance), round(matched.sync.offset * 1e9)
-    own = np.flatnonzero(log.has_value)
-    judged = np.isin(own, matched.sample, assume_unique=True)
+    valued = np.flatnonzero(log.has_value)
+    judged = np.isin(valued, matched.sample, assume_unique=True)
     order = joint_order(reference.joints, log.joints)
     q = None if reference.q is None or order is None else reference.q[:, order]
-    asked = _Values(reference.position, reference.quat_xyzw, None if matched.reference_q is None else q)
-    asked_ns = reference.t_ns - shift
-    shown = _shown(asked_ns, asked, matched, usual_period(log.t_ns[own]), limits)
+    values = _Values(reference.position, reference.quat_xyzw, None if matched.reference_q is None else q)
+    times = reference.t_ns - shift
+    covered = _near_judged(times, values, matched, usual_period(log.t_ns[valued]), limits)
     if timed:
-        shown |= _resting(asked_ns, asked, matched, limits)
-    rows = np.arange(len(shown))
-    moved = _judged_motion(log, own, judged, limits)
-    coverage = _share("coverage", float(np.mean(shown)), shown, rows, reference.t_ns, tolerance, timed=timed)
-    whole = _share("judged", moved, judged, own, log.t_ns[own], tolerance, timed=timed)
-    return {one.quantity: one for one in (coverage, whole)}
+        covered |= _resting(times, values, matched, limits)
+    rows = np.arange(len(covered))
+    motion_share = _judged_motion(log, valued, judged, limits)
+    coverage = _share(
+        "coverage", float(np.mean(covered)), covered, rows, reference.t_ns, tolerance, timed=timed
+    )
+    judged_share = _share("judged", motion_share, judged, valued, log.t_ns[valued], tolerance, timed=timed)
+    return {share.quantity: share for share in (coverage, judged_share)}
 
 
 def _share(
@@ -111,14 +113,16 @@ def _limits(tolerance: Mapping[str, float]) -> _Limits:
         tolerance = {"axis": DEFAULT_TOLERANCE}
     axes = [allowed_for(axis, "axis", tolerance) for axis in "xyz"]
     return _Limits(
-        np.array([math.inf if one is None else one for one in axes]),
+        np.array([math.inf if limit is None else limit for limit in axes]),
         min(tolerance.get("norm", math.inf), tolerance.get("path", math.inf)),
         tolerance.get("angle", math.inf),
         tolerance.get("joint", math.inf),
     )
 
 
-def _shown(t_ns: IntArray, asked: _Values, matched: Matched, log_period: float, limits: _Limits) -> BoolArray:
+def _near_judged(
+    t_ns: IntArray, values: _Values, matched: Matched, log_period: float, limits: _Limits
+) -> BoolArray:
     """Return which samples of the reference, at times on the log's clock [ns], are near a judged one."""
     judged_ns = matched.t_ns
     after = np.searchsorted(judged_ns, t_ns, side="right")
@@ -127,20 +131,22 @@ def _shown(t_ns: IntArray, asked: _Values, matched: Matched, log_period: float, 
     between = np.flatnonzero((left < right) & (nearest > 0))
     left, right = left[between], right[between]
     share = (t_ns[between] - judged_ns[left]) / (judged_ns[right] - judged_ns[left])
-    known = _Values(matched.reference, matched.reference_quat, matched.reference_q)
-    departs = _departs(asked.at(between), _straight(known.at(left), known.at(right), share), limits)
+    matched_values = _Values(matched.reference, matched.reference_quat, matched.reference_q)
+    departs = _departs(
+        values.at(between), _straight(matched_values.at(left), matched_values.at(right), share), limits
+    )
     curved = np.bincount(left[departs], minlength=len(judged_ns)) > 0  # by the judged sample before
     straight = np.zeros(len(t_ns), np.bool_)
     straight[between] = ~curved[left]
     return np.asarray((nearest <= usual_period(t_ns) / 2) | (straight & (nearest <= NEAR * log_period)))
 
 
-def _resting(t_ns: IntArray, asked: _Values, matched: Matched, limits: _Limits) -> BoolArray:
-    """Return which samples lie in a rest before the first judged sample or behind the last, shape (n,)."""
-    known = _Values(matched.reference, matched.reference_quat, matched.reference_q)
+def _resting(t_ns: IntArray, values: _Values, matched: Matched, limits: _Limits) -> BoolArray:
+    """Return which samples lie in a rest before the first judged sample or after the last, shape (n,)."""
+    matched_values = _Values(matched.reference, matched.reference_quat, matched.reference_q)
     resting, every = np.zeros(len(t_ns), np.bool_), np.zeros(len(t_ns), np.int64)
     for end, beyond in ((0, t_ns < matched.t_ns[0]), (-1, t_ns > matched.t_ns[-1])):
-        moves = _departs(asked, known.at(every + end), limits)
+        moves = _departs(values, matched_values.at(every + end), limits)
         if moves.any() and not (moves & beyond).any():
             resting |= beyond
     return resting
@@ -163,34 +169,34 @@ def _straight(left: _Values, right: _Values, share: FloatArray) -> _Values:
     )
 
 
-def _departs(one: _Values, other: _Values, limits: _Limits) -> BoolArray:
+def _departs(first: _Values, second: _Values, limits: _Limits) -> BoolArray:
     """Return where two sets of values differ by more than what is allowed; a missing value differs."""
-    apart = one.position - other.position
-    within = [np.abs(apart[:, k]) <= limit for k, limit in enumerate(limits.axes) if limit < math.inf]
+    difference = first.position - second.position
+    within = [np.abs(difference[:, k]) <= limit for k, limit in enumerate(limits.axes) if limit < math.inf]
     if limits.norm < math.inf:
-        within.append(np.linalg.norm(apart, axis=1) <= limits.norm)
-    if limits.angle < math.inf and one.quat is not None and other.quat is not None:
-        within.append(angle_between(one.quat, other.quat) <= limits.angle)
-    if limits.joint < math.inf and one.q is not None and other.q is not None:
-        within.append((np.abs(one.q - other.q) <= limits.joint).all(axis=1))
+        within.append(np.linalg.norm(difference, axis=1) <= limits.norm)
+    if limits.angle < math.inf and first.quat is not None and second.quat is not None:
+        within.append(angle_between(first.quat, second.quat) <= limits.angle)
+    if limits.joint < math.inf and first.q is not None and second.q is not None:
+        within.append((np.abs(first.q - second.q) <= limits.joint).all(axis=1))
     return np.asarray(~np.all(within, axis=0))
 
 
-def _judged_motion(log: Trajectory, own: IntArray, judged: BoolArray, limits: _Limits) -> float:
+def _judged_motion(log: Trajectory, valued: IntArray, judged: BoolArray, limits: _Limits) -> float:
     """Return the share of a log's motion, or of its samples if it rests, that lies in judged samples."""
     if judged.all():
         return 1.0
-    values, least = log.position, min(limits.axes.min(), limits.norm)
+    points, least = log.position, min(limits.axes.min(), limits.norm)
     if least == math.inf and log.q is not None and limits.joint < math.inf:
-        values, least = log.q, limits.joint
+        points, least = log.q, limits.joint
     elif least == math.inf and log.quat_xyzw is not None:  # |2 q1 - 2 q2| = 4 sin(angle / 4)
-        values, least = 2.0 * log.quat_xyzw, limits.angle
-    whole = done = 0.0
-    rows = values[own].tolist()
+        points, least = 2.0 * log.quat_xyzw, limits.angle
+    total = counted = 0.0
+    rows = points[valued].tolist()
     start = rows[0]
     for row, is_judged in zip(rows, judged.tolist(), strict=True):
         if (length := math.dist(start, row)) >= least:
             start = row
-            whole += length
-            done += length * is_judged
-    return done / whole if whole else float(np.mean(judged))
+            total += length
+            counted += length * is_judged
+    return counted / total if total else float(np.mean(judged))

@@ -29,7 +29,7 @@ MEANING = {"coverage": "of the reference, shown by the log", "judged": "of the l
 def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
     """Yield why a log deviates, if that is known, and what decided the verdict: how much, when and where."""
     held, furthest = one.decisive, one.furthest
-    cause = () if one.diagnosis is None else diagnosis_facts(one.diagnosis)[:1]
+    cause = diagnosis_facts(one.diagnosis)[:1] if one.diagnosis and held is furthest else ()
     yield from (replace(fact, page=False) for fact in cause)  # a page says it where the log stands
     yield Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", Ref(one.name, colour))
     yield Fact("Decided by", decided_words(held), page=False)
