@@ -107,6 +107,23 @@ def test_no_disturbed_cycle_passes(
         assert abs(failed_cycle.row - first) <= RESTS and abs(failed_cycle.last_row - last) <= RESTS
 
 
+def test_a_cycle_that_shows_too_little_of_the_command_fails() -> None:
+    holed = once()
+    leg = (
+        (holed[:, 0] > SQUARE[0, 0] + 0.01)
+        & (holed[:, 0] < SQUARE[1, 0] - 0.01)
+        & (holed[:, 1] == SQUARE[0, 1])
+    )
+    holed[leg] = np.nan  # which is straight, so that every plane is crossed all the same
+    log = np.concatenate([once(0.22), holed, once(0.28)])
+    result = compared(log)
+    (failed,) = there(result.iso).failed_cycles
+    assert (result.verdict, failed.name) == ("fail", "cycle 2")
+    assert failed.reason.startswith("coverage 8") and " of 90 % needed, longest unseen: 0." in failed.reason
+    assert [one.shares["coverage"].value for one in result.runs] == [1.0, 1.0]
+    assert compared(log, TOLERANCE | {"coverage": 0.8}).verdict == "pass"
+
+
 def test_nine_of_ten_cycles_that_are_off_fail(
     shared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
