@@ -235,6 +235,8 @@ def test_what_is_printed_back_has_units(urmpipe: Any, tmp_path: Path) -> None:
         for one in made
         for name, words in zip(*(column.cells for column in one.columns), strict=True)
     }
-    assert told["option tolerance"] == '{"axis": "10 mm", "norm": "5 mm"}'
+    assert told["option tolerance"] == (
+        '{"axis": "10 mm", "norm": "5 mm", "coverage": "90 %", "judged": "50 %"}'
+    )
     options = {name: told[f"option {name}"] for name in ("velocity", "acceleration", "tsp", "law")}
     assert options == {"velocity": "0.25 m/s", "acceleration": "6 m/s2", "tsp": "0.005 s", "law": "trapezoid"}

@@ -81,7 +81,8 @@ def parse_tolerance(
         unit = UNITS.get(kinds[0], "")
         number = quantity(value, WRITTEN.get(unit, {}))
         fits = _fits(kinds[0], number, zero)
-        if both := readings(value, unit):
+        both = readings(value, unit) if math.isfinite(number) else ()
+        if both:
             name = f"{kinds[0]}=" if "=" in part else ""
             allowed = f"a unit: {' or '.join(f'{name}{one}' for one in both)}"
             faults.append(Finding(parameter=parameter, found=part.strip(), allowed=allowed))

@@ -72,6 +72,7 @@ def test_a_unit_is_a_shift_of_the_decimal_point(number: int) -> None:
         ("joint=.2", "joint=1", "joint=1deg or joint=1rad"),
         ("AP_rz=0.2", "AP_rz=0.21", "AP_rz=0.21deg or AP_rz=0.21rad"),
         ("AV=1", "AV=1.01", "AV=1.01% or AV=101%"),
+        ("coverage=1", "coverage=90", "coverage=90% or coverage=9000%"),
     ],
 )
 def test_a_large_number_needs_its_unit(clear: str, unclear: str, both: str) -> None:
@@ -107,7 +108,7 @@ def test_a_degree_is_that_of_pi() -> None:
         ("±±1mm", "'±±1mm'"),
         ("joint=2mm", "'joint=2mm'"),  # of joints that turn it would be 2 mrad
         ("a=b=1", "'a=b=1'"),
-        ("coverage=90", "'coverage=90'"),  # a share: 90% or 0.9
+        ("coverage=190%", "'coverage=190%'"),
     ],
 )
 def test_what_is_no_tolerance_is_one_line(part: str, said: str) -> None:
