@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.coverage import measure_shares
@@ -282,18 +283,35 @@ def _followed(
 def _shares(
     asked: Side, one: _Candidate, followed: Followed, planes: Stations | None, least: Mapping[str, float]
 ) -> dict[str, Share]:
-    """Return how much of the command a cycle shows, its clock set to the command's at each plane."""
-    reference, cycle = wanted_rows(asked, one.side), one.side.trajectory
+    """Return how much of the command a cycle shows.
+
+    Samples are matched on the command's clock, and near each other on the cycle's: between two planes either
+    goes on at its own speed.
+    """
+    command, cycle = wanted_rows(asked, one.side), one.side.trajectory
+    reference, on_command = command, cycle
     if planes is not None and followed.crossed is not None:
-        crossed, rising = np.unique(np.maximum.accumulate(followed.crossed.t), return_index=True)
-        known = planes.t[rising]
-        t = np.interp(cycle.t, crossed, known)
-        t += np.minimum(cycle.t - crossed[0], 0.0) + np.maximum(cycle.t - crossed[-1], 0.0)
-        cycle = replace(cycle, t_ns=np.rint(1e9 * t).astype(np.int64))
-    matched = match(reference, cycle, Sync())
+        crossed = np.maximum.accumulate(followed.crossed.t)
+        reference = replace(command, t_ns=_other_clock(command.t, planes.t, crossed))
+        on_command = replace(cycle, t_ns=_other_clock(cycle.t, crossed, planes.t))
+    matched = match(command, on_command, Sync())
+    matched = replace(matched, t_ns=cycle.t_ns[matched.sample])
     if not len(matched.sample):
         return {}
-    return measure_shares(reference, cycle, matched, least, timed=asked.run.timed)
+    shares = measure_shares(reference, cycle, matched, least, timed=asked.run.timed)
+    unseen = shares["coverage"].unseen
+    if unseen is not None and unseen.t is not None:  # on the command's own clock
+        first, last = command.t[[unseen.sample, unseen.sample + unseen.samples - 1]].tolist()
+        shares["coverage"] = replace(
+            shares["coverage"], unseen=replace(unseen, t=first, duration=last - first)
+        )
+    return shares
+
+
+def _other_clock(t: FloatArray, own: FloatArray, other: FloatArray) -> IntArray:
+    """Return times in [s] in [ns] of another clock, by the times of some instants on both, rising."""
+    beyond = np.minimum(t - own[0], 0.0) + np.maximum(t - own[-1], 0.0)
+    return np.asarray(np.rint(1e9 * (np.interp(t, own, other) + beyond)).astype(np.int64))
 
 
 def _largest_distance(command: Motion, cycle: Motion) -> float | None:

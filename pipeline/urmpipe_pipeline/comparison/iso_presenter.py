@@ -95,7 +95,7 @@ def headline(result: Comparison, test: IsoTest) -> str:
     if test.failed_cycles:
         count = text.counted(len(test.failed_cycles), "cycle")
         named = failed_cycles_words(test.failed_cycles)
-        said = f"followed {result.reference.name}; {count} failed: {named}; {said}"
+        said = f"followed {result.reference.name}; {count} failed: {named}; the others {said}"
     said = f"{_cycles(result, test)} {said}"
     if test.not_judged:
         said += f"; not judged: {', '.join(one.name for one in test.not_judged)}"
