@@ -33,7 +33,8 @@ PATH, WRONG, RIGHT = NAMES = "path.csv", "counter_rotating.csv", "matlab.csv"
 ARM = ("--robot", "urm6")
 ANSWER = "module 3 (phi3) counter-rotates: rms 415.78 mm -> 0.0002 mm"
 KEYS = [
-    "schema", "name", "verdict", "samples", "unit", "rms", "causes", "undecided", "not_looked_for",
+    "schema", "name", "verdict", "samples", "coverage", "judged", "unit", "rms", "causes", "undecided",
+    "not_looked_for",
     "remainder", "warnings", "recording",
 ]  # fmt: skip
 CAUSE_KEYS = [

@@ -19,7 +19,7 @@ from urmpipe_pipeline.comparison.change import (
 )
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Statistics
-from urmpipe_pipeline.comparison.tolerance import allowed_for, check_tolerance, parse_tolerance
+from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES, allowed_for, check_tolerance, parse_tolerance
 from urmpipe_pipeline.iso9283.criteria import Criterion
 
 LENGTHS = ("axis", "norm", "path")
@@ -252,7 +252,7 @@ def _made(result: Comparison) -> dict[str, Any]:
     return {
         "reference": reference.name,
         "files of the reference": [f"{file.name} {file.sha256[:12]}" for file in reference.files],
-        "tolerance": dict(result.tolerance),
+        "tolerance": {kind: one for kind, one in result.tolerance.items() if one != LEAST_SHARES.get(kind)},
         **options,
         **versions,
     }

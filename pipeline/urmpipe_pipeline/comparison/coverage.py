@@ -146,9 +146,9 @@ def _resting(t_ns: IntArray, values: _Values, matched: Matched, limits: _Limits)
     matched_values = _Values(matched.reference, matched.reference_quat, matched.reference_q)
     resting, every = np.zeros(len(t_ns), np.bool_), np.zeros(len(t_ns), np.int64)
     for end, beyond in ((0, t_ns < matched.t_ns[0]), (-1, t_ns > matched.t_ns[-1])):
-        moves = _departs(values, matched_values.at(every + end), limits)
-        if moves.any() and not (moves & beyond).any():
-            resting |= beyond
+        if beyond.any():
+            moves = _departs(values, matched_values.at(every + end), limits)
+            resting |= beyond & (moves.any() and not (moves & beyond).any())
     return resting
 
 

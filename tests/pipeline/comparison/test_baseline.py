@@ -120,7 +120,7 @@ def test_shares_of_different_tolerances_do_not_compare(paths: Compared) -> None:
     found = against_baseline(now, before)
     assert (found.changes[0].share_noise, found.changes[0].worse, found.verdict) == (None, (), "pass")
     assert found.changes[0].changed  # the verdict did
-    assert found.differences == (Difference("tolerance", before.tolerance, now.tolerance),)
+    assert found.differences == (Difference("tolerance", {"axis": 0.0035}, {"axis": 0.001}),)
 
 
 def test_a_diagnosis_is_no_difference_since_it_changes_no_figure(paths: Compared) -> None:
