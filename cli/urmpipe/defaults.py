@@ -69,12 +69,25 @@ def shared_files(files: Iterable[Path]) -> Iterator[LogWarning]:
 
     for path in files if os.name == "posix" else ():
         status = path.stat()
-        whose = {stat.S_IWGRP: "its group", stat.S_IWOTH: "all users"}
+        group = 0 if _is_own_group(status) else stat.S_IWGRP
+        whose = {group: "its group", stat.S_IWOTH: "all users"}
         writers = [who for bit, who in whose.items() if status.st_mode & bit]
         writers += [f"its owner (user {status.st_uid})"] if status.st_uid not in (0, os.getuid()) else []
         if writers:
             message = f"{' and '.join(writers)} may write it: the defaults in it may be those of others"
             yield LogWarning("defaults-writable", message, about=str(path))
+
+
+def _is_own_group(status: os.stat_result) -> bool:
+    """Return whether a file's group is its owner's alone: users with such a group write files as 664."""
+    import grp
+    import pwd
+
+    try:
+        group, owner = grp.getgrgid(status.st_gid), pwd.getpwuid(status.st_uid)
+    except KeyError:  # names that this machine does not know
+        return False
+    return group.gr_name == owner.pw_name and not {*group.gr_mem} - {owner.pw_name}
 
 
 def deciding_defaults(

@@ -301,11 +301,11 @@ def test_a_file_that_others_may_write_is_a_warning(lab: Path, capsys: Captured, 
     path = lab / "urmpipe.toml"
     path.write_text('robot = "ur5e"\nunit = "deg"\n')
     path.chmod(mode)
-    if who == "its owner":
+    if who != "all users":
         if os.getuid() != 0:
-            pytest.skip("giving a file to another user needs root")
-        os.chown(path, 12345, -1)
-        who += " (user 12345)"
+            pytest.skip("giving a file to another user or group needs root")
+        os.chown(path, *((12345, -1) if who == "its owner" else (-1, 12345)))
+        who += " (user 12345)" if who == "its owner" else ""
     said = f"{path}: {who} may write it: the defaults in it may be those of others"
     for command in (["ingest", "log.csv"], ["compare", "log.csv", "log.csv"]):
         assert run(command) == 0
@@ -313,6 +313,10 @@ def test_a_file_that_others_may_write_is_a_warning(lab: Path, capsys: Captured, 
     assert run(["ingest", "log.csv", "--strict"]) == 2
     assert f"error: {said}\n" in capsys.readouterr().err
     assert run(["compare", "log.csv", "--strict", "--help"]) == 0
+    os.chown(path, os.getuid(), os.getgid())
+    path.chmod(0o664 if path.group() == path.owner() else 0o644)
+    assert run(["ingest", "log.csv"]) == 0
+    assert "may write it" not in capsys.readouterr().err  # its group is its owner's alone
 
 
 def test_the_line_of_a_verdict_names_the_file_that_sets_what_decides_it(lab: Path, capsys: Captured) -> None:
