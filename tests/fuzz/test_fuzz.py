@@ -50,7 +50,7 @@ unchanged = [lambda data, rng, others: data]
 kinds.KINDS = (kinds.Kind("planted", lambda made: names, unchanged, read, 1.0),)
 kinds.BY_NAME["planted"] = kinds.KINDS[0]
 campaign.make = lambda folder: None
-words = "fuzz --inputs 30 --seed 7 --workers 1 --limit 3 --json --keep"
+words = "fuzz --inputs 30 --seed 7 --workers 1 --limit 10 --json --keep"
 sys.argv = [*words.split(), sys.argv[1]]
 sys.exit(main())
 """

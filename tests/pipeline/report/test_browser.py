@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -184,7 +184,9 @@ SIDEWAYS = "document.documentElement.scrollWidth - document.documentElement.clie
 
 
 def sideways(page: Page) -> int:
-    """By how many px the page is wider than the window."""
+    """By how many px the page is wider than the window, once its figures have the size of the window."""
+    with suppress(Exception):  # a time-out: the page stays wider
+        page.wait_for_function(f"{SIDEWAYS} <= 0", timeout=10_000)
     return int(page.evaluate(SIDEWAYS))
 
 
