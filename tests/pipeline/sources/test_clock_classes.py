@@ -371,11 +371,8 @@ def test_a_file_of_times_that_does_not_fit(write: Write) -> None:
     assert said.endswith(" for 2 tables, allowed: FILE:COLUMN for one table")
 
 
-SHARED = Path("/work/shared/logs/motoman-dx200/joint_recording.csv")
-
-
-@pytest.mark.skipif(not SHARED.exists(), reason="the log of the DX200 is not in the repository")
-def test_the_log_of_a_dx200(write: Write) -> None:
-    log = read_log([SHARED], ReadOptions(joints=tuple(str(k) for k in range(2, 8))))
-    stamps = np.loadtxt(SHARED.read_text().replace(",\n", "\n").splitlines(), delimiter=",")[:, 0]
+def test_the_log_of_a_dx200(shared: Path) -> None:
+    path = shared / "logs" / "motoman-dx200" / "joint_recording.csv"
+    log = read_log([path], ReadOptions(joints=tuple(str(k) for k in range(2, 8))))
+    stamps = np.loadtxt(path.read_text().replace(",\n", "\n").splitlines(), delimiter=",")[:, 0]
     np.testing.assert_allclose(log.t_ns / 1e9, stamps - stamps[0], atol=5e-7)  # floats of 1.7e9 s
