@@ -1,4 +1,4 @@
-"""How much of a motion a verdict rests on: two shares, judged like a deviation.
+"""How much of a motion a verdict is based on: two shares, judged like a deviation.
 
 `coverage` is the share of the reference's samples that the log shows, `judged` the share of the log's
 motion that lies in judged samples. Samples are the rows of a side that have a value; a judged sample is a row

@@ -122,8 +122,8 @@ def judge_cycles(
 ) -> JudgedCycles:
     """Return what the cycles of a test tell: n logs, or one in which the motion repeats.
 
-    A cycle that does not follow the reference, or shows too little of it, is a failed one, of which no
-    criterion is.
+    A cycle that does not follow the reference, or shows too little of it, is a failed cycle. Criteria are
+    computed from the other cycles.
 
     Args:
         asked: The reference.

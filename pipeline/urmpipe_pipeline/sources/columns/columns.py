@@ -35,7 +35,7 @@ _NUMBERED = re.compile(r"(?P<before>.*?)(position|velocity|effort)_?(?P<n>\d+)\Z
 
 
 class Kind(IntEnum):
-    """What the name of a column says of its values, the kind that is read first of all."""
+    """What the name of a column says about its values, in the order of preference for reading."""
 
     MEASURED, PLAIN, COMMANDED = range(3)
 
