@@ -84,13 +84,8 @@ def test_what_an_offset_leaves_out_of_a_log_is_no_doubt(tmp_path: Path) -> None:
     late = write_piece(tmp_path / "late.csv", 0, 397)
     result = urmpipe.compare(wanted, [late], robot="ur5e", sync="auto", strict=True)
     assert result.runs[0].sync.offset == pytest.approx(-0.5, abs=1e-7)  # of values to 1e-9 rad
-    assert [(one.kind, one.message) for one in result.warnings] == [
-        (
-            "sync-left-out",
-            "the offset of -0.5 s leaves 100 of 397 samples and 3 of 300 samples of wanted without the"
-            " other side",
-        )
-    ]
+    assert result.warnings == ()
+    assert [(one.samples, one.of) for one in result.runs[0].shares.values()] == [(297, 300), (297, 397)]
     with pytest.raises(LogError) as error:
         urmpipe.compare(wanted, [late], robot="ur5e", sync="auto", tsp=0.0051, strict=True)
     assert "resampled" in {one.kind for one in error.value.findings}

@@ -33,7 +33,7 @@ from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.tolerance import parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.unjudged import Unjudged, judge_others
-from urmpipe_pipeline.comparison.warnings import BEYOND, EXCHANGED, LARGE_NOISE, large_noises
+from urmpipe_pipeline.comparison.warnings import EXCHANGED, LARGE_NOISE, large_noises
 from urmpipe_pipeline.operands import (
     MADE_RUNS,
     WITH_BASELINE,
@@ -324,7 +324,7 @@ def _with_noise(made: Comparison, noise: Mapping[str, float]) -> Comparison:
 def _refuse_doubts(strict: bool, result: Comparison) -> None:
     """Raise a `LogError` with the warnings of the logs and the comparison, if they are to be errors."""
     of_logs = [w.of(one.name) for one in result.runs for w in one.run.warnings]
-    explaining = (LACKING_TOOL, BEYOND, EXCHANGED, CLOCKS_DIFFER)  # a result, and no doubts about it
+    explaining = (LACKING_TOOL, EXCHANGED, CLOCKS_DIFFER)  # a result, and no doubts about it
     doubts = [w for w in result.warnings if w.kind not in explaining]
     refuse_warnings(strict, (*of_logs, *doubts))
 

@@ -24,9 +24,6 @@ from urmpipe_pipeline.runs.results import Run
 EXCHANGED = "path-as-log"
 """The kind of a doubt about the order of what was given: it says nothing against a log."""
 
-BEYOND = "sync-left-out"
-"""Kind of the warning that says what an offset between the clocks leaves out: no doubt about the log."""
-
 LARGE_NOISE = "large-noise"
 """The kind of a doubt about the noise of a baseline: another baseline has its own."""
 
@@ -48,22 +45,17 @@ LARGE = {"m": 0.1, "rad": float(np.radians(10.0))}
 def left_out_warnings(one: Deviation, reference: Trajectory) -> Iterator[LogWarning]:
     """Yield what was not compared of a log and of the reference.
 
-    Samples that an offset moves beyond the reference's time are what `sync` asks for; they are told apart
-    from those that lack a value, lie in a gap, or come after a reference that started together with the log.
-    A part of the reference that was not judged is told however the clocks were put together.
+    Samples that an offset moves beyond the reference's time are what `sync` requests, and no doubt about the
+    log: the shares count them.
     """
-    samples, whole = one.left_out + len(one.sample), len(reference.t_ns)
+    samples = one.left_out + len(one.sample)
     beyond = _beyond(one, reference) if one.sync.offset else 0
     if one.left_out > beyond:
         said = f"{one.left_out - beyond} of {samples} samples have no reference or no value"
         yield LogWarning("left-out", said, about=one.name)
     coverage = one.shares["coverage"]
-    if partly := coverage.verdict != "fail" and coverage in one.partly:
+    if coverage.verdict != "fail" and coverage in one.partly:
         yield LogWarning("not-covered", _covered(coverage, reference), about=one.name)
-    if one.sync.offset and (beyond or (one.reference_left_out and not partly)):
-        theirs = f"{one.reference_left_out} of {whole} samples of {reference.name}"
-        said = f"the offset of {one.sync.offset:.6g} s leaves {beyond} of {samples} samples and {theirs}"
-        yield LogWarning(BEYOND, f"{said} without the other side", about=one.name)
 
 
 def _covered(coverage: Share, reference: Trajectory) -> str:

@@ -104,12 +104,6 @@ def test_an_offset_is_estimated_and_what_it_leaves_out_on_both_sides_is_told(q: 
     assert (judged.samples, judged.of, judged.verdict) == (349, 399, "pass")
     assert result.warnings == (
         LogWarning("left-out", "1 of 400 samples have no reference or no value", about="log"),
-        LogWarning(
-            "sync-left-out",
-            "the offset of 0.5 s leaves 50 of 400 samples and 100 of 450 samples of path without the"
-            " other side",
-            about="log",
-        ),
     )
 
 
