@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -84,7 +85,7 @@ def _diagnosed(deviation: Deviation, asked: Question, lag: float | None) -> Diag
     edits = (*asked.edits, *(_later(asked) if timed else ()))
     starts = tuple(_late(model, lag))
     search, found = _found(Search(model, edits, _floor(deviation, asked), asked.forced, starts, timed=timed))
-    explained = Explained(search, found, asked.names, asked.own_names)
+    explained = Explained(search, found, asked.names, asked.own_names, partial(_breaks, deviation))
     causes, undecided = explained.causes()
     every = np.arange(model.rows)
     state = found.best.state if found.best.subset or found.best.state.edits else search.zero
@@ -182,6 +183,20 @@ def _tolerance(deviation: Deviation, kinds: tuple[str, ...], otherwise: float) -
     """Return the least tolerance of some kinds in [m] or [rad]."""
     held = [one.tolerance for one in deviation.all_statistics if one.kind in kinds and one.tolerance]
     return min((one for one in held if one is not None), default=otherwise)
+
+
+def _breaks(deviation: Deviation, made: FloatArray) -> bool:
+    """Tell whether a deviation in [m] or [rad], shape (k, n), is out of tolerance."""
+    known = made[:, np.isfinite(made).all(axis=0)]
+    if not known.size:
+        return False
+    largest = np.abs(known).max(axis=1)
+    length = float(np.sqrt((known**2).sum(axis=0).max()))
+    sizes = {"axis": float(largest.max()), "norm": length, "path": length, "joint": float(largest.max())}
+    sizes |= dict(zip("xyz", map(float, largest), strict=False))
+    kinds = ("joint",) if not deviation.statistics else ("axis", "norm", "path", *"xyz")
+    held = [one for one in deviation.all_statistics if one.tolerance and one.kind in kinds]
+    return any(sizes[one.kind] > one.tolerance for one in held if one.tolerance)
 
 
 def _tells_nothing(asked: Question) -> str:

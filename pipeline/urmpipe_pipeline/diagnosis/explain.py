@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.deciding import deciding_joint
 from urmpipe_pipeline.diagnosis.fit import Model
 from urmpipe_pipeline.diagnosis.found import Explanation, Found
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
+from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.result import Alternative, Cause, rms
 from urmpipe_pipeline.diagnosis.search import COARSE, Search
-from urmpipe_pipeline.diagnosis.shares import shapley_shares
 from urmpipe_pipeline.diagnosis.twins import exchanged, same_at_full_size
 from urmpipe_pipeline.log_edits import Edit
 
@@ -30,6 +30,11 @@ EXACT = 1e-9
 
 CONFIDENCE = 1.96
 """Standard deviations to both sides that hold 95 % of a normal distribution."""
+
+ORDERED = 1_000
+"""Rows, spread evenly, on which the order of causes is found."""
+
+TIME = ("time_lag", "clock_drift")
 
 TWINS = {
     "joint_offset": "offset of {}", "joint_scale": "scale of {}", "compliance": "compliance of {}",
@@ -62,17 +67,24 @@ class Explained:
         found: What was found.
         names: What the log calls its joints.
         own_names: What the arm calls them.
+        breaks: Tells whether a deviation in [m] or [rad], shape (k, n), is out of tolerance.
     """
 
     search: Search
     found: Found
     names: tuple[str, ...]
     own_names: tuple[str, ...]
+    breaks: Callable[[FloatArray], bool]
 
     @property
     def model(self) -> Model:
         """What was held against what it should be."""
         return self.search.model
+
+    @property
+    def metres(self) -> bool:
+        """Whether positions are judged, not joints alone."""
+        return not isinstance(self.model, JointsModel) or self.model.chain is not None
 
     def causes(self) -> tuple[tuple[Cause, ...], tuple[Alternative, ...]]:
         """Return the named causes, the largest share first, and what the log does not decide between."""
@@ -93,22 +105,39 @@ class Explained:
         )
 
     def _causes(self, one: Explanation, wanted: set[Part]) -> tuple[Cause, ...]:
-        """Return some causes of an explanation, the largest share first."""
-        parts = _parts(one)
-        shares = shapley_shares(parts, lambda some: self._left(one.state, some) ** 2)
-        causes = [
-            replace(
-                self._of_edit(part.edit) if part.edit else self._of_group(part.group, one),
-                rms_before=self._left(one.state, ()),
-                rms_after=self._left(one.state, (part,)),
-                share=shares[part],
-            )
-            for part in parts if part in wanted
-        ]  # fmt: skip
-        return tuple(sorted(causes, key=lambda cause: -cause.share))
+        """Return some causes of an explanation: clocks first, then what takes most away after those before."""
+        few, every = self.search.spread(ORDERED), np.arange(self.model.rows)
+        rest, order = _parts(one), list[Part]()
+        while rest:
+            clocks = [part for part in rest if self._kind(part) in TIME]
+            left = {part: self._left(one.state, [*order, part], few) for part in clocks or rest}
+            order.append(min(left, key=lambda part: left[part]))
+            rest.remove(order[-1])
+        after = [self._left(one.state, order[:k], every) for k in range(len(order) + 1)]
+        nothing = self.model.deviation(self._only(one.state, ()), every)
+        causes = []
+        for k, part in enumerate(order):
+            alone = self.model.deviation(self._only(one.state, [part]), every)
+            made = nothing - alone
+            size = np.sqrt((made**2).sum(axis=0)) if self.metres else np.abs(made).max(axis=0)
+            causes.append(
+                replace(
+                    self._of_edit(part.edit) if part.edit else self._of_group(part.group, one),
+                    rms_before=after[k], rms_after=after[k + 1], rms_alone=rms(alone.T),
+                    effect=float(np.nanmax(size, initial=0.0)), breaks=self.breaks(made),
+                )
+            )  # fmt: skip
+        return tuple(cause for cause, part in zip(causes, order, strict=True) if part in wanted)
 
-    def _left(self, state: State, mended: Iterable[Part]) -> float:
+    def _kind(self, part: Part) -> str:
+        return part.edit.kind if part.edit else self.model.groups[part.group].kind
+
+    def _left(self, state: State, mended: Iterable[Part], rows: IntArray) -> float:
         """Return the root mean square of what stays when some causes of an explanation are mended."""
+        return rms(self.model.deviation(self._only(state, mended), rows).T)
+
+    def _only(self, state: State, mended: Iterable[Part]) -> State:
+        """Return an explanation with some of its causes alone, and with what is always taken."""
         kept = set(mended)
         values = np.zeros_like(state.values)
         for g in [*self.search.forced, *(part.group for part in kept if part.edit is None)]:
@@ -117,8 +146,7 @@ class Explained:
         edits = tuple(edit for edit in state.edits if Part(edit) in kept)
         rows = self.found.rows
         few = replace(rows, at=rows.at[:: max(len(rows.at) // SAMPLES, 1)])
-        some = self.search.placed(State(values, edits), few)
-        return rms(self.model.deviation(some, self.search.spread(SAMPLES)).T)
+        return self.search.placed(State(values, edits), few)
 
     def _of_edit(self, edit: Edit) -> Cause:
         """Return a cause that is there or not."""

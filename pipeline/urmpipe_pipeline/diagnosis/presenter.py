@@ -13,7 +13,6 @@ from urmpipe_pipeline.diagnosis.wording import (
     explanation_words,
     interval_words,
     remainder_words,
-    share_words,
     undecided_words,
     value_words,
 )
@@ -102,6 +101,7 @@ def _heads(unit: str) -> Heads[Cause]:
         "interval": ("95 % interval", interval_words),
         "from_row": ("from row", lambda one: None if one.from_sample is None else Value(one.from_sample + 1)),
         "twins": ("twins", lambda one: ", ".join(one.twins)),
-        "rms_after": ("rms without it", lambda one: Value(one.rms_after, unit)),
-        "share": ("share", lambda one: share_words(one.share)),
+        "rms_before": ("rms before", lambda one: Value(one.rms_before, unit)),
+        "rms_after": ("rms after", lambda one: Value(one.rms_after, unit)),
+        "rms_alone": ("without it alone", lambda one: Value(one.rms_alone, unit)),
     }

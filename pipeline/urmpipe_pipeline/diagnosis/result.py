@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 SCHEMA = 1
 
 Kind = Literal[
-    "joint_sign", "joints_swapped", "half_turn", "mirrored", "turns",
-    "joint_offset", "joint_scale", "compliance",
-    "link_length", "tilt",
-    "base_shift", "base_rotation", "tool_shift", "tool_rotation",
-    "path_unit", "time_lag", "clock_drift",
-    "other_robot",
+    "time_lag", "clock_drift", "servo_lag", "joint_lag",
+    "base_shift", "base_rotation", "base_mirrored", "tool_shift", "tool_rotation", "path_unit",
+    "joint_sign", "joints_swapped", "joint_unit", "joint_coupled", "half_turn", "mirrored", "turns",
+    "joint_offset", "joint_scale", "compliance", "backlash", "sag",
+    "link_length", "link_shift", "tilt", "own_geometry",
+    "other_robot", "outliers",
 ]  # fmt: skip
 """What may make two sides deviate."""
 
@@ -37,20 +37,29 @@ class Cause:
 
     Attributes:
         kind: What it is.
-        name: What it is of: a joint as the arm calls it, two with " and " between them, a parameter of the
-            chain, base or tool, the unit of a path, the clock, another robot.
+        name: What it is of: a joint as the arm calls it, two with " and " between them, a parameter or
+            segment of the chain, base or tool, the side and unit of a path, the axes of a mirrored base
+            ("(x, y, -z)"), the clock, all joints, another robot, rows.
         joints: The joints it is of, as the log calls them; none of other causes.
         segment: The point p1..pn that ends the segment it is of; None of other causes.
-        axis: Unit vector along or about which it acts, in the frame of the segment [-]; None of other causes.
-        value: One number, three of base and tool, none of signs and exchanges, in `unit`.
-        unit: m, rad, s, s2 (of q'' in q), s/s, turns, or empty of a factor.
+        axis: Unit vector along or about which it acts, in the frame of segment, base or tool [-]; None of
+            other causes, and of a base or tool with three numbers.
+        value: One number, three of base and tool, none of signs and exchanges, in `unit`. Of a backlash the
+            whole play, of a sag 1 / stiffness, of a coupling -1 if the first joint includes the second, of
+            outliers their largest distance.
+        unit: m, rad, s, s2 (of q'' in q), s/s, turns, rad/(N m), rad/kg (of a sag without masses: of each kg
+            at the tool centre point), or empty of a factor.
         low: Lower end of the 95 % interval of each number; none where nothing was fitted.
         high: Upper end.
         from_sample: Row of the log, from 0, from which on it holds; None for all of them.
-        twins: Names of what would move the tool centre point in the very same way.
-        rms_before: Root mean square of the deviation in the unit of the diagnosis.
-        rms_after: The same with this cause alone taken away.
-        share: Share of the mean square that it explains (its Shapley value), all others counted.
+        rows: Rows of the log, from 0, that are outliers; none of other causes.
+        twins: Short names of what would move the tool centre point in the very same way.
+        rms_before: Root mean square of the deviation in the unit of the diagnosis, without the causes that
+            stand before this one.
+        rms_after: The same without this one, too.
+        rms_alone: Root mean square without this cause alone.
+        effect: Largest deviation that this cause alone makes, in the unit of the diagnosis.
+        breaks: Whether that is out of tolerance.
     """
 
     kind: Kind
@@ -63,10 +72,13 @@ class Cause:
     low: tuple[float, ...] = ()
     high: tuple[float, ...] = ()
     from_sample: int | None = None
+    rows: tuple[int, ...] = ()
     twins: tuple[str, ...] = ()
     rms_before: float = 0.0
     rms_after: float = 0.0
-    share: float = 0.0
+    rms_alone: float = 0.0
+    effect: float = 0.0
+    breaks: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object: null where a key does not apply, lists of three of base and tool."""
@@ -83,10 +95,13 @@ class Cause:
             "unit": self.unit or None,
             "interval": interval,
             "from_sample": self.from_sample,
+            "rows": list(self.rows),
             "twins": list(self.twins),
             "rms_before": self.rms_before,
             "rms_after": self.rms_after,
-            "share": self.share,
+            "rms_alone": self.rms_alone,
+            "effect": self.effect,
+            "breaks_tolerance": self.breaks,
         }
 
 
@@ -105,6 +120,43 @@ class Alternative:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
         return {"causes": [one.to_dict() for one in self.causes], "needs": self.needs or None}
+
+
+@dataclass(frozen=True, slots=True)
+class Refused:
+    """Causes that leave less, but that this motion does not determine.
+
+    Attributes:
+        causes: What was fitted.
+        reason: Why it is not believed.
+        needs: The joint whose motion would determine it; empty if none would.
+    """
+
+    causes: tuple[Cause, ...]
+    reason: str
+    needs: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        causes = [one.to_dict() for one in self.causes]
+        return {"causes": causes, "reason": self.reason, "needs": self.needs or None}
+
+
+@dataclass(frozen=True, slots=True)
+class OwnTcp:
+    """How far the kinematics of a side are from the tool centre point that it recorded itself.
+
+    Attributes:
+        name: What the side is called.
+        rms: Root mean square distance in [m].
+        largest: Largest distance in [m].
+        agrees: Whether that is within the tolerance.
+    """
+
+    name: str
+    rms: float
+    largest: float
+    agrees: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +199,7 @@ class Diagnosis(Result):
         samples: How many samples were looked at.
         unit: m of positions, rad of joints alone.
         rms: Root mean square of the deviation before, in `unit`.
-        causes: What was found, the largest share first.
+        causes: What was found: clocks first, then in the order of what each takes away after those before.
         undecided: Explanations between which the log does not decide.
         not_looked_for: What these sides cannot tell, and why.
         remainder: What stays.
@@ -159,6 +211,9 @@ class Diagnosis(Result):
         comparison: The comparison that it stands in, where `urmpipe.diagnose` made it.
         seen: The shares, 0..1, on which the verdict and the causes rest: coverage of the reference, judged of
             the log's motion.
+        refused: What was fitted and is not believed.
+        own_tcp: How far each side with joints is from its own recorded tool centre point.
+        origin: Name of the side that the causes are in, as its own tool centre point shows; empty if unknown.
     """
 
     name: str
@@ -176,6 +231,9 @@ class Diagnosis(Result):
     recording: Path | None = field(default=None, metadata={"stored": False})
     comparison: Result | None = field(default=None, metadata={"stored": False})
     seen: Mapping[str, float] = field(default_factory=dict)
+    refused: tuple[Refused, ...] = ()
+    own_tcp: tuple[OwnTcp, ...] = ()
+    origin: str = ""
 
     @property
     def sentence(self) -> str:
@@ -191,7 +249,7 @@ class Diagnosis(Result):
         return [str(one) for one in self.warnings]
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row a cause: kind, name, value, interval and share, in SI."""
+        """Return one row a cause: kind, name, value, interval and rms before and after it, in SI."""
         import pandas as pd
 
         return pd.DataFrame([one.to_dict() for one in self.causes], columns=list(_NO_CAUSE.to_dict()))
@@ -208,6 +266,9 @@ class Diagnosis(Result):
             "rms": self.rms,
             "causes": [one.to_dict() for one in self.causes],
             "undecided": [one.to_dict() for one in self.undecided],
+            "refused": [one.to_dict() for one in self.refused],
+            "own_tcp": [asdict(one) for one in self.own_tcp],
+            "origin": self.origin or None,
             "not_looked_for": [asdict(one) for one in self.not_looked_for],
             "remainder": asdict(self.remainder),
             "warnings": [one.to_dict(voice) for one in self.warnings],

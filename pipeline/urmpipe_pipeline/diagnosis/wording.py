@@ -66,19 +66,14 @@ def sentence(result: Diagnosis) -> str:
     if not causes and not alternatives:
         taken = f" ({result.remainder.words})" if result.remainder.words else ""
         return f"no cause found: rms {before} remains{taken}"
-    several = len(causes) > 1
-    main = [one for one in causes if abs(one.share) >= SMALL] or list(causes[:1])
-    said = [f"{cause_words(one)}{f' ({_share_of(one)})' if several else ''}" for one in main[:MAIN]]
-    said += [f"{len(main) - MAIN} more"] if len(main) > MAIN else []
-    if alternatives and (not causes or any(abs(c.share) >= SMALL for a in alternatives for c in a.causes)):
-        said.append(f"{_either(alternatives)} ({_deciding(alternatives)})")
-    stays = f", {share_words(result.remainder.share)} of the mean square remains" if len(said) > 1 else ""
-    return f"{text.enumerated(said)}: rms {before} -> {after}{stays}"
+    said = [f"{cause_words(one)}: {change_words(one, result.unit)}" for one in causes]
+    said += [f"{_either(alternatives)} ({_deciding(alternatives)})"] if alternatives else []
+    return "; ".join(said)
 
 
-def _share_of(one: Cause) -> str:
-    """Return the share of a cause; of one that hides a part of the others, that it does."""
-    return share_words(one.share) if one.share >= 0.0 else "hides a part of the others"
+def change_words(one: Cause, unit: str) -> str:
+    """Return what taking a cause away changes, after those before it: "rms 1.61 mm -> 0.002 mm"."""
+    return f"rms {amount(one.rms_before, unit)} -> {amount(one.rms_after, unit)}"
 
 
 def undecided_words(alternatives: Sequence[Alternative]) -> str:
