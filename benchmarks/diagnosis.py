@@ -57,7 +57,7 @@ from urmpipe_pipeline.comparison.compare import compare_runs, trajectory
 from urmpipe_pipeline.comparison.matching import match
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.diagnose import diagnose
-from urmpipe_pipeline.diagnosis.explain import Explained
+from urmpipe_pipeline.diagnosis.explain import ExplanationBuilder as Explained
 from urmpipe_pipeline.diagnosis.fit import Rows, normal_equations
 from urmpipe_pipeline.diagnosis.hypotheses import Group
 from urmpipe_pipeline.diagnosis.result import rms

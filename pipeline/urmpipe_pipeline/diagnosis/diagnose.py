@@ -13,14 +13,13 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.diagnosis.edits import later_edits, turn_edits
-from urmpipe_pipeline.diagnosis.explain import Explained
+from urmpipe_pipeline.diagnosis.explain import ExplanationBuilder
 from urmpipe_pipeline.diagnosis.fit import Model, residual
-from urmpipe_pipeline.diagnosis.found import Found
 from urmpipe_pipeline.diagnosis.hypotheses import State, zero
 from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.one_pose import tool_hypotheses
 from urmpipe_pipeline.diagnosis.result import Diagnosis, NotLookedFor, Remainder, rms
-from urmpipe_pipeline.diagnosis.search import Search
+from urmpipe_pipeline.diagnosis.search import STRUCTURE, Search, SearchResult
 from urmpipe_pipeline.diagnosis.sides import AT_REST, Question, Side, question
 from urmpipe_pipeline.log_edits import Edits
 
@@ -85,12 +84,12 @@ def _diagnosed(deviation: Deviation, asked: Question, lag: float | None) -> Diag
     edits = (*asked.edits, *(_later(asked) if timed else ()))
     starts = tuple(_late(model, lag))
     search, found = _found(Search(model, edits, _floor(deviation, asked), asked.forced, starts, timed=timed))
-    explained = Explained(search, found, asked.names, asked.own_names, partial(_breaks, deviation))
-    causes, undecided = explained.causes()
-    every = np.arange(model.rows)
-    state = found.best.state if found.best.subset or found.best.state.edits else search.zero
-    before, after = (model.deviation(one, every) for one in (search.zero, state))
-    whole, stays = rms(before.T), rms(after.T)
+    built = ExplanationBuilder(
+        search, found, asked.names, asked.own_names, asked.sample, partial(_breaks, deviation)
+    )
+    causes, undecided = built.causes()
+    state, after = built.state, built.after()
+    whole, stays = rms(built.before.T), rms(after.T)
     turns = any(edit.kind == "turns" for edit in state.edits)  # these the joints alone tell
     if isinstance(model, JointsModel) and model.chain is not None and not turns and not _judged(deviation):
         least = FLOOR * _tolerance(deviation, LENGTHS, DEFAULT_TOLERANCE)
@@ -105,6 +104,7 @@ def _diagnosed(deviation: Deviation, asked: Question, lag: float | None) -> Diag
         rms=whole,
         causes=causes,
         undecided=undecided,
+        refused=built.refused(),
         not_looked_for=asked.not_looked_for,
         remainder=_remainder(deviation, model, whole, stays, OWN if search.usual else ""),
         sample=asked.sample,
@@ -147,11 +147,12 @@ def _late(model: Model, lag: float | None) -> Iterator[State]:
             yield late
 
 
-def _found(search: Search) -> tuple[Search, Found]:
+def _found(search: Search) -> tuple[Search, SearchResult]:
     """Return what was looked for, and what was found.
 
     Many lengths, tilts, zeros and scales at once are no list of causes, but what an arm's own geometry is
     beside its data sheet: only what is more than usual is then looked for, as where a device measured it.
+    Zeros alone are a list of causes, however many.
     """
     groups = search.model.groups
     usual = {g: USUAL[group.kind] for g, group in enumerate(groups) if group.kind in USUAL}
@@ -159,7 +160,9 @@ def _found(search: Search) -> tuple[Search, Found]:
     if search.forced:
         return own, own.find()
     found = search.find()
-    return (search, found) if len(found.best.subset & set(usual)) < MANY else (own, own.find())
+    taken = found.best.subset & set(usual)
+    structure = any(groups[g].kind in STRUCTURE for g in taken)
+    return (own, own.find()) if len(taken) >= MANY and structure else (search, found)
 
 
 def _judged(deviation: Deviation) -> bool:

@@ -1,65 +1,59 @@
-"""What an explanation is worth: sizes with their intervals, shares, twins, what would decide."""
+"""What an explanation is worth: its causes in order, their sizes with intervals, twins, what would decide.
+
+1. Causes are ordered: clocks first, then what takes the most away after those before it.
+2. Each number has a 95 % interval that knows the correlation of the noise (intervals.py).
+3. Rows that no explanation fits are a cause of their own, and left out.
+4. Twins do exactly the same; rivals differ by less than the noise: these stay undecided.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.row_blocks import row_blocks, side_by_side
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.deciding import deciding_joint
-from urmpipe_pipeline.diagnosis.fit import Model
-from urmpipe_pipeline.diagnosis.found import Explanation, Found
+from urmpipe_pipeline.diagnosis.fit import BLOCK, Model, deviation, inliers
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
+from urmpipe_pipeline.diagnosis.intervals import batch_covariance, student_quantile
 from urmpipe_pipeline.diagnosis.joints import JointsModel
-from urmpipe_pipeline.diagnosis.result import Alternative, Cause, rms
-from urmpipe_pipeline.diagnosis.search import COARSE, Search
-from urmpipe_pipeline.diagnosis.twins import exchanged, same_at_full_size
-from urmpipe_pipeline.log_edits import Edit
+from urmpipe_pipeline.diagnosis.result import Alternative, Cause, Refused, rms
+from urmpipe_pipeline.diagnosis.search import COARSE, Explanation, Search, SearchResult
+from urmpipe_pipeline.log_edits import Edit, Edits
 
-SAMPLES = 4_000
-"""Rows, spread evenly, on which shares are told: each takes all combinations of causes."""
-
-SWEPT = 120
-"""Poses on which it is looked for which joint's motion tells two explanations apart."""
-
-EXACT = 1e-9
-"""Two columns are one if 1 - |cos| of their directions is less: they differ by rounding alone."""
-
-CONFIDENCE = 1.96
-"""Standard deviations to both sides that hold 95 % of a normal distribution."""
-
-ORDERED = 1_000
-"""Rows, spread evenly, on which the order of causes is found."""
-
-TIME = ("time_lag", "clock_drift")
-
-TWINS = {
-    "joint_offset": "offset of {}", "joint_scale": "scale of {}", "compliance": "compliance of {}",
-    "base_shift": "base shift", "base_rotation": "base rotation",
-    "tool_shift": "tool shift", "tool_rotation": "tool rotation",
-    "time_lag": "time lag", "clock_drift": "clock drift",
-}  # fmt: skip
-"""What causes are called among twins; others by their name alone."""
+ORDERED = 1_000  # rows, spread evenly, on which the order of causes is found
+PLACED = 4_000  # rows, spread evenly, on which what is always fitted follows
+SWEPT = 120  # poses on which the joint is found whose motion tells two explanations apart
+EXACT = 1e-9  # columns whose directions differ by less (1 - |cos|) are the same but for rounding
+ABRUPT = 0.5  # share of its size by which a stretch of outliers begins and ends from one row to the next
+SEVERAL = 1.2  # outliers are a cause if all rows have so many times the rms of the others
+CLOCKS = ("time_lag", "clock_drift")
 
 
 @dataclass(frozen=True)
 class Part:
-    """One cause of an explanation: an edit, or the numbers of a group.
+    """One cause of an explanation: a discrete one, the numbers of a group, or rows that are left out.
 
     Attributes:
-        edit: The edit; None of a group.
-        group: Place of the group; -1 of an edit.
+        edit: The discrete cause; None of others.
+        group: Place of the group; -1 of others.
+        rows: Places of the rows among those compared.
+        usual: Whether it is what arms usually differ by, all of it together.
     """
 
     edit: Edit | None = None
     group: int = -1
+    rows: tuple[int, ...] = ()
+    usual: bool = False
 
 
 @dataclass(frozen=True, eq=False)
-class Explained:
+class ExplanationBuilder:
     """What a search found, in the words of the result.
 
     Attributes:
@@ -67,18 +61,21 @@ class Explained:
         found: What was found.
         names: What the log calls its joints.
         own_names: What the arm calls them.
+        sample: Rows of the log that were compared, shape (n,).
         breaks: Tells whether a deviation in [m] or [rad], shape (k, n), is out of tolerance.
     """
 
     search: Search
-    found: Found
+    found: SearchResult
     names: tuple[str, ...]
     own_names: tuple[str, ...]
+    sample: IntArray
     breaks: Callable[[FloatArray], bool]
+    _deviations: dict[tuple[bytes, Edits], FloatArray] = field(default_factory=dict)
 
     @property
     def model(self) -> Model:
-        """What was held against what it should be."""
+        """The side that is modelled, with its data."""
         return self.search.model
 
     @property
@@ -86,84 +83,210 @@ class Explained:
         """Whether positions are judged, not joints alone."""
         return not isinstance(self.model, JointsModel) or self.model.chain is not None
 
+    @cached_property
+    def state(self) -> State:
+        """The explanation that is reported."""
+        best = self.found.best
+        return best.state if best.subset or best.state.edits else self.search.zero
+
+    @cached_property
+    def outliers(self) -> Part | None:
+        """The rows that the best explanation leaves far off, if they matter; None without any."""
+        left = self._deviation(self.state)
+        least = float(np.linalg.norm(self.search.floor[: len(left)]))
+        known = np.isfinite(left).all(axis=0)
+        far = np.flatnonzero(known & ~inliers(left, least))
+        if not len(far) or len(far) == known.sum():
+            return None
+        size = np.sqrt((left**2).sum(axis=0))
+        rest = np.setdiff1d(np.flatnonzero(known), far)
+        if rms(left.T) < SEVERAL * rms(left[:, rest].T) and not self.breaks(left[:, far]):
+            return None
+        if self.search.timed and not _begin_abruptly(left, size, far):
+            return None
+        return Part(rows=tuple(far.tolist()))
+
     def causes(self) -> tuple[tuple[Cause, ...], tuple[Alternative, ...]]:
-        """Return the named causes, the largest share first, and what the log does not decide between."""
+        """Return the named causes in order, and the alternatives that the log does not decide between."""
         best = self.found.best
         every = [best, *(one for one in self.found.others if self._relevant(one))]
-        common = set.intersection(*(set(_parts(one)) for one in every))
-        named = self._causes(best, common)
-        if len(every) == 1:
+        rivals, twins = self._without_twins(every)
+        common = set.intersection(*(set(self._parts(one)) for one in rivals))
+        named = self._causes(best, common, twins)
+        if len(rivals) == 1:
             return named, ()
-        needs = self._needs(every)
-        return named, tuple(Alternative(self._causes(one, set(_parts(one)) - common), needs) for one in every)
+        needs = self._needs(rivals)
+        alternatives = (self._causes(one, set(self._parts(one)) - common, {}) for one in rivals)
+        return named, tuple(Alternative(causes, needs) for causes in alternatives)
+
+    def refused(self) -> tuple[Refused, ...]:
+        """Return the explanation that left the least of those that are not believed, if it left less."""
+        every = {(one.state.edits, one.subset): (one, reason) for one, reason in self.found.refused}
+        rows, found = self.search.spread(ORDERED), list[tuple[float, Explanation, str]]()
+        now = rms(self.model.deviation(self.state, rows).T)
+        for one, reason in every.values():
+            after = rms(self.model.deviation(self.search.placed(one.state, self.found.rows), rows).T)
+            found.append((after, one, reason))
+        if not found or min(found, key=lambda each: each[0])[0] > 0.9 * now:
+            return ()
+        _, one, reason = min(found, key=lambda each: each[0])
+        if not self._breaks_or_large(now):
+            return ()
+        causes = tuple(self._of_group(g, one, {}) for g in sorted(one.subset))
+        return (Refused(causes, reason, self._needs([one, self.found.best])),)
+
+    def _breaks_or_large(self, now: float) -> bool:
+        """Tell whether enough is left to speak of what was refused: more than the floor."""
+        return now > float(np.linalg.norm(self.search.floor[: 3 if self.metres else None]))
+
+    def after(self) -> FloatArray:
+        """Return what the causes leave in [m] or [rad], shape (k, n); NaN of rows that are left out."""
+        left = self._deviation(self.state)
+        if self.outliers is not None:
+            left = left.copy()
+            left[:, list(self.outliers.rows)] = np.nan
+        return left
+
+    def _without_twins(self, every: Sequence[Explanation]) -> tuple[list[Explanation], dict[Part, list[str]]]:
+        """Return explanations that differ in what they do, and the names of what does exactly the same."""
+        best, *others = every
+        rivals, twins = [best], dict[Part, list[str]]()
+        own = set(self._parts(best))
+        rows = replace(self.found.rows, at=self.search.spread(COARSE))
+        for one in others:
+            mine, theirs = own - set(self._parts(one)), set(self._parts(one)) - own
+            if len(mine) == len(theirs) == 1 and self._same_effect(best.state, one.state, rows.at):
+                (part,), (other,) = mine, theirs
+                twins.setdefault(part, []).append(self._short_name(other, one))
+            else:
+                rivals.append(one)
+        return rivals, twins
+
+    def _same_effect(self, first: State, second: State, rows: IntArray) -> bool:
+        """Tell whether two explanations leave the same but for a hundredth of the noise floor."""
+        one, two = (self.model.residual(state, rows) for state in (first, second))
+        between = (one - two) / self.search.floor[:, np.newaxis]
+        known = np.isfinite(between).all(axis=0)
+        return bool(known.any() and np.sqrt(np.mean(between[:, known] ** 2)) < 0.01)
 
     def _relevant(self, one: Explanation) -> bool:
         """Tell whether each cause of an explanation has a number whose interval lies beside 0."""
         return all(
-            (np.abs(one.state.of(self.model.groups[g])) > CONFIDENCE * self._deviations(one, g)).any()
-            for g in one.subset
+            (np.abs(one.state.of(self.model.groups[g])) > self._half_width(one, g)).any() for g in one.subset
         )
 
-    def _causes(self, one: Explanation, wanted: set[Part]) -> tuple[Cause, ...]:
+    def _parts(self, one: Explanation) -> list[Part]:
+        """Return the causes of an explanation: rows, what is usual, edits, then groups."""
+        rows = [] if self.outliers is None else [self.outliers]
+        rows += [Part(usual=True)] if self._usual_columns(one) else []
+        return [*rows, *(Part(edit) for edit in one.state.edits), *(Part(group=g) for g in sorted(one.subset))]
+
+    def _causes(
+        self, one: Explanation, wanted: set[Part], twins: dict[Part, list[str]]
+    ) -> tuple[Cause, ...]:
         """Return some causes of an explanation: clocks first, then what takes most away after those before."""
-        few, every = self.search.spread(ORDERED), np.arange(self.model.rows)
-        rest, order = _parts(one), list[Part]()
+        rest, order = self._parts(one), list[Part]()
+        if not wanted:
+            return ()
+        few = self.search.spread(ORDERED)
+        if self.outliers is not None:
+            few = np.union1d(few, self.outliers.rows)
         while rest:
-            clocks = [part for part in rest if self._kind(part) in TIME]
+            clocks = [part for part in rest if self._kind(part) in CLOCKS]
             left = {part: self._left(one.state, [*order, part], few) for part in clocks or rest}
             order.append(min(left, key=lambda part: left[part]))
             rest.remove(order[-1])
-        after = [self._left(one.state, order[:k], every) for k in range(len(order) + 1)]
-        nothing = self.model.deviation(self._only(one.state, ()), every)
+        after = [self._left(one.state, order[:k]) for k in range(len(order) + 1)]
+        nothing = self.before
         causes = []
         for k, part in enumerate(order):
-            alone = self.model.deviation(self._only(one.state, [part]), every)
-            made = nothing - alone
+            alone = self._deviation(self._only(one.state, (part,)))
+            made = nothing[:, list(part.rows)] if part.rows else nothing - alone
             size = np.sqrt((made**2).sum(axis=0)) if self.metres else np.abs(made).max(axis=0)
+            effect = float(np.nanmax(size, initial=0.0))
             causes.append(
                 replace(
-                    self._of_edit(part.edit) if part.edit else self._of_group(part.group, one),
-                    rms_before=after[k], rms_after=after[k + 1], rms_alone=rms(alone.T),
-                    effect=float(np.nanmax(size, initial=0.0)), breaks=self.breaks(made),
+                    self._of_part(part, one, effect, twins.get(part, ())),
+                    rms_before=after[k], rms_after=after[k + 1],
+                    rms_alone=self._left(one.state, (part,)),
+                    effect=effect, breaks=self.breaks(made),
                 )
             )  # fmt: skip
         return tuple(cause for cause, part in zip(causes, order, strict=True) if part in wanted)
 
+    def _of_part(self, part: Part, one: Explanation, effect: float, twins: Sequence[str]) -> Cause:
+        """Return a cause without what it changes."""
+        if part.rows:
+            rows = tuple(self.sample[list(part.rows)].tolist())
+            return Cause("outliers", "rows", rows=rows, value=(effect,), unit="m" if self.metres else "rad")
+        if part.usual:
+            return Cause("own_geometry", "arm")
+        cause = self._of_edit(part.edit) if part.edit else self._of_group(part.group, one, {})
+        return replace(cause, twins=(*cause.twins, *(name for name in twins if name not in cause.twins)))
+
+    def _usual_columns(self, one: Explanation) -> list[int]:
+        """Return the places of what arms usually differ by, where it was fitted beside a cause."""
+        columns = self._columns(set(self.search.usual) - one.subset)
+        return [c for c in columns if one.state.values[c]]
+
     def _kind(self, part: Part) -> str:
+        if part.rows or part.usual:
+            return "outliers" if part.rows else "own_geometry"
         return part.edit.kind if part.edit else self.model.groups[part.group].kind
 
-    def _left(self, state: State, mended: Iterable[Part], rows: IntArray) -> float:
-        """Return the root mean square of what stays when some causes of an explanation are mended."""
-        return rms(self.model.deviation(self._only(state, mended), rows).T)
+    def _left(self, state: State, mended: Sequence[Part], rows: IntArray | None = None) -> float:
+        """Return the root mean square of what stays of rows when some causes of an explanation are mended."""
+        gone = [place for part in mended for place in part.rows]
+        only = self._only(state, mended)
+        if rows is not None:
+            return rms(self.model.deviation(only, np.setdiff1d(rows, gone)).T)
+        left = self._deviation(only)
+        return rms(np.delete(left, gone, axis=1).T if gone else left.T)
+
+    @property
+    def before(self) -> FloatArray:
+        """What is judged before any cause is mended, of all rows, in [m] or [rad], shape (k, n)."""
+        return self._deviation(self._only(self.search.zero, ()))
+
+    def _deviation(self, state: State) -> FloatArray:
+        """Return what stays of all rows, in [m] or [rad], shape (k, n); of one state once."""
+        key = state.values.tobytes(), state.edits
+        if key not in self._deviations:
+            self._deviations[key] = deviation(self.model, state)
+        return self._deviations[key]
 
     def _only(self, state: State, mended: Iterable[Part]) -> State:
-        """Return an explanation with some of its causes alone, and with what is always taken."""
+        """Return an explanation with some of its causes alone, and with what is always fitted."""
         kept = set(mended)
         values = np.zeros_like(state.values)
-        for g in [*self.search.forced, *(part.group for part in kept if part.edit is None)]:
+        for g in [*self.search.forced, *(part.group for part in kept if part.group >= 0)]:
             columns = list(self.model.groups[g].columns)
+            values[columns] = state.values[columns]
+        if Part(usual=True) in kept:
+            columns = self._columns(set(self.search.usual) - self.found.best.subset)
             values[columns] = state.values[columns]
         edits = tuple(edit for edit in state.edits if Part(edit) in kept)
         rows = self.found.rows
-        few = replace(rows, at=rows.at[:: max(len(rows.at) // SAMPLES, 1)])
+        few = replace(rows, at=rows.at[:: max(len(rows.at) // PLACED, 1)])
         return self.search.placed(State(values, edits), few)
 
     def _of_edit(self, edit: Edit) -> Cause:
         """Return a cause that is there or not."""
         joints = tuple(self.names[j] for j in edit.joints)
         name = edit.name or " and ".join(self.own_names[j] for j in edit.joints)
-        value, unit = {"path_unit": ((edit.value,), ""), "turns": ((edit.value,), "turns")}.get(
-            edit.kind, ((), "")
-        )
-        begins = edit.kind in ("half_turn", "mirrored", "turns")
+        value, unit = {
+            "path_unit": ((edit.value,), ""), "turns": ((edit.value,), "turns"), "joint_unit": ((edit.value,), ""),
+            "joint_coupled": ((edit.value,), ""), 
+        }.get(edit.kind, ((), ""))  # fmt: skip
+        begins = edit.kind in ("half_turn", "mirrored", "turns") and edit.first > 0
         return Cause(
             edit.kind, name, joints, value=value, unit=unit, from_sample=edit.first if begins else None
         )
 
-    def _of_group(self, g: int, one: Explanation) -> Cause:
+    def _of_group(self, g: int, one: Explanation, twins: dict[Part, list[str]]) -> Cause:
         """Return a cause of some size, with its interval and its twins."""
         group = self.model.groups[g]
-        values, reach = one.state.of(group), CONFIDENCE * self._deviations(one, g)
+        values, reach = one.state.of(group), self._half_width(one, g)
         nominal = 1.0 if group.kind == "joint_scale" else 0.0
         low, middle, high = (
             tuple((nominal + part).tolist()) for part in (values - reach, values, values + reach)
@@ -171,22 +294,71 @@ class Explained:
         joint = () if group.joint is None else (self.names[group.joint],)
         return Cause(
             group.kind, self._name(group), joint, group.segment, group.axis, middle, group.unit, low, high,
-            twins=tuple(self._twins(g, one.state)),
+            twins=tuple(dict.fromkeys(self._twins(g, one.state))),
         )  # fmt: skip
 
     def _name(self, group: Group) -> str:
         """Return what a cause is of, a joint as the arm calls it."""
         return group.name if group.joint is None else self.own_names[group.joint]
 
-    def _deviations(self, one: Explanation, g: int) -> FloatArray:
-        """Return the standard deviations of a group's numbers, all causes fitted together."""
-        columns = [c for h in sorted(one.subset) for c in self.model.groups[h].columns]
-        gram = self.found.normal.gram[np.ix_(columns, columns)]
+    def _short_name(self, part: Part, one: Explanation) -> str:
+        """Return what a cause is called among twins."""
+        if part.rows:
+            return "outliers"
+        return short_name(self._of_edit(part.edit) if part.edit else self._bare(self.model.groups[part.group]))
+
+    def _bare(self, group: Group) -> Cause:
+        """Return the cause of a group without numbers."""
+        joint = () if group.joint is None else (self.names[group.joint],)
+        return Cause(group.kind, self._name(group), joint, group.segment, group.axis, unit=group.unit)
+
+    def _half_width(self, one: Explanation, g: int) -> FloatArray:
+        """Return half the 95 % interval of a group's numbers, all numbers of the explanation fitted together.
+
+        By batch means in correlated noise, not below what noise of the floor would make.
+        """
+        columns = self._columns(one.subset)
+        covariance, free = self._covariance(one)
+        own = [columns.index(c) for c in self.model.groups[g].columns]
+        return np.asarray(student_quantile(free) * np.sqrt(np.maximum(np.diag(covariance)[own], 0.0)))
+
+    def _columns(self, subset: Iterable[int]) -> list[int]:
+        return [c for h in sorted(subset) for c in self.model.groups[h].columns]
+
+    def _covariance(self, one: Explanation) -> tuple[FloatArray, int]:
+        """Return the covariance of the numbers of an explanation, and its degrees of freedom."""
+        key = one.state.edits, one.subset
+        if key not in self._covariances:
+            self._covariances[key] = self._estimate_covariance(one)
+        return self._covariances[key]
+
+    @cached_property
+    def _covariances(self) -> dict[object, tuple[FloatArray, int]]:
+        return {}
+
+    def _estimate_covariance(self, one: Explanation) -> tuple[FloatArray, int]:
+        taken = one.subset | set(self.search.forced)
+        rows, groups = self.found.rows, [self.model.groups[h] for h in sorted(taken)]
+        columns = self._columns(taken)
+
+        def scores_of(block: slice) -> tuple[FloatArray, FloatArray]:
+            left, jacobian = self.model.linear(one.state, rows.at[block], groups)
+            known = np.isfinite(left).all(axis=0)
+            left, jacobian = (part[..., known] * rows.weight[:, np.newaxis] for part in (left, jacobian))
+            flat = jacobian.reshape(len(columns), -1)
+            return np.einsum("pcn,cn->np", jacobian, left), flat @ flat.T
+
+        parts = side_by_side(scores_of, row_blocks(len(rows.at), BLOCK))
+        scores, gram = np.concatenate([part[0] for part in parts]), sum(part[1] for part in parts)
         size = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
         inverse = np.linalg.pinv(gram / size / size[:, np.newaxis], rcond=1e-12, hermitian=True)
-        variance = self.found.variance * self.found.tau * np.diag(inverse) / size**2
-        own = [columns.index(c) for c in self.model.groups[g].columns]
-        return np.asarray(np.sqrt(np.maximum(variance[own], 0.0)))
+        inverse = inverse / size / size[:, np.newaxis]
+        tau = self.found.tau if self.search.timed else 1.0
+        omega, free = batch_covariance(scores - scores.mean(axis=0), tau)
+        floor = float(np.mean((self.search.floor * rows.weight) ** 2))
+        covariance = inverse @ omega @ inverse + floor * inverse
+        at = np.searchsorted(columns, self._columns(one.subset))
+        return covariance[np.ix_(at, at)], free
 
     def _twins(self, g: int, state: State) -> Iterator[str]:
         """Yield the names of what would do the very same as a group, or as one of its three numbers."""
@@ -196,22 +368,21 @@ class Explained:
             single = len(group.columns) == len(other.columns) == 1
             if h == g or not (like or (h not in self.found.twins and not single)):
                 continue
+            if other.name == group.name and other.kind == group.kind:  # an axis of the same frame
+                continue
             for k, c in enumerate(group.columns):
                 own = f" ({'xyz'[k]})" if len(group.columns) > 1 else ""
-                for i, d in enumerate(other.columns):
-                    if state.values[c] and (like or self._same(c, d)) and self._stays_same(state, c, d):
-                        axis = f" {'xyz'[i]}" if len(other.columns) > 1 else ""
-                        yield f"{self._called(other)}{axis}{own}"
+                if len(other.columns) > 1:  # its single axes are groups of their own
+                    continue
+                (d,) = other.columns
+                if state.values[c] and (like or self._same(c, d)) and self._stays_same(state, c, d):
+                    yield f"{short_name(self._bare(other))}{own}"
 
     def _stays_same(self, state: State, c: int, d: int) -> bool:
         """Tell whether a number in place of another leaves the same at its full size."""
-        other = exchanged(state, c, d, self.found.normal.gram)
+        other = self.search.exchange(state, c, d, self.found.normal.gram)
         some = replace(self.found.rows, at=self.search.spread(COARSE))
-        return same_at_full_size(self.search, state, other, some)
-
-    def _called(self, group: Group) -> str:
-        """Return what a cause is called among twins."""
-        return TWINS.get(group.kind, "{}").format(self._name(group))
+        return self.search.is_equivalent(state, other, some)
 
     def _same(self, c: int, d: int) -> bool:
         """Tell whether two columns have one direction."""
@@ -224,12 +395,12 @@ class Explained:
         joints = {j for one in every for j in self._joints_of(one)}
         if len(joints) == 1:
             (only,) = joints
-            return "" if only is None else self.names[only]
+            return "" if only is None else self.own_names[only]
         if not isinstance(self.model, ArmModel):
             return ""
         first, second = (one.state for one in every[:2])
         decides = deciding_joint(self.model, first, second, self.search.spread(SWEPT))
-        return "" if decides is None else self.names[decides]
+        return "" if decides is None else self.own_names[decides]
 
     def _joints_of(self, one: Explanation) -> set[int | None]:
         """Return the joints that an explanation changes, with None if a part of it changes no joint."""
@@ -237,6 +408,17 @@ class Explained:
         return of_edits | {self.model.groups[g].joint for g in one.subset}
 
 
-def _parts(one: Explanation) -> list[Part]:
-    """Return the causes of an explanation: its edits, then its groups."""
-    return [*(Part(edit) for edit in one.state.edits), *(Part(group=g) for g in sorted(one.subset))]
+def _begin_abruptly(left: FloatArray, size: FloatArray, far: IntArray) -> bool:
+    """Tell whether each stretch of rows is entered and left by a step of a large share of its size."""
+    for stretch in np.split(far, np.flatnonzero(np.diff(far) > 1) + 1):
+        largest = float(size[stretch].max())
+        for inside, outside in ((stretch[0], stretch[0] - 1), (stretch[-1], stretch[-1] + 1)):
+            if 0 <= outside < left.shape[1] and np.isfinite(size[outside]):
+                step = float(np.linalg.norm(left[:, inside] - left[:, outside]))
+                if step < ABRUPT * min(largest, float(size[inside])):
+                    return False
+    return True
+
+
+def short_name(cause: Cause) -> str:
+    return f"{cause.kind} {cause.name} {cause.axis or ''}"

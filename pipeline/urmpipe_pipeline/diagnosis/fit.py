@@ -9,9 +9,11 @@ from typing import Protocol
 import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.row_blocks import row_blocks, side_by_side
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.diagnosis.selection import Normal
+from urmpipe_pipeline.log_edits import Edits
 
 OUTLIER = 6.0
 """A row is left out if it is further off than so many medians: of Gaussian noise none in a million is."""
@@ -27,6 +29,9 @@ STEPS = 12
 
 STILL = 1e-8
 """A fit has come to rest when a step takes less than this share from what it leaves."""
+
+HALVED = 12
+"""A step that leaves more is halved so many times."""
 
 BLOCK = 4096
 """Rows whose Jacobian is in memory at a time, on each thread."""
@@ -54,6 +59,14 @@ class Model(Protocol):
         self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
     ) -> tuple[FloatArray, FloatArray]:
         """Return what an explanation leaves in [m] and [rad], shape (c, n), and the Jacobian (p, c, n)."""
+
+    def residuals(self, edits: Sequence[Edits], rows: IntArray) -> FloatArray:
+        """Return what each of some discrete causes leaves by itself in [m] and [rad], shape (k, c, n)."""
+
+    def motions(
+        self, state: State, rows: IntArray, groups: Sequence[Group]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return what positions leave in [m], and how numbers move and turn them, shape (p, 3, n) each."""
 
     def deviation(self, state: State, rows: IntArray) -> FloatArray:
         """Return what an explanation leaves of what is judged, in [m] or [rad], shape (k, n)."""
@@ -125,19 +138,23 @@ def normal_equations(model: Model, state: State, rows: Rows, groups: Sequence[Gr
 
 def residual(model: Model, state: State, rows: IntArray) -> FloatArray:
     """Return what an explanation leaves of rows in [m] and [rad], shape (c, n), worked on by blocks."""
-    left = np.empty((len(model.blocks), len(rows)))
+    parts = side_by_side(lambda block: model.residual(state, rows[block]), row_blocks(len(rows)))
+    return np.concatenate(parts, axis=1)
 
-    def work(block: slice) -> None:
-        """Write what is left of one block of rows."""
-        left[:, block] = model.residual(state, rows[block])
 
-    side_by_side(work, row_blocks(len(rows)))
-    return left
+def deviation(model: Model, state: State) -> FloatArray:
+    """Return what an explanation leaves of what is judged, of all rows, in [m] or [rad], shape (k, n)."""
+    rows = np.arange(model.rows)
+    parts = side_by_side(lambda block: model.deviation(state, rows[block]), row_blocks(len(rows)))
+    return np.concatenate(parts, axis=1)
 
 
 def cost(model: Model, state: State, rows: Rows) -> float:
     """Return the mean square of what an explanation leaves, in the weights of rows; inf without any."""
-    left = residual(model, state, rows.at) * rows.weight[:, np.newaxis]
+    try:
+        left = residual(model, state, rows.at) * rows.weight[:, np.newaxis]
+    except UrmpipeError:  # numbers that no arm has: a frame beyond what can be computed with
+        return np.inf
     known = np.isfinite(left).all(axis=0)
     return float((left[:, known] ** 2).mean()) if known.any() else np.inf
 
@@ -165,7 +182,7 @@ def fitted(model: Model, state: State, groups: Sequence[Group], rows: Rows, *, o
         scaled = normal.gram / size / size[:, np.newaxis]
         target = np.linalg.lstsq(scaled, normal.moment / size, rcond=1e-13)[0] / size
         step = target - state.values[columns]
-        for _ in range(8):
+        for _ in range(HALVED):
             values = state.values.copy()
             values[columns] += step
             there = replace(state, values=values)

@@ -1,47 +1,141 @@
-"""The search for the causes of a deviation: first what is there or not, then what has some size."""
+"""The search for the causes of a deviation.
+
+1. Discrete causes (signs, exchanges, axes, units, another robot) are ranked on few rows (candidates.py), and
+   with each plausible one single large causes are fitted exactly.
+2. From each of these starts a subset of numbers is selected (selection.py), fitted, and selected again where
+   the fit leads, until it stays.
+3. The best is settled on up to `MANY` rows, with the autocorrelation time of what it leaves, and with
+   equivalent causes in place of its own where these leave less at full size.
+4. Explanations whose score is within `NEAR` of the best are its rivals.
+
+A subset that no engineer believes is never taken: causes that cancel each other, and, beside other causes,
+lengths, tilts and scales beyond `BESIDE`. What was left out so is kept: `SearchResult.refused`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_pipeline.diagnosis.candidates import (
+    add_discrete_cause,
+    find_large_causes,
+    rank_discrete_causes,
+    residual_after_fit,
+)
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, cost, fitted, inliers, normal_equations, residual
-from urmpipe_pipeline.diagnosis.found import Explanation, Found, Stable
 from urmpipe_pipeline.diagnosis.hypotheses import State, zero
-from urmpipe_pipeline.diagnosis.independence import LONGEST, autocorrelation_time
-from urmpipe_pipeline.diagnosis.plausible import further_edit, plausible_edits, projected
+from urmpipe_pipeline.diagnosis.intervals import LONGEST, autocorrelation_time
 from urmpipe_pipeline.diagnosis.selection import Normal, Selection, Subset, without_twins
-from urmpipe_pipeline.diagnosis.twins import exchanged, same_at_full_size
 from urmpipe_pipeline.log_edits import Edits
 
-COARSE = 300
-"""Rows, spread evenly, on which causes are told that are there or not."""
+COARSE = 300  # rows, spread evenly, on which discrete causes are ranked
+MEDIUM = 600  # rows, spread evenly, on which starts are compared
+MANY = 20_000  # rows, spread evenly, that settle an explanation; standard errors fall with the root of them
+ROUNDS = 6  # selections after each other: from a good start three are enough
+NEAR = 6.0  # explanations whose scores differ by less are rivals: odds of twenty to one
+FAR = 100.0  # an explanation whose score on some rows is so much above the best is no rival on more
+SHOWN = 5  # so many rivals are kept
 
-MEDIUM = 2_000
-"""Rows, spread evenly, on which the explanations with different edits are held against each other."""
+LARGEST: Mapping[str, float] = {
+    "joint_scale": 0.5,  # a joint that is read in other steps is off by less
+    "compliance": 0.02,  # s2: more would swing below 1.1 Hz
+    "clock_drift": 0.05,  # no clock is off by a twentieth
+    "servo_lag": 1.0,  # s: a slower drive follows nothing
+    "joint_lag": 1.0,  # s
+    "backlash": 0.1,  # rad: 6 deg
+}
+"""Beyond this a number is that of no such cause, by kind."""
 
-MANY = 20_000
-"""Rows, spread evenly, on which a selection is made stable before all rows decide."""
+REACHED: Mapping[str, float] = {"link_length": 0.2, "link_shift": 0.2}
+BESIDE: Mapping[str, float] = {"tilt": np.radians(10.0), "joint_scale": 0.02}
+"""Beside other causes no length changes by more than a share of the reach, and no tilt or scale by more."""
 
-ROUNDS = 6
-"""Times that causes are selected anew where the last fit led."""
+CANCELS = 3.0
+"""A cause among several that alone makes the rms so many times what it was only cancels another."""
 
-LARGEST: Mapping[str, float] = {"joint_scale": 0.5, "compliance": 0.02, "clock_drift": 0.05}
-"""Beyond this a number is that of no such cause, by kind: a joint that is read in other steps is off by less,
-one that gives way by 0.02 s2 would swing at 1.1 Hz, and no clock is off by a twentieth."""
+ORDER: Mapping[str, float] = {
+    "tool_shift": 0.0, "tool_rotation": 0.0, "base_shift": 0.3, "base_rotation": 0.3, "base_mirrored": 0.3,
+    "time_lag": 0.6, "servo_lag": 1.0, "clock_drift": 1.0, "path_unit": 0.6, "other_robot": 1.5,
+    "joint_sign": 1.0, "joints_swapped": 1.0, "joint_unit": 1.0, "joint_coupled": 1.0, "half_turn": 1.0,
+    "mirrored": 2.0, "turns": 1.0, "joint_offset": 1.2, "joint_scale": 2.0, "joint_lag": 2.0,
+    "link_length": 1.8, "backlash": 2.5, "compliance": 2.5, "sag": 2.5, "tilt": 2.5, "link_shift": 3.5,
+}  # fmt: skip
+"""What each kind adds to a score (twice the log of odds): setup comes before structure, e^(1.2 / 2) = 1.8 to 1."""
 
-NEAR = 6.0
-"""Explanations whose scores differ by less are not told apart: odds of twenty to one."""
+STRUCTURE = ("link_length", "link_shift", "tilt")
 
-FAR = 100.0
-"""An explanation whose score on some rows is so much above the best is no rival on more."""
 
-SHOWN = 5
-"""So many explanations that are not told apart are named."""
+class Explanation(NamedTuple):
+    """Causes, with their sizes.
+
+    Attributes:
+        state: Discrete causes and numbers.
+        subset: The groups whose numbers are taken.
+        score: Lower is better.
+    """
+
+    state: State
+    subset: Subset
+    score: float
+
+    @property
+    def count(self) -> int:
+        """How many causes it takes."""
+        return len(self.subset) + len(self.state.edits)
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """What a search found.
+
+    Attributes:
+        best: The best explanation.
+        others: Those that the log does not tell from it.
+        rows: The rows that counted: without outliers, in the weights of their noise.
+        tau: The autocorrelation time of what stays, in rows.
+        variance: Mean square of what stays of a component in its weight, not below the floor.
+        normal: The normal equations there.
+        twins: Which groups stand for another that does exactly the same.
+        refused: Explanations that leave less, and that no engineer believes, each with the reason.
+    """
+
+    best: Explanation
+    others: tuple[Explanation, ...]
+    rows: Rows
+    tau: float
+    variance: float
+    normal: Normal
+    twins: dict[int, int]
+    refused: tuple[tuple[Explanation, str], ...] = ()
+
+
+class SelfConsistentFit(NamedTuple):
+    """An explanation that its own fit selects again.
+
+    Attributes:
+        state: Discrete causes and numbers.
+        subset: The groups that are taken.
+        tau: The autocorrelation time of what stays, in rows.
+        rows: The rows without outliers.
+        selection: What it was selected from.
+    """
+
+    state: State
+    subset: Subset
+    tau: float
+    rows: Rows
+    selection: Selection
+
+    def score(self, tau: float) -> float:
+        """Return its score where so many rows tell as much as one."""
+        selection = replace(self.selection, independent=self.selection.normal.count / tau)
+        return float(selection.scores([self.subset])[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +143,13 @@ class Search:
     """A search among the hypotheses of a model.
 
     Attributes:
-        model: What is held against what it should be.
+        model: The side that is modelled, with its data.
         edits: What may be there or not, alone or together.
-        floor: What means nothing, of each component in [m] or [rad], shape (c,).
-        forced: Groups that are always taken, since they are unknown.
-        starts: Explanations to start from besides, such as a lag that the motions tell.
+        floor: Noise floor of each component in [m] or [rad], shape (c,).
+        forced: Groups that are always fitted, since they are unknown.
+        starts: Explanations to start from besides, such as a lag that the motions show.
         usual: Groups that differ from arm to arm, with the size that is usual: only more is a cause.
-        timed: Whether the rows follow each other in time: neighbours may then tell the same.
+        timed: Whether the rows follow each other in time: neighbours may then show the same.
         first: Groups that stand for their twins before all others.
     """
 
@@ -67,6 +161,7 @@ class Search:
     usual: Mapping[int, float] = field(default_factory=dict)
     timed: bool = True
     first: tuple[int, ...] = ()
+    _refused: list[tuple[Explanation, str]] = field(default_factory=list)
 
     @property
     def zero(self) -> State:
@@ -78,41 +173,69 @@ class Search:
         rows = self.model.rows
         return np.unique(np.linspace(0, rows - 1, min(rows, count)).round().astype(np.int64))
 
-    def find(self) -> Found:
-        """Return the causes of a deviation.
-
-        Edits are told on few rows; with those that are plausible, numbers are selected on more; the best is
-        then selected anew on all rows, until its own fit selects it again.
-        """
+    def find(self) -> SearchResult:
+        """Return the causes of a deviation."""
         weight = self._weight(1.0 / self.floor, self.zero)
-        coarse = self.spread(COARSE)
-        plausible = plausible_edits(self.model, self.edits, self.zero, Rows(coarse, weight), self.floor)
-        weight = self._weight(weight, replace(self.zero, edits=plausible[0]))
+        coarse = Rows(self.spread(COARSE), weight)
+        ranked = rank_discrete_causes(self.model, self.edits, self.zero, coarse, self.floor)
+        weight = self._weight(weight, replace(self.zero, edits=ranked[0]))
         medium = Rows(self.spread(MEDIUM), weight, self._least(weight))
         every: list[Explanation] = []
-        for start in [*self.starts, *(replace(self.zero, edits=edits) for edits in plausible)]:
+        for start in self._starts(ranked, replace(coarse, weight=weight)):
             most = min((one.score for one in every), default=np.inf) + len(medium.at)
             every.append(self._explained(medium, start, most=most))
         best, *others = sorted(every, key=lambda one: one.score)
         while True:
-            further = further_edit(self.model, self.edits, best.state, Rows(coarse, weight), self.floor)
+            coarse = replace(coarse, weight=weight)
+            further = add_discrete_cause(self.model, self.edits, best.state, coarse, self.floor)
             found = None if further is None else self._explained(medium, further)
             if found is None or found.score >= best.score:
                 break
             best, others = found, [best, *others]
         weight = self._weight(weight, best.state)
-        rows = Rows(np.arange(self.model.rows), weight, self._least(weight))
+        rows = Rows(self.spread(MANY), weight, self._least(weight))
         return self._settled(rows, best, others)
 
+    def _starts(self, ranked: Sequence[Edits], coarse: Rows) -> Iterator[State]:
+        """Yield where selections begin: the discrete causes, the clock, and single large causes."""
+        states = [replace(self.zero, edits=edits) for edits in ranked]
+        yield from states
+        yield from self.starts
+        single = [g for g in self._distinct[0] if len(self.model.groups[g].columns) == 1]
+        if hasattr(self.model, "motions") and not self.forced:
+            for state in dict.fromkeys((states[0].edits, ())):
+                yield from find_large_causes(self.model, replace(self.zero, edits=state), coarse, single)
+
     def fitted(self, state: State, subset: Subset, rows: Rows) -> State:
-        """Return an explanation with the best numbers of a subset, and of what is always taken."""
+        """Return an explanation with the best numbers of a subset, and of what is always fitted."""
         taken = [self.model.groups[g] for g in sorted(subset | set(self.forced))]
         return fitted(self.model, state, taken, rows)
 
     def placed(self, state: State, rows: Rows) -> State:
-        """Return an explanation with the best numbers of what is always taken, its others as they are."""
+        """Return an explanation with the best numbers of what is always fitted, its others as they are."""
         numbers = [self.model.groups[g] for g in self.forced]
         return fitted(self.model, state, numbers, rows, others=True) if numbers else state
+
+    def exchange(self, state: State, c: int, d: int, gram: FloatArray) -> State:
+        """Return an explanation with one number in place of another, of the same effect to first order.
+
+        Args:
+            state: The explanation.
+            c: Place of the number that goes.
+            d: Place of the number that comes.
+            gram: J^T J [-] of all numbers, in the weights of the rows, shape (p, p).
+        """
+        values = state.values.copy()
+        values[d] += values[c] * gram[c, d] / max(gram[d, d], np.finfo(float).tiny)
+        values[c] = 0.0
+        return replace(state, values=values)
+
+    def is_equivalent(self, state: State, other: State, rows: Rows) -> bool:
+        """Tell whether two explanations leave the same at full size: rms of the difference below the floor."""
+        one, two = (self.model.residual(self.placed(each, rows), rows.at) for each in (state, other))
+        between = (one - two) / self.floor[:, np.newaxis]
+        known = np.isfinite(between).all(axis=0)
+        return bool(known.any() and np.mean(between[:, known] ** 2) < 1.0)
 
     @cached_property
     def _distinct(self) -> tuple[list[int], dict[int, int]]:
@@ -125,17 +248,22 @@ class Search:
         stand, twins = without_twins(beside, groups, np.diag(normal.gram), self.first)
         return [g for g in stand if g not in self.forced], twins
 
+    @cached_property
+    def _prior(self) -> FloatArray:
+        """What each group adds to a score by its kind; a twin that stands for another goes first."""
+        return np.array([ORDER.get(group.kind, 0.0) for group in self.model.groups])
+
     def _columns(self, groups: Sequence[int]) -> list[int]:
         """Return the places of the numbers of some groups."""
         return [c for g in groups for c in self.model.groups[g].columns]
 
     def _least(self, weight: FloatArray) -> float:
-        """Return what means nothing of a whole row, in its weights."""
+        """Return the noise floor of a whole row, in its weights."""
         return float(np.linalg.norm(self.floor * weight))
 
     def _weight(self, weight: FloatArray, state: State) -> FloatArray:
         """Return one over the noise of each component: what all numbers together leave, by blocks."""
-        left = projected(self.model, state, self.spread(COARSE), weight)
+        left = residual_after_fit(self.model, state, self.spread(COARSE), weight)
         left = left[:, inliers(left * weight[:, np.newaxis])]
         blocks = self.model.blocks
         noise = [np.sqrt(np.mean(left[blocks == b] ** 2)) if left.size else 0.0 for b in blocks]
@@ -154,7 +282,11 @@ class Search:
         floor = float(np.mean((self.floor * rows.weight) ** 2))
         edits = state.edits
         numbers = sum(1 + (edit.first > 0) for edit in edits)
-        return Selection(normal, groups, normal.count / tau, floor, len(edits), numbers, len(among), whole)
+        more = sum(ORDER.get(edit.kind, 0.0) for edit in edits)
+        return Selection(
+            normal, groups, normal.count / tau, floor, len(edits), numbers, len(among), whole,
+            prior=self._prior, more=more,
+        )  # fmt: skip
 
     def _explained(self, rows: Rows, state: State, tau: float = 1.0, most: float = np.inf) -> Explanation:
         """Return the best explanation with some edits, selected anew where the last fit led until it stays.
@@ -175,47 +307,99 @@ class Search:
             if chosen in seen or (len(seen) > 1 and best is not None and best.score > most):
                 break
             seen.add(chosen)
-            state, more = self._within(state, chosen, some)
+            state, more = self._within(state, chosen, some, selection)
             taken, beyond = chosen - more, beyond | more
         return best or Explanation(state, taken or frozenset(), np.inf)
 
-    def _within(self, state: State, subset: Subset, rows: Rows) -> tuple[State, set[int]]:
-        """Return an explanation with the best numbers of a subset, and the groups they exclude."""
-        there = self.fitted(state, subset, rows)
-        beyond = self._beyond(there)
-        return (self.fitted(state, subset - beyond, rows) if beyond else there), beyond
+    def _within(
+        self, state: State, subset: Subset, rows: Rows, selection: Selection
+    ) -> tuple[State, set[int]]:
+        """Return an explanation with the best numbers of a subset that is believed, and the groups it lacks."""
+        gone: set[int] = set()
+        guess = self._guess(state, subset, selection)
+        while True:
+            kept = subset - gone
+            starts = [state] if guess is None else [state, guess]
+            there = min((self.fitted(one, kept, rows) for one in starts), key=lambda one: cost(self.model, one, rows))
+            beyond = self._unbelievable(there, kept, rows)
+            if not beyond:
+                return there, gone
+            gone |= beyond
+            guess = None
 
-    def _beyond(self, state: State) -> set[int]:
-        """Return the groups whose number is larger than that of any such cause."""
-        groups = enumerate(self.model.groups)
-        return {g for g, group in groups if np.abs(state.of(group)).max() > LARGEST.get(group.kind, np.inf)}
+    def _guess(self, state: State, subset: Subset, selection: Selection) -> State | None:
+        """Return the numbers of a linear fit, where they differ by much from those to start from."""
+        columns = selection.columns(subset)
+        if not columns or state.values[columns].any() or self.usual:
+            return None
+        values = np.zeros_like(state.values)
+        values[columns] = selection.solution(columns)
+        return replace(state, values=values) if np.abs(values).max() > 0.05 else None
 
-    def _settled(self, every: Rows, best: Explanation, others: Sequence[Explanation]) -> Found:
-        """Return what all rows decide; of very many, some tell first what is selected."""
-        few = replace(every, at=self.spread(MANY))
-        found = self._stable(few, best.state, None)
-        near = [one for one in others if one.score < best.score + FAR * found.tau]
-        near = [self._explained(found.rows, one.state, found.tau) for one in near]
+    def _unbelievable(self, state: State, subset: Subset, rows: Rows) -> set[int]:
+        """Return the groups of a subset whose numbers no engineer believes, the reason noted."""
+        groups = self.model.groups
+        beyond = {
+            g for g in subset if np.abs(state.of(groups[g])).max() > LARGEST.get(groups[g].kind, np.inf)
+        }
+        if beyond or len(subset) + len(state.edits) < 2:
+            return beyond
+        reach = getattr(self.model, "reach", np.inf)
+        for g in subset:
+            limit = BESIDE.get(groups[g].kind, REACHED.get(groups[g].kind, np.inf) * reach)
+            if np.abs(state.of(groups[g])).max() > limit:
+                beyond.add(g)
+        if beyond:
+            self._note(state, subset, "a part of the arm would differ by more than any arm does")
+            return beyond
+        cancelling = self._cancelling(state, subset, rows)
+        if cancelling:
+            self._note(state, subset, "its causes cancel each other")
+        return cancelling
+
+    def _cancelling(self, state: State, subset: Subset, rows: Rows) -> set[int]:
+        """Return the groups that alone make the rms more than `CANCELS` times what it was before any."""
+        some = replace(rows, at=rows.at[:: max(len(rows.at) // COARSE, 1)])
+        before = cost(self.model, self.placed(self.zero, some), some)
+        most = CANCELS**2 * max(before, float(np.mean((self.floor * rows.weight) ** 2)))
+        worse = set()
+        for g in subset:
+            alone = np.zeros_like(state.values)
+            columns = list(self.model.groups[g].columns)
+            alone[columns] = state.values[columns]
+            if cost(self.model, self.placed(State(alone), some), some) > most:
+                worse.add(g)
+        structure = {g for g in worse if self.model.groups[g].kind in STRUCTURE}
+        return structure or worse
+
+    def _note(self, state: State, subset: Subset, reason: str) -> None:
+        self._refused.append((Explanation(state, subset, np.inf), reason))
+
+    def _settled(self, rows: Rows, best: Explanation, others: Sequence[Explanation]) -> SearchResult:
+        """Return what many rows decide."""
+        found = self._stable(rows, best.state, None)
+        near = sorted((one for one in others if one.score < best.score + FAR * found.tau), key=_score)
+        near = [self._explained(found.rows, one.state, found.tau) for one in near[:SHOWN]]
         for one in near:
             if one.score < found.score(found.tau):
-                again = self._stable(few, one.state, None)
+                again = self._stable(rows, one.state, None)
                 found = min(found, again, key=lambda each, tau=found.tau: each.score(tau))  # type: ignore[misc]
-        search, found, rivals = self._with_twins(few, found)
+        search, found, rivals = self._with_twins(rows, found)
         most = found.score(found.tau) + NEAR
         same = found.state.edits, found.subset
         near = [one for one in (*near, *rivals) if one.score < most and (one.state.edits, one.subset) != same]
-        if len(few.at) < len(every.at):
-            found = search._stable(every, found.state, found.subset)
         return search._concluded(found, near)
 
-    def _with_twins(self, few: Rows, found: Stable) -> tuple[Search, Stable, list[Explanation]]:
+    def _with_twins(
+        self, rows: Rows, found: SelfConsistentFit
+    ) -> tuple[Search, SelfConsistentFit, list[Explanation]]:
         """Return the best explanation with twins in place of its causes, what finds it, and its rivals.
 
         Twins do the same to first order. At full size one of them may leave less, or need fewer causes.
         """
         search, rivals = self, []
         for _ in range(ROUNDS):
-            others = list(search._exchanged(few, found))
+            others = list(search._exchanged(rows, found))
             scores = [other.score(found.tau) for _, other in others]
             now = found.score(found.tau)
             rivals += [
@@ -227,48 +411,58 @@ class Search:
             search, found = others[int(np.argmin(scores))]
         return search, found, rivals
 
-    def _exchanged(self, few: Rows, found: Stable) -> Iterator[tuple[Search, Stable]]:
+    def _exchanged(self, rows: Rows, found: SelfConsistentFit) -> Iterator[tuple[Search, SelfConsistentFit]]:
         """Yield what is found where a twin that differs at full size stands for a cause."""
         gram, some = found.selection.normal.gram, replace(found.rows, at=self.spread(COARSE))
         for twin, g in self._distinct[1].items():
             if g in found.subset:
                 c, d = self._columns([g, twin])
-                other = exchanged(found.state, c, d, gram)
-                if not same_at_full_size(self, found.state, other, some):
+                other = self.exchange(found.state, c, d, gram)
+                if not self.is_equivalent(found.state, other, some):
                     search = replace(self, first=(twin, *self.first))
-                    yield search, search._stable(few, other, None)
+                    yield search, search._stable(rows, other, None)
 
-    def _concluded(self, found: Stable, near: list[Explanation]) -> Found:
+    def _concluded(self, found: SelfConsistentFit, near: list[Explanation]) -> SearchResult:
         """Return an explanation with what stays of it, and with those that are not told from it.
 
         Who takes more causes has to leave less, and each of them moves the floor or more.
         """
         state, subset, tau, rows, selection = found
-        state = self._beside_usual(state, subset, selection.normal)
         final = Explanation(state, subset, float(selection.scores([subset])[0]))
         variance = max(float(selection.left([subset])[0]), selection.floor)
         near += self._neighbours(selection, final, rows)
-        few = replace(rows, at=rows.at[:: max(len(rows.at) // MANY, 1)])
-        simple, least = _count(final), cost(self.model, state, few)
+        simple, least = final.count, cost(self.model, state, rows)
         near = [
             one for one in near
-            if (_count(one) <= simple or cost(self.model, one.state, few) < least)
+            if (one.count <= simple or cost(self.model, one.state, rows) < least)
             and (one.state.edits != state.edits or selection.moving(one.subset) == one.subset)
         ]  # fmt: skip
         near = list({(one.state.edits, one.subset): one for one in near}.values())
         shown = tuple(sorted(near, key=_score)[:SHOWN])
-        return Found(final, shown, rows, tau, variance, selection.normal, self._distinct[1])
+        refused = tuple(self._refused)
+        return SearchResult(
+            final, shown, rows, tau, variance, selection.normal, self._distinct[1], refused
+        )
 
-    def _beside_usual(self, state: State, subset: Subset, normal: Normal) -> State:
-        """Return the numbers of a subset beside what arms usually differ by, fitted with it and held back."""
-        columns = self._columns(sorted(subset))
-        if not self.usual or not columns:
+    def beside_usual(self, state: State, subset: Subset, rows: Rows) -> State:
+        """Return an explanation with what arms usually differ by, fitted with its numbers and damped."""
+        among = set(self._distinct[0])
+        usual = [(c, size) for g, size in self.usual.items() if g in among - subset for c in self._columns([g])]
+        if not usual or not (subset or state.edits):
             return state
+        own = self._columns([*self.forced, *sorted(subset)])
+        columns = [*own, *(c for c, _ in usual)]
+        normal = normal_equations(self.model, state, rows)
+        damped = normal.gram[np.ix_(columns, columns)]
+        damped += np.diag([*(0.0 for _ in own), *(size**-2.0 for _, size in usual)])
+        size = np.sqrt(np.maximum(np.diag(damped), np.finfo(float).tiny))
+        solved = np.linalg.lstsq(damped / size / size[:, np.newaxis], normal.moment[columns] / size, rcond=1e-13)
         values = state.values.copy()
-        values[columns] = np.linalg.solve(normal.gram[np.ix_(columns, columns)], normal.moment[columns])
-        return replace(state, values=values)
+        values[columns] = solved[0] / size
+        there = replace(state, values=values)
+        return there if cost(self.model, there, rows) <= cost(self.model, state, rows) else state
 
-    def _stable(self, every: Rows, state: State, subset: Subset | None) -> Stable:
+    def _stable(self, every: Rows, state: State, subset: Subset | None) -> SelfConsistentFit:
         """Return an explanation that is selected again where its fit leads.
 
         The autocorrelation time is that of what stays: of the whole, the causes themselves would count as
@@ -280,19 +474,21 @@ class Search:
             rows = every.trimmed(residual(self.model, state, every.at))
             selection = self._selection(state, rows, tau)
             chosen = selection.best(among)
-            state, beyond = self._within(state, chosen, rows)
+            state, beyond = self._within(state, chosen, rows, selection)
             if beyond:
                 among = [g for g in among if g not in beyond]
+                chosen -= beyond
                 continue
+            state = self.beside_usual(state, chosen, rows)
             if self.timed:
                 tau = max(tau, self._tau(state, rows))
             selection = replace(selection, independent=selection.normal.count / tau)
             if chosen == subset and selection.best(among) == chosen:
                 break
             subset = chosen
-        kept = selection.moving(chosen - beyond)
-        state = state if kept == chosen else self.fitted(state, kept, rows)
-        return Stable(state, kept, tau, rows, selection)
+        kept = selection.moving(chosen)
+        state = state if kept == chosen else self.beside_usual(self.fitted(state, kept, rows), kept, rows)
+        return SelfConsistentFit(state, kept, tau, rows, selection)
 
     def _tau(self, state: State, rows: Rows) -> float:
         """Return the autocorrelation time of what an explanation leaves: the longest, of places or turns."""
@@ -311,23 +507,17 @@ class Search:
         every = selection.neighbours(final.subset, self._distinct[0])
         subsets = [one for one in every if not (one <= final.subset or one >= final.subset)]
         scores = selection.scores(subsets) if subsets else np.zeros(0)
-        few = replace(rows, at=rows.at[:: max(len(rows.at) // MANY, 1)])
-        left, least = float(selection.left([final.subset])[0]), cost(self.model, final.state, few)
+        left, least = float(selection.left([final.subset])[0]), cost(self.model, final.state, rows)
         for i in np.argsort(scores, kind="stable").tolist()[:SHOWN]:
             if scores[i] >= final.score + NEAR:
                 break
-            state = self.fitted(final.state, subsets[i], few)
-            told = all(state.of(self.model.groups[g]).any() for g in subsets[i])  # else the fit got nowhere
-            after = left * cost(self.model, state, few) / max(least, np.finfo(float).tiny)
+            state = self.fitted(final.state, subsets[i], rows)
+            moved = all(state.of(self.model.groups[g]).any() for g in subsets[i])  # else the fit got nowhere
+            after = left * cost(self.model, state, rows) / max(least, np.finfo(float).tiny)
             score = selection.score(after, subsets[i])
-            if score < final.score + NEAR and told and not self._beyond(state):
+            if score < final.score + NEAR and moved and not self._unbelievable(state, subsets[i], rows):
                 yield Explanation(state, subsets[i], score)
 
 
 def _score(one: Explanation) -> float:
     return one.score
-
-
-def _count(one: Explanation) -> int:
-    """Return how many causes an explanation takes."""
-    return len(one.subset) + len(one.state.edits)

@@ -107,6 +107,8 @@ class Selection:
         hypotheses: K, among how many causes is chosen.
         whole: J^T J [-] before numbers of a usual size were taken away, shape (p, p): by it a group moves
             what it moves, though the usual could do so too; None where none were.
+        prior: What each group adds to a score by its kind, shape (groups,); None for nothing.
+        more: The same of the causes that are taken besides.
     """
 
     normal: Normal
@@ -117,6 +119,8 @@ class Selection:
     numbers: int
     hypotheses: int
     whole: FloatArray | None = None
+    prior: FloatArray | None = None
+    more: float = 0.0
 
     @cached_property
     def _scaled(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -174,17 +178,26 @@ class Selection:
         """Return the score [-] of each of some subsets, shape (len(subsets),)."""
         columns = [self.columns(subset) for subset in subsets]
         left = self._left_by(columns)
-        penalty = [self.penalty(len(at), len(one)) for at, one in zip(columns, subsets, strict=True)]
+        penalty = [self.penalty(len(at), one) for at, one in zip(columns, subsets, strict=True)]
         return np.asarray(self.independent * np.log(np.maximum(left, self.floor)) + np.array(penalty))
 
     def score(self, left: float, subset: Subset) -> float:
         """Return the score [-] of a subset that leaves a mean square [-]."""
         size = sum(len(self._columns[g]) for g in subset)
-        return self.independent * log(max(left, self.floor)) + self.penalty(size, len(subset))
+        return self.independent * log(max(left, self.floor)) + self.penalty(size, subset)
 
-    def penalty(self, columns: int, groups: int) -> float:
-        """Return what a subset of some groups with some columns in all pays."""
-        return self._penalties[0] * (columns + self.numbers) + self._penalties[1 + groups]
+    def penalty(self, columns: int, subset: Subset) -> float:
+        """Return what a subset with some columns in all pays."""
+        prior = 0.0 if self.prior is None else sum(self.prior[g] for g in subset)
+        penalty = self._penalties[0] * (columns + self.numbers) + self._penalties[1 + len(subset)]
+        return float(penalty + prior + self.more)
+
+    def solution(self, columns: Sequence[int]) -> FloatArray:
+        """Return the numbers of some columns that leave the least, shape (len(columns),)."""
+        gram, moment, _ = self._scaled
+        size = np.sqrt(np.maximum(np.diag(self.normal.gram)[list(columns)], np.finfo(float).tiny))
+        at = list(columns)
+        return np.asarray(np.linalg.solve(gram[np.ix_(at, at)], moment[at]) / size)
 
     @cached_property
     def _penalties(self) -> list[float]:
