@@ -18,10 +18,10 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.repolarizer import repolarize
 from urmpipe_pipeline.diagnosis.arm import ArmModel
-from urmpipe_pipeline.diagnosis.arm_groups import arm_groups, time_groups
+from urmpipe_pipeline.diagnosis.arm_groups import cause_groups
 from urmpipe_pipeline.diagnosis.edits import later_edits
 from urmpipe_pipeline.diagnosis.found import Explanation, Found
-from urmpipe_pipeline.diagnosis.hypotheses import State, numbered
+from urmpipe_pipeline.diagnosis.hypotheses import Group, State, numbered
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
 from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.log_edits import Edit, Edits, robot_edits, sign_edits, swap_edits, unit_edits
@@ -90,7 +90,7 @@ def arm_model(
         rotation: Matrices [-], shape (3, 3, n); None without any.
     """
     names = chain.coordinates
-    groups = numbered([*arm_groups(chain, names, turned=rotation is not None), *time_groups()])
+    groups = numbered(cause_groups(chain, names, turned=rotation is not None, timed=True))
     motion = Motion(t, *(moved(t, order).T.copy() for order in range(3)))
     return ArmModel(chain, groups, motion, Clock(t, -1.0, t), np.arange(len(t)), position, rotation)
 
@@ -106,10 +106,17 @@ def poses(chain: Chain, q: FloatArray, *, oriented: bool) -> Posed:
     return position.T.copy(), rotation.transpose(1, 2, 0).copy() if oriented else None
 
 
+def called(group: Group) -> str:
+    """Return the key of a cause of some size: "kind:name", with its axis of one of base or tool."""
+    if group.name not in ("base", "tool") or group.axis is None:
+        return f"{group.kind}:{group.name}"
+    return f"{group.kind}:{group.name} {'xyz'[group.axis.index(1.0)]}"
+
+
 def state_of(model: ArmModel, numbers: Numbers, edits: Edits = ()) -> State:
     """Return an explanation by the names of its causes."""
     values = np.zeros(sum(len(group.columns) for group in model.groups))
-    places = {f"{group.kind}:{group.name}": list(group.columns) for group in model.groups}
+    places = {called(group): list(group.columns) for group in model.groups}
     for name, size in numbers.items():
         values[places[name]] = size
     return State(values, edits)
@@ -211,7 +218,7 @@ def named(search: Search, found: Found) -> Named:
         return names_of(
             search,
             found,
-            [f"{g.kind}:{g.name}" for k, g in enumerate(search.model.groups) if k in one.subset],
+            [called(g) for k, g in enumerate(search.model.groups) if k in one.subset],
             one.state.edits,
         )
 
@@ -220,7 +227,7 @@ def named(search: Search, found: Found) -> Named:
 
 def names_of(search: Search, found: Found, numbers: Sequence[str], edits: Edits = ()) -> frozenset[str]:
     """Return the names of causes, of twins the one that stands for all."""
-    groups = [f"{group.kind}:{group.name}" for group in search.model.groups]
+    groups = [called(group) for group in search.model.groups]
     told = {groups[g]: groups[by] for g, by in found.twins.items()}
     said = (f"{edit.kind}:{edit.name or sorted(edit.joints)}" for edit in edits)
     return frozenset((*(told.get(name, name) for name in numbers), *said))

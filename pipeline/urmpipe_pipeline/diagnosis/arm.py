@@ -9,15 +9,15 @@ import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.elementwise import Element, Vector
+from urmpipe_models.elementwise import Element, Vector, scale
 from urmpipe_models.hand_eye import hand_eye
 from urmpipe_models.kinematics.forward import jacobian, poses_over_log, tip_pose
 from urmpipe_models.kinematics.identification import Twist, changed, sensitivities
 from urmpipe_models.transform import Transform
-from urmpipe_pipeline.diagnosis.arm_groups import arm_groups
+from urmpipe_pipeline.diagnosis.arm_groups import cause_groups
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
-from urmpipe_pipeline.diagnosis.motion import Clock, Motion
-from urmpipe_pipeline.log_edits import Edits
+from urmpipe_pipeline.diagnosis.motion import Clock, Joints, Motion
+from urmpipe_pipeline.log_edits import IDENTITY, Edits, Matrix
 
 FITTED = 100
 """Rows, spread evenly, on which unknown frames are put where they fit best; fits on all rows come after."""
@@ -26,6 +26,10 @@ FITTED = 100
 @dataclass(frozen=True, eq=False)
 class ArmModel:
     """A side with joints and an arm, beside a side that tells where the tool centre point was.
+
+    Residuals are in the unit that the data were read in: a factor of the path divides the model, so that it
+    does not make the noise of the data smaller. What stands an arm's frame beyond the bounds of an arm
+    raises a RobotError.
 
     Attributes:
         chain: The arm.
@@ -47,6 +51,7 @@ class ArmModel:
     rotation: FloatArray | None
     frames_open: bool = False
     _placed: dict[Edits, Chain] = field(default_factory=dict)
+    _of_others: dict[str, tuple[Group, ...]] = field(default_factory=dict, init=False)
 
     @property
     def rows(self) -> int:
@@ -60,47 +65,55 @@ class ArmModel:
 
     def arm(self, state: State) -> tuple[Chain, list[tuple[Twist, int]]]:
         """Return the arm as an explanation has it, and its twists there with the places of their numbers."""
-        chain, groups = self._robot(state.edits), self.groups
-        if chain is not self.chain:  # its own twists, with the places that those of the same name have here
-            names = [group.name for group in groups if group.kind == "joint_offset"]
-            own = {
-                (one.kind, one.name): one
-                for one in arm_groups(chain, names, turned=self.rotation is not None)
-            }
-            groups = tuple(
-                replace(
-                    group,
-                    twists=own[group.kind, group.name].twists if (group.kind, group.name) in own else (),
-                )
-                for group in groups
-            )
-        twists = ordered_twists(groups)
+        chain = self._robot(state.edits)
+        twists = ordered_twists(self._groups_of(chain, state.edits))
         there, located = changed(chain, [(twist, float(state.values[c])) for twist, c in twists])
         return there, [(twist, c) for twist, (_, c) in zip(located, twists, strict=True)]
 
+    def _groups_of(self, chain: Chain, edits: Edits) -> tuple[Group, ...]:
+        """Return the groups with the twists of the robot that some edits speak of: those of the same name."""
+        name = next((edit.name for edit in edits if edit.robot is not None), None)
+        if name is None:
+            return self.groups
+        if name not in self._of_others:
+            joints = [group.name for group in self.groups if group.kind == "joint_offset"]
+            every = cause_groups(chain, joints, turned=self.rotation is not None, timed=False)
+            own = {_called(one): one.twists for one in every}
+            self._of_others[name] = tuple(
+                replace(group, twists=own.get(_called(group), ())) for group in self.groups
+            )
+        return self._of_others[name]
+
     def _robot(self, edits: Edits) -> Chain:
-        """Return the arm that some edits speak of, where it fits best if that is open."""
+        """Return the arm that some edits speak of, on a turned base or where it fits best if that is open."""
         other = next((edit.robot for edit in edits if edit.robot is not None), None)
         chain = self.chain if other is None else other.placed(self.chain.base, self.chain.tool)
-        if not self.frames_open:
+        if self.frames_open:
+            if edits not in self._placed:
+                self._placed[edits] = self._where_it_fits(chain, edits)
+            return self._placed[edits]
+        matrix = axes_of(edits, "base_rotation")
+        if matrix is None:
             return chain
-        if edits not in self._placed:
-            self._placed[edits] = self._where_it_fits(chain, edits)
-        return self._placed[edits]
+        base = Transform(matrix) @ Transform(chain.base.rotation)
+        return chain.placed(Transform(base.rotation, chain.base.translation))
 
     def _where_it_fits(self, chain: Chain, edits: Edits) -> Chain:
         """Return an arm on the base and with the tool of the least misses."""
         rows = np.unique(np.linspace(0, self.rows - 1, min(self.rows, FITTED)).round().astype(np.int64))
         state = replace(zero(self.groups), edits=edits)
-        q = self.motion.joints(state, self.groups, self.clock, self.sample, rows).q
+        q = self._joints(state, rows).q
         position, rotation = poses_over_log(chain, q.T)
-        measured = None if self.rotation is None else self.rotation[:, :, rows].transpose(2, 0, 1)
-        found = hand_eye(position, rotation, self.position[:, rows].T, measured)
+        mirror = np.array(axes_of(edits, "base_mirrored") or IDENTITY)
+        measured = None
+        if self.rotation is not None:
+            measured = mirror.T @ self.rotation[:, :, rows].transpose(2, 0, 1) @ mirror
+        found = hand_eye(position, rotation, self.position[:, rows].T @ mirror, measured)
         base = _frame(found.base_rotation, found.base_position)
         return chain.placed(base @ chain.base, chain.tool @ _frame(found.tool_rotation, found.tool_position))
 
     def residual(self, state: State, rows: IntArray) -> FloatArray:
-        """Return what an explanation leaves: data - model in [m] and [rad], shape (c, n).
+        """Return data - model of an explanation in [m] as the data were read and [rad], shape (c, n).
 
         Outside the time of its side a row is NaN.
 
@@ -108,26 +121,68 @@ class ArmModel:
             state: The explanation.
             rows: Rows, by index, shape (n,).
         """
-        joints = self.motion.joints(state, self.groups, self.clock, self.sample, rows)
-        return self._left(tip_pose(self.arm(state)[0], list(joints.q)), state, rows, joints.inside)
+        joints = self._joints(state, rows)
+        return self._left(tip_pose(self.arm(state)[0], list(joints.q)), state.edits, rows, joints.inside)
+
+    def residuals(self, every: Sequence[Edits], rows: IntArray) -> FloatArray:
+        """Return the residual of explanations without numbers, shape (len(every), c, n).
+
+        Each is that of `residual`; what edits make of the joints goes through the arm in one go.
+
+        Args:
+            every: The edits of each explanation.
+            rows: Rows, by index, shape (n,).
+        """
+        nothing, count = zero(self.groups), len(rows)
+        if self.frames_open:  # each has frames of its own
+            lefts = [self.residual(replace(nothing, edits=edits), rows) for edits in every]
+            return np.array(lefts).reshape(-1, len(self.blocks), count)
+        joints = self._joints(nothing, rows)
+        result = np.empty((len(every), len(self.blocks), count))
+        of_robots: dict[str, dict[Edits, list[int]]] = {}
+        for i, edits in enumerate(every):
+            robot = next((edit.name for edit in edits if edit.robot is not None), "")
+            of_joints = tuple(edit for edit in edits if edit.joints)
+            of_robots.setdefault(robot, {}).setdefault(of_joints, []).append(i)
+        for cases in of_robots.values():
+            alone = tuple(edit for edit in every[next(iter(cases.values()))[0]] if edit.robot is not None)
+            q = np.concatenate([edited(each, self.sample[rows], joints.q) for each in cases], axis=1)
+            pose = tip_pose(self._robot(alone), list(q))
+            many = np.tile(rows, len(cases)), np.tile(joints.inside, len(cases))
+            plain = self._left(pose, (), *many).reshape(len(self.blocks), -1, count)
+            for k, places in enumerate(cases.values()):
+                part = slice(k * count, (k + 1) * count)
+                for i in places:
+                    placing = tuple(edit for edit in every[i] if not edit.joints and edit.robot is None)
+                    result[i] = plain[:, k]
+                    if placing:
+                        turned = self._turned(_rows_of(pose, part), placing)
+                        result[i] = self._left(turned, placing, rows, joints.inside)
+        return result
+
+    def _turned(self, pose: Transform, edits: Edits) -> Transform:
+        """Return poses on a base that edits turn about its own place."""
+        matrix = axes_of(edits, "base_rotation")
+        if matrix is None:
+            return pose
+        at = self.chain.base.translation
+        turn = Transform(translation=at) @ Transform(matrix) @ Transform(translation=scale(-1.0, at))
+        return turn @ pose
+
+    def _joints(self, state: State, rows: IntArray) -> Joints:
+        return self.motion.joints(state, self.groups, self.clock, self.sample, rows, self.chain)
 
     def deviation(self, state: State, rows: IntArray) -> FloatArray:
-        """Return what an explanation leaves of positions in [m], shape (3, n)."""
-        return self.residual(state, rows)[:3]
+        """Return what an explanation leaves of positions in true [m], shape (3, n)."""
+        return unit_of(state.edits) * self.residual(state, rows)[:3]
 
     def wanted(self, rows: IntArray) -> FloatArray:
-        """Return where the tool centre point should be in [m], shape (3, n)."""
+        """Return where the tool centre point should be in [m] as it was read, shape (3, n)."""
         return self.position[:, rows]
 
-    def _left(self, pose: Transform, state: State, rows: IntArray, inside: BoolArray) -> FloatArray:
-        factor = next((edit.value for edit in state.edits if edit.kind == "path_unit"), 1.0)
-        left = np.empty((len(self.blocks), len(rows)))
-        for k, value in enumerate(pose.translation):
-            left[k] = factor * self.position[k, rows] - value
-        if self.rotation is not None:
-            left[3:] = turn_between(pose, self.rotation[:, :, rows])
-        left[:, ~inside] = np.nan
-        return left
+    def _left(self, pose: Transform, edits: Edits, rows: IntArray, inside: BoolArray) -> FloatArray:
+        rotation = None if self.rotation is None else self.rotation[:, :, rows]
+        return pose_residual(pose, edits, self.position[:, rows], rotation, inside)
 
     def linear(
         self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
@@ -140,25 +195,26 @@ class ArmModel:
             groups: Whose numbers; all by default.
 
         Returns:
-            The residual in [m] and [rad], shape (c, n), and the Jacobian per unit of each number, in the
-            order of the groups, shape (p, c, n).
+            The residual as `residual` has it, shape (c, n), and the Jacobian of the model per unit of each
+            number, in the order of the groups, shape (p, c, n).
         """
         taken = self.groups if groups is None else groups
-        joints = self.motion.joints(state, self.groups, self.clock, self.sample, rows)
+        joints = self._joints(state, rows)
         chain, located = self.arm(state)
         q = list(joints.q)
-        left = self._left(tip_pose(chain, q), state, rows, joints.inside)
+        left = self._left(tip_pose(chain, q), state.edits, rows, joints.inside)
         wanted = {c for g in taken for c in g.columns}
         twists = [(twist, c) for twist, c in located if c in wanted]
-        velocities = sensitivities(chain, q, [t for t, _ in twists])
-        moved = {c: velocity for (_, c), velocity in zip(twists, velocities, strict=True)}
+        distinct = {id(twist): twist for twist, _ in twists}  # one axis of a frame alone, and of all three
+        velocities = dict(zip(distinct, sensitivities(chain, q, [*distinct.values()]), strict=True))
+        moved = {c: velocities[id(twist)] for twist, c in twists}
         by_joint = jacobian(chain, q) if any(not group.twists for group in taken) else ()
         columns = np.zeros((len(wanted), len(self.blocks), len(rows)))
         add_columns(
             columns, taken, moved,
             lambda group: [(by_joint[j], by) for j, by in joints.factors(group, self.clock, rows)],
         )  # fmt: skip
-        return left, columns
+        return left, as_read(columns, state.edits)
 
 
 def ordered_twists(groups: Iterable[Group]) -> list[tuple[Twist, int]]:
@@ -197,6 +253,82 @@ def add_columns(
             elif not group.twists:
                 for values, factor in others(group):
                     _add(column, values, factor)
+
+
+def axes_of(edits: Edits, kind: str) -> Matrix | None:
+    """Return how edits of a kind turn or mirror the base [-]; None if none does."""
+    return next((edit.matrix for edit in edits if edit.kind == kind), None)
+
+
+def unit_of(edits: Edits, side: str = "") -> float:
+    """Return what positions of a side, as read, are to be multiplied by to be in [m]."""
+    factors = (edit.value for edit in edits if edit.kind == "path_unit" and edit.name.startswith(side))
+    return next(factors, 1.0)
+
+
+def edited(edits: Edits, log_rows: IntArray, q: FloatArray) -> FloatArray:
+    """Return joints in [rad] or [m], shape (joints, n), with what edits make of them."""
+    for edit in edits:
+        (q,) = edit.of_joints(log_rows, q)
+    return q
+
+
+def pose_residual(
+    pose: Transform,
+    edits: Edits,
+    position: FloatArray,
+    rotation: FloatArray | None,
+    inside: BoolArray,
+    side: str = "",
+) -> FloatArray:
+    """Return data - model in [m] as the data were read and [rad], shape (3, n) or (6, n); NaN outside.
+
+    Args:
+        pose: The model's, on a base that is not mirrored.
+        edits: What is there or not; its mirrored base and the unit of the data count here.
+        position: Of the data in [m] as they were read, shape (3, n).
+        rotation: Matrices [-], shape (3, 3, n); None without any.
+        inside: Which rows lie within the time of the model, shape (n,).
+        side: Which side the data are, in names of units; any by default.
+    """
+    if (mirror := axes_of(edits, "base_mirrored")) is not None:
+        axes = Transform(mirror)
+        there = axes @ pose
+        pose = Transform((there @ Transform(axes.columns)).rotation, there.translation)
+    left = np.empty((3 if rotation is None else 6, position.shape[1]))
+    factor = unit_of(edits, side)
+    for k, value in enumerate(pose.translation):
+        left[k] = position[k] - value / factor
+    if rotation is not None:
+        left[3:] = turn_between(pose, rotation)
+    left[:, ~inside] = np.nan
+    return left
+
+
+def as_read(columns: FloatArray, edits: Edits, side: str = "") -> FloatArray:
+    """Return a Jacobian in [m] and [rad], shape (p, c, n), in the axes and the unit that data were read in.
+
+    Args:
+        columns: Velocities and turns per unit of each number, of a base that is not mirrored; changed.
+        edits: What is there or not.
+        side: Which side the data are, in names of units; any by default.
+    """
+    if (mirror := axes_of(edits, "base_mirrored")) is not None:
+        columns[:, :3] = np.einsum("ij,pjn->pin", mirror, columns[:, :3])
+        columns[:, 3:] = -np.einsum("ij,pjn->pin", mirror, columns[:, 3:])  # turns count the other way
+    columns[:, :3] /= unit_of(edits, side)
+    return columns
+
+
+def _called(group: Group) -> tuple[object, ...]:
+    return group.kind, group.name, group.axis if group.name in ("base", "tool") else None
+
+
+def _rows_of(pose: Transform, part: slice) -> Transform:
+    """Return some of the rows of poses."""
+    elements = (*pose.translation, *(one for row in pose.rotation for one in row))
+    x, y, z, *r = (one[part] if isinstance(one, np.ndarray) else one for one in elements)
+    return Transform(((r[0], r[1], r[2]), (r[3], r[4], r[5]), (r[6], r[7], r[8])), (x, y, z))
 
 
 def _frame(rotation: FloatArray, position: FloatArray) -> Transform:

@@ -1,17 +1,30 @@
-"""The causes of some size that an arm may have: lengths and tilts, joints, base and tool, time."""
+"""The causes of some size that an arm may have: tool, base, clock, joints, and the segments of the arm.
+
+They come in the order in which one of several with the very same effect is preferred: tool, base, clock, the
+zeros of joints, other effects of joints, then lengths and tilts that the data sheet has, then those that are
+zero there. Of tool and base one axis alone comes before all three.
+
+A segment is what leads from a joint to the next one, and has six numbers: shifts along and turns about three
+axes. Those that the arm is known by (URM, Denavit-Hartenberg) keep their names; the others are "sideways"
+along and "about" the axes that are missing. The turn about a joint's own axis, or the shift along that of one
+that slides, is the zero of the joint.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
 import numpy as np
 
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.chains.parameters import Parameter
+from urmpipe_models.elementwise import ZERO, Vector, cross, subtract
 from urmpipe_models.kinematics.identification import BASE, Twist
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline.diagnosis.hypotheses import Axis, Group
+from urmpipe_pipeline.diagnosis.motion import has_masses
 from urmpipe_pipeline.diagnosis.result import Kind
 
 X, Y, Z = AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -21,51 +34,64 @@ _AXES = dict(zip("xyz", AXES, strict=True))
 KNOWN_BY = ("URM", "DH", "6R")
 """How the sources of parameters begin that people know an arm by."""
 
-NEGLIGIBLE = 1e-9
-"""A segment shorter than this in [m] has no direction."""
+NEGLIGIBLE = 1e-9  # [m] or [-]: rounding of a length or of a direction
 
 
-def arm_groups(chain: Chain, names: Sequence[str], *, turned: bool) -> Iterator[Group]:
-    """Yield what may differ of an arm, what has a name of its own first.
+def cause_groups(chain: Chain, names: Sequence[str], *, turned: bool, timed: bool) -> Iterator[Group]:
+    """Yield what may differ of an arm and its log.
 
     Args:
         chain: The arm.
         names: What the log calls its joints.
-        turned: Whether orientations are held against each other, too.
+        turned: Whether orientations are compared, too.
+        timed: Whether the log has times.
     """
-    yield from _segments(chain)
-    yield from joint_groups(["m" if one.kind == "prismatic" else "rad" for one in chain.moving], names)
-    yield from base_groups(chain.base)
     yield from tool_groups(chain.tool, len(chain.joints) + 2, turned=turned)
+    yield from base_groups(chain.base)
+    units = ["m" if joint.kind == "prismatic" else "rad" for joint in chain.moving]
+    yield from joint_groups(units, names, chain, timed=timed)
+    segments = [one for place in range(1, len(chain.joints) + 2) for one in _segment_groups(chain, place)]
+    ranks = [("link_length", True), ("tilt", True), ("link_length", False), ("link_shift", False)]
+    for rank in (*ranks, ("tilt", False)):
+        yield from (group for group, in_data_sheet in segments if (group.kind, in_data_sheet) == rank)
 
 
-def joint_groups(units: Sequence[str], names: Sequence[str]) -> Iterator[Group]:
-    """Yield the offset, the scale and the compliance of each joint, by their units and names."""
-    for j, (unit, name) in enumerate(zip(units, names, strict=True)):
-        yield Group("joint_offset", name, unit, (0,), j)
-        yield Group("joint_scale", name, "", (0,), j)
-        yield Group("compliance", name, "s2", (0,), j)
+def joint_groups(
+    units: Sequence[str], names: Sequence[str], chain: Chain | None, *, timed: bool
+) -> Iterator[Group]:
+    """Yield what may differ of the clock and of each joint.
+
+    Args:
+        units: m or rad of each joint.
+        names: What the log calls them.
+        chain: The arm, which gravity pulls at; None of joints alone.
+        timed: Whether the log has times.
+    """
+    if timed:
+        yield from time_groups()
+        yield Group("servo_lag", "all joints", "s", (0,))
+    sag = "" if chain is None else "/(N m)" if has_masses(chain) else "/kg"
+    kinds: list[tuple[Kind, str | None]] = [("joint_offset", None), ("joint_scale", "")]
+    kinds += [("joint_lag", "s"), ("compliance", "s2"), ("backlash", None)] if timed else []
+    for kind, shared in kinds:
+        for j, (unit, name) in enumerate(zip(units, names, strict=True)):
+            yield Group(kind, name, unit if shared is None else shared, (0,), j)
+    for j, (unit, name) in enumerate(zip(units, names, strict=True) if sag else ()):
+        yield Group("sag", name, "m/N" if unit == "m" and sag != "/kg" else f"{unit}{sag}", (0,), j)
 
 
 def base_groups(base: Transform) -> Iterator[Group]:
     """Yield how a base may stand elsewhere: shifted and turned in the world, about its own place."""
     at = Transform(translation=base.translation)
-    yield _frame_group("base_shift", "base", BASE, at)
-    yield _frame_group("base_rotation", "base", BASE, at)
+    yield from _frame_groups("base_shift", "base", BASE, at)
+    yield from _frame_groups("base_rotation", "base", BASE, at)
 
 
 def tool_groups(tool: Transform, place: int, *, turned: bool) -> Iterator[Group]:
-    """Yield how a tool may differ in its own frame; its turn only where orientations are told."""
-    yield _frame_group("tool_shift", "tool", place, tool)
+    """Yield how a tool may differ in its own frame; its turn only where there are orientations."""
+    yield from _frame_groups("tool_shift", "tool", place, tool)
     if turned:
-        yield _frame_group("tool_rotation", "tool", place, tool)
-
-
-def _frame_group(kind: Kind, name: str, place: int, frame: Transform) -> Group:
-    """Return three numbers of a frame, along or about its axes."""
-    way: Literal["along", "about"] = "along" if kind.endswith("shift") else "about"
-    twists = tuple(Twist(place, way, axis, frame) for axis in AXES)
-    return Group(kind, name, "m" if way == "along" else "rad", (0, 1, 2), twists=twists)
+        yield from _frame_groups("tool_rotation", "tool", place, tool)
 
 
 def time_groups() -> Iterator[Group]:
@@ -74,52 +100,93 @@ def time_groups() -> Iterator[Group]:
     yield Group("clock_drift", "clock", "s/s", (0,))
 
 
-def _segments(chain: Chain) -> Iterator[Group]:
-    """Yield the lengths and tilts of an arm: the parameters it is known by, else those of its frames."""
-    own = [one for one in chain.parameters if one.source.startswith(KNOWN_BY) and _of_link(one, chain)]
-    yield from (_of_parameter(one) for one in own)
-    places = range(1, len(chain.joints) + 2)
-    if not any(one.kind == "along" for one in own):
-        yield from (length for place in places for length in _length(chain, place))
-    if not any(one.kind == "about" for one in own):
-        yield from (tilt for place in places[:-1] for tilt in _tilts(chain, place))
+def _frame_groups(kind: Kind, name: str, place: int, frame: Transform) -> Iterator[Group]:
+    """Yield one number along or about each axis of a frame, then all three."""
+    way: Literal["along", "about"] = "along" if kind.endswith("shift") else "about"
+    unit = "m" if way == "along" else "rad"
+    twists = tuple(Twist(place, way, axis, frame) for axis in AXES)
+    for axis, twist in zip(AXES, twists, strict=True):
+        yield Group(kind, name, unit, (0,), axis=axis, twists=(twist,))
+    yield Group(kind, name, unit, (0, 1, 2), twists=twists)
 
 
-def _of_link(one: Parameter, chain: Chain) -> bool:
-    """Tell whether a parameter is one of a link: the angle of a row is the offset of its joint."""
-    return 0 < one.frame_index <= len(chain.joints) + 1 and not one.name.startswith("theta_")
+def _segment_groups(chain: Chain, place: int) -> Iterator[tuple[Group, bool]]:
+    """Yield the six numbers of the segment that a frame ends, each with whether the data sheet has it.
+
+    A frame without a length or turn at either end of the arm, or behind a fixed joint, ends none.
+    """
+    frame, count = chain.frames[place], len(chain.joints)
+    named = [one for one in chain.parameters if one.frame_index == place and one.source.startswith(KNOWN_BY)]
+    at_an_end = place in (1, count + 1) or chain.joints[place - 2].kind == "fixed"
+    if not named and frame == Transform() and at_an_end:
+        return
+    yield from ((_of_parameter(one), bool(one.value)) for one in named if not one.name.startswith("theta_"))
+    ends = [*(joint.name for joint in chain.joints), "tip"]
+    number = re.sub(r"\D", "", named[0].name) if named else ""
+    name = f"segment {number}" if number else f"segment to {ends[place - 1]}"
+    lengths, turns = ([one for one in named if one.kind == kind] for kind in ("along", "about"))
+    # behind the last length and before the last turn, x, y and z are those of all named parameters
+    across = turns[-1].before if turns else Transform(translation=frame.translation)
+    if lengths:
+        missing, at = [axis for axis in "xyz" if axis not in {one.axis for one in lengths}], across
+    else:
+        length, at = np.linalg.norm(frame.translation), Transform()
+        along = int(np.argmax(np.abs(frame.translation))) if length > NEGLIGIBLE else None
+        missing = [axis for k, axis in enumerate("xyz") if k != along]
+        if along is not None:
+            direction = _axis(np.array(frame.translation) / length)
+            twist = Twist(place, "along", direction, at)
+            yield Group("link_length", name, "m", (0,), None, _point(place), direction, (twist,)), True
+    for letter in missing:
+        twist = Twist(place, "along", _AXES[letter], at)
+        if not _is_zero_of_joint(chain, place, twist):
+            named_so = f"{name} sideways {letter}"
+            yield Group("link_shift", named_so, "m", (0,), None, _point(place), twist.axis, (twist,)), False
+    yield from ((one, False) for one in _tilts(chain, place, name, {one.axis for one in turns}, across))
 
 
 def _of_parameter(one: Parameter) -> Group:
     """Return a named length or angle."""
     twist = Twist(one.frame_index, one.kind, _AXES[one.axis], one.before)
     kind, unit = ("link_length", "m") if one.kind == "along" else ("tilt", "rad")
-    return Group(kind, one.name, unit, (0,), None, _segment(one.frame_index), _AXES[one.axis], (twist,))  # type: ignore[arg-type]
+    return Group(kind, one.name, unit, (0,), None, _point(one.frame_index), _AXES[one.axis], (twist,))  # type: ignore[arg-type]
 
 
-def _length(chain: Chain, place: int) -> Iterator[Group]:
-    """Yield the length of the segment that a frame ends, along it; nothing where it has none."""
-    along = np.array(chain.frames[place].translation, dtype=float)
-    length = float(np.linalg.norm(along))
-    if length > NEGLIGIBLE:
-        axis = _axis(along / length)
-        twist = Twist(place, "along", axis, Transform())
-        name = [*(joint.name for joint in chain.joints), "tip"][place - 1]
-        yield Group("link_length", f"segment to {name}", "m", (0,), None, _segment(place), axis, (twist,))
+def _tilts(chain: Chain, place: int, name: str, taken: set[str], across: Transform) -> Iterator[Group]:
+    """Yield the turns of a frame that no named parameter has: of a joint those across its axis."""
+    joint = chain.joints[place - 1] if place <= len(chain.joints) else None
+    if taken or joint is None or joint.kind == "fixed":
+        at = across if taken else chain.frames[place]
+        axes = {letter: axis for letter, axis in _AXES.items() if letter not in taken}
+    else:
+        name, at = joint.name, joint.origin
+        axes = {_letter(axis, letter): axis for letter, axis in zip("uv", _across(joint.axis), strict=True)}
+    for letter, axis in axes.items():
+        twist = Twist(place, "about", axis, at)
+        if not _is_zero_of_joint(chain, place, twist):
+            yield Group("tilt", f"{name} about {letter}", "rad", (0,), None, _point(place), axis, (twist,))
 
 
-def _tilts(chain: Chain, place: int) -> Iterator[Group]:
-    """Yield the tilts of a joint about both directions across its axis."""
-    joint = chain.joints[place - 1]
-    if joint.kind == "fixed":
-        return
-    for letter, axis in zip("uv", _across(joint.axis), strict=True):
-        called = f"{joint.name} about {_said(axis, letter)}"
-        twist = Twist(place, "about", axis, joint.origin)
-        yield Group("tilt", called, "rad", (0,), None, _segment(place), axis, (twist,))
+def _is_zero_of_joint(chain: Chain, place: int, twist: Twist) -> bool:
+    """Return whether a twist moves the arm as the zero of a joint at either end of its segment does."""
+    frame = chain.frames[place]
+    ends: list[tuple[Joint, Vector, Vector]] = []  # with a direction and a point of its axis
+    if place > 1:
+        ends.append((chain.joints[place - 2], chain.joints[place - 2].axis, ZERO))
+    if place <= len(chain.joints):
+        joint = chain.joints[place - 1]
+        ends.append((joint, frame.rotate(joint.axis), frame.translation))
+    direction = twist.frame.rotate(twist.axis)
+    for joint, axis, point in ends:
+        moved = {"revolute": "about", "prismatic": "along"}.get(joint.kind)
+        apart = subtract(twist.frame.translation, point) if moved == "about" else ZERO
+        off = (*cross(direction, axis), *cross(direction, apart))
+        if joint.mimic is None and moved == twist.kind and max(map(abs, off)) < NEGLIGIBLE:
+            return True
+    return False
 
 
-def _segment(place: int) -> str | None:
+def _point(place: int) -> str | None:
     """Return the point that a frame stands in; none of the first joint, which stands in the base."""
     return f"p{place - 1}" if place > 1 else None
 
@@ -138,6 +205,7 @@ def _axis(vector: np.ndarray) -> Axis:
     return x, y, z
 
 
-def _said(axis: Axis, otherwise: str) -> str:
+def _letter(axis: Axis, otherwise: str) -> str:
     """Return the letter of an axis of the frame, else another."""
-    return next((letter for letter, own in _AXES.items() if abs(np.dot(axis, own)) > 1 - 1e-9), otherwise)
+    near = (letter for letter, own in _AXES.items() if abs(np.dot(axis, own)) > 1.0 - NEGLIGIBLE)
+    return next(near, otherwise)

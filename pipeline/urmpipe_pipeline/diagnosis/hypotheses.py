@@ -27,7 +27,8 @@ class Group:
         columns: Their places among all numbers.
         joint: Index of its joint; None of another cause.
         segment: The point that ends its segment; None of another cause.
-        axis: Along or about which it acts in the segment's frame; None of another cause.
+        axis: Along or about which it acts in the frame of segment, base or tool; None of another cause, and
+            of three numbers.
         twists: What it changes in the arm, one a number; none of joints and time.
     """
 

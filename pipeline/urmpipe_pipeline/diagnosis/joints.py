@@ -10,8 +10,10 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import positions_over_log
-from urmpipe_pipeline.diagnosis.hypotheses import Group, State
-from urmpipe_pipeline.diagnosis.motion import Clock, Motion
+from urmpipe_pipeline.diagnosis.arm import edited
+from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
+from urmpipe_pipeline.diagnosis.motion import Clock, Joints, Motion
+from urmpipe_pipeline.log_edits import Edits
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +50,17 @@ class JointsModel:
 
     def residual(self, state: State, rows: IntArray) -> FloatArray:
         """Return what an explanation leaves: reference - log in [rad] or [m], shape (joints, n)."""
-        joints = self.motion.joints(state, self.groups, self.clock, self.sample, rows)
+        joints = self._joints(state, rows)
         return np.asarray(np.where(joints.inside, self.q[:, rows] - joints.q, np.nan))
+
+    def residuals(self, every: Sequence[Edits], rows: IntArray) -> FloatArray:
+        """Return the residual of explanations without numbers, by edits, shape (len(every), joints, n)."""
+        joints = self._joints(zero(self.groups), rows)
+        left = [self.q[:, rows] - edited(edits, self.sample[rows], joints.q) for edits in every]
+        return np.where(joints.inside, np.array(left).reshape(-1, *joints.q.shape), np.nan)
+
+    def _joints(self, state: State, rows: IntArray) -> Joints:
+        return self.motion.joints(state, self.groups, self.clock, self.sample, rows, self.chain)
 
     def linear(
         self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
@@ -66,7 +77,7 @@ class JointsModel:
             of the groups, shape (p, c, n).
         """
         taken = self.groups if groups is None else groups
-        joints = self.motion.joints(state, self.groups, self.clock, self.sample, rows)
+        joints = self._joints(state, rows)
         columns = np.zeros((len(taken), *joints.q.shape))
         for column, group in zip(columns, taken, strict=True):
             for j, factor in joints.factors(group, self.clock, rows):
@@ -84,7 +95,7 @@ class JointsModel:
         """
         if self.chain is None:
             return self.residual(state, rows)
-        joints = self.motion.joints(state, self.groups, self.clock, self.sample, rows)
+        joints = self._joints(state, rows)
         left = self.wanted(rows) - positions_over_log(self.chain, joints.q.T).T
         return np.asarray(np.where(joints.inside, left, np.nan))
 

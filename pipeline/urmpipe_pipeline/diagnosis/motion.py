@@ -1,16 +1,31 @@
-"""The side that is modelled, at any time: its joints as an explanation has them."""
+"""The side that is modelled, at any time: its joints as an explanation has them.
+
+q + offset + scale q + compliance q'' + lag q' + play / 2 sign(q') + sag times the torque of gravity, q being
+that of the log at its own time, after what is there or not (`log_edits`).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
-from urmpipe_models.elementwise import Element
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.dynamics.inverse import inverse_dynamics
+from urmpipe_models.elementwise import Element, dot
+from urmpipe_models.kinematics.forward import jacobian
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
+from urmpipe_pipeline.log_edits import Edits
+
+MOVING = 5.0
+"""A joint moves if its rate is so many times the noise of it: less often than once in a million by chance."""
+
+WEIGHTLESS = 1e-9  # [N m] or [N]: rounding of the torque of an axis that stands upright
+
+SHIFTING_TIME = ("time_lag", "clock_drift", "joint_lag")
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,34 +58,51 @@ class Clock:
         return self.direction * (1.0 if group.kind == "time_lag" else self.since[rows])
 
 
-class Joints(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Joints:
     """Joints of some rows as an explanation has them.
 
     Attributes:
         q: In [rad] or [m], shape (joints, n).
         rate: q' in [rad/s] or [m/s], shape (joints, n).
         own: q before its numbers are added in [rad] or [m], shape (joints, n).
+        own_rate: q' of that in [rad/s] or [m/s], shape (joints, n).
         second: q'' of that in [rad/s2] or [m/s2], shape (joints, n).
         inside: Which rows lie within the time of their side, shape (n,).
+        direction: Returns which way a joint moves, or moved last, shape (n,): 1 or -1; 0 if it never moves.
+        torque: Returns what holds a joint against gravity in [N m] or [N], shape (n,); of an arm without
+            masses for each [kg] at its tool centre point.
     """
 
     q: FloatArray
     rate: FloatArray
     own: FloatArray
+    own_rate: FloatArray
     second: FloatArray
     inside: BoolArray
+    direction: Callable[[int], FloatArray]
+    torque: Callable[[int], FloatArray]
 
     def factors(self, group: Group, clock: Clock, rows: IntArray) -> Iterator[tuple[int, Element]]:
         """Yield the joints that a number of a group moves at rows, shape (n,), and by how much per unit."""
-        if group.kind == "joint_offset":
-            yield group.joint or 0, 1.0
-        elif group.kind == "joint_scale":
-            yield group.joint or 0, self.own[group.joint or 0]
-        elif group.kind == "compliance":
-            yield group.joint or 0, self.second[group.joint or 0]
-        else:
+        if group.kind == "servo_lag":
+            yield from ((j, -clock.direction * rate) for j, rate in enumerate(self.own_rate))
+        elif group.joint is None:
             by = clock.flow(group, rows)
             yield from ((j, rate * by) for j, rate in enumerate(self.rate))
+        else:
+            yield group.joint, self._factor(group.kind, group.joint, clock)
+
+    def _factor(self, kind: str, j: int, clock: Clock) -> Element:
+        if kind == "joint_scale":
+            return self.own[j]
+        if kind == "compliance":
+            return self.second[j]
+        if kind == "joint_lag":
+            return clock.direction * self.rate[j]
+        if kind == "backlash":
+            return 0.5 * self.direction(j)
+        return self.torque(j) if kind == "sag" else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +114,16 @@ class Motion:
         value: In any unit, shape (k, m).
         rate: First derivative, in that unit a second [s], shape (k, m).
         second: Second derivative, in that unit a second squared [s2], shape (k, m).
+        noise: Root mean square noise of the first derivative, in its unit, shape (k,); None if there is none.
     """
 
     t: FloatArray
     value: FloatArray
     rate: FloatArray
     second: FloatArray
+    noise: FloatArray | None = None
+    _directions: dict[tuple[Edits, int], FloatArray] = field(default_factory=dict, init=False)
+    _torques: dict[Edits, tuple[FloatArray, BoolArray]] = field(default_factory=dict, init=False)
 
     def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
         """Return value, rate and second derivative at some times, and which lie within its own.
@@ -118,7 +154,13 @@ class Motion:
         return np.asarray(np.where(t - self.t[before] <= self.t[after] - t, before, after))
 
     def joints(
-        self, state: State, groups: Sequence[Group], clock: Clock, sample: IntArray, rows: IntArray
+        self,
+        state: State,
+        groups: Sequence[Group],
+        clock: Clock,
+        sample: IntArray,
+        rows: IntArray,
+        chain: Chain | None = None,
     ) -> Joints:
         """Return the joints of some rows as an explanation has them.
 
@@ -128,24 +170,120 @@ class Motion:
             clock: The times of all rows.
             sample: Rows of the log, shape (n,).
             rows: Indices of those that are asked for, shape (k,).
+            chain: The arm that gravity pulls at; needed where there are groups of sag.
         """
-        q, rate, second, inside = self.at(clock.at(state, groups, rows))
-        for edit in state.edits:
-            q, rate, second = edit.of_joints(sample[rows], q, rate, second)
-        own, q, rate = q, q.copy(), rate.copy()
-        for group in groups:
-            value = float(state.values[group.columns[0]])
-            if group.joint is None or not value:
+        at = clock.at(state, groups, rows)
+        edits = tuple(edit for edit in state.edits if edit.joints)
+        own, own_rate, second, inside = self._edited(edits, at, sample[rows])
+        taken = [(one, float(state.values[one.columns[0]])) for one in groups if not one.twists]
+        taken = [(group, value) for group, value in taken if value]
+        for group, value in taken:
+            if group.kind == "joint_lag" and group.joint is not None:
+                late = self._edited(edits, at + clock.direction * value, sample[rows])
+                for part, other in zip((own, own_rate, second), late[:3], strict=True):
+                    part[group.joint] = other[group.joint]
+                inside = inside & late[3]
+        nearest = self.nearest(at)
+        q, rate = own.copy(), own_rate.copy()
+        joints = Joints(
+            q, rate, own, own_rate, second, inside,
+            partial(self._direction, edits, clock, sample, nearest),
+            partial(self._torque, edits, clock, sample, nearest, chain),
+        )  # fmt: skip
+        for group, value in taken:
+            if group.kind in SHIFTING_TIME:
                 continue
-            j = group.joint
-            if group.kind == "joint_offset":
-                q[j] += value
-            elif group.kind == "joint_scale":
-                q[j] += value * own[j]
-                rate[j] *= 1.0 + value
-            else:
-                q[j] += value * second[j]
-        return Joints(q, rate, own, second, inside)
+            for j, factor in joints.factors(group, clock, rows):
+                q[j] += value * factor
+            if group.kind == "joint_scale":
+                rate[group.joint] += value * own_rate[group.joint]
+            elif group.kind == "servo_lag":
+                rate -= clock.direction * value * second
+        return joints
+
+    def _edited(
+        self, edits: Edits, at: FloatArray, log_rows: IntArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+        """Return `at` of some times with what is there or not, in the log's rows at these times."""
+        q, rate, second, inside = self.at(at)
+        for edit in edits:
+            q, rate, second = edit.of_joints(log_rows, q, rate, second)
+        return q, rate, second, inside
+
+    def _direction(
+        self, edits: Edits, clock: Clock, sample: IntArray, nearest: IntArray, j: int
+    ) -> FloatArray:
+        """Return which way a joint moves at some samples, or moved last, shape of `nearest`.
+
+        Noise does not move it: it moves where its rate is beyond that; before, it is as it moves first.
+        """
+        if not any(j in edit.joints for edit in edits):
+            edits = ()
+        if (edits, j) not in self._directions:
+            rate, noise = self.rate, np.zeros(len(self.rate)) if self.noise is None else self.noise
+            parts = np.diag(noise)  # a joint that includes another has the noise of both
+            every = self._log_rows(clock, sample, np.arange(len(self.t)))
+            for edit in edits:
+                rate = edit.of_joints(every, rate, rate)[1]
+                parts = edit.of_joints(np.arange(len(noise)), parts, parts)[1]
+            moves = np.flatnonzero(np.abs(rate[j]) > MOVING * np.linalg.norm(parts[j]))
+            last = np.maximum(np.searchsorted(moves, np.arange(len(self.t)), side="right") - 1, 0)
+            signs = np.sign(rate[j][moves[last]]) if len(moves) else np.zeros(len(self.t))
+            self._directions[edits, j] = signs
+        return self._directions[edits, j][nearest]
+
+    def _torque(
+        self,
+        edits: Edits,
+        clock: Clock,
+        sample: IntArray,
+        nearest: IntArray,
+        chain: Chain | None,
+        j: int,
+    ) -> FloatArray:
+        """Return what holds a joint against gravity at some samples, each computed once."""
+        assert chain is not None  # without an arm there is no group of sag
+        if edits not in self._torques:
+            self._torques[edits] = np.zeros_like(self.value), np.zeros(len(self.t), dtype=bool)
+        torques, known = self._torques[edits]
+        new = np.unique(nearest[~known[nearest]])
+        if len(new):
+            q = self.value[:, new]
+            for edit in edits:
+                (q,) = edit.of_joints(self._log_rows(clock, sample, new), q)
+            torques[:, new] = gravity_torques(chain, q)
+            known[new] = True
+        return np.asarray(torques[j, nearest])
+
+    def _log_rows(self, clock: Clock, sample: IntArray, at: IntArray) -> IntArray:
+        """Return the rows of the log that some samples stand beside, shape of `at`."""
+        return sample[np.minimum(np.searchsorted(clock.t, self.t[at]), len(sample) - 1)]
+
+
+def has_masses(chain: Chain) -> bool:
+    """Return whether gravity pulls at an arm itself; else it is taken to pull at its tool centre point."""
+    return any(one.mass != 0.0 for one in chain.inertials)
+
+
+def gravity_torques(chain: Chain, q: FloatArray) -> FloatArray:
+    """Return what the joints of an arm at rest give against gravity, shape (joints, n).
+
+    Args:
+        chain: The arm; of one without masses it is what 1 kg at its tool centre point takes.
+        q: Joints in [rad] or [m], shape (joints, n).
+
+    Returns:
+        In [N m] of joints that turn, in [N] of those that slide.
+    """
+    still = [0.0] * len(q)
+    if has_masses(chain):
+        torques = inverse_dynamics(chain, [*q], still, still)
+    else:
+        torques = [-dot(chain.gravity, column[:3]) for column in jacobian(chain, [*q])]
+    found = np.empty_like(q)
+    for row, torque in zip(found, torques, strict=True):
+        row[:] = torque
+    return np.asarray(np.where(np.abs(found) < WEIGHTLESS, 0.0, found))
 
 
 QUIET = 0.05
@@ -168,17 +306,17 @@ def motion_of(t: FloatArray | None, values: FloatArray) -> Motion:
     none = np.zeros_like(values)
     if t is None or count < 3:
         return Motion(np.arange(count, dtype=float) if t is None else t, values, none, none)
-    rate, second = none, none.copy()
-    for row, first, other in zip(values, rate, second, strict=True):
+    rate, second, noise = none, none.copy(), np.zeros(len(values))
+    for k, row in enumerate(values):
         known = np.isfinite(row)
         if known.sum() > 3:
             whole = np.interp(t, t[known], row[known])
-            first[:], other[:] = (_derivative(t, whole, order) for order in (1, 2))
-    return Motion(t, values, rate, second)
+            (rate[k], noise[k]), (second[k], _) = (_derivative(t, whole, order) for order in (1, 2))
+    return Motion(t, values, rate, second, noise)
 
 
-def _derivative(t: FloatArray, values: FloatArray, order: int) -> FloatArray:
-    """Return the first or second derivative, by means of as few samples as its noise allows.
+def _derivative(t: FloatArray, values: FloatArray, order: int) -> tuple[FloatArray, float]:
+    """Return the first or second derivative, by means of as few samples as its noise allows, and its noise.
 
     The noise of a sample is told by third differences, which take the motion away: their variance is 20
     times that of a sample.
@@ -191,7 +329,7 @@ def _derivative(t: FloatArray, values: FloatArray, order: int) -> FloatArray:
         step = reach * float(np.median(np.diff(t)))
         left = noise / np.sqrt(reach) * (np.sqrt(0.5) / step if order == 1 else np.sqrt(6.0) / step**2)
         if left <= QUIET * float(np.sqrt(np.mean(found**2))) or 2 * reach * WIDEST > len(t):
-            return found
+            return found, float(left)
         reach *= 2
 
 

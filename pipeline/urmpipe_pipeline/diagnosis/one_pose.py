@@ -9,7 +9,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, fitted
 from urmpipe_pipeline.diagnosis.hypotheses import State, zero
-from urmpipe_pipeline.diagnosis.result import Alternative, Cause, rms
+from urmpipe_pipeline.diagnosis.result import Alternative, Cause, Kind, rms
 
 
 def tool_hypotheses(model: Model, held: float) -> tuple[tuple[Alternative, ...], FloatArray]:
@@ -38,16 +38,16 @@ def _agreeing(model: Model, held: float) -> Iterator[tuple[Cause, State]]:
     every = np.arange(model.rows)
     rows = Rows(every, np.ones(len(model.blocks)) * (model.blocks == 0))  # positions alone
     before = rms(model.deviation(zero(model.groups), every).T)
-    shifts = {group.kind: group for group in model.groups if group.kind in ("tool_shift", "base_shift")}
-    for kind in ("tool_shift", "base_shift"):
+    kinds: tuple[Kind, ...] = ("tool_shift", "base_shift")
+    shifts = {group.kind: group for group in model.groups if group.kind in kinds and group.axis is None}
+    for kind in kinds:
         if kind in shifts:
             state = fitted(model, zero(model.groups), [shifts[kind]], rows)
             after = rms(model.deviation(state, every).T)
             if after <= held:
                 value = tuple(state.of(shifts[kind]).tolist())
-                share = 1.0 - (after / before) ** 2
                 yield (
                     Cause(kind, shifts[kind].name, value=value, unit="m", rms_before=before, rms_after=after,
-                          share=share),
+                          rms_alone=after),
                     state,
                 )  # fmt: skip

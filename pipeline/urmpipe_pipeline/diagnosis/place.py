@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,9 +12,18 @@ from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.elementwise import Vector, add, cross
 from urmpipe_models.kinematics.identification import changed_frames, columns_of
 from urmpipe_models.transform import Transform
-from urmpipe_pipeline.diagnosis.arm import add_columns, ordered_twists, turn_between
-from urmpipe_pipeline.diagnosis.hypotheses import Group, State
+from urmpipe_pipeline.diagnosis.arm import (
+    add_columns,
+    as_read,
+    axes_of,
+    ordered_twists,
+    pose_residual,
+    turn_between,
+    unit_of,
+)
+from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
+from urmpipe_pipeline.log_edits import IDENTITY, Edits
 
 TOOL = 1
 """The place of the tool; that of the base is 0."""
@@ -23,6 +32,8 @@ TOOL = 1
 @dataclass(frozen=True, eq=False)
 class PlaceModel:
     """Where a log recorded its tool centre point, beside where the reference has it: base @ pose @ tool.
+
+    Residuals are in the unit that the reference was read in, whatever the unit of either side is.
 
     Attributes:
         groups: What may differ by some amount.
@@ -62,15 +73,21 @@ class PlaceModel:
         return np.nan_to_num(np.pad(turned, ((0, 0), (1, 1)), mode="edge"))
 
     def residual(self, state: State, rows: IntArray) -> FloatArray:
-        """Return what an explanation leaves: data - model in [m] and [rad], shape (c, n)."""
+        """Return data - model of an explanation in [m] as the data were read and [rad], shape (c, n)."""
         return self.linear(state, rows, ())[0]
 
+    def residuals(self, every: Sequence[Edits], rows: IntArray) -> FloatArray:
+        """Return the residual of explanations without numbers, by their edits, shape (len(every), c, n)."""
+        nothing = zero(self.groups)
+        lefts = [self.residual(replace(nothing, edits=edits), rows) for edits in every]
+        return np.array(lefts).reshape(-1, len(self.blocks), len(rows))
+
     def deviation(self, state: State, rows: IntArray) -> FloatArray:
-        """Return what an explanation leaves of positions in [m], shape (3, n)."""
-        return self.residual(state, rows)[:3]
+        """Return what an explanation leaves of positions in true [m], shape (3, n)."""
+        return unit_of(state.edits, "reference") * self.residual(state, rows)[:3]
 
     def wanted(self, rows: IntArray) -> FloatArray:
-        """Return where the tool centre point should be in [m], shape (3, n)."""
+        """Return where the tool centre point should be in [m] as it was read, shape (3, n)."""
         return self.position[:, rows]
 
     def linear(
@@ -84,21 +101,19 @@ class PlaceModel:
             groups: Whose numbers; all by default.
 
         Returns:
-            The residual in [m] and [rad], shape (c, n), and the Jacobian per unit of each number, in order
-            of the groups, shape (p, c, n).
+            The residual as `residual` has it, shape (c, n), and the Jacobian of the model per unit of each
+            number, in order of the groups, shape (p, c, n).
         """
         taken = self.groups if groups is None else groups
         pose, velocity, spin, inside = self._looked_up(state, rows)
         ordered = ordered_twists(self.groups)
         changes = [(twist, float(state.values[c])) for twist, c in ordered]
-        (base, tool), located = changed_frames((Transform(), Transform()), changes)
+        turned = Transform(axes_of(state.edits, "base_rotation") or IDENTITY)
+        (base, tool), located = changed_frames((turned, Transform()), changes)
         before = base @ pose
         there = before @ tool
-        left = np.empty((len(self.blocks), len(rows)))
-        left[:3] = _factor(state, "reference") * self.position[:, rows] - np.array(there.translation)
-        if self.rotation is not None:
-            left[3:] = turn_between(there, self.rotation[:, :, rows])
-        left[:, ~inside] = np.nan
+        rotation = None if self.rotation is None else self.rotation[:, :, rows]
+        left = pose_residual(there, state.edits, self.position[:, rows], rotation, inside, "reference")
         wanted = {c for group in taken for c in group.columns}
         twists = [(twist, c) for twist, (_, c) in zip(located, ordered, strict=True) if c in wanted]
         found = columns_of((Transform(), before), there.translation, [twist for twist, _ in twists])
@@ -108,13 +123,13 @@ class PlaceModel:
         moving = add(base.rotate(velocity), cross(turning, before.rotate(tool.translation)))
         flow = (*moving, *turning)
         add_columns(columns, taken, moved, lambda group: [(flow, self.clock.flow(group, rows))])
-        return left, columns
+        return left, as_read(columns, state.edits, "reference")
 
     def _looked_up(self, state: State, rows: IntArray) -> tuple[Transform, Vector, Vector, BoolArray]:
         """Return the log's poses, velocities and spins at the times of rows, and which lie within its own."""
         at = self.clock.at(state, self.groups, rows)
         position, velocity, _, inside = self.motion.at(at)
-        factor = _factor(state, "log")
+        factor = unit_of(state.edits, "log")
         pose = Transform(translation=_vector(factor * position))
         spin = np.zeros_like(velocity)
         if self.turns is not None:
@@ -125,11 +140,6 @@ class PlaceModel:
                 _transform(turns + np.cross(on, turns, axisa=0, axisb=0, axisc=0)).rotation, pose.translation
             )
         return pose, _vector(factor * velocity), _vector(spin), inside
-
-
-def _factor(state: State, side: str) -> float:
-    """Return what the positions of a side are to be multiplied by."""
-    return next((edit.value for edit in state.edits if edit.name.startswith(side)), 1.0)
 
 
 def _vector(values: FloatArray) -> Vector:

@@ -14,18 +14,27 @@ from urmpipe_models.orientation import matrices
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.arm_groups import (
-    arm_groups,
     base_groups,
+    cause_groups,
     joint_groups,
     time_groups,
     tool_groups,
 )
-from urmpipe_pipeline.diagnosis.hypotheses import numbered
+from urmpipe_pipeline.diagnosis.hypotheses import Group, numbered
 from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion, motion_of
 from urmpipe_pipeline.diagnosis.place import TOOL, PlaceModel
 from urmpipe_pipeline.diagnosis.result import NotLookedFor
-from urmpipe_pipeline.log_edits import Edits, robot_edits, sign_edits, swap_edits, unit_edits
+from urmpipe_pipeline.log_edits import (
+    Edits,
+    axis_edits,
+    coupling_edits,
+    joint_unit_edits,
+    robot_edits,
+    sign_edits,
+    swap_edits,
+    unit_edits,
+)
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
 from urmpipe_pipeline.runs.results import Run
 
@@ -49,18 +58,13 @@ PARTS = (1, 2, 5, 10)
 WHOLE = 0.01
 """A value is a multiple of a step if it is no further off than this share of one."""
 
-STRUCTURE = ("link_length", "tilt")
+STRUCTURE = ("link_length", "link_shift", "tilt")
 JOINTS = (
-    "joint_sign",
-    "joint_offset",
-    "joint_scale",
-    "compliance",
-    "joints_swapped",
-    "half_turn",
-    "mirrored",
-)
+    "joint_sign", "joints_swapped", "joint_unit", "joint_coupled", "half_turn", "mirrored",
+    "joint_offset", "joint_scale", "joint_lag", "servo_lag", "compliance", "backlash", "sag",
+)  # fmt: skip
 FRAMES = ("base_shift", "base_rotation", "tool_shift", "tool_rotation")
-TIME = ("time_lag", "clock_drift")
+TIME = ("time_lag", "clock_drift", "servo_lag", "joint_lag", "compliance", "backlash")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,7 +126,7 @@ def _of_joints(matched: Matched, reference: Side, log: Side) -> Question:
     run = log.run
     sliding = tuple(unit == "m" for unit in run.joint_units)
     units = ["m" if one else "rad" for one in sliding]
-    groups = numbered([*joint_groups(units, run.log.joints), *(time_groups() if run.timed else ())])
+    groups = numbered(joint_groups(units, run.log.joints, run.robot, timed=run.timed))
     q = np.asarray(matched.reference_q).T
     model = JointsModel(
         groups, _motion(run), _clock(matched, run, log=True), matched.sample, q, sliding, run.robot
@@ -138,9 +142,13 @@ def _of_joints(matched: Matched, reference: Side, log: Side) -> Question:
         else "none was recorded"
     )
     reason = f"both sides have joints: only a recorded tool centre point tells them, {alone}"
-    told = NotLookedFor((*STRUCTURE, *FRAMES, "path_unit", "other_robot"), reason)
-    edits = (*sign_edits(len(sliding), most=len(sliding)), *swap_edits(len(sliding)))
+    told = NotLookedFor((*STRUCTURE, *FRAMES, "base_mirrored", "path_unit", "other_robot"), reason)
     turning = tuple(not one for one in sliding)
+    edits = (
+        *sign_edits(len(sliding), most=len(sliding)), *swap_edits(len(sliding)),
+        *joint_unit_edits(turning), *coupling_edits(turning),
+    )  # fmt: skip
+    bare = () if run.robot else (NotLookedFor(("sag",), "without a robot gravity is unknown"),)
     return Question(
         model,
         edits,
@@ -151,7 +159,7 @@ def _of_joints(matched: Matched, reference: Side, log: Side) -> Question:
         rounding,
         (),
         1.0,
-        (told, *_untimed(run)),
+        (told, *bare, *_untimed(run)),
     )
 
 
@@ -168,9 +176,7 @@ def _of_arm(matched: Matched, reference: Side, log: Side) -> Question:
     rotation = _turned(quat)
     names, timed = run.log.joints, log.run.timed
     open_frames = other.run.log.measured
-    groups = numbered(
-        [*arm_groups(robot, names, turned=rotation is not None), *(time_groups() if timed else ())]
-    )
+    groups = numbered(cause_groups(robot, names, turned=rotation is not None, timed=timed))
     clock = _clock(matched, log.run, log=log.by_joints)
     model = ArmModel(
         robot, groups, _motion(run), clock, matched.sample, position.T.copy(), rotation, open_frames
@@ -180,10 +186,14 @@ def _of_arm(matched: Matched, reference: Side, log: Side) -> Question:
         + _between(matched, reference.trajectory, reference.trajectory.position) ** 2
     )  # fmt: skip
     rounding = np.concatenate((rounding, np.zeros(len(model.blocks) - 3)))
-    count = len(robot.moving)
-    edits = (*sign_edits(count, most=2 if open_frames else count), *swap_edits(count), *robot_edits(robot))
+    count, turning = len(robot.moving), tuple(joint.kind == "revolute" for joint in robot.moving)
+    edits = (
+        *sign_edits(count, most=2 if open_frames else count), *swap_edits(count),
+        *joint_unit_edits(turning), *coupling_edits(turning),
+        *axis_edits(base_known=not open_frames), *robot_edits(robot),
+    )  # fmt: skip
     edits += () if open_frames else tuple(unit_edits("reference" if log.by_joints else "log"))
-    forced = tuple(g for g, group in enumerate(groups) if open_frames and group.kind in FRAMES)
+    forced = tuple(g for g, group in enumerate(groups) if open_frames and _whole_frame(group))
     told = [
         NotLookedFor(
             ("turns",), "whole turns do not move the tool centre point: only joints on both sides show them"
@@ -195,7 +205,6 @@ def _of_arm(matched: Matched, reference: Side, log: Side) -> Question:
         told.append(
             NotLookedFor((*FRAMES, "path_unit"), "measured in a frame of its own: base and tool are unknown")
         )
-    turning = tuple(joint.kind == "revolute" for joint in robot.moving)
     return Question(
         model, edits, turning, names, _own_names(run), matched.sample, rounding, forced,
         1.0 if log.by_joints else -1.0, (*told, *_untimed(log.run)),
@@ -209,7 +218,7 @@ def _of_places(matched: Matched, reference: Side, log: Side) -> Question:
     oriented = _turned(quat) is not None
     rotation = _turned(matched.reference_quat) if oriented else None
     tool = tool_groups(Transform(), TOOL, turned=rotation is not None) if oriented else ()
-    groups = numbered([*base_groups(Transform()), *tool, *(time_groups() if run.timed else ())])
+    groups = numbered([*tool, *base_groups(Transform()), *(time_groups() if run.timed else ())])
     trajectory = log.trajectory
     turns = None if trajectory.quat_xyzw is None or not oriented else _matrices(trajectory.quat_xyzw)
     model = PlaceModel(
@@ -228,7 +237,7 @@ def _of_places(matched: Matched, reference: Side, log: Side) -> Question:
         told.append(NotLookedFor(("tool_rotation",), "the reference has no orientation"))
     return Question(
         model,
-        tuple(unit_edits("reference", "log")),
+        (*axis_edits(base_known=True), *unit_edits("reference", "log")),
         (),
         (),
         (),
@@ -240,6 +249,10 @@ def _of_places(matched: Matched, reference: Side, log: Side) -> Question:
     )
 
 
+def _whole_frame(group: Group) -> bool:
+    return group.kind in FRAMES and group.axis is None
+
+
 def _own_names(run: Run) -> tuple[str, ...]:
     """Return what an arm calls its joints; without one what the log calls them."""
     return run.log.joints if run.robot is None else run.robot.coordinates
@@ -248,7 +261,7 @@ def _own_names(run: Run) -> tuple[str, ...]:
 def _untimed(run: Run) -> Iterator[NotLookedFor]:
     """Yield that still poses tell nothing of time."""
     if not run.timed:
-        yield NotLookedFor((*TIME, "compliance"), "still poses have no time")
+        yield NotLookedFor(TIME, "still poses have no time")
 
 
 def _clock(matched: Matched, run: Run, *, log: bool) -> Clock:
