@@ -20,7 +20,7 @@ from urmpipe_models.repolarizer import repolarize
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.arm_groups import cause_groups
 from urmpipe_pipeline.diagnosis.edits import later_edits
-from urmpipe_pipeline.diagnosis.found import Explanation, Found
+from urmpipe_pipeline.diagnosis.search import Explanation, SearchResult as Found
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, numbered
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
 from urmpipe_pipeline.diagnosis.search import Search

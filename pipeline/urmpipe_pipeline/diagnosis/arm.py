@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -184,6 +185,27 @@ class ArmModel:
         rotation = None if self.rotation is None else self.rotation[:, :, rows]
         return pose_residual(pose, edits, self.position[:, rows], rotation, inside)
 
+    @cached_property
+    def reach(self) -> float:
+        """The sum of the arm's lengths in [m]."""
+        return sum(float(np.linalg.norm(frame.translation)) for frame in self.chain.frames[1:])
+
+    def motions(
+        self, state: State, rows: IntArray, groups: Sequence[Group]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return what positions leave, and how each number of some groups moves and turns the tool.
+
+        Args:
+            state: The explanation.
+            rows: Rows, by index, shape (n,).
+            groups: Whose numbers.
+
+        Returns:
+            The residual in [m], shape (3, n); velocities in [m] and turns in [rad] per unit, (p, 3, n) each.
+        """
+        left, columns = self._linear(state, rows, groups, 6)
+        return left[:3], columns[:, :3], columns[:, 3:]
+
     def linear(
         self, state: State, rows: IntArray, groups: Sequence[Group] | None = None
     ) -> tuple[FloatArray, FloatArray]:
@@ -198,7 +220,11 @@ class ArmModel:
             The residual as `residual` has it, shape (c, n), and the Jacobian of the model per unit of each
             number, in the order of the groups, shape (p, c, n).
         """
-        taken = self.groups if groups is None else groups
+        return self._linear(state, rows, self.groups if groups is None else groups, len(self.blocks))
+
+    def _linear(
+        self, state: State, rows: IntArray, taken: Sequence[Group], components: int
+    ) -> tuple[FloatArray, FloatArray]:
         joints = self._joints(state, rows)
         chain, located = self.arm(state)
         q = list(joints.q)
@@ -209,7 +235,7 @@ class ArmModel:
         velocities = dict(zip(distinct, sensitivities(chain, q, [*distinct.values()]), strict=True))
         moved = {c: velocities[id(twist)] for twist, c in twists}
         by_joint = jacobian(chain, q) if any(not group.twists for group in taken) else ()
-        columns = np.zeros((len(wanted), len(self.blocks), len(rows)))
+        columns = np.zeros((len(wanted), components, len(rows)))
         add_columns(
             columns, taken, moved,
             lambda group: [(by_joint[j], by) for j, by in joints.factors(group, self.clock, rows)],

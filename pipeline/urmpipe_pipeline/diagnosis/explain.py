@@ -274,14 +274,13 @@ class ExplanationBuilder:
         """Return a cause that is there or not."""
         joints = tuple(self.names[j] for j in edit.joints)
         name = edit.name or " and ".join(self.own_names[j] for j in edit.joints)
-        value, unit = {
-            "path_unit": ((edit.value,), ""), "turns": ((edit.value,), "turns"), "joint_unit": ((edit.value,), ""),
-            "joint_coupled": ((edit.value,), ""), 
-        }.get(edit.kind, ((), ""))  # fmt: skip
-        begins = edit.kind in ("half_turn", "mirrored", "turns") and edit.first > 0
-        return Cause(
-            edit.kind, name, joints, value=value, unit=unit, from_sample=edit.first if begins else None
-        )
+        if edit.kind == "base_rotation":
+            axis, angle = edit.axis_angle
+            return Cause(edit.kind, name, axis=axis, value=(angle,), unit="rad")
+        value = (edit.value,) if edit.kind in ("path_unit", "joint_unit", "joint_coupled", "turns") else ()
+        first = edit.first if edit.kind in ("half_turn", "mirrored", "turns") and edit.first else None
+        unit = "turns" if edit.kind == "turns" else ""
+        return Cause(edit.kind, name, joints, value=value, unit=unit, from_sample=first)
 
     def _of_group(self, g: int, one: Explanation, twins: dict[Part, list[str]]) -> Cause:
         """Return a cause of some size, with its interval and its twins."""
