@@ -17,7 +17,6 @@ from urmpipe_pipeline.accuracy.result import Accuracy
 from urmpipe_pipeline.comparison import exports as comparison_exports
 from urmpipe_pipeline.comparison import presenter as comparison
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.diagnosis import presenter as diagnosis
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.networks import presenter as networks
 from urmpipe_pipeline.networks.result import NetworkResult
@@ -63,7 +62,7 @@ class Kind:
 KINDS: tuple[Kind, ...] = (
     Kind("run", Run, runs.present, run_exports.exports),
     Kind("comparison", Comparison, comparison.present, comparison_exports.exports),
-    Kind("diagnosis", Diagnosis, diagnosis.present),
+    Kind("diagnosis", Diagnosis, comparison.present_diagnosis),
     Kind("simulation", Simulation, simulations.present, simulation_exports.exports),
     Kind("solved targets", SolvedTargets, solved_targets.present, solved_targets.exports),
     Kind("plan", PlannedPath, planned_paths.present, planned_paths.exports),

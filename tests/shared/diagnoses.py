@@ -8,16 +8,21 @@ from urmpipe_pipeline.diagnosis.result import (
     Cause,
     Diagnosis,
     NotLookedFor,
+    OwnTcp,
+    Refused,
     Remainder,
     rms,
 )
 from urmpipe_pipeline.joint_log import LogWarning
 
-SIGN = Cause("joint_sign", "phi3", ("q3",), rms_before=0.4, rms_after=0.001, share=0.998)
+SIGN = Cause(
+    "joint_sign", "phi3", ("q3",), rms_before=0.4, rms_after=0.0015, rms_alone=0.0015,
+    effect=0.8, breaks=True,
+)  # fmt: skip
 LENGTH = Cause(
     "link_length", "r_4", segment="p4", axis=(0.0, 0.0, 1.0), value=(0.0012,), unit="m", low=(0.0011,),
-    high=(0.0013,), from_sample=3, twins=("d_5", "tool shift z"), rms_before=0.4, rms_after=0.399,
-    share=0.002,
+    high=(0.0013,), from_sample=3, twins=("d_5", "tool shift z"), rms_before=0.0015, rms_after=0.001,
+    rms_alone=0.3995, effect=0.0012,
 )  # fmt: skip
 BASE = Cause(
     "base_rotation",
@@ -29,6 +34,8 @@ BASE = Cause(
 )
 OFFSET = Cause("joint_offset", "phi1", ("q1",), value=(0.002,), unit="rad", low=(0.0019,), high=(0.0021,))
 
+TWIN = Cause("link_length", "d_5", value=(-0.3,), unit="m", rms_before=0.001, rms_after=0.0009)
+
 
 def diagnosis_of(one: Deviation) -> Diagnosis:
     """Return a diagnosis of a compared log that mends every second sample but for a hundredth."""
@@ -38,5 +45,6 @@ def diagnosis_of(one: Deviation) -> Diagnosis:
         (Alternative((BASE,), "phi5"), Alternative((OFFSET,), "phi5")),
         (NotLookedFor(("tool_rotation",), "the reference has no orientation"),),
         Remainder(rms(mended), 1e-4, "the digits of the log"), one.sample[::2], mended,
-        (LogWarning("short", "the motion is short"),),
+        (LogWarning("short", "the motion is short"),), refused=(Refused((TWIN,), "it cancels r_4", "phi5"),),
+        own_tcp=(OwnTcp("log", 5e-5, 1e-4, agrees=True), OwnTcp("sim", 0.01, 0.02, agrees=False)), origin="sim",
     )  # fmt: skip

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_models.kinematics.identification import Twist, changed_frames
 from urmpipe_models.messages import Hint
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline import text
@@ -19,6 +20,7 @@ from urmpipe_pipeline.comparison.warnings import rests
 from urmpipe_pipeline.comparison.wording import decided_words, out_words, size_of, stretch_words, used_words
 from urmpipe_pipeline.diagnosis.diagnose import LEAST_SAMPLES
 from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts
+from urmpipe_pipeline.diagnosis.result import Cause
 from urmpipe_pipeline.presentation.section import Advice, Fact, Place, Ref, Value
 from urmpipe_pipeline.runs.parts import log_facts
 
@@ -101,7 +103,8 @@ def _why(one: Deviation, result: Comparison) -> Iterator[Fact]:
     """Yield why a log deviates, or what says so."""
     if one.diagnosis is not None:
         several = len(result.runs) > 1  # else the answer stands with the verdict
-        yield from (replace(fact, brief=fact.brief and several) for fact in diagnosis_facts(one.diagnosis))
+        facts = diagnosis_facts(one.diagnosis, remedy_hints(one))
+        yield from (replace(fact, brief=fact.brief and several) for fact in facts)
     yield from (replace(fact, brief=False) for fact in _undiagnosed(one))
 
 
@@ -207,6 +210,45 @@ def _alignment(one: Deviation) -> Iterator[Fact]:
             moved = Hint("base", _given(arm.base), "moves the arm")
             hints = [moved, replace(hints[0], does="moves its tool as well")]
         yield Fact("To apply this permanently", Advice(hints=tuple(hints)))
+
+
+def remedy_hints(one: Deviation) -> list[Hint]:
+    """Return the parameters that remove causes of a diagnosed log, with their complete new values."""
+    diagnosis, robot = one.diagnosis, one.run.robot
+    if diagnosis is None or diagnosis.remainder.different:
+        return []
+    hints = []
+    for cause in diagnosis.causes:
+        if cause.kind == "time_lag":
+            hints.append(Hint("sync", float(f"{one.sync.offset + cause.value[0]:.6g}"), "sets the clocks"))
+        elif cause.kind == "joint_unit":
+            unit = "deg" if cause.value[0] < 1.0 else "rad"
+            hints.append(Hint("unit", {cause.joints[0]: unit}, "reads it so"))
+        elif cause.kind == "other_robot":
+            hints.append(Hint("robot", cause.name, "takes this arm"))
+    by_joints = all("joint_offset" not in untested.kinds for untested in diagnosis.not_looked_for)
+    if robot is not None and by_joints:  # poses that a log recorded have another base and tool than its arm
+        base, tool = _corrected_frames(diagnosis.causes, robot.base, robot.tool)
+        hints += [Hint("base", _given(base), "puts the arm there")] if base != robot.base else []
+        hints += [Hint("tool", _given(tool), "sets this tool")] if tool != robot.tool else []
+    return hints
+
+
+def _corrected_frames(causes: Sequence[Cause], base: Transform, tool: Transform) -> list[Transform]:
+    """Return a base and a tool to which the shifts and then the turns of causes are added."""
+    at_base = Transform(translation=base.translation)  # shifted and turned in the world, about its origin
+    changes = []
+    for cause in sorted(causes, key=lambda cause: cause.kind.endswith("rotation")):
+        if cause.kind in ("base_shift", "base_rotation", "tool_shift", "tool_rotation"):
+            place, frame = (0, at_base) if cause.kind.startswith("base") else (1, tool)
+            turns = cause.kind.endswith("rotation")
+            axes = [cause.axis] if cause.axis else [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+            added = [
+                (Twist(place, "about" if turns else "along", axis, frame), value)
+                for axis, value in zip(axes, cause.value, strict=True)
+            ]
+            changes += reversed(added) if turns else added  # rx, ry, rz of Rz Ry Rx
+    return changed_frames((base, tool), changes)[0]
 
 
 def _given(frame: Transform) -> list[float]:

@@ -11,8 +11,8 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.wording import SYMBOLS
+from urmpipe_pipeline.diagnosis.formatting import format_cause, format_residual, joint_names
 from urmpipe_pipeline.diagnosis.result import Diagnosis
-from urmpipe_pipeline.diagnosis.wording import cause_words, joint_names, remainder_words
 from urmpipe_pipeline.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
@@ -37,7 +37,7 @@ def mended_figure(one: Deviation) -> Iterator[Figure]:
         f"Deviation over {over} without the causes",
         "What stays when the causes above are taken away. Dashed: the tolerance; tinted: out of it.",
         f"Deviation of {one.name} over {over} without the causes: {found.sentence}."
-        f" What stays: {remainder_words(found.remainder, found.unit)}.",
+        f" What stays: {format_residual(found.remainder, found.unit)}.",
         (View("delta without the causes", panels),),
         share=3.0,
         beside=True,
@@ -93,7 +93,7 @@ def cause_marks(one: Deviation, chain: Chain) -> tuple[ArmMark, ...]:
         if cause.segment in chain.point_names:
             places = [(chain.point_names.index(cause.segment) + 1, True)]
         for place in places:
-            words.setdefault(place, []).append(cause_words(cause))
+            words.setdefault(place, []).append(format_cause(cause))
     return tuple(
         ArmMark(point, text.enumerated(said), DEVIATION_COLOUR, segment)
         for (point, segment), said in words.items()

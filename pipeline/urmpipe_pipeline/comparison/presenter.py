@@ -11,7 +11,13 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.baseline_section import baseline_checks, baseline_section, worse_facts
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share
-from urmpipe_pipeline.comparison.facts import alignment_words, decisive_facts, deviation_facts, sync_words
+from urmpipe_pipeline.comparison.facts import (
+    alignment_words,
+    decisive_facts,
+    deviation_facts,
+    remedy_hints,
+    sync_words,
+)
 from urmpipe_pipeline.comparison.figures import deviation_figures, overview_figure, path_figure, speed_cloud
 from urmpipe_pipeline.comparison.iso_presenter import present_test
 from urmpipe_pipeline.comparison.scene import comparison_scene
@@ -31,7 +37,9 @@ from urmpipe_pipeline.comparison.wording import (
     verdict_words,
     when,
 )
+from urmpipe_pipeline.diagnosis import presenter as diagnosis_presenter
 from urmpipe_pipeline.diagnosis.presenter import diagnosis_tables
+from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.palette import run_colour
 from urmpipe_pipeline.presentation.parts import inputs_table, minute, provenance_table, recording_fact
 from urmpipe_pipeline.presentation.section import (
@@ -68,6 +76,14 @@ def present(result: Comparison) -> Presentation:
         created=result.provenance.created,
         word="incomplete" if result.verdict is None else "",
     )
+
+
+def present_diagnosis(diagnosis: Diagnosis) -> Presentation:
+    """Return what a diagnosis alone shows, with the parameters of its comparison that remove causes."""
+    made = diagnosis.comparison
+    runs = made.runs if isinstance(made, Comparison) else ()
+    hints = [hint for run in runs if run.name == diagnosis.name for hint in remedy_hints(run)]
+    return diagnosis_presenter.present(diagnosis, hints)
 
 
 def _against(result: Comparison) -> tuple[Fact, ...]:

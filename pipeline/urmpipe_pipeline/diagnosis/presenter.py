@@ -1,107 +1,161 @@
-"""How a diagnosis shows itself: the answer, the causes, what is undecided, what was not looked for."""
+"""Presentation of a diagnosis: the answer, what to do, tables of causes, what was not tested."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from urmpipe_pipeline.diagnosis.result import Alternative, Cause, Diagnosis
-from urmpipe_pipeline.diagnosis.wording import (
-    KINDS,
-    cause_words,
-    explained,
-    explanation_words,
-    interval_words,
-    remainder_words,
-    undecided_words,
-    value_words,
+from urmpipe_models.messages import Hint
+from urmpipe_pipeline.diagnosis.formatting import (
+    KIND_TEXTS,
+    PASSES,
+    build_remedy,
+    format_amount,
+    format_cause,
+    format_explanation,
+    format_interval,
+    format_own_tcp,
+    format_residual,
+    format_undecided,
+    format_value,
+    select_causes,
 )
+from urmpipe_pipeline.diagnosis.result import Alternative, Cause, Diagnosis, Refused
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, table_of
-from urmpipe_pipeline.presentation.section import Fact, Presentation, Section, Table, Value
+from urmpipe_pipeline.presentation.section import Advice, Fact, Presentation, Section, Table, Value
 
-ADDED = "Value: to be added to the robot or to the reading of the log, so that both sides agree."
-ALONE = (
-    "rms without it: remaining deviation if only this cause is removed. Share: of the mean square; all shares"
-    " and the remainder make up 100 %. Below 0: the cause hides a part of another."
+NOTE = (
+    "Each row: the rms before and after its cause is removed, with the causes above it removed already;"
+    " and the rms if this cause alone is removed."
 )
 
 
-def present(result: Diagnosis) -> Presentation:
-    """Return what a diagnosis alone shows; a report and a recording show the comparison that it stands in."""
-    tables = tuple(diagnosis_tables(result))
-    facts = tuple(replace(one, brief=one.name != "Undecided") for one in diagnosis_facts(result)[1:])
-    body = Section(f"Diagnosis of {result.name}", None, facts, tables, warnings=result.warnings)
-    return Presentation(result.name, result.sentence, result.verdict, (), body)
+def present(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> Presentation:
+    """Return what a diagnosis alone shows; a report and a recording show the comparison that it stands in.
+
+    Args:
+        diagnosis: The diagnosis.
+        hints: Parameters that remove causes.
+    """
+    facts = tuple(
+        replace(fact, brief=fact.name != "Undecided") for fact in diagnosis_facts(diagnosis, hints)[1:]
+    )
+    tables = tuple(diagnosis_tables(diagnosis))
+    body = Section(f"Diagnosis of {diagnosis.name}", None, facts, tables, warnings=diagnosis.warnings)
+    headline = diagnosis.sentence.removeprefix(PASSES)  # the verdict stands before it
+    return Presentation(diagnosis.name, headline, diagnosis.verdict, (), body)
 
 
-def diagnosis_facts(result: Diagnosis) -> tuple[Fact, ...]:
-    """Return the answer, what it means, what is undecided, and what stays."""
-    alone = len(result.causes) == 1  # of several the table has interval and twins
-    meant = [explained(one) for one in result.causes if alone or one.kind == "joint_sign"]
-    meaning = "; ".join(one for one in meant if one not in result.sentence)
-    undecided = undecided_words(result.undecided) if result.undecided else ""
-    stays = result.causes or result.undecided  # else the answer says so
+def diagnosis_facts(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> tuple[Fact, ...]:
+    """Return the answer, what to do, what is undecided, and what remains.
+
+    Args:
+        diagnosis: The diagnosis.
+        hints: Parameters that remove causes.
+    """
+    undecided = format_undecided(diagnosis.undecided) if diagnosis.undecided else ""
+    has_residual = diagnosis.causes or diagnosis.undecided  # else the answer says it
+    residual = format_residual(diagnosis.remainder, diagnosis.unit) if has_residual else ""
+    alone = diagnosis.causes[0] if len(diagnosis.causes) == 1 else None
+    own_tcp = "; ".join(map(format_own_tcp, diagnosis.own_tcp))
     return (
-        Fact("Cause", result.sentence, leads=True),
-        Fact("Meaning", meaning, brief=False, leads=True),
+        Fact("Cause", diagnosis.sentence, leads=True),
+        Fact("Meaning", _meaning(diagnosis, hints), brief=False, leads=True),
+        Fact("95 % interval", format_interval(alone) if alone else "", brief=False, page=False),
         Fact("Undecided", undecided, brief=False, page=False),  # the cause and a table say it
-        Fact("Twins", "; ".join(_twins(result)), page=False),  # meaning or tables of a page say it
-        Fact(
-            "Remaining deviation",
-            remainder_words(result.remainder, result.unit) if stays else "",
-            brief=False,
-            page=False,
-        ),
-        Fact("Not tested", "; ".join(_not_looked_for(result)), brief=False),
+        Fact("Twins", "; ".join(_twins(diagnosis)), page=False),  # tables of a page say it
+        Fact("Remaining deviation", residual, brief=False, page=False),
+        Fact("Own TCP", "" if diagnosis.origin else own_tcp, brief=False),
+        Fact("Not tested", "; ".join(_untested(diagnosis)), brief=False),
     )
 
 
-def _twins(result: Diagnosis) -> Iterator[str]:
+def _meaning(diagnosis: Diagnosis, hints: Sequence[Hint]) -> Advice | None:
+    """Return what to do about the causes of the answer; None without any."""
+    if not diagnosis.causes or diagnosis.remainder.different:
+        return None
+    remedies = [build_remedy(cause) for cause in select_causes(diagnosis.causes)]
+    last = {remedy.place: k for k, remedy in enumerate(remedies)}  # a place stands once, behind the last
+    steps = [
+        remedy.imperative() if last[remedy.place] == k else remedy._replace(place="").imperative()
+        for k, remedy in enumerate(remedies)
+    ]
+    return Advice("; ".join(steps), tuple(hints))
+
+
+def _twins(diagnosis: Diagnosis) -> Iterator[str]:
     """Yield causes with their twins, which the log does not tell from them."""
-    for one in (*result.causes, *(cause for each in result.undecided for cause in each.causes)):
-        if one.twins:
-            yield f"{cause_words(one)}, or its twin {' or '.join(one.twins)}"
+    alternatives = (cause for each in diagnosis.undecided for cause in each.causes)
+    for cause in (*diagnosis.causes, *alternatives):
+        if cause.twins:
+            yield f"{format_cause(cause)}, or its twin {' or '.join(cause.twins)}"
 
 
-def _not_looked_for(result: Diagnosis) -> Iterator[str]:
-    """Yield what these sides cannot tell, and why; not again what the answer gives as its reason."""
-    for one in result.not_looked_for:
-        if one.reason != result.remainder.words:
-            yield f"{', '.join(KINDS.get(kind, kind) for kind in one.kinds)} ({one.reason})"
+def _untested(diagnosis: Diagnosis) -> Iterator[str]:
+    """Yield which kinds were not tested, and why; without the reason that the answer gives."""
+    for untested in diagnosis.not_looked_for:
+        if untested.reason != diagnosis.remainder.words:
+            labels = (KIND_TEXTS[kind].label for kind in untested.kinds)
+            yield f"{', '.join(labels)} ({untested.reason})"
 
 
-def diagnosis_tables(result: Diagnosis) -> Iterator[Table]:
-    """Yield the causes, and the explanations that are not told apart."""
-    if result.causes:
-        several = len(result.causes) > 1 or result.remainder.different
-        columns = columns_of(result.causes, _heads(result.unit))
-        yield Table("Causes", columns, f"{ADDED} {ALONE}", several, page=several)
-    if result.undecided:
+def diagnosis_tables(diagnosis: Diagnosis) -> Iterator[Table]:
+    """Yield the causes, the undecided explanations, and those that are not determined."""
+    if diagnosis.causes:
+        several = len(diagnosis.causes) > 1 or diagnosis.remainder.different
+        shown = several or bool(diagnosis.causes[0].low)  # the answer has all of a cause without an interval
+        yield Table("Causes", columns_of(diagnosis.causes, _heads(diagnosis.unit)), NOTE, several, page=shown)
+    if diagnosis.undecided:
         heads = {
             "explanation": "Explanation",
             "interval": "95 % interval",
             "twins": "twins",
             "needs": "a motion that would decide",
         }
-        rows = [(explanation_words(one), *_of_causes(one), one.needs or "none") for one in result.undecided]
+        rows = [
+            (format_explanation(alternative), *_details(alternative), alternative.needs or "none")
+            for alternative in diagnosis.undecided
+        ]
         yield table_of("Undecided between", heads, rows, brief=True)
+    if diagnosis.refused:
+        heads = {
+            "explanation": "Explanation",
+            "interval": "95 % interval",
+            "twins": "twins",
+            "rms_after": "rms after",
+            "reason": "reason",
+            "needs": "a motion that would determine it",
+        }
+        refused_rows = [
+            (
+                format_explanation(refused), *_details(refused),
+                format_amount(refused.causes[-1].rms_after, diagnosis.unit) if refused.causes else "",
+                refused.reason, refused.needs or "none",
+            )
+            for refused in diagnosis.refused
+        ]  # fmt: skip
+        yield table_of("Not determined by this motion", heads, refused_rows)
 
 
-def _of_causes(one: Alternative) -> tuple[str, str]:
+def _details(explanation: Alternative | Refused) -> tuple[str, str]:
     """Return the intervals and the twins of the causes of an explanation."""
-    intervals = "; ".join(filter(None, map(interval_words, one.causes)))
-    return intervals, ", ".join(twin for cause in one.causes for twin in cause.twins)
+    intervals = "; ".join(filter(None, map(format_interval, explanation.causes)))
+    return intervals, ", ".join(twin for cause in explanation.causes for twin in cause.twins)
 
 
 def _heads(unit: str) -> Heads[Cause]:
     """Return the columns of causes; deviations are in the unit of the diagnosis."""
     return {
-        "cause": ("Cause", cause_words),
-        "value": ("value", value_words),
-        "interval": ("95 % interval", interval_words),
-        "from_row": ("from row", lambda one: None if one.from_sample is None else Value(one.from_sample + 1)),
-        "twins": ("twins", lambda one: ", ".join(one.twins)),
-        "rms_before": ("rms before", lambda one: Value(one.rms_before, unit)),
-        "rms_after": ("rms after", lambda one: Value(one.rms_after, unit)),
-        "rms_alone": ("without it alone", lambda one: Value(one.rms_alone, unit)),
+        "cause": ("Cause", format_cause),
+        "value": ("value", format_value),
+        "interval": ("95 % interval", format_interval),
+        "from_row": (
+            "from row",
+            lambda cause: None if cause.from_sample is None else Value(cause.from_sample + 1),
+        ),
+        "rms_before": ("rms before", lambda cause: Value(cause.rms_before, unit)),
+        "rms_after": ("rms after", lambda cause: Value(cause.rms_after, unit)),
+        "rms_alone": ("without it alone", lambda cause: Value(cause.rms_alone, unit)),
+        "twins": ("twins", lambda cause: ", ".join(cause.twins)),
+        "breaks_tolerance": ("alone out of tolerance", lambda cause: "yes" if cause.breaks else "no"),
     }

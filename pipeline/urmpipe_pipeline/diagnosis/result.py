@@ -11,7 +11,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.spelling import Voice
-from urmpipe_pipeline.diagnosis.wording import sentence
+from urmpipe_pipeline.diagnosis.formatting import format_summary
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
 
@@ -238,7 +238,7 @@ class Diagnosis(Result):
     @property
     def sentence(self) -> str:
         """The answer in one sentence."""
-        return sentence(self)
+        return format_summary(self)
 
     def _headline(self) -> str:
         """Return the answer."""
