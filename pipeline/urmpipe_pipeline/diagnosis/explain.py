@@ -19,6 +19,7 @@ from urmpipe_models.row_blocks import row_blocks, side_by_side
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.deciding import deciding_joint
 from urmpipe_pipeline.diagnosis.fit import BLOCK, Model, deviation, inliers
+from urmpipe_pipeline.diagnosis.formatting import short_name
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.diagnosis.intervals import batch_covariance, student_quantile
 from urmpipe_pipeline.diagnosis.joints import JointsModel
@@ -418,6 +419,3 @@ def _begin_abruptly(left: FloatArray, size: FloatArray, far: IntArray) -> bool:
                     return False
     return True
 
-
-def short_name(cause: Cause) -> str:
-    return f"{cause.kind} {cause.name} {cause.axis or ''}"
