@@ -340,9 +340,12 @@ def as_read(columns: FloatArray, edits: Edits, side: str = "") -> FloatArray:
         side: Which side the data are, in names of units; any by default.
     """
     if (mirror := axes_of(edits, "base_mirrored")) is not None:
-        columns[:, :3] = np.einsum("ij,pjn->pin", mirror, columns[:, :3])
-        columns[:, 3:] = -np.einsum("ij,pjn->pin", mirror, columns[:, 3:])  # turns count the other way
-    columns[:, :3] /= unit_of(edits, side)
+        moved, turned = columns[:, :3].copy(), columns[:, 3:].copy()
+        columns[:, :3] = np.einsum("ij,pjn->pin", mirror, moved)
+        if turned.size:
+            columns[:, 3:] = -np.einsum("ij,pjn->pin", mirror, turned)  # turns count the other way
+    if (factor := unit_of(edits, side)) != 1.0:
+        columns[:, :3] /= factor
     return columns
 
 

@@ -299,6 +299,8 @@ class Search:
         beyond: set[int] = set()
         for _ in range(ROUNDS):
             some = rows.trimmed(residual(self.model, state, rows.at))
+            if not len(some.at):  # a lag beyond the log
+                break
             selection = self._selection(state, some, tau)
             if taken is not None:
                 now = Explanation(state, taken, float(selection.scores([taken])[0]))
