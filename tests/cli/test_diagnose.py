@@ -23,6 +23,8 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.presentation.section import Advice
+from urmpipe_pipeline.results import present
 
 Captured = pytest.CaptureFixture[str]
 
@@ -34,12 +36,11 @@ ARM = ("--robot", "urm6")
 ANSWER = "module 3 (phi3) counter-rotates: rms 415.78 mm -> 0.0002 mm"
 KEYS = [
     "schema", "name", "verdict", "samples", "coverage", "judged", "unit", "rms", "causes", "undecided",
-    "not_looked_for",
-    "remainder", "warnings", "recording",
+    "refused", "own_tcp", "origin", "not_looked_for", "remainder", "warnings", "recording",
 ]  # fmt: skip
 CAUSE_KEYS = [
-    "kind", "name", "joint", "segment", "axis", "value", "unit", "interval", "from_sample", "twins",
-    "rms_before", "rms_after", "share",
+    "kind", "name", "joint", "segment", "axis", "value", "unit", "interval", "from_sample", "rows",
+    "twins", "rms_before", "rms_after", "rms_alone", "effect", "breaks_tolerance",
 ]  # fmt: skip
 
 
@@ -240,3 +241,24 @@ def test_poses_measured_from_outside_are_put_into_their_base_and_tool_first() ->
     assert found.comparison.runs[0].alignment.mode == "base+tool"
     assert (found.verdict, found.causes) == ("pass", ())
     assert found.rms < 1e-8  # the digits of the file
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("setup", "parameters"),
+    [
+        ({"tool": (0.003, -0.005, 0.002)}, ["sync", "tool"]),
+        ({"base": (0.01, -0.02, 0.03, 0.05, -0.1, 0.02)}, ["sync", "base"]),
+        ({"base": (0.3, 0.0, 0.0), "tool": (0.0, 0.01, 0.0, 0.0, 0.4, 0.0)}, ["sync", "base", "tool"]),
+        ({"sync": 0.2}, ["sync"]),
+    ],
+)
+def test_what_to_do_removes_the_causes(setup: dict[str, Any], parameters: list[str]) -> None:
+    diagnosis = urmpipe.diagnose(PATH, RIGHT, "urm6", unit="rad", **setup)
+    (meaning,) = (fact.value for fact in present(diagnosis).body.facts if fact.name == "Meaning")
+    assert isinstance(meaning, Advice)
+    given = setup | {hint.parameter: hint.value for hint in meaning.hints}
+    assert [hint.parameter for hint in meaning.hints] == parameters
+    (run,) = urmpipe.compare(PATH, RIGHT, "urm6", unit="rad", **given).runs
+    # lines between rows 0.2 s apart leave 0.1 mm that the diagnosis does not have
+    assert there(run.statistics["norm"]).rms == pytest.approx(diagnosis.remainder.rms, abs=1e-4)

@@ -32,7 +32,7 @@ def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
     """Yield why a log deviates, if that is known, and what decided the verdict: how much, when and where."""
     held, furthest = one.decisive, one.furthest
     cause = diagnosis_facts(one.diagnosis)[:1] if one.diagnosis and held is furthest else ()
-    yield from (replace(fact, page=False) for fact in cause)  # a page says it where the log stands
+    yield from (replace(fact, page=_leads_page(one)) for fact in cause)
     yield Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", Ref(one.name, colour))
     yield Fact("Decided by", decided_words(held), page=False)
     yield Fact("Decided by", ", ".join(filter(None, (size_of(held), used_words(held)))), brief=False)
@@ -42,6 +42,11 @@ def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
         yield Fact("Position", place_of(one, furthest), page=False)
     yield from _furthest_joint(one)
     yield from (replace(fact, page=False) for fact in _undiagnosed(one))
+
+
+def _leads_page(one: Deviation) -> bool:
+    """Return whether the cause of the worst log is at the top of a page: not if it passes."""
+    return one.verdict == "fail" and one.decisive is one.furthest
 
 
 def place_of(one: Deviation, held: Statistics) -> Place | None:
@@ -103,8 +108,10 @@ def _why(one: Deviation, result: Comparison) -> Iterator[Fact]:
     """Yield why a log deviates, or what says so."""
     if one.diagnosis is not None:
         several = len(result.runs) > 1  # else the answer stands with the verdict
-        facts = diagnosis_facts(one.diagnosis, remedy_hints(one))
-        yield from (replace(fact, brief=fact.brief and several) for fact in facts)
+        above = one is result.worst and _leads_page(one)
+        for fact in diagnosis_facts(one.diagnosis, remedy_hints(one)):
+            page = fact.page and not (above and fact.name == "Cause")
+            yield replace(fact, brief=fact.brief and several, page=page)
     yield from (replace(fact, brief=False) for fact in _undiagnosed(one))
 
 
@@ -220,7 +227,7 @@ def remedy_hints(one: Deviation) -> list[Hint]:
     hints = []
     for cause in diagnosis.causes:
         if cause.kind == "time_lag":
-            hints.append(Hint("sync", float(f"{one.sync.offset + cause.value[0]:.6g}"), "sets the clocks"))
+            hints.append(Hint("sync", round(one.sync.offset + cause.value[0], 6), "sets the clocks"))
         elif cause.kind == "joint_unit":
             unit = "deg" if cause.value[0] < 1.0 else "rad"
             hints.append(Hint("unit", {cause.joints[0]: unit}, "reads it so"))

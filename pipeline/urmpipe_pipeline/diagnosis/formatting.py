@@ -25,7 +25,7 @@ UNITS = {
     "rad/(N m)": ("deg/(N m)", DEGREES), "rad/kg": ("deg/kg", DEGREES),
 }  # fmt: skip  # displayed unit and its number per SI unit
 MAX_DECIMALS = 4  # 0.1 micrometres, 2 microradians, as of lengths and angles elsewhere
-MAX_CAUSES = 3  # in a summary, beside all that break the tolerance; a table has the others
+MAX_CAUSES = 3  # in a summary, with all that break the tolerance; a table has the others
 MAX_LISTED = 2  # undecided explanations in a summary; a table has the others
 MIN_EXPLAINED = 1.0 / 3.0  # fraction of the rms; with less, the summary says that it explains little
 CLOCKS = ("time_lag", "clock_drift")
@@ -110,8 +110,8 @@ def _format_others(cause: Cause, diagnosis: Diagnosis, *, is_last: bool) -> str:
     if not is_last:
         return f"without {'them' if len(cause.rows) > 1 else 'it'} {rms} rms"
     agrees = cause.rms_after < MIN_EXPLAINED * cause.rms_before
-    others = f"the other {diagnosis.samples - len(cause.rows)}"
-    return f"{others} agree within {rms} rms" if agrees else f"{others} are off by {rms} rms"
+    rest = f"the other {diagnosis.samples - len(cause.rows)}"
+    return f"{rest} agree within {rms} rms" if agrees else f"{rest} are off by {rms} rms"
 
 
 def _format_more(diagnosis: Diagnosis, listed: Sequence[Cause]) -> str:
@@ -254,7 +254,9 @@ def _displayed_unit(cause: Cause) -> tuple[str, float]:
 def _format_numbers(cause: Cause, numbers: Sequence[float]) -> str:
     """Return numbers in the displayed unit of a cause, without it."""
     if len(numbers) > 1:
-        return f"({', '.join(_format_signed(cause, number) for number in numbers)})"
+        negligible = 1e-4 * max(map(abs, numbers))  # below the digits of the largest
+        shown = [number if abs(number) > negligible else 0.0 for number in numbers]
+        return f"({', '.join(_format_signed(cause, number) for number in shown)})"
     number = numbers[0] * _sign(cause)
     plain = cause.kind in (*DIRECTIONS, *UNSIGNED) or not cause.unit
     return _format_signed(cause, number).removeprefix("+") if plain else _format_signed(cause, number)
@@ -440,8 +442,8 @@ def _sideways(cause: Cause) -> str:
 def _mirrored_base(cause: Cause) -> str:
     """Return which axes a mirrored base has: "z has the opposite sign", "x and y are exchanged"."""
     axes = cause.name.strip("()").split(", ")
-    flipped = [axis for axis, given in zip("xyz", axes, strict=False) if given == f"-{axis}"]
-    moved = [axis for axis, given in zip("xyz", axes, strict=False) if given.removeprefix("-") != axis]
+    flipped = [axis for axis, source in zip("xyz", axes, strict=False) if source == f"-{axis}"]
+    moved = [axis for axis, source in zip("xyz", axes, strict=False) if source.removeprefix("-") != axis]
     if len(flipped) == 1 and not moved:
         return f"the base is mirrored: {flipped[0]} has the opposite sign"
     if len(moved) == 2 and "-" not in cause.name:
@@ -492,7 +494,7 @@ def _path_unit(cause: Cause) -> tuple[str, str]:
 
 
 def _sign_kind() -> KindText:
-    place = "(in the log or in the robot: positions do not tell which)"
+    place = "(in the log or in the robot: positions do not show which)"
 
     def clause(cause: Cause) -> str:
         turns = "counter-rotates" if MODULE.fullmatch(cause.name) else "rotates in reverse"

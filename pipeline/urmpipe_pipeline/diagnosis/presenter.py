@@ -29,9 +29,11 @@ NOTE = (
     " and the rms if this cause alone is removed."
 )
 
+DETAILS = ("value", "from_row", "rms_alone", "breaks_tolerance")  # columns that only a page has room for
+
 
 def present(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> Presentation:
-    """Return what a diagnosis alone shows; a report and a recording show the comparison that it stands in.
+    """Return what a diagnosis alone shows; a report and a recording show its comparison.
 
     Args:
         diagnosis: The diagnosis.
@@ -42,7 +44,7 @@ def present(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> Presentation:
     )
     tables = tuple(diagnosis_tables(diagnosis))
     body = Section(f"Diagnosis of {diagnosis.name}", None, facts, tables, warnings=diagnosis.warnings)
-    headline = diagnosis.sentence.removeprefix(PASSES)  # the verdict stands before it
+    headline = diagnosis.sentence.removeprefix(PASSES)  # the verdict precedes it
     return Presentation(diagnosis.name, headline, diagnosis.verdict, (), body)
 
 
@@ -56,12 +58,12 @@ def diagnosis_facts(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> tuple[F
     undecided = format_undecided(diagnosis.undecided) if diagnosis.undecided else ""
     has_residual = diagnosis.causes or diagnosis.undecided  # else the answer says it
     residual = format_residual(diagnosis.remainder, diagnosis.unit) if has_residual else ""
-    alone = diagnosis.causes[0] if len(diagnosis.causes) == 1 else None
+    single = diagnosis.causes[0] if len(diagnosis.causes) == 1 else None
     own_tcp = "; ".join(map(format_own_tcp, diagnosis.own_tcp))
     return (
         Fact("Cause", diagnosis.sentence, leads=True),
         Fact("Meaning", _meaning(diagnosis, hints), brief=False, leads=True),
-        Fact("95 % interval", format_interval(alone) if alone else "", brief=False, page=False),
+        Fact("95 % interval", format_interval(single) if single else "", brief=False, page=False),
         Fact("Undecided", undecided, brief=False, page=False),  # the cause and a table say it
         Fact("Twins", "; ".join(_twins(diagnosis)), page=False),  # tables of a page say it
         Fact("Remaining deviation", residual, brief=False, page=False),
@@ -71,11 +73,13 @@ def diagnosis_facts(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> tuple[F
 
 
 def _meaning(diagnosis: Diagnosis, hints: Sequence[Hint]) -> Advice | None:
-    """Return what to do about the causes of the answer; None without any."""
+    """Return what to do about the causes of the answer; None without any, or if the answer says it."""
     if not diagnosis.causes or diagnosis.remainder.different:
         return None
+    if diagnosis.verdict == "pass":
+        return Advice(hints=tuple(hints)) if hints else None
     remedies = [build_remedy(cause) for cause in select_causes(diagnosis.causes)]
-    last = {remedy.place: k for k, remedy in enumerate(remedies)}  # a place stands once, behind the last
+    last = {remedy.place: k for k, remedy in enumerate(remedies)}  # a place is named once, after the last
     steps = [
         remedy.imperative() if last[remedy.place] == k else remedy._replace(place="").imperative()
         for k, remedy in enumerate(remedies)
@@ -84,7 +88,7 @@ def _meaning(diagnosis: Diagnosis, hints: Sequence[Hint]) -> Advice | None:
 
 
 def _twins(diagnosis: Diagnosis) -> Iterator[str]:
-    """Yield causes with their twins, which the log does not tell from them."""
+    """Yield causes with their twins, which the log does not distinguish."""
     alternatives = (cause for each in diagnosis.undecided for cause in each.causes)
     for cause in (*diagnosis.causes, *alternatives):
         if cause.twins:
@@ -104,7 +108,11 @@ def diagnosis_tables(diagnosis: Diagnosis) -> Iterator[Table]:
     if diagnosis.causes:
         several = len(diagnosis.causes) > 1 or diagnosis.remainder.different
         shown = several or bool(diagnosis.causes[0].low)  # the answer has all of a cause without an interval
-        yield Table("Causes", columns_of(diagnosis.causes, _heads(diagnosis.unit)), NOTE, several, page=shown)
+        columns = (
+            replace(column, brief=column.key not in DETAILS)
+            for column in columns_of(diagnosis.causes, _heads(diagnosis.unit))
+        )
+        yield Table("Causes", tuple(columns), NOTE, several, page=shown)
     if diagnosis.undecided:
         heads = {
             "explanation": "Explanation",

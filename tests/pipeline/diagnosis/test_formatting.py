@@ -220,7 +220,7 @@ def test_the_meaning_says_what_to_do_and_a_place_once() -> None:
     place = "(as its offset in a map of the log, or as its zero in the robot file)"
     facts = {fact.name: fact.value for fact in diagnosis_facts(chain(SIGN, *HIGH[:2]))}
     assert facts["Meaning"] == Advice(
-        "count module 3 (phi3) the other way (in the log or in the robot: positions do not tell which);"
+        "count module 3 (phi3) the other way (in the log or in the robot: positions do not show which);"
         f" correct joint q1 by -1 deg; correct joint q2 by -2 deg {place}"
     )
     nothing = (chain(last=0.3), chain(undecided=UNDECIDED), chain(SIGN, remainder=DIFFERENT))

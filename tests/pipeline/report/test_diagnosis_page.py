@@ -18,18 +18,30 @@ def test_its_parts_stand_where_they_are_read_first(comparison: Comparison) -> No
     result = replace(comparison, runs=tuple(runs))
     page = lay_out([present(result)])
     said = there(result.worst.diagnosis).sentence
-    assert said not in [fact.value for fact in page.banner.facts]  # the log that failed stands just below
+    assert [fact.value for fact in page.banner.facts if fact.leads] == [said]  # seen without scrolling
     (part,) = (one for one in page.parts[0].parts if one.title == result.worst.name)
-    assert (part.facts[0].name, part.facts[0].value) == ("Cause", said)
+    assert (part.facts[0].name, part.facts[0].value.split(" (")[0]) == ("Meaning", "count module 3")
+    assert said not in [fact.value for fact in part.facts]
     assert not part.folded
     assert isinstance(part.blocks[0], Figure)
     grids = [block for block in part.blocks if isinstance(block, Grid)]
-    assert [(one.title, one.folded) for one in grids[:3]] == [
-        ("Causes", False), ("Undecided between", False), ("Statistics of position and path", False),
+    assert [(one.title, one.folded) for one in grids[:4]] == [
+        ("Causes", False), ("Undecided between", False), ("Not determined by this motion", False),
+        ("Statistics of position and path", False),
     ]  # fmt: skip
     assert [one.text for one in grids[0].rows[1]] == [
-        "r_4 needs +1.2000 mm from row 4 on", "+1.2000 mm", "+1.1000 to +1.3000 mm", "4",
-        "d_5, tool shift z", "399.0", "0.2 %",
+        "r_4 needs +1.2 mm from row 4 on", "+1.2 mm", "+1.1 to +1.3 mm", "4",
+        "1.500", "1.000", "399.5", "d_5, tool shift z", "no",
     ]  # fmt: skip
     figures = [block.title for block in part.blocks if isinstance(block, Figure)]
     assert figures[:2] == ["Deviation over time", "Deviation of joints"]
+
+
+def test_a_log_that_passes_has_no_cause_in_the_banner(comparison: Comparison) -> None:
+    passed = replace(next(one for one in comparison.runs if one.verdict == "pass"))
+    diagnosis = replace(diagnosis_of(passed), own_tcp=(), origin="")
+    page = lay_out([present(replace(comparison, runs=(replace(passed, diagnosis=diagnosis),)))])
+    assert not [fact for fact in page.banner.facts if fact.leads]
+    (part,) = page.parts[0].parts
+    assert part.facts[0].value == diagnosis.sentence
+    assert diagnosis.sentence.startswith("passes; ")
