@@ -127,9 +127,9 @@ def altered(model: ArmModel, moved: CubicSpline, numbers: Numbers, edits: Edits 
     state = state_of(model, numbers, edits)
     of = {
         kind: dict.fromkeys(model.chain.coordinates, 0.0)
-        for kind in ("joint_offset", "joint_scale", "compliance")
+        for kind in ("joint_offset", "joint_scale", "compliance", "joint_lag", "backlash", "sag")
     }
-    lag = drift = 0.0
+    lag = drift = servo = 0.0
     for name, size in numbers.items():
         kind, _, what = name.partition(":")
         if kind in of:
@@ -138,15 +138,34 @@ def altered(model: ArmModel, moved: CubicSpline, numbers: Numbers, edits: Edits 
             lag = size[0]
         elif kind == "clock_drift":
             drift = size[0]
+        elif kind == "servo_lag":
+            servo = size[0]
     t = model.clock.t
     at = t - lag - drift * t
-    q, second = moved(at), moved(at, 2)
-    for edit in edits:
-        q, second = _edited(q, edit), _edited(second, edit, value=False)
-    offset, scale, bend = (np.array(list(of[kind].values())) for kind in of)
-    return poses(
-        model.arm(state)[0], q + offset + scale * q + bend * second, oriented=model.rotation is not None
+    offset, scale, bend, late, play, sag = (np.array(list(of[kind].values())) for kind in of)
+    q, rate, second = np.empty((3, len(t), len(late)))
+    for j, more in enumerate(late):  # each joint from the whole arm at its own time: edits may exchange them
+        every = [moved(at - more, order) for order in range(3)]
+        for edit in edits:
+            every = [_edited(part, edit, value=order == 0) for order, part in enumerate(every)]
+        q[:, j], rate[:, j], second[:, j] = (part[:, j] for part in every)
+    q = q + offset + scale * q + bend * second + servo * rate + play / 2.0 * np.sign(rate)
+    if sag.any():
+        now = moved(at)
+        for edit in edits:
+            now = _edited(now, edit)
+        q = q + sag * _weights(model.chain, now)
+    return poses(model.arm(state)[0], q, oriented=model.rotation is not None)
+
+
+def _weights(chain: Chain, q: FloatArray) -> FloatArray:
+    """Return how 9.80665 N at the tool centre point of an arm without masses turn each joint, (n, joints)."""
+    assert not chain.inertials
+    steps = 1e-6 * np.eye(q.shape[1])
+    heights = (
+        poses_over_log(chain, q + step)[0][:, 2] - poses_over_log(chain, q - step)[0][:, 2] for step in steps
     )
+    return np.array([9.80665 * height / 2e-6 for height in heights]).T
 
 
 def _edited(q: FloatArray, edit: Edit, *, value: bool = True) -> FloatArray:

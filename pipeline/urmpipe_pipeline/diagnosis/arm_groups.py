@@ -155,7 +155,7 @@ def _of_parameter(one: Parameter) -> Group:
 def _tilts(chain: Chain, place: int, name: str, taken: set[str], across: Transform) -> Iterator[Group]:
     """Yield the turns of a frame that no named parameter has: of a joint those across its axis."""
     joint = chain.joints[place - 1] if place <= len(chain.joints) else None
-    if taken or joint is None or joint.kind == "fixed":
+    if taken or joint is None or joint.kind == "fixed" or joint.mimic is not None:
         at = across if taken else chain.frames[place]
         axes = {letter: axis for letter, axis in _AXES.items() if letter not in taken}
     else:

@@ -6,6 +6,7 @@ that of the log at its own time, after what is there or not (`log_edits`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -15,13 +16,15 @@ import numpy as np
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.dynamics.inverse import inverse_dynamics
-from urmpipe_models.elementwise import Element, dot
+from urmpipe_models.elementwise import Element, dot, scale
 from urmpipe_models.kinematics.forward import jacobian
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.log_edits import Edits
 
 MOVING = 5.0
 """A joint moves if its rate is so many times the noise of it: less often than once in a million by chance."""
+
+STANDARD_GRAVITY = 9.80665  # [m/s2]
 
 WEIGHTLESS = 1e-9  # [N m] or [N]: rounding of the torque of an axis that stands upright
 
@@ -160,7 +163,7 @@ class Motion:
         clock: Clock,
         sample: IntArray,
         rows: IntArray,
-        chain: Chain | None = None,
+        chain: Chain | None,
     ) -> Joints:
         """Return the joints of some rows as an explanation has them.
 
@@ -170,7 +173,7 @@ class Motion:
             clock: The times of all rows.
             sample: Rows of the log, shape (n,).
             rows: Indices of those that are asked for, shape (k,).
-            chain: The arm that gravity pulls at; needed where there are groups of sag.
+            chain: The arm that gravity pulls at; None if there is no group of sag.
         """
         at = clock.at(state, groups, rows)
         edits = tuple(edit for edit in state.edits if edit.joints)
@@ -279,7 +282,8 @@ def gravity_torques(chain: Chain, q: FloatArray) -> FloatArray:
     if has_masses(chain):
         torques = inverse_dynamics(chain, [*q], still, still)
     else:
-        torques = [-dot(chain.gravity, column[:3]) for column in jacobian(chain, [*q])]
+        upward = scale(-STANDARD_GRAVITY / max(math.hypot(*chain.gravity), WEIGHTLESS), chain.gravity)
+        torques = [dot(upward, column[:3]) for column in jacobian(chain, [*q])]
     found = np.empty_like(q)
     for row, torque in zip(found, torques, strict=True):
         row[:] = torque

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from altered_arm import altered, arm_model, nominal, rich_motion, spoilt, state_of, times, uniform
+from altered_arm import altered, arm_model, called, nominal, rich_motion, spoilt, state_of, times, uniform
 from normal_equations import normal_of
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
@@ -38,7 +38,7 @@ def log_with(causes: dict[str, FloatArray]) -> ArmModel:
 
 
 def groups_of(model: ArmModel, causes: dict[str, FloatArray]) -> list[Group]:
-    return [group for group in model.groups if f"{group.kind}:{group.name}" in causes]
+    return [group for group in model.groups if called(group) in causes]
 
 
 def zero_of(model: ArmModel) -> State:
