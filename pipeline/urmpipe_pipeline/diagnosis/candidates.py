@@ -22,7 +22,7 @@ from urmpipe_pipeline.log_edits import Edits
 SETUP = ("base_shift", "base_rotation", "tool_shift", "tool_rotation", "time_lag", "joint_offset")
 """What a discrete cause may need besides to leave little; lengths and tilts are small."""
 
-NEAREST = 12  # discrete causes that are fitted with these, those that leave the least by themselves
+NEAREST = 8  # discrete causes that are fitted with these, those that leave the least by themselves
 PLAUSIBLE = 4.0  # a discrete cause is plausible if it leaves no more than this times the least square
 MOST = 5  # so many of them at most
 UNSEEN = 1e-3  # share of the noise floor below which a discrete cause changes nothing
@@ -32,6 +32,7 @@ RIDGE = 1e-10  # keeps the equations of equal columns solvable; columns have uni
 ANGLES = (0.3, -0.3, 0.8, -0.8, 1.57, -1.57, 2.4, -2.4, np.pi)
 """Where fits of a single angle begin, in [rad], besides its linear estimate: a cosine has few minima."""
 
+FEW = 3  # of so many rows one shows what a single angle leaves
 LINEAR = 0.02  # an angle in [rad] below which the linear search needs no other start: its error is theta^2 / 2
 STARTS = 4  # so many single causes are starts
 WORTH = 4.0  # a start leaves no more than this times the square of the best single cause
@@ -106,7 +107,7 @@ def find_large_causes(model: Model, state: State, rows: Rows, among: Sequence[in
         among: Groups with one number each.
     """
     groups = [model.groups[g] for g in among]
-    left, velocity, turn = model.motions(state, rows.at, groups)
+    left, velocity, turn = model.motions(state, rows.at[::FEW], groups)
     known = np.isfinite(left).all(axis=0)
     known[known] = inliers(left[:, known])
     if not known.any() or not groups:

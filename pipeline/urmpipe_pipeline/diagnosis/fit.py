@@ -33,7 +33,7 @@ STILL = 1e-8
 HALVED = 12
 """A step that leaves more is halved so many times."""
 
-BLOCK = 4096
+BLOCK = 8192
 """Rows whose Jacobian is in memory at a time, on each thread."""
 
 

@@ -36,6 +36,7 @@ from urmpipe_pipeline.log_edits import Edits
 
 COARSE = 300  # rows, spread evenly, on which discrete causes are ranked
 MEDIUM = 600  # rows, spread evenly, on which starts are compared
+SOME = 2_000  # rows, spread evenly, that select before more of them settle it
 MANY = 20_000  # rows, spread evenly, that settle an explanation; standard errors fall with the root of them
 ROUNDS = 6  # selections after each other: from a good start three are enough
 NEAR = 6.0  # explanations whose scores differ by less are rivals: odds of twenty to one
@@ -378,8 +379,11 @@ class Search:
         self._refused.append((Explanation(state, subset, np.inf), reason))
 
     def _settled(self, rows: Rows, best: Explanation, others: Sequence[Explanation]) -> SearchResult:
-        """Return what many rows decide."""
-        found = self._stable(rows, best.state, None)
+        """Return what many rows decide, from what some select."""
+        some = replace(rows, at=self.spread(SOME))
+        found = self._stable(some, best.state, None)
+        if len(rows.at) > len(some.at):
+            found = self._stable(rows, found.state, found.subset)
         near = sorted((one for one in others if one.score < best.score + FAR * found.tau), key=_score)
         near = [self._explained(found.rows, one.state, found.tau) for one in near[:SHOWN]]
         for one in near:

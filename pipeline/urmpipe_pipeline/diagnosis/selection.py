@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, product
 from math import comb, log
 from typing import TypeAlias
 
@@ -210,11 +210,33 @@ class Selection:
 
     def best(self, among: Sequence[int]) -> Subset:
         """Return the best subset of some groups: none, singles, pairs, and what they grow into."""
-        small = [frozenset(subset) for size in range(3) for subset in combinations(among, size)]
-        scores = self.scores(small)
-        order = np.argsort(scores, kind="stable")
-        climbed = [self.climbed(small[i], float(scores[i]), among) for i in order[:STARTS]]
+        single = [g for g in among if len(self._columns[g]) == 1]
+        several = [g for g in among if len(self._columns[g]) > 1]
+        small = [frozenset[int](), *(frozenset((g,)) for g in among)]
+        small += [frozenset(pair) for pair in combinations(several, 2)]
+        small += [frozenset(pair) for pair in product(several, single)]
+        starts = [*zip(self.scores(small).tolist(), small, strict=True), *self._best_pairs(single)]
+        starts.sort(key=lambda one: one[0])
+        climbed = [self.climbed(subset, score, among) for score, subset in starts[:STARTS]]
         return min(climbed, key=lambda one: one[1])[0]
+
+    def _best_pairs(self, groups: Sequence[int]) -> Iterator[tuple[float, Subset]]:
+        """Yield the best pairs of groups with one column each, with their scores: Cramer's rule for all."""
+        if len(groups) < 2:
+            return
+        gram, moment, _ = self._scaled
+        columns = np.array([self._columns[g][0] for g in groups])
+        first, second = np.triu_indices(len(groups), 1)
+        c, d = columns[first], columns[second]
+        a, b, across, m, n = gram[c, c], gram[d, d], gram[c, d], moment[c], moment[d]
+        rest = np.maximum(a * b - across**2, np.finfo(float).tiny)
+        explained = (m**2 * b - 2.0 * m * n * across + n**2 * a) / rest
+        left = np.maximum(self.normal.square - explained, 0.0) / max(self.normal.count, 1)
+        prior = np.zeros(len(groups)) if self.prior is None else self.prior[list(groups)]
+        scores = self.independent * np.log(np.maximum(left, self.floor)) + prior[first] + prior[second]
+        common = self.penalty(2, frozenset()) - self._penalties[1] + self._penalties[3]
+        for i in np.argpartition(scores, min(STARTS, len(scores) - 1))[:STARTS]:
+            yield float(scores[i] + common), frozenset((groups[first[i]], groups[second[i]]))
 
     def climbed(self, subset: Subset, score: float, among: Sequence[int]) -> tuple[Subset, float]:
         """Return where adding, dropping and exchanging groups leads from a subset, and the score there."""
