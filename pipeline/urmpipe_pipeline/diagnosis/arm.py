@@ -41,6 +41,7 @@ class ArmModel:
         position: Where the tool centre point should be in [m], shape (3, n).
         rotation: Its orientation as matrices [-], shape (3, 3, n); None without any.
         frames_open: Whether base and tool are unknown: they are then put where they fit best.
+        judged: Where it should be as a comparison has it in [m], shape (3, n); None if that is `position`.
     """
 
     chain: Chain
@@ -51,6 +52,7 @@ class ArmModel:
     position: FloatArray
     rotation: FloatArray | None
     frames_open: bool = False
+    judged: FloatArray | None = None
     _placed: dict[Edits, Chain] = field(default_factory=dict)
     _of_others: dict[str, tuple[Group, ...]] = field(default_factory=dict, init=False)
 
@@ -174,12 +176,15 @@ class ArmModel:
         return self.motion.joints(state, self.groups, self.clock, self.sample, rows, self.chain)
 
     def deviation(self, state: State, rows: IntArray) -> FloatArray:
-        """Return what an explanation leaves of positions in true [m], shape (3, n)."""
-        return unit_of(state.edits) * self.residual(state, rows)[:3]
+        """Return what an explanation leaves of what is judged: positions in true [m], shape (3, n)."""
+        left = self.residual(state, rows)[:3]
+        if self.judged is not None:
+            left = left + (self.judged - self.position)[:, rows]
+        return unit_of(state.edits) * left
 
     def wanted(self, rows: IntArray) -> FloatArray:
-        """Return where the tool centre point should be in [m] as it was read, shape (3, n)."""
-        return self.position[:, rows]
+        """Return where the tool centre point should be as it is judged in [m], shape (3, n)."""
+        return (self.position if self.judged is None else self.judged)[:, rows]
 
     def _left(self, pose: Transform, edits: Edits, rows: IntArray, inside: BoolArray) -> FloatArray:
         rotation = None if self.rotation is None else self.rotation[:, :, rows]

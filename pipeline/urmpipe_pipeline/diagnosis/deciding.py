@@ -54,5 +54,5 @@ def _with_moved(model: ArmModel, j: int, rows: IntArray) -> ArmModel:
     rotation = None if model.rotation is None else model.rotation[:, :, rows]
     return replace(
         model, motion=Motion(t, q, none, none), clock=Clock(t, -1.0, t), sample=model.sample[rows],
-        position=model.position[:, rows], rotation=rotation,
+        position=model.position[:, rows], rotation=rotation, judged=None,
     )  # fmt: skip

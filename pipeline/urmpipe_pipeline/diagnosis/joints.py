@@ -28,6 +28,8 @@ class JointsModel:
         q: The reference's joints in [rad] or [m], shape (joints, n).
         sliding: Which joints are in [m], shape (joints,).
         chain: The arm; None for the joints alone.
+        judged: Where the reference is as a comparison has it: positions in [m], shape (3, n), without an arm
+            joints, shape (joints, n); None if that is where `q` leads.
     """
 
     groups: tuple[Group, ...]
@@ -37,6 +39,7 @@ class JointsModel:
     q: FloatArray
     sliding: tuple[bool, ...]
     chain: Chain | None = None
+    judged: FloatArray | None = None
 
     @property
     def rows(self) -> int:
@@ -93,13 +96,14 @@ class JointsModel:
             state: The explanation.
             rows: Rows, by index, shape (n,).
         """
-        if self.chain is None:
-            return self.residual(state, rows)
         joints = self._joints(state, rows)
-        left = self.wanted(rows) - positions_over_log(self.chain, joints.q.T).T
+        is_at = joints.q if self.chain is None else positions_over_log(self.chain, joints.q.T).T
+        left = self.wanted(rows) - is_at
         return np.asarray(np.where(joints.inside, left, np.nan))
 
     def wanted(self, rows: IntArray) -> FloatArray:
         """Return where the reference is: positions in [m], shape (3, n); without an arm its joints."""
+        if self.judged is not None:
+            return self.judged[:, rows]
         q = self.q[:, rows]
         return q if self.chain is None else positions_over_log(self.chain, q.T).T

@@ -43,6 +43,7 @@ class PlaceModel:
         sample: Rows of the log, shape (n,).
         position: Where the tool centre point should be in [m], shape (3, n).
         rotation: Its orientation [-], shape (3, 3, n); None unless both sides have one.
+        judged: Where it should be as a comparison has it in [m], shape (3, n); None if that is `position`.
     """
 
     groups: tuple[Group, ...]
@@ -52,6 +53,7 @@ class PlaceModel:
     sample: IntArray
     position: FloatArray
     rotation: FloatArray | None
+    judged: FloatArray | None = None
 
     @property
     def rows(self) -> int:
@@ -83,12 +85,15 @@ class PlaceModel:
         return np.array(lefts).reshape(-1, len(self.blocks), len(rows))
 
     def deviation(self, state: State, rows: IntArray) -> FloatArray:
-        """Return what an explanation leaves of positions in true [m], shape (3, n)."""
-        return unit_of(state.edits, "reference") * self.residual(state, rows)[:3]
+        """Return what an explanation leaves of what is judged: positions in true [m], shape (3, n)."""
+        left = self.residual(state, rows)[:3]
+        if self.judged is not None:
+            left = left + (self.judged - self.position)[:, rows]
+        return unit_of(state.edits, "reference") * left
 
     def wanted(self, rows: IntArray) -> FloatArray:
-        """Return where the tool centre point should be in [m] as it was read, shape (3, n)."""
-        return self.position[:, rows]
+        """Return where the tool centre point should be as it is judged in [m], shape (3, n)."""
+        return (self.position if self.judged is None else self.judged)[:, rows]
 
     def linear(
         self, state: State, rows: IntArray, groups: Sequence[Group] | None = None

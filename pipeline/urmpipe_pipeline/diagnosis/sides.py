@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.kinematics.forward import jacobian
+from urmpipe_models.kinematics.forward import jacobian, positions_over_log
 from urmpipe_models.orientation import matrices
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline.diagnosis.arm import ArmModel
@@ -21,6 +21,7 @@ from urmpipe_pipeline.diagnosis.arm_groups import (
     tool_groups,
 )
 from urmpipe_pipeline.diagnosis.hypotheses import Group, numbered
+from urmpipe_pipeline.diagnosis.interpolation import Cubics, Interpolated, SparseMotion, interpolated
 from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion, motion_of
 from urmpipe_pipeline.diagnosis.place import TOOL, PlaceModel
@@ -35,7 +36,6 @@ from urmpipe_pipeline.log_edits import (
     swap_edits,
     unit_edits,
 )
-from urmpipe_pipeline.runs.grid import ROUNDING_NS
 from urmpipe_pipeline.runs.results import Run
 
 if TYPE_CHECKING:  # a comparison holds its diagnosis: no ring between the two
@@ -114,6 +114,8 @@ class Question:
 
 def question(matched: Matched, reference: Side, log: Side) -> Question:
     """Return what two sides, at the same times, allow to be asked."""
+    if reference.run.timed and reference.run is not log.run:
+        reference = replace(reference, trajectory=reference.trajectory.rows_with_value())
     if reference.by_joints and log.by_joints and matched.reference_q is not None:
         return _of_joints(matched, reference, log)
     if log.by_joints or reference.by_joints:
@@ -127,14 +129,13 @@ def _of_joints(matched: Matched, reference: Side, log: Side) -> Question:
     sliding = tuple(unit == "m" for unit in run.joint_units)
     units = ["m" if one else "rad" for one in sliding]
     groups = numbered(joint_groups(units, run.log.joints, run.robot, timed=run.timed))
-    q = np.asarray(matched.reference_q).T
+    samples, lines = _ordered_joints(reference.trajectory, run), np.asarray(matched.reference_q)
+    q = interpolated(matched, reference.trajectory, samples, lines, np.asarray(matched.actual_q))
     model = JointsModel(
-        groups, _motion(run), _clock(matched, run, log=True), matched.sample, q, sliding, run.robot
-    )
-    rounding = np.sqrt(
-        _rounding(run.on_rows.q, run) ** 2 + _rounding(q.T, run) ** 2
-        + _between(matched, reference.trajectory, _ordered_joints(reference.trajectory, run)) ** 2
+        groups, _motion(run), _clock(matched, run, log=True), matched.sample, q.values.T.copy(), sliding,
+        run.robot, _judged(matched, reference, log) if q.between else None,
     )  # fmt: skip
+    rounding = np.sqrt(_rounding(run.on_rows.q, run) ** 2 + _rounding(samples, run) ** 2 + q.error**2)
     recorded = run.log.tcp_position is not None
     alone = (
         "diagnosed alone, the log is compared with the one that it recorded"
@@ -168,22 +169,29 @@ def _of_arm(matched: Matched, reference: Side, log: Side) -> Question:
     own, other = (log, reference) if log.by_joints else (reference, log)
     run, robot = own.run, own.run.robot
     assert robot is not None  # a side without kinematics has no place, and is not compared by it
+    place = _reference_place(matched, reference)
     position, quat = (
-        (matched.reference, matched.reference_quat)
-        if log.by_joints
-        else (matched.actual, matched.actual_quat)
+        (place.values, matched.reference_quat) if log.by_joints else (matched.actual, matched.actual_quat)
     )
     rotation = _turned(quat)
     names, timed = run.log.joints, log.run.timed
     open_frames = other.run.log.measured
     groups = numbered(cause_groups(robot, names, turned=rotation is not None, timed=timed))
     clock = _clock(matched, log.run, log=log.by_joints)
+    motion, lines = _motion(run), matched.reference
+    if place.between and not log.by_joints:
+        cubics = Cubics.through(
+            reference.trajectory.t_ns, np.asarray(reference.trajectory.q), reference.trajectory.broken
+        )
+        motion = SparseMotion(motion.t, motion.value, motion.rate, motion.second, cubics)
+        lines = position + positions_over_log(robot, motion.at(clock.t)[0].T) - lines
+    judged = lines.T.copy() if place.between and not open_frames else None
     model = ArmModel(
-        robot, groups, _motion(run), clock, matched.sample, position.T.copy(), rotation, open_frames
+        robot, groups, motion, clock, matched.sample, position.T.copy(), rotation, open_frames, judged
     )
     rounding = np.sqrt(
-        _rounding(position, run) ** 2 + _by_joints(model, _rounding(run.on_rows.q, run)) ** 2
-        + _between(matched, reference.trajectory, reference.trajectory.position) ** 2
+        _rounding(other.trajectory.position, run) ** 2 + place.error**2
+        + _by_joints(model, _rounding(run.on_rows.q, run)) ** 2
     )  # fmt: skip
     rounding = np.concatenate((rounding, np.zeros(len(model.blocks) - 3)))
     count, turning = len(robot.moving), tuple(joint.kind == "revolute" for joint in robot.moving)
@@ -219,15 +227,16 @@ def _of_places(matched: Matched, reference: Side, log: Side) -> Question:
     rotation = _turned(matched.reference_quat) if oriented else None
     tool = tool_groups(Transform(), TOOL, turned=rotation is not None) if oriented else ()
     groups = numbered([*tool, *base_groups(Transform()), *(time_groups() if run.timed else ())])
-    trajectory = log.trajectory
+    trajectory, place = log.trajectory, _reference_place(matched, reference)
     turns = None if trajectory.quat_xyzw is None or not oriented else _matrices(trajectory.quat_xyzw)
     model = PlaceModel(
         groups, motion_of(trajectory.t if run.timed else None, trajectory.position.T), turns,
-        _clock(matched, run, log=True), matched.sample, matched.reference.T.copy(), rotation,
+        _clock(matched, run, log=True), matched.sample, place.values.T.copy(), rotation,
+        matched.reference.T.copy() if place.between else None,
     )  # fmt: skip
     rounding = np.sqrt(
-        _rounding(matched.reference, run) ** 2 + _rounding(matched.actual, run) ** 2
-        + _between(matched, reference.trajectory, reference.trajectory.position) ** 2
+        _rounding(reference.trajectory.position, run) ** 2 + _rounding(matched.actual, run) ** 2
+        + place.error**2
     )  # fmt: skip
     rounding = np.concatenate((rounding, np.zeros(len(model.blocks) - 3)))
     told = [NotLookedFor((*STRUCTURE, *JOINTS, "turns", "other_robot"), "no side has joints")]
@@ -251,6 +260,22 @@ def _of_places(matched: Matched, reference: Side, log: Side) -> Question:
 
 def _whole_frame(group: Group) -> bool:
     return group.kind in FRAMES and group.axis is None
+
+
+def _reference_place(matched: Matched, reference: Side) -> Interpolated:
+    """Return the tool centre point of the reference at the rows of the log."""
+    samples = reference.trajectory.position
+    return interpolated(matched, reference.trajectory, samples, matched.reference, matched.actual)
+
+
+def _judged(matched: Matched, reference: Side, log: Side) -> FloatArray:
+    """Return what is judged of a reference with joints: its place on lines, else that of joints on lines."""
+    robot, q = log.run.robot, np.asarray(matched.reference_q)
+    if robot is None:
+        return q.T.copy()
+    if robot == reference.run.robot and np.isfinite(matched.reference).all():
+        return matched.reference.T.copy()
+    return positions_over_log(robot, q).T.copy()
 
 
 def _own_names(run: Run) -> tuple[str, ...]:
@@ -324,23 +349,3 @@ def _ordered_joints(reference: Trajectory, run: Run) -> FloatArray:
     """Return the joints of a reference in the order of a log, by name, else by place, shape (m, joints)."""
     q, names = np.asarray(reference.q), run.log.joints
     return q[:, [reference.joints.index(one) for one in names]] if {*reference.joints} == {*names} else q
-
-
-def _between(matched: Matched, reference: Trajectory, values: FloatArray) -> FloatArray:
-    """Return what lines between samples of the reference leave: an eighth of second differences, shape (k,).
-
-    Nothing where the rows of the log meet its samples.
-
-    Args:
-        matched: Both sides at the same times.
-        reference: The reference at its own samples.
-        values: What is interpolated of it in [m] or [rad], shape (m, k).
-    """
-    at_ns = matched.t_ns + round(matched.sync.offset * 1e9)
-    if len(reference.t_ns) < 3:
-        return np.zeros(values.shape[1])
-    after = np.clip(np.searchsorted(reference.t_ns, at_ns), 1, len(reference.t_ns) - 1)
-    away = np.minimum(*(np.abs(at_ns - reference.t_ns[beside]) for beside in (after - 1, after)))
-    if np.median(away) <= ROUNDING_NS:
-        return np.zeros(values.shape[1])
-    return np.asarray(np.sqrt(np.nanmean(np.diff(values, 2, axis=0) ** 2, axis=0)) / 8.0)

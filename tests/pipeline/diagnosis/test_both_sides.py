@@ -1,0 +1,102 @@
+"""Files of two sides: a reference with few samples, and the tool centre points that the sides recorded."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import urmpipe
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.diagnosis.result import Diagnosis
+
+UR5E = load_robot("ur5e")
+ZERO = np.radians([0.0, 0.0, 0.5, 0.0, 0.0, 0.0])
+"""What one log reads too high: 0.5 deg of its third joint."""
+
+SPARSE, DENSE = np.arange(0.0, 6.01, 0.05), np.arange(0.0, 6.0005, 0.001)
+Write = Callable[..., Path]
+
+
+def moved(t: FloatArray, often: float = 0.4) -> FloatArray:
+    """Return joints that swing by 18 to 40 deg, about `often` times a second, shape (n, 6)."""
+    wide, rest = (
+        np.radians([35.0, 20.0, 25.0, 18.0, 22.0, 40.0]),
+        np.radians([0.0, -90.0, 90.0, -90.0, -90.0, 0.0]),
+    )
+    waves = often * np.array([0.78, 1.18, 0.93, 1.33, 1.03, 0.73])
+    return np.asarray(rest + wide * np.sin(2.0 * np.pi * waves * t[:, np.newaxis] + np.arange(6)))
+
+
+def place(q: FloatArray) -> FloatArray:
+    """Return where the arm is, shape (n, 3)."""
+    return poses_over_log(UR5E, q)[0]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Return what writes a log with joints, a tool centre point, or both."""
+
+    def file(name: str, t: FloatArray, q: FloatArray | None = None, tcp: FloatArray | None = None) -> Path:
+        columns = {"t [s]": t}
+        columns |= {} if q is None else {f"q{k + 1} [rad]": column for k, column in enumerate(q.T)}
+        columns |= {} if tcp is None else {f"{k} [m]": column for k, column in zip("xyz", tcp.T, strict=True)}
+        there = tmp_path / f"{name}.csv"
+        np.savetxt(
+            there, np.column_stack([*columns.values()]), "%.15g", ",", header=",".join(columns), comments=""
+        )
+        return there
+
+    return file
+
+
+def diagnosed(reference: Path, log: Path) -> Diagnosis:
+    """Return why a log deviates; that a path is no log is not what is tested."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", urmpipe.UrmpipeWarning)
+        return urmpipe.diagnose(reference, log, robot="ur5e")
+
+
+def on_lines(t: FloatArray, values: FloatArray) -> FloatArray:
+    """Return a reference between its samples as a comparison has it, shape (n, k)."""
+    return np.column_stack([np.interp(DENSE, t, column) for column in values.T])
+
+
+@pytest.mark.parametrize("reads", ["path", "joints", "reversed"])
+@pytest.mark.parametrize("stamps", ["even", "uneven with a gap"])
+def test_lines_between_few_samples_do_not_change_the_number_of_a_cause(
+    write: Write, reads: str, stamps: str
+) -> None:
+    """20 Hz and 1 kHz: a line is 0.5 mm (rms) from the motion, and the zero of a joint moves it by 4 mm."""
+    t = SPARSE
+    if stamps != "even":
+        t = np.delete(t, [50, 51, 52]) + np.random.default_rng(1).uniform(-0.01, 0.01, len(t) - 3)
+        t[[0, -1]] = SPARSE[[0, -1]]
+    at, dense = moved(t), moved(DENSE)
+    sides = {
+        "path": (write("path", t, tcp=place(at)), write("log", DENSE, dense + ZERO)),
+        "joints": (write("asked", t, at), write("log", DENSE, dense + ZERO)),
+        "reversed": (write("read", t, at + ZERO), write("done", DENSE, tcp=place(dense))),
+    }[reads]
+    found = diagnosed(*sides)
+    ((kind, joint, value),) = [(cause.kind, cause.name, cause.value[0]) for cause in found.causes]
+    assert (kind, joint) == ("joint_offset", "elbow_joint")
+    assert value == pytest.approx(-ZERO[2], rel=1e-4)
+    asked, done = (at + ZERO, dense) if reads == "reversed" else (at, dense + ZERO)
+    apart = on_lines(t, place(asked)) - place(done)
+    apart = apart[np.isin(np.arange(len(DENSE)), found.sample)]
+    assert found.rms == pytest.approx(np.sqrt((apart**2).sum(axis=1).mean()), rel=1e-9)
+
+
+def test_a_polygon_stays_one(write: Write) -> None:
+    corners = np.random.default_rng(2).uniform(0.2, 0.6, (len(SPARSE[::5]), 3))
+    log = on_lines(SPARSE[::5], corners) + np.array([0.0, 0.002, 0.0])
+    found = diagnosed(write("path", SPARSE[::5], tcp=corners), write("log", DENSE, tcp=log))
+    ((kind, value),) = [(cause.kind, cause.value) for cause in found.causes]
+    assert kind == "base_shift"
+    np.testing.assert_allclose(value, [0.0, -0.002, 0.0], atol=1e-9)
