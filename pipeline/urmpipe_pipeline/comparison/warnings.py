@@ -11,14 +11,14 @@ from urmpipe_models.measure_units import USUAL_UNITS
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share
-from urmpipe_pipeline.comparison.matching import by_kinematics, joint_order
+from urmpipe_pipeline.comparison.matching import joint_order
 from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
 from urmpipe_pipeline.comparison.trajectory import Trajectory, extent
 from urmpipe_pipeline.comparison.wording import unseen_words
 from urmpipe_pipeline.diagnosis.sides import AT_REST, Side
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
-from urmpipe_pipeline.runs.recorded_start import outlying_start
+from urmpipe_pipeline.runs.recorded_tcp import distances_from_recorded
 from urmpipe_pipeline.runs.results import Run
 
 EXCHANGED = "path-as-log"
@@ -191,7 +191,8 @@ def recorded_apart(runs: Sequence[Run], allowed: float) -> Iterator[LogWarning]:
         runs: The logs.
         allowed: The distance that is allowed, in [m].
     """
-    found = [(run, most) for run in runs if (most := _furthest_recorded(run)) > allowed]
+    furthest = ((run, float(distances_from_recorded(run).max(initial=0.0))) for run in runs)
+    found = [(run, most) for run, most in furthest if most > allowed]
     for usual in (True, False):
         alike = [(run, most) for run, most in found if (most <= CALIBRATION) == usual]
         if len(alike) == 1:
@@ -204,15 +205,6 @@ def recorded_apart(runs: Sequence[Run], allowed: float) -> Iterator[LogWarning]:
             said = f"by forward kinematics {far} from the recorded tool centre points"
             remedy = "this verdict does not include that; a comparison of each alone does"
             yield LogWarning(TCP_APART, f"{said}, {_cause(alike[0][1])}; {remedy}")
-
-
-def _furthest_recorded(run: Run) -> float:
-    """Return how far a log is by its joints from where it recorded itself, in [m]; 0 if it did not."""
-    if run.tcp is None or run.log.tcp_position is None or run.log.measured:
-        return 0.0
-    start, _ = outlying_start(run.robot, run.log)
-    apart = np.linalg.norm(by_kinematics(run).position - run.log.tcp_position, axis=1)[start:]
-    return float(apart[np.isfinite(apart)].max(initial=0.0))
 
 
 def _cause(apart: float) -> str:

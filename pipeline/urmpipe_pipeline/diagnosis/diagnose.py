@@ -18,6 +18,7 @@ from urmpipe_pipeline.diagnosis.fit import Model, residual
 from urmpipe_pipeline.diagnosis.hypotheses import State, zero
 from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.one_pose import tool_hypotheses
+from urmpipe_pipeline.diagnosis.own_tcp import ask_both_sides
 from urmpipe_pipeline.diagnosis.result import Diagnosis, NotLookedFor, Remainder, rms
 from urmpipe_pipeline.diagnosis.search import STRUCTURE, Search, SearchResult
 from urmpipe_pipeline.diagnosis.sides import AT_REST, Question, Side, question
@@ -72,11 +73,12 @@ def diagnose(
     """
     with threadpool_limits(1, "blas"):  # blocks of rows run side by side already
         asked = question(matched, reference, log)
+        length = _tolerance(deviation, LENGTHS, DEFAULT_TOLERANCE)
         if reason := _tells_nothing(asked):
-            recorded = reference.run is log.run
-            held = _tolerance(deviation, LENGTHS, DEFAULT_TOLERANCE) if recorded else 0.0
-            return _nothing(deviation, asked, reason, held)
-        return _diagnosed(deviation, asked, lag)
+            found = _nothing(deviation, asked, reason, length if reference.run is log.run else 0.0)
+        else:
+            found = _diagnosed(deviation, asked, lag)
+        return ask_both_sides(found, matched, reference, log, length)
 
 
 def _diagnosed(deviation: Deviation, asked: Question, lag: float | None) -> Diagnosis:

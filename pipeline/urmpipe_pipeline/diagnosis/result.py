@@ -150,13 +150,16 @@ class OwnTcp:
         name: What the side is called.
         rms: Root mean square distance in [m].
         largest: Largest distance in [m].
-        agrees: Whether that is within the tolerance.
+        agrees: Whether that is within the tolerance, with the tool as it is given.
+        rms_with_tool: Root mean square distance with the constant tool that fits best in [m]; `rms` where the
+            motion does not determine one.
     """
 
     name: str
     rms: float
     largest: float
     agrees: bool
+    rms_with_tool: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

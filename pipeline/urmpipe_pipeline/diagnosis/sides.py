@@ -136,14 +136,9 @@ def _of_joints(matched: Matched, reference: Side, log: Side) -> Question:
         run.robot, _judged(matched, reference, log) if q.between else None,
     )  # fmt: skip
     rounding = np.sqrt(_rounding(run.on_rows.q, run) ** 2 + _rounding(samples, run) ** 2 + q.error**2)
-    recorded = run.log.tcp_position is not None
-    alone = (
-        "diagnosed alone, the log is compared with the one that it recorded"
-        if recorded
-        else "none was recorded"
+    told = NotLookedFor(
+        (*STRUCTURE, *FRAMES, "base_mirrored", "path_unit", "other_robot"), _why_joints_show_none(reference, log)
     )
-    reason = f"both sides have joints: only a recorded tool centre point tells them, {alone}"
-    told = NotLookedFor((*STRUCTURE, *FRAMES, "base_mirrored", "path_unit", "other_robot"), reason)
     turning = tuple(not one for one in sliding)
     edits = (
         *sign_edits(len(sliding), most=len(sliding)), *swap_edits(len(sliding)),
@@ -162,6 +157,17 @@ def _of_joints(matched: Matched, reference: Side, log: Side) -> Question:
         1.0,
         (told, *bare, *_untimed(run)),
     )
+
+
+def _why_joints_show_none(reference: Side, log: Side) -> str:
+    """Return why joints on both sides show nothing of arm, base and tool, and what would."""
+    recorded = [side.run.name for side in (reference, log) if side.run.log.tcp_position is not None]
+    if not recorded:
+        return "joints on both sides do not show them, and neither side recorded a tool centre point"
+    alone = (
+        f"{' and '.join(recorded)}, diagnosed alone, {'is' if len(recorded) == 1 else 'are'} compared with"
+    )
+    return f"joints on both sides do not show them: {alone} the recorded tool centre point"
 
 
 def _of_arm(matched: Matched, reference: Side, log: Side) -> Question:

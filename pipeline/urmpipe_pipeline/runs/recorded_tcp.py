@@ -10,7 +10,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.kinematics.forward import poses_over_log, positions_over_log
 from urmpipe_models.messages import Hint
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.transform import Transform, from_offset
@@ -18,7 +18,8 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.log_edits import Edit, robot_edits, sign_edits, swap_edits
 from urmpipe_pipeline.runs.recorded_poses import FINEST, FINEST_TURN, Apart, RecordedPoses
-from urmpipe_pipeline.runs.recorded_start import start_warning
+from urmpipe_pipeline.runs.recorded_start import outlying_start, start_warning
+from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, Fit, extent
 from urmpipe_pipeline.sources.vocabulary import split_unit
 
@@ -35,6 +36,25 @@ TURNED = np.radians(2.0)
 
 EXPLAINED = 1.0 / 25.0
 """What explains a motion leaves no more of it: a wrong arm and some tool leave a fifth by chance."""
+
+
+def distances_from_recorded(run: Run, computed: FloatArray | None = None) -> FloatArray:
+    """Return how far the kinematics of a log are from its recorded tool centre point in [m], shape (n,).
+
+    Only rows that have both are counted, without outliers at the start. It is empty if the log recorded no
+    tool centre point in the frame of its base, or has no robot.
+
+    Args:
+        run: The log.
+        computed: Its tool centre point by forward kinematics on its own rows in [m], shape (rows, 3), where
+            that is known already.
+    """
+    if run.robot is None or run.tcp is None or run.log.tcp_position is None or run.log.measured:
+        return np.empty(0)
+    place = positions_over_log(run.robot, run.on_rows.q) if computed is None else computed
+    start, _ = outlying_start(run.robot, run.log)
+    distance = np.linalg.norm(place - run.log.tcp_position, axis=1)[start:]
+    return np.asarray(distance[np.isfinite(distance)])
 
 
 class _Other(NamedTuple):

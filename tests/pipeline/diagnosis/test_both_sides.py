@@ -100,3 +100,51 @@ def test_a_polygon_stays_one(write: Write) -> None:
     ((kind, value),) = [(cause.kind, cause.value) for cause in found.causes]
     assert kind == "base_shift"
     np.testing.assert_allclose(value, [0.0, -0.002, 0.0], atol=1e-9)
+
+
+T = np.arange(0.0, 6.0, 0.008)
+Q = moved(T, 0.2)
+READ, LATE = Q + ZERO, moved(T - 0.02, 0.2)
+TOOL = poses_over_log(UR5E, READ)[1] @ [0.0, 0.0, 0.1]
+NONE = "neither side recorded a tool centre point"
+
+
+@pytest.mark.parametrize(
+    ("reference", "log", "agree", "origin", "reason"),
+    [
+        pytest.param((Q, Q), (READ, None), {"one": True}, "two", "one, diagnosed alone,", id="simulated"),
+        pytest.param((READ, None), (Q, Q), {"two": True}, "one", "two, diagnosed alone,", id="exchanged"),
+        pytest.param((Q, Q), (READ, Q), {"one": True, "two": False}, "two", "one and two,", id="one agrees"),
+        pytest.param((Q, Q), (READ, READ), {"one": True, "two": True}, "", "one and two,", id="both agree"),
+        pytest.param((Q, Q), (READ, TOOL), {"one": True, "two": False}, "", "one and two,", id="a tool"),
+        pytest.param((Q, None), (READ, Q), {"two": False}, "two", "two, diagnosed alone,", id="as the other"),
+        pytest.param((Q, None), (READ, None), {}, "", NONE, id="none"),
+        pytest.param((None, Q), (READ, Q), {"two": False}, "two", "", id="a path that the record follows"),
+        pytest.param((None, Q), (READ, READ), {"two": True}, "", "", id="a path that nothing follows"),
+        pytest.param((Q, Q), (LATE, LATE), {"one": True, "two": True}, "", "one and two,", id="a clock"),
+    ],
+)
+def test_the_side_that_disagrees_with_its_tool_centre_point_has_the_causes(
+    write: Write,
+    reference: tuple[FloatArray | None, FloatArray | None],
+    log: tuple[FloatArray | None, FloatArray | None],
+    agree: dict[str, bool],
+    origin: str,
+    reason: str,
+) -> None:
+    """Each side has joints, or the joints that its tool centre point is of, or both."""
+    rng, sides, apart = np.random.default_rng(3), [], {}
+    for name, (q, of) in (("one", reference), ("two", log)):
+        tcp = place(READ) + TOOL if of is TOOL else None if of is None else place(of)
+        tcp = None if tcp is None else tcp + rng.normal(0.0, 5e-5, tcp.shape)
+        sides.append(write(name, T, q, tcp))
+        if q is not None and tcp is not None:
+            apart[name] = np.linalg.norm(place(q) - tcp, axis=1)
+    found = diagnosed(*sides)
+    assert {one.name: one.agrees for one in found.own_tcp} == agree
+    for one in found.own_tcp:
+        assert one.rms == pytest.approx(np.sqrt((apart[one.name] ** 2).mean()), rel=1e-9)
+        assert one.largest == pytest.approx(apart[one.name].max(), rel=1e-9)
+    assert found.origin == origin
+    reasons = [one.reason for one in found.not_looked_for if "link_length" in one.kinds]
+    assert [reason in one for one in reasons] == ([True] if reason else [])
