@@ -141,14 +141,14 @@ def coupling_edits(turning: Sequence[bool]) -> Iterator[Edits]:
 def axis_edits(*, base_known: bool) -> Iterator[Edits]:
     """Yield the bases whose axes lie along others: 23 that are turned and 24 that are mirrored.
 
-    Of a base that may stand anywhere there is one, mirrored: all others are this one, turned.
+    Of a base at an unknown pose there is one, mirrored: all others are this one, turned.
     """
     if not base_known:
         yield (_of_axes((X, Y, (0.0, 0.0, -1.0))),)
         return
-    for one, other, last in permutations(IDENTITY):
+    for first, second, third in permutations(IDENTITY):
         for a, b, c in product((1.0, -1.0), repeat=3):
-            matrix = _scaled(a, one), _scaled(b, other), _scaled(c, last)
+            matrix = _scaled(a, first), _scaled(b, second), _scaled(c, third)
             if matrix != IDENTITY:
                 yield (_of_axes(matrix),)
 

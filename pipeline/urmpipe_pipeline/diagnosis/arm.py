@@ -29,8 +29,7 @@ class ArmModel:
     """A side with joints and an arm, beside a side that tells where the tool centre point was.
 
     Residuals are in the unit that the data were read in: a factor of the path divides the model, so that it
-    does not make the noise of the data smaller. What stands an arm's frame beyond the bounds of an arm
-    raises a RobotError.
+    does not make the noise of the data smaller. A frame beyond the bounds of an arm raises a RobotError.
 
     Attributes:
         chain: The arm.
@@ -81,10 +80,9 @@ class ArmModel:
         if name not in self._of_others:
             joints = [group.name for group in self.groups if group.kind == "joint_offset"]
             every = cause_groups(chain, joints, turned=self.rotation is not None, timed=False)
-            own = {_called(one): one.twists for one in every}
-            self._of_others[name] = tuple(
-                replace(group, twists=own.get(_called(group), ())) for group in self.groups
-            )
+            twists = {_key(group): group.twists for group in every}
+            groups = (replace(group, twists=twists.get(_key(group), ())) for group in self.groups)
+            self._of_others[name] = tuple(groups)
         return self._of_others[name]
 
     def _robot(self, edits: Edits) -> Chain:
@@ -137,20 +135,19 @@ class ArmModel:
             rows: Rows, by index, shape (n,).
         """
         nothing, count = zero(self.groups), len(rows)
-        if self.frames_open:  # each has frames of its own
+        if self.frames_open:  # the frames depend on the edits
             lefts = [self.residual(replace(nothing, edits=edits), rows) for edits in every]
             return np.array(lefts).reshape(-1, len(self.blocks), count)
         joints = self._joints(nothing, rows)
         result = np.empty((len(every), len(self.blocks), count))
-        of_robots: dict[str, dict[Edits, list[int]]] = {}
+        of_robots: dict[Edits, dict[Edits, list[int]]] = {}
         for i, edits in enumerate(every):
-            robot = next((edit.name for edit in edits if edit.robot is not None), "")
+            robot = tuple(edit for edit in edits if edit.robot is not None)
             of_joints = tuple(edit for edit in edits if edit.joints)
             of_robots.setdefault(robot, {}).setdefault(of_joints, []).append(i)
-        for cases in of_robots.values():
-            alone = tuple(edit for edit in every[next(iter(cases.values()))[0]] if edit.robot is not None)
+        for robot, cases in of_robots.items():
             q = np.concatenate([edited(each, self.sample[rows], joints.q) for each in cases], axis=1)
-            pose = tip_pose(self._robot(alone), list(q))
+            pose = tip_pose(self._robot(robot), list(q))
             many = np.tile(rows, len(cases)), np.tile(joints.inside, len(cases))
             plain = self._left(pose, (), *many).reshape(len(self.blocks), -1, count)
             for k, places in enumerate(cases.values()):
@@ -316,7 +313,7 @@ def pose_residual(
 
     Args:
         pose: The model's, on a base that is not mirrored.
-        edits: What is there or not; its mirrored base and the unit of the data count here.
+        edits: The edits of the explanation; a mirrored base and the unit of the data count here.
         position: Of the data in [m] as they were read, shape (3, n).
         rotation: Matrices [-], shape (3, 3, n); None without any.
         inside: Which rows lie within the time of the model, shape (n,).
@@ -341,7 +338,7 @@ def as_read(columns: FloatArray, edits: Edits, side: str = "") -> FloatArray:
 
     Args:
         columns: Velocities and turns per unit of each number, of a base that is not mirrored; changed.
-        edits: What is there or not.
+        edits: The edits of the explanation.
         side: Which side the data are, in names of units; any by default.
     """
     if (mirror := axes_of(edits, "base_mirrored")) is not None:
@@ -354,14 +351,14 @@ def as_read(columns: FloatArray, edits: Edits, side: str = "") -> FloatArray:
     return columns
 
 
-def _called(group: Group) -> tuple[object, ...]:
+def _key(group: Group) -> tuple[object, ...]:
     return group.kind, group.name, group.axis if group.name in ("base", "tool") else None
 
 
 def _rows_of(pose: Transform, part: slice) -> Transform:
     """Return some of the rows of poses."""
-    elements = (*pose.translation, *(one for row in pose.rotation for one in row))
-    x, y, z, *r = (one[part] if isinstance(one, np.ndarray) else one for one in elements)
+    elements = (*pose.translation, *(element for row in pose.rotation for element in row))
+    x, y, z, *r = (element[part] if isinstance(element, np.ndarray) else element for element in elements)
     return Transform(((r[0], r[1], r[2]), (r[3], r[4], r[5]), (r[6], r[7], r[8])), (x, y, z))
 
 

@@ -50,7 +50,8 @@ def cause_groups(chain: Chain, names: Sequence[str], *, turned: bool, timed: boo
     yield from base_groups(chain.base)
     units = ["m" if joint.kind == "prismatic" else "rad" for joint in chain.moving]
     yield from joint_groups(units, names, chain, timed=timed)
-    segments = [one for place in range(1, len(chain.joints) + 2) for one in _segment_groups(chain, place)]
+    places = range(1, len(chain.joints) + 2)
+    segments = [numbers for place in places for numbers in _segment_groups(chain, place)]
     ranks = [("link_length", True), ("tilt", True), ("link_length", False), ("link_shift", False)]
     for rank in (*ranks, ("tilt", False)):
         yield from (group for group, in_data_sheet in segments if (group.kind, in_data_sheet) == rank)
@@ -81,7 +82,7 @@ def joint_groups(
 
 
 def base_groups(base: Transform) -> Iterator[Group]:
-    """Yield how a base may stand elsewhere: shifted and turned in the world, about its own place."""
+    """Yield the shifts and turns of a base along and about the axes of the world, through its origin."""
     at = Transform(translation=base.translation)
     yield from _frame_groups("base_shift", "base", BASE, at)
     yield from _frame_groups("base_rotation", "base", BASE, at)
@@ -113,22 +114,22 @@ def _frame_groups(kind: Kind, name: str, place: int, frame: Transform) -> Iterat
 def _segment_groups(chain: Chain, place: int) -> Iterator[tuple[Group, bool]]:
     """Yield the six numbers of the segment that a frame ends, each with whether the data sheet has it.
 
-    A frame without a length or turn at either end of the arm, or behind a fixed joint, ends none.
+    A frame without a length or turn at either end of the arm, or after a fixed joint, is no segment.
     """
     frame, count = chain.frames[place], len(chain.joints)
-    named = [one for one in chain.parameters if one.frame_index == place and one.source.startswith(KNOWN_BY)]
+    named = [p for p in chain.parameters if p.frame_index == place and p.source.startswith(KNOWN_BY)]
     at_an_end = place in (1, count + 1) or chain.joints[place - 2].kind == "fixed"
     if not named and frame == Transform() and at_an_end:
         return
-    yield from ((_of_parameter(one), bool(one.value)) for one in named if not one.name.startswith("theta_"))
+    yield from ((_of_parameter(p), bool(p.value)) for p in named if not p.name.startswith("theta_"))
     ends = [*(joint.name for joint in chain.joints), "tip"]
     number = re.sub(r"\D", "", named[0].name) if named else ""
     name = f"segment {number}" if number else f"segment to {ends[place - 1]}"
-    lengths, turns = ([one for one in named if one.kind == kind] for kind in ("along", "about"))
-    # behind the last length and before the last turn, x, y and z are those of all named parameters
+    lengths, turns = ([p for p in named if p.kind == kind] for kind in ("along", "about"))
+    # after the last length and before the last turn, x, y and z are those of all named parameters
     across = turns[-1].before if turns else Transform(translation=frame.translation)
     if lengths:
-        missing, at = [axis for axis in "xyz" if axis not in {one.axis for one in lengths}], across
+        missing, at = [axis for axis in "xyz" if axis not in {p.axis for p in lengths}], across
     else:
         length, at = np.linalg.norm(frame.translation), Transform()
         along = int(np.argmax(np.abs(frame.translation))) if length > NEGLIGIBLE else None
@@ -142,14 +143,16 @@ def _segment_groups(chain: Chain, place: int) -> Iterator[tuple[Group, bool]]:
         if not _is_zero_of_joint(chain, place, twist):
             named_so = f"{name} sideways {letter}"
             yield Group("link_shift", named_so, "m", (0,), None, _point(place), twist.axis, (twist,)), False
-    yield from ((one, False) for one in _tilts(chain, place, name, {one.axis for one in turns}, across))
+    yield from ((tilt, False) for tilt in _tilts(chain, place, name, {p.axis for p in turns}, across))
 
 
-def _of_parameter(one: Parameter) -> Group:
+def _of_parameter(parameter: Parameter) -> Group:
     """Return a named length or angle."""
-    twist = Twist(one.frame_index, one.kind, _AXES[one.axis], one.before)
-    kind, unit = ("link_length", "m") if one.kind == "along" else ("tilt", "rad")
-    return Group(kind, one.name, unit, (0,), None, _point(one.frame_index), _AXES[one.axis], (twist,))  # type: ignore[arg-type]
+    place, axis = parameter.frame_index, _AXES[parameter.axis]
+    twist = Twist(place, parameter.kind, axis, parameter.before)
+    if parameter.kind == "along":
+        return Group("link_length", parameter.name, "m", (0,), None, _point(place), axis, (twist,))
+    return Group("tilt", parameter.name, "rad", (0,), None, _point(place), axis, (twist,))
 
 
 def _tilts(chain: Chain, place: int, name: str, taken: set[str], across: Transform) -> Iterator[Group]:
@@ -179,15 +182,15 @@ def _is_zero_of_joint(chain: Chain, place: int, twist: Twist) -> bool:
     direction = twist.frame.rotate(twist.axis)
     for joint, axis, point in ends:
         moved = {"revolute": "about", "prismatic": "along"}.get(joint.kind)
-        apart = subtract(twist.frame.translation, point) if moved == "about" else ZERO
-        off = (*cross(direction, axis), *cross(direction, apart))
+        between = subtract(twist.frame.translation, point) if moved == "about" else ZERO
+        off = (*cross(direction, axis), *cross(direction, between))
         if joint.mimic is None and moved == twist.kind and max(map(abs, off)) < NEGLIGIBLE:
             return True
     return False
 
 
 def _point(place: int) -> str | None:
-    """Return the point that a frame stands in; none of the first joint, which stands in the base."""
+    """Return the point at the origin of a frame; None for the first joint, whose point is the base."""
     return f"p{place - 1}" if place > 1 else None
 
 
@@ -201,11 +204,11 @@ def _across(axis: Axis) -> tuple[Axis, Axis]:
 
 def _axis(vector: np.ndarray) -> Axis:
     """Return a unit vector as a tuple, without signed zeros."""
-    x, y, z = (float(one) + 0.0 for one in vector)
+    x, y, z = (float(part) + 0.0 for part in vector)
     return x, y, z
 
 
 def _letter(axis: Axis, otherwise: str) -> str:
     """Return the letter of an axis of the frame, else another."""
-    near = (letter for letter, own in _AXES.items() if abs(np.dot(axis, own)) > 1.0 - NEGLIGIBLE)
+    near = (letter for letter, other in _AXES.items() if abs(np.dot(axis, other)) > 1.0 - NEGLIGIBLE)
     return next(near, otherwise)

@@ -1,7 +1,7 @@
 """The side that is modelled, at any time: its joints as an explanation has them.
 
 q + offset + scale q + compliance q'' + lag q' + play / 2 sign(q') + sag times the torque of gravity, q being
-that of the log at its own time, after what is there or not (`log_edits`).
+that of the log at its own time, changed by `log_edits`.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -22,11 +22,11 @@ from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.log_edits import Edits
 
 MOVING = 5.0
-"""A joint moves if its rate is so many times the noise of it: less often than once in a million by chance."""
+"""A joint moves if its rate exceeds its noise this many times: by chance less than once in a million."""
 
 STANDARD_GRAVITY = 9.80665  # [m/s2]
 
-WEIGHTLESS = 1e-9  # [N m] or [N]: rounding of the torque of an axis that stands upright
+WEIGHTLESS = 1e-9  # [N m] or [N]: rounding of the torque about a vertical axis
 
 SHIFTING_TIME = ("time_lag", "clock_drift", "joint_lag")
 
@@ -73,7 +73,7 @@ class Joints:
         second: q'' of that in [rad/s2] or [m/s2], shape (joints, n).
         inside: Which rows lie within the time of their side, shape (n,).
         direction: Returns which way a joint moves, or moved last, shape (n,): 1 or -1; 0 if it never moves.
-        torque: Returns what holds a joint against gravity in [N m] or [N], shape (n,); of an arm without
+        torque: Returns the static torque of gravity on a joint in [N m] or [N], shape (n,); of an arm without
             masses for each [kg] at its tool centre point.
     """
 
@@ -178,7 +178,7 @@ class Motion:
         at = clock.at(state, groups, rows)
         edits = tuple(edit for edit in state.edits if edit.joints)
         own, own_rate, second, inside = self._edited(edits, at, sample[rows])
-        taken = [(one, float(state.values[one.columns[0]])) for one in groups if not one.twists]
+        taken = [(group, float(state.values[group.columns[0]])) for group in groups if not group.twists]
         taken = [(group, value) for group, value in taken if value]
         for group, value in taken:
             if group.kind == "joint_lag" and group.joint is not None:
@@ -186,7 +186,7 @@ class Motion:
                 for part, other in zip((own, own_rate, second), late[:3], strict=True):
                     part[group.joint] = other[group.joint]
                 inside = inside & late[3]
-        nearest = self.nearest(at)
+        nearest = cache(partial(self.nearest, at))
         q, rate = own.copy(), own_rate.copy()
         joints = Joints(
             q, rate, own, own_rate, second, inside,
@@ -207,16 +207,16 @@ class Motion:
     def _edited(
         self, edits: Edits, at: FloatArray, log_rows: IntArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-        """Return `at` of some times with what is there or not, in the log's rows at these times."""
+        """Return `at` changed by edits, with the log's rows at these times."""
         q, rate, second, inside = self.at(at)
         for edit in edits:
             q, rate, second = edit.of_joints(log_rows, q, rate, second)
         return q, rate, second, inside
 
     def _direction(
-        self, edits: Edits, clock: Clock, sample: IntArray, nearest: IntArray, j: int
+        self, edits: Edits, clock: Clock, sample: IntArray, nearest: Callable[[], IntArray], j: int
     ) -> FloatArray:
-        """Return which way a joint moves at some samples, or moved last, shape of `nearest`.
+        """Return which way a joint moves at some samples, or moved last, shape of these.
 
         Noise does not move it: it moves where its rate is beyond that; before, it is as it moves first.
         """
@@ -233,43 +233,44 @@ class Motion:
             last = np.maximum(np.searchsorted(moves, np.arange(len(self.t)), side="right") - 1, 0)
             signs = np.sign(rate[j][moves[last]]) if len(moves) else np.zeros(len(self.t))
             self._directions[edits, j] = signs
-        return self._directions[edits, j][nearest]
+        return self._directions[edits, j][nearest()]
 
     def _torque(
         self,
         edits: Edits,
         clock: Clock,
         sample: IntArray,
-        nearest: IntArray,
+        nearest: Callable[[], IntArray],
         chain: Chain | None,
         j: int,
     ) -> FloatArray:
-        """Return what holds a joint against gravity at some samples, each computed once."""
+        """Return the static torque of gravity on a joint at some samples, each computed once."""
         assert chain is not None  # without an arm there is no group of sag
         if edits not in self._torques:
             self._torques[edits] = np.zeros_like(self.value), np.zeros(len(self.t), dtype=bool)
         torques, known = self._torques[edits]
-        new = np.unique(nearest[~known[nearest]])
+        at = nearest()
+        new = np.unique(at[~known[at]])
         if len(new):
             q = self.value[:, new]
             for edit in edits:
                 (q,) = edit.of_joints(self._log_rows(clock, sample, new), q)
             torques[:, new] = gravity_torques(chain, q)
             known[new] = True
-        return np.asarray(torques[j, nearest])
+        return np.asarray(torques[j, at])
 
     def _log_rows(self, clock: Clock, sample: IntArray, at: IntArray) -> IntArray:
-        """Return the rows of the log that some samples stand beside, shape of `at`."""
+        """Return the rows of the log nearest in time to some samples, shape of `at`."""
         return sample[np.minimum(np.searchsorted(clock.t, self.t[at]), len(sample) - 1)]
 
 
 def has_masses(chain: Chain) -> bool:
     """Return whether gravity pulls at an arm itself; else it is taken to pull at its tool centre point."""
-    return any(one.mass != 0.0 for one in chain.inertials)
+    return any(inertial.mass != 0.0 for inertial in chain.inertials)
 
 
 def gravity_torques(chain: Chain, q: FloatArray) -> FloatArray:
-    """Return what the joints of an arm at rest give against gravity, shape (joints, n).
+    """Return the torques that the joints of an arm at rest need against gravity, shape (joints, n).
 
     Args:
         chain: The arm; of one without masses it is what 1 kg at its tool centre point takes.
@@ -284,10 +285,10 @@ def gravity_torques(chain: Chain, q: FloatArray) -> FloatArray:
     else:
         upward = scale(-STANDARD_GRAVITY / max(math.hypot(*chain.gravity), WEIGHTLESS), chain.gravity)
         torques = [dot(upward, column[:3]) for column in jacobian(chain, [*q])]
-    found = np.empty_like(q)
-    for row, torque in zip(found, torques, strict=True):
+    result = np.empty_like(q)
+    for row, torque in zip(result, torques, strict=True):
         row[:] = torque
-    return np.asarray(np.where(np.abs(found) < WEIGHTLESS, 0.0, found))
+    return np.asarray(np.where(np.abs(result) < WEIGHTLESS, 0.0, result))
 
 
 QUIET = 0.05

@@ -161,9 +161,10 @@ def joints_model(numbers: float) -> tuple[JointsModel, State]:
     return model, State(numbers * np.array(sizes) * rng.uniform(-1.0, 1.0, len(groups)))
 
 
-@pytest.mark.parametrize("size", [0.0, 1.0])
-def test_the_jacobian_of_joints_is_their_slope(size: float) -> None:
-    assert_linear(*joints_model(size))
+@pytest.mark.parametrize(("size", "direction"), [(0.0, -1.0), (1.0, -1.0), (1.0, 1.0)])
+def test_the_jacobian_of_joints_is_their_slope(size: float, direction: float) -> None:
+    model, state = joints_model(size)
+    assert_linear(replace(model, clock=replace(model.clock, direction=direction)), state)
 
 
 def place_model(numbers: float) -> tuple[PlaceModel, State]:
