@@ -7,11 +7,12 @@ import json
 import warnings
 import xml.etree.ElementTree as ET
 from contextlib import redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import urmpipe
@@ -23,6 +24,8 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.facts import remedy_hints
+from urmpipe_pipeline.diagnosis.result import Cause, Remainder
 from urmpipe_pipeline.presentation.section import Advice
 from urmpipe_pipeline.results import present
 
@@ -262,3 +265,19 @@ def test_what_to_do_removes_the_causes(setup: dict[str, Any], parameters: list[s
     (run,) = urmpipe.compare(PATH, RIGHT, "urm6", unit="rad", **given).runs
     # lines between rows 0.2 s apart leave 0.1 mm that the diagnosis does not have
     assert there(run.statistics["norm"]).rms == pytest.approx(diagnosis.remainder.rms, abs=1e-4)
+
+
+def test_the_unit_of_a_joint_is_an_option(folder: Path) -> None:
+    table = pd.read_csv(RIGHT)
+    table.assign(q3=np.degrees(table.q3)).to_csv("mixed.csv", index=False)
+    (run,) = urmpipe.compare(PATH, "mixed.csv", "urm6", unit="rad", diagnose=True).runs
+    cause = Cause("joint_unit", "phi3", ("q3",), value=(np.pi / 180.0,))
+    diagnosis = replace(there(run.diagnosis), causes=(cause,), remainder=Remainder(0.0, 0.0))
+    (hint,) = remedy_hints(replace(run, diagnosis=diagnosis))
+    assert hint.spelled("command line") == "--unit q3=deg"
+    assert isinstance(hint.value, dict)
+    right, mixed = (
+        urmpipe.compare(PATH, log, "urm6", unit={"": "rad"} | unit).runs[0]
+        for log, unit in ((RIGHT, {}), ("mixed.csv", hint.value))
+    )
+    assert mixed.statistics["norm"].rms == pytest.approx(right.statistics["norm"].rms)

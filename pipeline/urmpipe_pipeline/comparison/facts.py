@@ -244,7 +244,7 @@ def remedy_hints(one: Deviation) -> list[Hint]:
 def _corrected_frames(causes: Sequence[Cause], base: Transform, tool: Transform) -> list[Transform]:
     """Return a base and a tool to which the shifts and then the turns of causes are added."""
     at_base = Transform(translation=base.translation)  # shifted and turned in the world, about its origin
-    changes = []
+    changes: list[tuple[Twist, float]] = []
     for cause in sorted(causes, key=lambda cause: cause.kind.endswith("rotation")):
         if cause.kind in ("base_shift", "base_rotation", "tool_shift", "tool_rotation"):
             place, frame = (0, at_base) if cause.kind.startswith("base") else (1, tool)

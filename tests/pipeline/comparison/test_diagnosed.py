@@ -89,7 +89,8 @@ def test_what_stays_is_said_only_beside_a_cause(paths: Compared) -> None:
     found = diagnosis_of(paths({"log": off(0.01)}).runs[0])
     said = {fact.name: fact.value for fact in diagnosis_facts(found)}
     assert said["Remaining deviation"] == "rms 0.0574 mm: the digits of the log"
-    nothing = {fact.name: fact.value for fact in diagnosis_facts(replace(found, causes=(), undecided=(), refused=()))}
+    empty = replace(found, causes=(), undecided=(), refused=())
+    nothing = {fact.name: fact.value for fact in diagnosis_facts(empty)}
     assert nothing["Remaining deviation"] == ""
     assert str(nothing["Cause"]).startswith("no cause found: rms ")
 
