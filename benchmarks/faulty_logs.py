@@ -1,0 +1,721 @@
+"""Real motions of robot arms as logs that deviate for a known reason, in 1000 seeded trials.
+
+1. A motion: joints of a real log of others (`MOTIONS`), thinned to about 1000 rows, or still poses.
+2. A truth: causes that are drawn, and scaled until the tool centre point moves by a wanted rms (`trial`).
+3. Data: where the arm is with them, by products of matrices, and noise (`Trial.data`).
+
+Needs the folder `shared` beside the checkout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import lfilter
+from scipy.spatial.transform import Rotation
+
+import urmpipe
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.parameters import Parameter
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.runs.results import Run
+
+SHARED = Path(__file__).resolve().parents[2] / "shared"
+COUNT, SEED = 1000, 44
+SIZES = (0.3e-3, 1e-3, 4e-3, 20e-3)  # m, rms at the tool centre point
+NOISES = (0.05e-3, 0.2e-3, 0.5e-3)  # m a coordinate, standard deviation
+LASTING = 0.1  # s, until correlated noise falls to 1/e
+LEVER = 0.2  # m: a turn of the tool counts as what it moves at this distance
+ROWS = 1000
+GRAVITY = np.array([0.0, 0.0, -9.81])
+MOVED = 1e-3  # m rms: what singles have to move to count
+LOST_IN_NOISE = 30.0  # chi-square of two explanations below which these samples do not separate them
+SAME = 3e-3  # share of the effect, likewise: interpolation between samples
+
+
+class Source(NamedTuple):
+    """A log of others: file, robot, how often its motion is drawn, whether still, and how to read it."""
+
+    file: str
+    robot: str
+    weight: float
+    still: bool = False
+    period: float | None = None
+
+
+MOTIONS = (
+    Source("traj-recorder-ros2/salva.csv", "ur5e", 4),
+    Source("ur5e-isaaclab/joint_log.csv", "ur5e", 1),
+    Source("ur5-mujoco-rttsa/joint_trajectory.csv", "ur5", 0.4),
+    Source("panda-matlab-ascii/q_Traj1_Grad.txt", "panda", 2),
+    Source("panda-matlab-ascii/q_Traj1_PI.txt", "panda", 2),
+    Source("iiwa14-fri-text/pour1.txt", "iiwa14", 1.5),
+    Source("iiwa14-fri-text/iiwa14_singularity_change_config.txt", "iiwa14", 1.5),
+    Source("iiwa-dmp-text/iiwa_example1.txt", "iiwa14", 1.5),
+    Source("abb-egm-irb120/theta_actual.txt", "irb120", 4, period=0.01),
+    Source("ur10-laser-tracker/measurements_grid.csv", "ur10", 4, still=True),
+    Source("pybotics-ur10-fk/ur10-joints-poses.csv", "ur10", 1, still=True),
+    Source("ur5-factory-calibration/joint-eef-data.csv", "ur5e", 1, still=True),
+)
+
+
+TOOL = "0.05,0.03,0.12,0,0,-0.785398"
+"""The known tool of every second trial, in m and rad: one off the last axis shows what that joint does."""
+
+OTHERS = {
+    "ur5e": ("ur5", "ur3e", "ur10e"), "ur5": ("ur5e", "ur3", "ur10"), "ur10": ("ur10e", "ur5"),
+    "panda": ("iiwa14",), "iiwa14": ("panda",), "irb120": ("arm6", "ur5"),
+}  # fmt: skip
+
+KNOWN_BY = ("URM", "DH", "6R")  # sources of parameters with names of their own
+AXES = np.eye(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Fault:
+    """One cause, as the arm of a trial has it: what is added to the arm, or to the reading of its log.
+
+    Attributes:
+        kind: As `Cause.kind`.
+        value: As `Cause.value`; of a scale what is added to 1.
+        joints: Indices of its joints.
+        name: What the diagnosis should call it, where it has a name of its own.
+        axis: Unit vector along or about which a frame changes [-]; None: `value` has three numbers.
+        place: Index of that frame in `Chain.frames`; None of other causes.
+        at: The frame of the axis, in the frame before that one, shape (4, 4).
+        first: Row from which on it holds.
+        rows: Rows that are off.
+    """
+
+    kind: str
+    value: tuple[float, ...] = ()
+    joints: tuple[int, ...] = ()
+    name: str = ""
+    axis: FloatArray | None = None
+    place: int | None = None
+    at: FloatArray = field(default_factory=lambda: np.eye(4))
+    first: int = 0
+    rows: tuple[int, ...] = ()
+
+    @property
+    def turns(self) -> bool:
+        """Whether a frame is turned, not shifted."""
+        return self.kind in ("base_rotation", "tool_rotation", "tilt")
+
+    @property
+    def motion(self) -> FloatArray:
+        """What a frame is multiplied by, shape (4, 4)."""
+        vector = np.array(self.value) if self.axis is None else self.value[0] * self.axis
+        turn = Rotation.from_rotvec(vector) if self.axis is not None else _rpy(vector)
+        return matrix(turn.as_matrix()) if self.turns else matrix(AXES, vector)
+
+    def __str__(self) -> str:
+        """Return it for people, in SI."""
+        of = self.name or " and ".join(f"joint {j + 1}" for j in self.joints)
+        axis = "" if self.axis is None else f" {np.round(self.axis, 3).tolist()}"
+        where = f" from row {self.first}" * bool(self.first) + f", {len(self.rows)} rows" * bool(self.rows)
+        return f"{self.kind} {of}{axis} {[float(f'{v:.4g}') for v in self.value]}{where}"
+
+
+def _rpy(vector: FloatArray) -> Rotation:
+    return Rotation.from_euler("ZYX", vector[::-1])
+
+
+def matrix(rotation: ArrayLike, translation: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
+    """Return a frame, shape (4, 4), of its rotation and its origin in [m]."""
+    made = np.eye(4)
+    made[:3, :3], made[:3, 3] = rotation, translation
+    return made
+
+
+class Arm:
+    """Forward kinematics of a chain by products of matrices."""
+
+    def __init__(self, chain: Chain) -> None:
+        self.chain = chain
+        self.frames = [matrix(one.rotation, one.translation) for one in chain.frames]
+
+    def poses(
+        self, q: FloatArray, faults: Sequence[Fault] = (), growth: FloatArray | None = None
+    ) -> tuple[list[FloatArray], FloatArray]:
+        """Return the frame of each joint and that of the tool, shape (n, 4, 4), of joints, shape (n, joints).
+
+        Args:
+            q: In [rad].
+            faults: What differs of the arm.
+            growth: Factor of all lengths of its segments in each row, shape (n,).
+        """
+        frames = [np.broadcast_to(one, (len(q), 4, 4)).copy() for one in self.frames]
+        for one in sorted(faults, key=lambda one: not one.turns):  # a shift is outermost
+            if one.place is not None:
+                frames[one.place] = one.at @ one.motion @ np.linalg.inv(one.at) @ frames[one.place]
+        for frame in frames[1:-1] if growth is not None else ():
+            frame[:, :3, 3] *= np.asarray(growth)[:, np.newaxis]
+        at, links, columns = frames[0], [], iter(q.T)
+        for joint, frame in zip(self.chain.joints, frames[1:-2], strict=True):
+            turn = np.broadcast_to(np.eye(4), frame.shape).copy()
+            if joint.kind == "revolute":
+                turn[:, :3, :3] = Rotation.from_rotvec(np.outer(next(columns), joint.axis)).as_matrix()
+            at = at @ frame @ turn
+            links.append(at)
+        return links, at @ frames[-2] @ frames[-1]
+
+    def torque(self, q: FloatArray, j: int) -> FloatArray:
+        """Return what gravity does about a joint in [N m]: to the masses, else to 1 kg at the tool."""
+        links, tip = self.poses(q)
+        names = [joint.name for joint in self.chain.joints]
+        at = names.index(self.chain.coordinates[j])
+        loads = [(1.0, tip[:, :3, 3])]
+        if self.chain.inertials:
+            carried = [(one, names.index(one.joint)) for one in self.chain.inertials if one.joint in names]
+            loads = [
+                (float(one.mass), links[k][:, :3, :3] @ np.array(one.centre) + links[k][:, :3, 3])
+                for one, k in carried
+                if k >= at
+            ]
+        axis, origin = links[at][:, :3, :3] @ np.array(self.chain.joints[at].axis), links[at][:, :3, 3]
+        about = sum(mass * np.cross(centre - origin, GRAVITY) for mass, centre in loads)
+        return np.asarray((axis * about).sum(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A motion of a real log, and its arm with or without the tool.
+
+    Attributes:
+        source: Where it comes from.
+        chain: The arm.
+        t: Times of the rows in [s], shape (n,).
+        q: Joints in [rad], shape (n, joints).
+    """
+
+    source: Source
+    chain: Chain
+    t: FloatArray
+    q: FloatArray
+
+    @cached_property
+    def arm(self) -> Arm:
+        """Its kinematics."""
+        return Arm(self.chain)
+
+    @cached_property
+    def at(self) -> CubicSpline:
+        """The joints over time."""
+        return CubicSpline(self.t, self.q)
+
+    @cached_property
+    def second(self) -> CubicSpline:
+        """Their second derivatives in [rad/s2], without what the encoders add: of means over 30 ms."""
+        width = max(0.03 / float(np.median(np.diff(self.t))), 1.0)
+        return CubicSpline(self.t, gaussian_filter1d(self.q, width, axis=0, mode="nearest")).derivative(2)
+
+
+@cache
+def motion_of(source: Source, tool: bool) -> Motion:
+    """Return a motion from its file, thinned to about `ROWS`; of still poses 300."""
+    robot = str(SHARED / "cases/diagnosis/irb120.toml") if source.robot == "irb120" else source.robot
+    reading: dict[str, Any] = {} if source.still else {"unit": "rad"}
+    reading |= {"period": source.period} if source.period else {}
+    run = urmpipe.ingest(SHARED / "logs" / source.file, robot, tool=_tool(tool), **reading)
+    q, t = run.log.q, run.log.t_ns / 1e9
+    step = max(round(len(q) / (300 if source.still else ROWS)), 1)
+    assert run.robot is not None
+    return Motion(source, run.robot, t[::step] - t[0], q[::step].round(6))
+
+
+def _tool(known: bool) -> list[float] | None:
+    return [float(one) for one in TOOL.split(",")] if known else None
+
+
+def _of_joint(kind: str, value: float) -> Drawn:
+    return lambda motion, rng: Fault(kind, (value,), (int(rng.integers(motion.q.shape[1])),))
+
+
+def _of_frame(kind: str, count: int) -> Drawn:
+    """Return how base or tool are drawn to differ by one number or three."""
+
+    def drawn(motion: Motion, rng: np.random.Generator) -> Fault:
+        frames = motion.arm.frames
+        place = 0 if kind.startswith("base") else len(frames) - 1
+        at = frames[place] if place else matrix(AXES, frames[0][:3, 3])
+        if count == 1:
+            return Fault(kind, (1e-4,), axis=AXES[rng.integers(3)], place=place, at=at)
+        return Fault(kind, tuple(1e-4 * rng.uniform(0.3, 1.0, 3)), place=place, at=at)
+
+    return drawn
+
+
+def _of_segment(kind: str) -> Drawn:
+    return lambda motion, rng: (found := segments(motion.chain, kind))[rng.integers(len(found))]
+
+
+@cache
+def segments(chain: Chain, kind: str) -> list[Fault]:
+    """Return the lengths, tilts or sideways shifts that an arm has, by the names that people know."""
+    named = [
+        one
+        for one in chain.parameters
+        if one.source.startswith(KNOWN_BY)
+        and 0 < one.frame_index <= len(chain.joints) + 1
+        and not one.name.startswith("theta_")
+        and (one.kind == "along") == (kind == "link_length")
+    ]
+    if kind == "link_shift":
+        return [shift for place in range(1, len(chain.joints) + 2) for shift in _sideways(chain, place)]
+    places = range(1, len(chain.joints) + 2)
+    return [_of_parameter(kind, one) for one in named] or [
+        one for place in places for one in _unnamed(chain, kind, place)
+    ]
+
+
+def _of_parameter(kind: str, one: Parameter) -> Fault:
+    at = matrix(one.before.rotation, one.before.translation)
+    return Fault(kind, (1e-4,), (), one.name, AXES["xyz".index(one.axis)], one.frame_index, at)
+
+
+def _unnamed(chain: Chain, kind: str, place: int) -> Iterator[Fault]:
+    """Yield the length of a segment, or the tilts of a joint, of an arm that is known by its frames."""
+    names = [*(joint.name for joint in chain.joints), "tip"]
+    along = np.array(chain.frames[place].translation)
+    if kind == "link_length" and np.linalg.norm(along) > 1e-9:
+        axis = along / np.linalg.norm(along)
+        yield Fault(kind, (1e-4,), name=f"segment to {names[place - 1]}", axis=axis, place=place)
+    if kind == "tilt" and place <= len(chain.joints):
+        at, own = Arm(chain).frames[place], chain.joints[place - 1].axis
+        for letter, axis in zip("xyz", AXES, strict=True):
+            if abs(axis @ own) < 1e-9:
+                yield Fault(
+                    kind, (1e-4,), name=f"{names[place - 1]} about {letter}", axis=axis, place=place, at=at
+                )
+
+
+def _sideways(chain: Chain, place: int) -> Iterator[Fault]:
+    """Yield the shifts of a segment across its lengths: what no length of it can do."""
+    lengths = [
+        one.at[:3, :3] @ one.axis
+        for one in segments(chain, "link_length")
+        if one.place == place and one.axis is not None
+    ]
+    spanned = np.linalg.matrix_rank(np.array(lengths), tol=1e-6) if lengths else 0
+    across = np.linalg.svd(np.array(lengths))[2][spanned:] if spanned else np.empty((0, 3))
+    for axis in across:
+        yield Fault("link_shift", (1e-4,), axis=np.where(np.abs(axis) < 1e-9, 0.0, axis), place=place)
+
+
+def _turned_base(motion: Motion, rng: np.random.Generator) -> Fault:
+    angle = float(rng.choice([np.pi, np.pi / 2, -np.pi / 2]))
+    return replace(_of_frame("base_rotation", 1)(motion, rng), value=(angle,))
+
+
+def _mirrored_base(motion: Motion, rng: np.random.Generator) -> Fault:
+    k = int(rng.integers(3))
+    return Fault("base_mirrored", name="({})".format(", ".join("-" * (i == k) + "xyz"[i] for i in range(3))))
+
+
+def _two_joints(kind: str) -> Drawn:
+    def drawn(motion: Motion, rng: np.random.Generator) -> Fault:
+        j = int(rng.integers(1, motion.q.shape[1]))
+        k = j - 1 if kind == "joint_coupled" else int(rng.integers(j))
+        return Fault(kind, (float(rng.choice([-1.0, 1.0])),) if kind == "joint_coupled" else (), (j, k))
+
+    return drawn
+
+
+def _later(kind: str) -> Drawn:
+    def drawn(motion: Motion, rng: np.random.Generator) -> Fault:
+        n, count = motion.q.shape
+        return Fault(kind, (), (int(rng.integers(count)),), first=int(rng.integers(n // 10, n * 9 // 10)))
+
+    return drawn
+
+
+def _outliers(motion: Motion, rng: np.random.Generator) -> Fault:
+    n = len(motion.t)
+    count = max(int(rng.uniform(0.02, 0.05) * n), 1)
+    return Fault(
+        "outliers", rows=tuple(sorted(map(int, rng.choice(n, count, replace=False)))), name="scattered"
+    )
+
+
+def _reset(motion: Motion, rng: np.random.Generator) -> Fault:
+    n = len(motion.t)
+    count = max(int(rng.uniform(0.005, 0.04) * n), 1)
+    first = int(rng.integers(n // 10, n - count))
+    return Fault("outliers", rows=tuple(range(first, first + count)), name="a reset")
+
+
+def _unit(motion: Motion, rng: np.random.Generator) -> Fault:
+    name, metres = [("mm", 1e-3), ("cm", 1e-2), ("inch", 0.0254)][rng.integers(3)]
+    return Fault("path_unit", (metres,), name=f"reference in {name}")
+
+
+Drawn: TypeAlias = Callable[[Motion, np.random.Generator], Fault]
+Cell: TypeAlias = tuple[str, tuple[str, ...], float, float]
+
+SIZED: dict[str, Drawn] = {
+    "time_lag": lambda motion, rng: Fault("time_lag", (1e-3,)),
+    "clock_drift": lambda motion, rng: Fault("clock_drift", (1e-4,)),
+    "servo_lag": lambda motion, rng: Fault("servo_lag", (1e-3,)),
+    "joint_lag": _of_joint("joint_lag", 1e-3),
+    "base_shift, one axis": _of_frame("base_shift", 1), "base_shift": _of_frame("base_shift", 3),
+    "base_rotation, one axis": _of_frame("base_rotation", 1), "base_rotation": _of_frame("base_rotation", 3),
+    "tool_shift, one axis": _of_frame("tool_shift", 1), "tool_shift": _of_frame("tool_shift", 3),
+    "tool_rotation": _of_frame("tool_rotation", 3),
+    "joint_offset": _of_joint("joint_offset", 1e-4), "joint_scale": _of_joint("joint_scale", 1e-4),
+    "compliance": _of_joint("compliance", 1e-4), "backlash": _of_joint("backlash", 1e-3),
+    "sag": _of_joint("sag", 1e-5),
+    "link_length": _of_segment("link_length"), "link_shift": _of_segment("link_shift"),
+    "tilt": _of_segment("tilt"),
+}  # fmt: skip
+
+DISCRETE: dict[str, Drawn] = {
+    "base turned by 90 or 180 deg": _turned_base, "base_mirrored": _mirrored_base, "path_unit": _unit,
+    "joint_sign": _of_joint("joint_sign", 0.0), "joints_swapped": _two_joints("joints_swapped"),
+    "joint_unit": lambda motion, rng: replace(
+        _of_joint("joint_unit", 0.0)(motion, rng), value=(float(rng.choice([np.pi / 180, 180 / np.pi])),)
+    ),
+    "joint_coupled": _two_joints("joint_coupled"), "half_turn": _later("half_turn"),
+    "mirrored": _later("mirrored"), "turns": _of_joint("turns", 1.0),
+    "other_robot": lambda motion, rng: Fault(
+        "other_robot", name=str(rng.choice(OTHERS[motion.source.robot]))
+    ),
+    "outliers": _outliers, "outliers, a reset": _reset,
+}  # fmt: skip
+
+OUTSIDE = ("thermal growth", "quantised joints", "dropped rows")
+PAIRS = 127
+UNDISTURBED = 200
+
+TIMED = (
+    "time_lag", "clock_drift", "servo_lag", "joint_lag", "compliance", "backlash", "half_turn", "mirrored",
+    "outliers, a reset", "dropped rows",
+)  # fmt: skip
+"""What still poses do not have."""
+
+BY_ROW = ("half_turn", "mirrored", "outliers", "outliers, a reset", "dropped rows")
+"""What needs the same rows on both sides."""
+
+BY_JOINTS = (
+    "time_lag", "clock_drift", "servo_lag", "joint_lag", "joint_offset", "joint_scale", "compliance",
+    "backlash", "joint_sign", "joints_swapped", "joint_unit", "joint_coupled", "half_turn", "mirrored",
+    "turns",
+)  # fmt: skip
+"""What joints on both sides have, too."""
+
+EDITS = ("joint_sign", "joints_swapped", "joint_unit", "joint_coupled", "half_turn", "mirrored", "turns")
+LARGEST = {
+    "time_lag": 0.5,
+    "servo_lag": 0.2,
+    "joint_lag": 0.2,
+    "clock_drift": 0.05,
+    "joint_scale": 0.2,
+    "sag": 5e-3,
+    "compliance": 0.05,
+}
+"""Largest values that are drawn in SI; of angles and lengths 0.3."""
+
+ONE_SIGN = ("servo_lag", "backlash", "sag")  # the reference lags, or sags
+
+
+def read(q: FloatArray, one: Fault, rows: FloatArray | IntArray, *, back: bool = False) -> FloatArray:
+    """Return joints, shape (n, joints), as a fault of the reading corrects them; back: as it spoils them."""
+    q, later, sign = q.copy(), rows >= one.first, -1.0 if back else 1.0
+    j = one.joints[0]
+    if one.kind in ("joint_sign", "mirrored"):
+        q[later, j] *= -1.0
+    elif one.kind == "joints_swapped":
+        q[:, list(one.joints)] = q[:, list(one.joints[::-1])]
+    elif one.kind == "joint_unit":
+        q[:, j] *= one.value[0] ** sign
+    elif one.kind == "joint_coupled":
+        q[:, j] += sign * one.value[0] * q[:, one.joints[1]]
+    else:
+        q[later, j] += sign * (np.pi if one.kind == "half_turn" else 2.0 * np.pi * one.value[0])
+    return q
+
+
+def lagged(t: FloatArray, q: FloatArray, lag: float) -> FloatArray:
+    """Return joints, shape (n, joints), behind a first-order lag T y' + y = q, exact between lines."""
+    rate = np.gradient(q, t, axis=0)
+    if lag <= 0.0:
+        return q - lag * rate
+    dt = float(np.median(np.diff(t)))
+    a = np.exp(-dt / lag)
+    b = lag / dt * (1.0 - a)
+    start = q[0] - lag * rate[0]
+    made, _ = lfilter([1.0 - b, b - a], [1.0, -a], q, axis=0, zi=[start - (1.0 - b) * q[0]])
+    return np.asarray(made)
+
+
+def behind_play(q: FloatArray, width: float) -> FloatArray:
+    """Return a joint, shape (n,), behind a play of some width in [rad]: it moves once the play is used up."""
+    moved, there, half = q.copy(), q[0], abs(width) / 2.0
+    for k, value in enumerate(q):
+        moved[k] = there = min(max(there, value - half), value + half)
+    return moved if width > 0.0 else 2.0 * q - moved
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One question whose answer is known.
+
+    Attributes:
+        number: Its place among all, which seeds its noise.
+        group: single, pair, outside or undisturbed.
+        kinds: Names of what it has, of `SIZED`, `DISCRETE` or `OUTSIDE`.
+        size: What each sized cause moves in [m] rms; 0 of others.
+        sigma: Noise of a coordinate in [m]; of joints in as many rad.
+        correlated: Whether that lasts.
+        oriented: Whether the reference has orientations.
+        both: Whether the reference has joints instead.
+        every: The reference has each so manieth row.
+        motion: The motion.
+        truth: The causes.
+    """
+
+    number: int
+    group: str
+    kinds: tuple[str, ...]
+    size: float
+    sigma: float
+    correlated: bool
+    oriented: bool
+    both: bool
+    every: int
+    motion: Motion
+    truth: tuple[Fault, ...] = ()
+
+    def log(self, at: FloatArray) -> FloatArray:
+        """Return what the log reads at some times in [s]: the joints, spoilt by the edits of the truth."""
+        t = self.motion.t
+        inside = np.clip(at, t[0], t[-1])
+        q, rows = self.motion.at(inside), np.interp(inside, t, np.arange(len(t))).round()
+        for one in reversed(self.truth):
+            q = read(q, one, rows, back=True) if one.kind in EDITS else q
+        return np.asarray(q)
+
+    def joints(self, faults: Sequence[Fault]) -> FloatArray:
+        """Return the joints that the log means, if some faults are true, in [rad], shape (n, joints)."""
+        t = self.motion.t
+        by = {kind: [one for one in faults if one.kind == kind] for kind in {one.kind for one in faults}}
+        at = t - sum(one.value[0] for one in by.get("time_lag", ()))
+        at -= sum(one.value[0] for one in by.get("clock_drift", ())) * (t - t[0])
+        q = self.log(at)
+        for one in by.get("joint_lag", ()):
+            q[:, one.joints[0]] = self.log(at - one.value[0])[:, one.joints[0]]
+        for one in by.get("servo_lag", ()):
+            q = lagged(t, q, one.value[0])
+        for one in faults:
+            q = read(q, one, np.arange(len(t))) if one.kind in EDITS else q
+        factors = {"joint_offset": np.ones_like(q), "joint_scale": q.copy()}
+        factors["compliance"] = self.motion.second(np.clip(at, t[0], t[-1]))
+        for one in faults:
+            if one.kind in factors:
+                q[:, one.joints[0]] += one.value[0] * factors[one.kind][:, one.joints[0]]
+        for one in by.get("backlash", ()):
+            q[:, one.joints[0]] = behind_play(q[:, one.joints[0]], one.value[0])
+        for one in by.get("sag", ()):
+            q[:, one.joints[0]] += one.value[0] * self.motion.arm.torque(q, one.joints[0])
+        return q
+
+    def tcp(self, faults: Sequence[Fault], growth: FloatArray | None = None) -> tuple[FloatArray, Rotation]:
+        """Return where the tool centre point is, if some faults are true, in [m], shape (n, 3)."""
+        arm = self.motion.arm
+        for one in faults:
+            if one.kind == "other_robot":
+                arm = Arm(load_robot(one.name).placed(arm.chain.base, arm.chain.tool))
+        _, tip = arm.poses(self.joints(faults), faults, growth)
+        position = tip[:, :3, 3]
+        for one in faults:
+            if one.kind == "base_mirrored":
+                position = position * [-1.0 if "-" in part else 1.0 for part in one.name.split(",")]
+            elif one.kind == "path_unit":
+                position = position / one.value[0]
+        return position, Rotation.from_matrix(tip[:, :3, :3])
+
+    def apart(self, one: Sequence[Fault], other: Sequence[Fault], *, seen: bool = True) -> FloatArray:
+        """Return how far two explanations are apart in each row, shape (n,).
+
+        Args:
+            one: Causes.
+            other: Others.
+            seen: Whether joints in [rad] are told apart where both sides have them; else places in [m].
+        """
+        if seen and self.both:
+            return np.asarray(np.linalg.norm(self.joints(one) - self.joints(other), axis=1))
+        (p, turn), (p_other, turn_other) = self.tcp(one), self.tcp(other)
+        squares = ((p - p_other) ** 2).sum(axis=1)
+        if self.oriented:
+            squares = squares + (LEVER * (turn * turn_other.inv()).magnitude()) ** 2
+        return np.asarray(np.sqrt(squares))
+
+    @cached_property
+    def effect(self) -> float:
+        """How much the causes move the tool centre point in [m] rms."""
+        return rms(self.apart(self.truth, (), seen=False))
+
+    def noise(self, rng: np.random.Generator, columns: int) -> FloatArray:
+        """Return noise of each row, shape (n, columns), in [m] or [rad]."""
+        t = self.motion.t
+        if not self.correlated:
+            return np.asarray(rng.normal(0.0, self.sigma, (len(t), columns)))
+        a = np.exp(-float(np.median(np.diff(t))) / LASTING)
+        white = rng.normal(0.0, self.sigma * np.sqrt(1.0 - a * a), (len(t) + 1000, columns))
+        return np.asarray(lfilter([1.0], [1.0, -a], white, axis=0)[1000:])
+
+    def data(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Return times and joints of the log, then times and values of the reference.
+
+        These are joints, or x, y, z in [m] with the quaternion behind if there are orientations.
+        """
+        rng, t = np.random.default_rng([SEED, self.number, 1]), self.motion.t
+        q, log_t = self.log(t), t.copy()
+        growth = 1.0 + rng.uniform(5e-4, 2e-3) * t / t[-1] if self.kinds == ("thermal growth",) else None
+        position, turn = self.tcp(self.truth, growth)
+        values = self.joints(self.truth) if self.both else position
+        unit = next((one.value[0] for one in self.truth if one.kind == "path_unit"), 1.0)
+        values = values + self.noise(rng, values.shape[1]) / unit
+        if self.oriented:
+            off = Rotation.from_rotvec(rng.normal(0.0, self.sigma / LEVER, (len(t), 3)))
+            values = np.hstack([values, (off * turn).as_quat()])
+        for one in self.truth:
+            if one.name == "scattered":
+                away = rng.normal(size=(len(one.rows), 3))
+                away *= (rng.uniform(0.03, 0.3, len(away)) / np.linalg.norm(away, axis=1))[:, np.newaxis]
+                values[list(one.rows), :3] += away
+            elif one.name == "a reset":
+                q[list(one.rows)] = 0.0
+        if self.kinds == ("quantised joints",):
+            step = np.radians(rng.uniform(0.02, 0.2))
+            q = np.round(q / step) * step
+        elif self.kinds == ("dropped rows",):
+            kept = np.ones(len(t), bool)
+            for _ in range(rng.integers(1, 4)):
+                first = int(rng.integers(len(t) // 10, len(t) * 9 // 10))
+                kept[first : first + int(rng.integers(2, max(len(t) // 50, 3)))] = False
+            q, log_t = q[kept], np.arange(kept.sum()) * float(np.median(np.diff(t)))
+        return log_t, q.round(7), t[:: self.every], values[:: self.every].round(7)
+
+    def runs(self) -> tuple[Run, Run]:
+        """Return the reference and the log, as a script would hand them over."""
+        chain, still = self.motion.chain, self.motion.source.still
+        t, q, reference_t, values = self.data()
+        when: list[dict[str, Any]] = [{"poses": True}] * 2 if still else [{"t": reference_t}, {"t": t}]
+        named: dict[str, Any] = {"robot": chain, "names": chain.coordinates, "unit": "rad"}
+        asked = {"q": values, **named} if self.both else {"recorded_tcp": values}
+        return (
+            urmpipe.ingest(name="reference", **asked, **when[0]),
+            urmpipe.ingest(name="log", q=q, **named, **when[1]),
+        )
+
+    def __str__(self) -> str:
+        """Return it in a line."""
+        where = Path(self.motion.source.file).stem + ", tool" * any(self.motion.chain.tool.translation)
+        flags = [name for name in ("correlated", "oriented", "both") if getattr(self, name)]
+        flags += [f"each {self.every}th row"] * (self.every > 1)
+        told = "; ".join(map(str, self.truth)) or ", ".join(self.kinds)
+        moved = f"{1e3 * self.effect:.3g} mm, noise {1e3 * self.sigma:g} mm"
+        return f"{self.number} {self.group}: {told} | {moved} | {', '.join([where, *flags])}"
+
+
+def rms(values: FloatArray) -> float:
+    """Return the root mean square in the unit of the values."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def plan() -> list[Cell]:
+    """Return group, kinds, size and noise of all trials, so mixed that each beginning has all kinds."""
+    rng = np.random.default_rng(SEED)
+    cells: list[Cell] = []
+    for kind, size, sigma in [*product(SIZED, SIZES, NOISES)] * 2 + [*product(DISCRETE, (0.0,), NOISES)] * 3:
+        cells.append(("single", (kind,), size, sigma))
+    every = [*SIZED, *(kind for kind in DISCRETE if not kind.startswith("outliers"))]
+    for k in range(PAIRS):
+        first, second = str(rng.choice([*SIZED])), str(rng.choice(every))
+        while second.partition(",")[0] == first.partition(",")[0]:
+            second = str(rng.choice(every))
+        cells.append(("pair", (first, second), SIZES[1 + k % 3], NOISES[k // 3 % 3]))
+    cells += [("undisturbed", (), 0.0, NOISES[k % 3]) for k in range(UNDISTURBED)]
+    outside = COUNT - len(cells)
+    cells += [("outside", (OUTSIDE[k % 3],), 0.0, NOISES[k // 3 % 3]) for k in range(outside)]
+    return [cells[k] for k in rng.permutation(COUNT)]
+
+
+@cache
+def trial(number: int) -> Trial:
+    """Return a trial: circumstances and causes are drawn until the causes move as much as they should."""
+    group, kinds, size, sigma = plan()[number]
+    rng = np.random.default_rng([SEED, number])
+    for _ in range(300):
+        made = _circumstances(rng, number, group, kinds, size, sigma)
+        truth = []
+        for kind in kinds if group in ("single", "pair") else ():
+            drawn = (SIZED | DISCRETE)[kind](made.motion, rng)
+            if kind in SIZED and kind not in ONE_SIGN:
+                drawn = replace(drawn, value=tuple(rng.choice([-1.0, 1.0]) * v for v in drawn.value))
+            one = scaled(made, drawn, size) if kind in SIZED else _clear(made, drawn)
+            truth += [] if one is None else [one]
+        if group not in ("single", "pair") or len(truth) == len(kinds):
+            return replace(made, truth=tuple(truth))
+    raise RuntimeError(f"trial {number}: {kinds} of {size} m: no motion has it")
+
+
+def _circumstances(
+    rng: np.random.Generator, number: int, group: str, kinds: tuple[str, ...], size: float, sigma: float
+) -> Trial:
+    """Return a trial without causes: its motion, noise and sides."""
+    still = not {*kinds} & {*TIMED}
+    weights = np.array([one.weight * (still or not one.still) for one in MOTIONS])
+    source = MOTIONS[rng.choice(len(MOTIONS), p=weights / weights.sum())]
+    chance = dict(zip(("tool", "correlated", "oriented", "both", "sparse"), rng.random(5), strict=True))
+    both = {*kinds} <= {*BY_JOINTS} and (chance["both"] < 0.2 or "turns" in kinds)
+    oriented = (
+        ("tool_rotation" in kinds or chance["oriented"] < 0.25) and "base_mirrored" not in kinds and not both
+    )
+    sparse = chance["sparse"] < 0.1 and not source.still and not {*kinds} & {*BY_ROW}
+    return Trial(
+        number, group, kinds, size, sigma, chance["correlated"] < 0.2 and not source.still, oriented, both,
+        4 if sparse and source.weight > 1 else 1, motion_of(source, bool(chance["tool"] < 0.5)),
+    )  # fmt: skip
+
+
+def scaled(made: Trial, one: Fault, size: float) -> Fault | None:
+    """Return a cause that moves the tool centre point by a size in [m] rms; None where none does."""
+    for _ in range(5):
+        found = rms(made.apart([one], (), seen=False))
+        if found < 1e-9:
+            return None
+        one = replace(one, value=tuple(v * min(size / found, 1e3) for v in one.value))
+        if np.abs(one.value).max() > LARGEST.get(one.kind, 0.3):
+            return None
+    reached = abs(rms(made.apart([one], (), seen=False)) / size - 1.0) < 0.2
+    return one if reached and not (one.kind == "backlash" and _too_wide(made, one)) else None
+
+
+def _too_wide(made: Trial, one: Fault) -> bool:
+    """Whether a joint moves by less than ten times its play."""
+    return bool(np.ptp(made.motion.q[:, one.joints[0]]) < 10.0 * abs(one.value[0]))
+
+
+def _clear(made: Trial, one: Fault) -> Fault | None:
+    """Return a cause without a size, if it moves something by 1 mm rms."""
+    if one.name == "a reset":
+        zeros = (
+            made.motion.arm.poses(np.zeros_like(made.motion.q))[1] - made.motion.arm.poses(made.motion.q)[1]
+        )
+        return one if (np.linalg.norm(zeros[list(one.rows), :3, 3], axis=1) > 0.02).all() else None
+    if one.kind in ("outliers", "turns"):
+        return one
+    alone = replace(made, truth=(one,))
+    return one if alone.effect > MOVED else None
