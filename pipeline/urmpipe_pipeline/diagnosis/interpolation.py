@@ -128,7 +128,7 @@ def _runs(joined: BoolArray) -> tuple[IntArray, IntArray]:
     return starts[run], ends[run]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SparseMotion(Motion):
     """A motion whose rows lie apart from the times that are looked up: its values are those of cubics.
 

@@ -189,7 +189,7 @@ def _of_arm(matched: Matched, reference: Side, log: Side) -> Question:
         cubics = Cubics.through(
             reference.trajectory.t_ns, np.asarray(reference.trajectory.q), reference.trajectory.broken
         )
-        motion = SparseMotion(motion.t, motion.value, motion.rate, motion.second, cubics)
+        motion = SparseMotion(motion.t, motion.value, motion.rate, motion.second, motion.noise, cubics=cubics)
         lines = position + positions_over_log(robot, motion.at(clock.t)[0].T) - lines
     judged = lines.T.copy() if place.between and not open_frames else None
     model = ArmModel(
