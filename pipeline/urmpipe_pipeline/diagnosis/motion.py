@@ -225,14 +225,13 @@ class Motion:
         if (edits, j) not in self._directions:
             rate, noise = self.rate, np.zeros(len(self.rate)) if self.noise is None else self.noise
             parts = np.diag(noise)  # a joint that includes another has the noise of both
-            every = self._log_rows(clock, sample, np.arange(len(self.t)))
             for edit in edits:
-                rate = edit.of_joints(every, rate, rate)[1]
+                log_rows = self._log_rows(clock, sample, np.arange(len(self.t)))
+                rate = edit.of_joints(log_rows, rate, rate)[1]
                 parts = edit.of_joints(np.arange(len(noise)), parts, parts)[1]
-            moves = np.flatnonzero(np.abs(rate[j]) > MOVING * np.linalg.norm(parts[j]))
-            last = np.maximum(np.searchsorted(moves, np.arange(len(self.t)), side="right") - 1, 0)
-            signs = np.sign(rate[j][moves[last]]) if len(moves) else np.zeros(len(self.t))
-            self._directions[edits, j] = signs
+            moves = np.abs(rate[j]) > MOVING * np.linalg.norm(parts[j])
+            last = np.maximum.accumulate(np.where(moves, np.arange(len(moves)), np.argmax(moves)))
+            self._directions[edits, j] = np.sign(rate[j, last]) * moves[last]
         return self._directions[edits, j][nearest()]
 
     def _torque(
