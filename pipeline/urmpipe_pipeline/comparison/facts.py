@@ -245,7 +245,8 @@ def _corrected_frames(causes: Sequence[Cause], base: Transform, tool: Transform)
     """Return a base and a tool to which the shifts and then the turns of causes are added."""
     at_base = Transform(translation=base.translation)  # shifted and turned in the world, about its origin
     changes: list[tuple[Twist, float]] = []
-    for cause in sorted(causes, key=lambda cause: cause.kind.endswith("rotation")):
+    # shifts, then fitted turns, then the quarter and half turns that these are fitted after
+    for cause in sorted(causes, key=lambda cause: (cause.kind.endswith("rotation"), not cause.low)):
         if cause.kind in ("base_shift", "base_rotation", "tool_shift", "tool_rotation"):
             place, frame = (0, at_base) if cause.kind.startswith("base") else (1, tool)
             turns = cause.kind.endswith("rotation")

@@ -23,6 +23,7 @@ DEGREES = 57.29577951308232
 UNITS = {
     "m": ("mm", 1e3), "rad": ("deg", DEGREES), "s": ("ms", 1e3), "s/s": ("ms/s", 1e3),
     "rad/(N m)": ("deg/(N m)", DEGREES), "rad/kg": ("deg/kg", DEGREES),
+    "m/N": ("mm/N", 1e3), "m/kg": ("mm/kg", 1e3),
 }  # fmt: skip  # displayed unit and its number per SI unit
 MAX_DECIMALS = 4  # 0.1 micrometres, 2 microradians, as of lengths and angles elsewhere
 MAX_CAUSES = 3  # in a summary, with all that break the tolerance; a table has the others
@@ -483,7 +484,7 @@ def _outliers(cause: Cause) -> str:
 
 
 def _sag(cause: Cause) -> str:
-    like = ", like gravity" if cause.unit == "rad/kg" else ""
+    like = ", like gravity" if cause.unit.endswith("/kg") else ""
     return f"{_joints(cause)} sags by {format_value(cause)}{like}"
 
 
@@ -595,7 +596,11 @@ KIND_TEXTS: Mapping[str, KindText] = {
     "servo_lag": KindText(
         "lag of all joints",
         lambda _: "servo lag",
-        lambda cause: f"all joints lag by {format_value(cause)}, as a servo does",
+        lambda cause: (
+            f"all joints lag by {format_value(cause)}, as a servo does"
+            if cause.value[0] > 0.0
+            else f"all joints are ahead by {format_value(cause)}"
+        ),
         lambda cause: Remedy("compensate", f"the servo lag of {format_value(cause)}"),
     ),
     "other_robot": KindText(

@@ -65,6 +65,8 @@ TEXTS: Sequence[tuple[Cause, str, str, str]] = [
     (of_joint("joint_coupled", COUPLED, 1.0), "elbow_joint includes the negative of shoulder_lift_joint", "shoulder_lift_joint were added to elbow_joint", f"coupling of {COUPLED}"),
     (of_joint("joint_lag", "q3", -0.0165, unit="s"), "joint q3 is 16.5 ms late", "the times of joint q3 were made 16.5 ms earlier", "lag of q3"),
     (number("servo_lag", "all joints", 0.03, unit="s"), "all joints lag by 30 ms, as a servo does", "the servo lag of 30 ms were compensated", "servo lag"),
+    (number("servo_lag", "all joints", -0.03, unit="s"), "all joints are ahead by 30 ms", "the servo lag of 30 ms were compensated", "servo lag"),
+    (of_joint("sag", "slide", 1e-5, unit="m/N"), "joint slide sags by 0.01 mm/N", "joint slide were corrected for a sag of 0.01 mm/N", "sag of slide"),
     (of_joint("compliance", "q1", 1.3e-4, unit="s2"), "joint q1 is compliant: +0.00013 s2 of its acceleration", "joint q1 were corrected by +0.00013 s2 of its acceleration", "compliance of q1"),
     (of_joint("backlash", "q1", 0.2 * DEG, unit="rad"), "joint q1 has a backlash of 0.2 deg", "joint q1 were corrected for a backlash of 0.2 deg", "backlash of q1"),
     (of_joint("sag", "q2", 0.01 * DEG, unit="rad/(N m)"), "joint q2 sags by 0.01 deg/(N m)", "joint q2 were corrected for a sag of 0.01 deg/(N m)", "sag of q2"),
