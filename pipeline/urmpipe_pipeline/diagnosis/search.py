@@ -382,19 +382,33 @@ class Search:
         """Return what many rows decide, from what some select."""
         some = replace(rows, at=self.spread(SOME))
         found = self._stable(some, best.state, None)
-        if len(rows.at) > len(some.at):
-            found = self._stable(rows, found.state, found.subset)
         near = sorted((one for one in others if one.score < best.score + FAR * found.tau), key=_score)
         near = [self._explained(found.rows, one.state, found.tau) for one in near[:SHOWN]]
         for one in near:
             if one.score < found.score(found.tau):
-                again = self._stable(rows, one.state, None)
+                again = self._stable(some, one.state, None)
                 found = min(found, again, key=lambda each, tau=found.tau: each.score(tau))  # type: ignore[misc]
-        search, found, rivals = self._with_twins(rows, found)
+        search, found, rivals = self._with_twins(some, found)
         most = found.score(found.tau) + NEAR
+        if len(rows.at) > len(some.at):
+            found = search._stable(rows, found.state, found.subset)
         same = found.state.edits, found.subset
         near = [one for one in (*near, *rivals) if one.score < most and (one.state.edits, one.subset) != same]
-        return search._concluded(found, near)
+        return search._concluded(found, list(search._rescored(near, found)))
+
+    def _rescored(
+        self, near: Sequence[Explanation], found: SelfConsistentFit
+    ) -> Iterator[Explanation]:
+        """Yield rivals with their numbers and scores on the rows that decided, those that are still near."""
+        selection, rows = found.selection, found.rows
+        left, least = float(selection.left([found.subset])[0]), cost(self.model, found.state, rows)
+        for one in near:
+            if found.state.edits == one.state.edits:
+                state = self.fitted(one.state, one.subset, rows)
+                after = left * cost(self.model, state, rows) / max(least, np.finfo(float).tiny)
+                one = Explanation(state, one.subset, selection.score(after, one.subset))
+            if one.score < selection.score(left, found.subset) + NEAR or found.state.edits != one.state.edits:
+                yield one
 
     def _with_twins(
         self, rows: Rows, found: SelfConsistentFit
@@ -510,19 +524,16 @@ class Search:
 
         Their score is that of what they leave at full size, after a fit.
         """
-        every = selection.neighbours(final.subset, self._distinct[0])
-        subsets = [one for one in every if not (one <= final.subset or one >= final.subset)]
-        scores = selection.scores(subsets) if subsets else np.zeros(0)
         left, least = float(selection.left([final.subset])[0]), cost(self.model, final.state, rows)
-        for i in np.argsort(scores, kind="stable").tolist()[:SHOWN]:
-            if scores[i] >= final.score + NEAR:
+        for score, subset in selection.exchanged(final.subset, self._distinct[0])[:SHOWN]:
+            if score >= final.score + NEAR:
                 break
-            state = self.fitted(final.state, subsets[i], rows)
-            moved = all(state.of(self.model.groups[g]).any() for g in subsets[i])  # else the fit got nowhere
+            state = self.fitted(final.state, subset, rows)
+            moved = all(state.of(self.model.groups[g]).any() for g in subset)  # else the fit got nowhere
             after = left * cost(self.model, state, rows) / max(least, np.finfo(float).tiny)
-            score = selection.score(after, subsets[i])
-            if score < final.score + NEAR and moved and not self._unbelievable(state, subsets[i], rows):
-                yield Explanation(state, subsets[i], score)
+            score = selection.score(after, subset)
+            if score < final.score + NEAR and moved and not self._unbelievable(state, subset, rows):
+                yield Explanation(state, subset, score)
 
 
 def _score(one: Explanation) -> float:

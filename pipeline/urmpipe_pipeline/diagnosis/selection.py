@@ -14,10 +14,9 @@ Source: [ChenChen2008]_ eq. 2, gamma = 1.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations, product
 from math import comb, log
 from typing import TypeAlias
 
@@ -188,7 +187,7 @@ class Selection:
 
     def penalty(self, columns: int, subset: Subset) -> float:
         """Return what a subset with some columns in all pays."""
-        prior = 0.0 if self.prior is None else sum(self.prior[g] for g in subset)
+        prior = sum(self._priors[g] for g in subset)
         penalty = self._penalties[0] * (columns + self.numbers) + self._penalties[1 + len(subset)]
         return float(penalty + prior + self.more)
 
@@ -202,7 +201,7 @@ class Selection:
     @cached_property
     def _penalties(self) -> list[float]:
         """Of a column; then of so many groups, from 0."""
-        counts = (min(groups + self.taken, self.hypotheses) for groups in range(MOST + 1))
+        counts = (min(groups + self.taken, self.hypotheses) for groups in range(MOST + 2))
         return [
             log(max(self.independent, 2.0)),
             *(2.0 * log(comb(self.hypotheses, count)) for count in counts),
@@ -210,54 +209,86 @@ class Selection:
 
     def best(self, among: Sequence[int]) -> Subset:
         """Return the best subset of some groups: none, singles, pairs, and what they grow into."""
-        single = [g for g in among if len(self._columns[g]) == 1]
         several = [g for g in among if len(self._columns[g]) > 1]
-        small = [frozenset[int](), *(frozenset((g,)) for g in among)]
-        small += [frozenset(pair) for pair in combinations(several, 2)]
-        small += [frozenset(pair) for pair in product(several, single)]
-        starts = [*zip(self.scores(small).tolist(), small, strict=True), *self._best_pairs(single)]
-        starts.sort(key=lambda one: one[0])
-        climbed = [self.climbed(subset, score, among) for score, subset in starts[:STARTS]]
+        starts = [(self.score_of(frozenset()), frozenset[int]()), *self.extended(frozenset(), among)]
+        starts += self._best_pairs([g for g in among if len(self._columns[g]) == 1])
+        for g in several:
+            starts += self.extended(frozenset((g,)), among)[:STARTS]
+        starts = sorted(starts, key=lambda one: one[0])[:STARTS]
+        climbed = [self.climb(subset, score, among) for score, subset in starts]
         return min(climbed, key=lambda one: one[1])[0]
 
-    def _best_pairs(self, groups: Sequence[int]) -> Iterator[tuple[float, Subset]]:
-        """Yield the best pairs of groups with one column each, with their scores: Cramer's rule for all."""
+    def _best_pairs(self, groups: Sequence[int]) -> list[tuple[float, Subset]]:
+        """Return the best pairs of groups with one column each, with their scores: Cramer's rule for all."""
         if len(groups) < 2:
-            return
+            return []
         gram, moment, _ = self._scaled
         columns = np.array([self._columns[g][0] for g in groups])
         first, second = np.triu_indices(len(groups), 1)
         c, d = columns[first], columns[second]
         a, b, across, m, n = gram[c, c], gram[d, d], gram[c, d], moment[c], moment[d]
-        rest = np.maximum(a * b - across**2, np.finfo(float).tiny)
-        explained = (m**2 * b - 2.0 * m * n * across + n**2 * a) / rest
+        rest = a * b - across**2
+        explained = (m**2 * b - 2.0 * m * n * across + n**2 * a) / np.maximum(rest, np.finfo(float).tiny)
+        explained[rest <= TWIN * a * b] = 0.0  # one of the two does all that both do
         left = np.maximum(self.normal.square - explained, 0.0) / max(self.normal.count, 1)
-        prior = np.zeros(len(groups)) if self.prior is None else self.prior[list(groups)]
+        prior = self._priors[list(groups)]
         scores = self.independent * np.log(np.maximum(left, self.floor)) + prior[first] + prior[second]
-        common = self.penalty(2, frozenset()) - self._penalties[1] + self._penalties[3]
-        for i in np.argpartition(scores, min(STARTS, len(scores) - 1))[:STARTS]:
-            yield float(scores[i] + common), frozenset((groups[first[i]], groups[second[i]]))
+        best = np.argsort(scores, kind="stable")[:STARTS].tolist()
+        common = self._penalties[0] * (2 + self.numbers) + self._penalties[3] + self.more
+        return [(float(scores[i] + common), frozenset((groups[first[i]], groups[second[i]]))) for i in best]
 
-    def climbed(self, subset: Subset, score: float, among: Sequence[int]) -> tuple[Subset, float]:
+    def climb(self, subset: Subset, score: float, among: Sequence[int]) -> tuple[Subset, float]:
         """Return where adding, dropping and exchanging groups leads from a subset, and the score there."""
         while True:
-            near = list(self.neighbours(subset, among))
-            if not near:
+            near = [(self.score_of(subset - {gone}), subset - {gone}) for gone in sorted(subset)]
+            near += self.exchanged(subset, among)
+            near += self.extended(subset, among)[:1] if len(subset) < MOST else []
+            best = min(near, key=lambda one: one[0], default=(np.inf, subset))
+            if not best[0] < score - 1e-9:
                 return subset, score
-            scores = self.scores(near)
-            best = int(np.argmin(scores))
-            if not scores[best] < score - 1e-9:
-                return subset, score
-            subset, score = near[best], float(scores[best])
+            score, subset = best
 
-    def neighbours(self, subset: Subset, among: Sequence[int]) -> Iterator[Subset]:
-        """Yield the subsets with a group more, a group less, or a group exchanged."""
-        others = [g for g in among if g not in subset]
-        if len(subset) < MOST:
-            yield from (subset | {g} for g in others)
+    def exchanged(self, subset: Subset, among: Sequence[int]) -> list[tuple[float, Subset]]:
+        """Return the best exchanges of each group of a subset for another, with their scores."""
+        found = []
         for gone in sorted(subset):
-            yield subset - {gone}
-            yield from (subset - {gone} | {g} for g in others)
+            rest = subset - {gone}
+            found += self.extended(rest, [g for g in among if g != gone])[:STARTS]
+        return sorted(found, key=lambda one: one[0])
+
+    def extended(self, subset: Subset, among: Sequence[int]) -> list[tuple[float, Subset]]:
+        """Return a subset with each other group besides, with the scores, the best first (Schur complement)."""
+        others = [g for g in among if g not in subset]
+        if not others:
+            return []
+        gram, moment, _ = self._scaled
+        columns, square = self.columns(subset), self.normal.square
+        if columns:
+            across = np.linalg.solve(gram[np.ix_(columns, columns)], gram[columns])
+            square -= float(moment[columns] @ np.linalg.solve(gram[np.ix_(columns, columns)], moment[columns]))
+            gram, moment = gram - gram[:, columns] @ across, moment - moment[columns] @ across
+        own = np.diag(gram)
+        gain = np.where(own > TWIN, moment**2 / np.maximum(own, TWIN), 0.0)
+        gains = np.array([gain[self._columns[g][0]] for g in others])
+        sizes = np.array([len(self._columns[g]) for g in others])
+        for i in np.flatnonzero(sizes > 1).tolist():
+            at = list(self._columns[others[i]])
+            inner = gram[np.ix_(at, at)] + TWIN * np.eye(len(at))
+            gains[i] = moment[at] @ np.linalg.solve(inner, moment[at])
+        left = np.maximum(square - gains, 0.0) / max(self.normal.count, 1)
+        penalty = self._penalties[0] * (len(columns) + sizes + self.numbers) + self._penalties[2 + len(subset)]
+        prior = self._priors[others] + sum(self._priors[g] for g in subset) + self.more
+        scores = self.independent * np.log(np.maximum(left, self.floor)) + penalty + prior
+        order = np.argsort(scores, kind="stable").tolist()
+        return [(float(scores[i]), subset | {others[i]}) for i in order]
+
+    def score_of(self, subset: Subset) -> float:
+        """Return the score [-] of a subset."""
+        return float(self.scores([subset])[0])
+
+    @cached_property
+    def _priors(self) -> FloatArray:
+        return np.zeros(len(self.groups)) if self.prior is None else self.prior
 
 
 def without_twins(
