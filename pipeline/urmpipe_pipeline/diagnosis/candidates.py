@@ -35,7 +35,7 @@ ANGLES = (0.3, -0.3, 0.8, -0.8, 1.57, -1.57, 2.4, -2.4, np.pi)
 FEW = 3  # of so many rows one shows what a single angle leaves
 LINEAR = 0.02  # an angle in [rad] below which the linear search needs no other start: its error is theta^2 / 2
 STARTS = 4  # so many single causes are starts
-WORTH = 4.0  # a start leaves no more than this times the square of the best single cause
+WORTH = 0.5  # of what the best single cause takes away a start takes away so much
 
 
 def rank_discrete_causes(
@@ -115,7 +115,8 @@ def find_large_causes(model: Model, state: State, rows: Rows, among: Sequence[in
     left, velocity, turn = left[:, known], velocity[:, :, known], turn[:, :, known]
     values, squares = fit_alone(left, velocity, turn)
     angles = np.abs(values) * np.linalg.norm(turn, axis=1).max(axis=1)
-    worth = squares <= WORTH * max(float(squares.min()), np.finfo(float).tiny)
+    gain = float((left**2).sum()) - squares
+    worth = gain > WORTH * gain.max()
     order = [i for i in np.argsort(squares, kind="stable").tolist() if worth[i] and angles[i] > LINEAR]
     for i in order[:STARTS]:
         found = state.values.copy()

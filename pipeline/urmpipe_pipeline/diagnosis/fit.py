@@ -159,7 +159,9 @@ def cost(model: Model, state: State, rows: Rows) -> float:
     return float((left[:, known] ** 2).mean()) if known.any() else np.inf
 
 
-def fitted(model: Model, state: State, groups: Sequence[Group], rows: Rows, *, others: bool = False) -> State:
+def fitted(
+    model: Model, state: State, groups: Sequence[Group], rows: Rows, *, others: bool = False, steps: int = STEPS
+) -> State:
     """Return an explanation whose numbers of some groups leave the least (Gauss-Newton, halved steps).
 
     Args:
@@ -168,6 +170,7 @@ def fitted(model: Model, state: State, groups: Sequence[Group], rows: Rows, *, o
         groups: Whose numbers.
         rows: The rows that count.
         others: Whether the other numbers stay; else they are 0.
+        steps: How many are taken at most.
     """
     columns = np.array([c for g in groups for c in g.columns], dtype=np.int64)
     kept = state.values.copy() if others else np.zeros_like(state.values)
@@ -176,7 +179,7 @@ def fitted(model: Model, state: State, groups: Sequence[Group], rows: Rows, *, o
     if not len(columns):
         return state
     now = cost(model, state, rows)
-    for _ in range(STEPS):
+    for _ in range(steps):
         normal = normal_equations(model, state, rows, groups)
         size = np.sqrt(np.maximum(np.diag(normal.gram), 1e-300))
         scaled = normal.gram / size / size[:, np.newaxis]

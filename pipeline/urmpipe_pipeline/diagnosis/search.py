@@ -38,6 +38,8 @@ COARSE = 300  # rows, spread evenly, on which discrete causes are ranked
 MEDIUM = 600  # rows, spread evenly, on which starts are compared
 SOME = 2_000  # rows, spread evenly, that select before more of them settle it
 MANY = 20_000  # rows, spread evenly, that settle an explanation; standard errors fall with the root of them
+HOPELESS = 3.0  # a start is given up if it leaves e^(3 / 2) times the rms of the best so far
+STEPS = 6  # of a fit from a start; those of an explanation that is settled are more
 ROUNDS = 6  # selections after each other: from a good start three are enough
 NEAR = 6.0  # explanations whose scores differ by less are rivals: odds of twenty to one
 FAR = 100.0  # an explanation whose score on some rows is so much above the best is no rival on more
@@ -183,9 +185,9 @@ class Search:
         medium = Rows(self.spread(MEDIUM), weight, self._least(weight))
         every: list[Explanation] = []
         for start in self._starts(ranked, replace(coarse, weight=weight)):
-            most = min((one.score for one in every), default=np.inf) + len(medium.at)
+            most = min((one.score for one in every), default=np.inf) + HOPELESS * len(medium.at)
             every.append(self._explained(medium, start, most=most))
-        best, *others = sorted(every, key=lambda one: one.score)
+        best, *others = sorted({(one.state.edits, one.subset): one for one in every}.values(), key=_score)
         while True:
             coarse = replace(coarse, weight=weight)
             further = add_discrete_cause(self.model, self.edits, best.state, coarse, self.floor)
@@ -207,10 +209,10 @@ class Search:
             for state in dict.fromkeys((states[0].edits, ())):
                 yield from find_large_causes(self.model, replace(self.zero, edits=state), coarse, single)
 
-    def fitted(self, state: State, subset: Subset, rows: Rows) -> State:
+    def fitted(self, state: State, subset: Subset, rows: Rows, steps: int = 2 * STEPS) -> State:
         """Return an explanation with the best numbers of a subset, and of what is always fitted."""
         taken = [self.model.groups[g] for g in sorted(subset | set(self.forced))]
-        return fitted(self.model, state, taken, rows)
+        return fitted(self.model, state, taken, rows, steps=steps)
 
     def placed(self, state: State, rows: Rows) -> State:
         """Return an explanation with the best numbers of what is always fitted, its others as they are."""
@@ -307,15 +309,16 @@ class Search:
                 now = Explanation(state, taken, float(selection.scores([taken])[0]))
                 best = now if best is None else min(best, now, key=_score)
             chosen = selection.best([g for g in self._distinct[0] if g not in beyond])
-            if chosen in seen or (len(seen) > 1 and best is not None and best.score > most):
+            promised = selection.score_of(chosen) if best is None else best.score
+            if chosen in seen or promised > most:
                 break
             seen.add(chosen)
-            state, more = self._within(state, chosen, some, selection)
+            state, more = self._within(state, chosen, some, selection, STEPS)
             taken, beyond = chosen - more, beyond | more
         return best or Explanation(state, taken or frozenset(), np.inf)
 
     def _within(
-        self, state: State, subset: Subset, rows: Rows, selection: Selection
+        self, state: State, subset: Subset, rows: Rows, selection: Selection, steps: int = 2 * STEPS
     ) -> tuple[State, set[int]]:
         """Return an explanation with the best numbers of a subset that is believed, and the groups it lacks."""
         gone: set[int] = set()
@@ -323,7 +326,7 @@ class Search:
         while True:
             kept = subset - gone
             starts = [state] if guess is None else [state, guess]
-            there = min((self.fitted(one, kept, rows) for one in starts), key=lambda one: cost(self.model, one, rows))
+            there = min((self.fitted(one, kept, rows, steps) for one in starts), key=lambda one: cost(self.model, one, rows))
             beyond = self._unbelievable(there, kept, rows)
             if not beyond:
                 return there, gone
@@ -382,7 +385,7 @@ class Search:
         """Return what many rows decide, from what some select."""
         some = replace(rows, at=self.spread(SOME))
         found = self._stable(some, best.state, None)
-        near = sorted((one for one in others if one.score < best.score + FAR * found.tau), key=_score)
+        near = sorted((one for one in others if one.score < best.score + FAR), key=_score)
         near = [self._explained(found.rows, one.state, found.tau) for one in near[:SHOWN]]
         for one in near:
             if one.score < found.score(found.tau):
