@@ -38,6 +38,7 @@ COARSE = 300  # rows, spread evenly, on which discrete causes are ranked
 MEDIUM = 600  # rows, spread evenly, on which starts are compared
 SOME = 2_000  # rows, spread evenly, that select before more of them settle it
 MANY = 20_000  # rows, spread evenly, that settle an explanation; standard errors fall with the root of them
+NOISE = 4.0  # a mean square, in weights of the noise, that is taken for it
 HOPELESS = 3.0  # a start is given up if it leaves e^(3 / 2) times the rms of the best so far
 STEPS = 6  # of a fit from a start; those of an explanation that is settled are more
 ROUNDS = 6  # selections after each other: from a good start three are enough
@@ -184,8 +185,12 @@ class Search:
         weight = self._weight(weight, replace(self.zero, edits=ranked[0]))
         medium = Rows(self.spread(MEDIUM), weight, self._least(weight))
         every: list[Explanation] = []
-        for start in self._starts(ranked, replace(coarse, weight=weight)):
-            most = min((one.score for one in every), default=np.inf) + HOPELESS * len(medium.at)
+        coarse = replace(coarse, weight=weight)
+        for start in self._starts(ranked, coarse):
+            best = min(every, key=_score, default=None)
+            if best is not None and self._is_needless(start, best, coarse):
+                continue
+            most = np.inf if best is None else best.score + HOPELESS * len(medium.at)
             every.append(self._explained(medium, start, most=most))
         best, *others = sorted({(one.state.edits, one.subset): one for one in every}.values(), key=_score)
         while True:
@@ -208,6 +213,12 @@ class Search:
         if hasattr(self.model, "motions") and not self.forced:
             for state in dict.fromkeys((states[0].edits, ())):
                 yield from find_large_causes(self.model, replace(self.zero, edits=state), coarse, single)
+
+    def _is_needless(self, start: State, best: Explanation, rows: Rows) -> bool:
+        """Tell whether one cause, or none, leaves noise, and a start with discrete causes needs more."""
+        if not start.edits or best.count > 1 or cost(self.model, best.state, rows) > NOISE:
+            return False
+        return cost(self.model, start, rows) > NOISE
 
     def fitted(self, state: State, subset: Subset, rows: Rows, steps: int = 2 * STEPS) -> State:
         """Return an explanation with the best numbers of a subset, and of what is always fitted."""
@@ -314,6 +325,8 @@ class Search:
                 break
             seen.add(chosen)
             state, more = self._within(state, chosen, some, selection, STEPS)
+            if selection.score(cost(self.model, state, some), chosen - more) > most:
+                break
             taken, beyond = chosen - more, beyond | more
         return best or Explanation(state, taken or frozenset(), np.inf)
 
@@ -326,12 +339,19 @@ class Search:
         while True:
             kept = subset - gone
             starts = [state] if guess is None else [state, guess]
-            there = min((self.fitted(one, kept, rows, steps) for one in starts), key=lambda one: cost(self.model, one, rows))
+            start = min(starts, key=lambda one: cost(self.model, self._bare(one, kept), rows))
+            there = self.fitted(start, kept, rows, steps)
             beyond = self._unbelievable(there, kept, rows)
             if not beyond:
                 return there, gone
             gone |= beyond
             guess = None
+
+    def _bare(self, state: State, subset: Subset) -> State:
+        """Return an explanation with the numbers of a subset, and of what is always fitted, alone."""
+        values, columns = np.zeros_like(state.values), self._columns([*self.forced, *subset])
+        values[columns] = state.values[columns]
+        return replace(state, values=values)
 
     def _guess(self, state: State, subset: Subset, selection: Selection) -> State | None:
         """Return the numbers of a linear fit, where they differ by much from those to start from."""
