@@ -53,44 +53,40 @@ LOST_IN_NOISE = 30.0  # chi-square of two explanations below which these samples
 SAME = 3e-3  # share of the effect, likewise: interpolation between samples
 
 TWIN_WORDS = {
-    "joint_offset": "offset of {}", "joint_scale": "scale of {}", "compliance": "compliance of {}",
-    "joint_lag": "lag of {}", "backlash": "backlash of {}", "sag": "sag of {}", "base_shift": "base shift",
-    "base_rotation": "base rotation", "tool_shift": "tool shift", "tool_rotation": "tool rotation",
-    "time_lag": "time lag", "clock_drift": "clock drift", "servo_lag": "servo lag",
-    "link_length": "{}", "tilt": "{}",
+    "joint_offset": ("offset", "zero"), "joint_scale": ("scale", "factor"), "joint_lag": ("lag", "delay"),
+    "base_shift": ("shift",), "tool_shift": ("shift",), "base_rotation": ("rotation", "turn"),
+    "tool_rotation": ("rotation", "turn"), "time_lag": ("time lag", "clock"), "clock_drift": ("drift",),
+    "servo_lag": ("servo lag",), "joint_unit": ("unit", "deg"),
 }  # fmt: skip
-"""What a cause is called among twins."""
+"""Words of which a twin has one, of kinds whose name is not in it as it is."""
 
 EITHER_SIGN = ("joint_lag", "servo_lag", "backlash", "sag")
 """Kinds of which a size is compared without its sign."""
+
+UNSIZED = ("path_unit", "outliers", *EDITS)
+"""Kinds that are there or not."""
 
 NEAR = 0.25
 """A named cause is the true one if it is no further from it than this share, and three times its interval."""
 
 
-def fault_of(cause: Cause, made: Trial, sign: float = 1.0, *, own_frame: bool = True) -> Fault:
-    """Return a named cause as one of the arm; with the other sign or frame where that is open."""
-    chain, value = made.motion.chain, tuple(float(one) for one in cause.value)
-    joints = tuple(chain.coordinates.index(one) for one in cause.joints if one in chain.coordinates)
-    axis = None if cause.axis is None else np.array(cause.axis)
+def fault_of(cause: Cause, made: Trial, sign: float = 1.0, frame: int = 0) -> Fault:
+    """Return a named cause as one of the arm; `sign` and `frame` count through what is open of it."""
+    chain, frames, place, at = made.motion.chain, made.motion.arm.frames, None, np.eye(4)
+    value = tuple((sign if cause.kind in EITHER_SIGN else 1.0) * float(one) for one in cause.value)
     if cause.kind == "joint_scale":
         value = (value[0] - 1.0,)
-    if cause.kind in EITHER_SIGN or cause.kind in ("link_shift", "tilt", "link_length"):
-        value = tuple(sign * one for one in value)
-    place, at = None, np.eye(4)
     if cause.kind in ("link_length", "link_shift", "tilt"):
         place = int(cause.segment[1:]) + 1 if cause.segment else 1
-        known = {
-            (one.kind, one.name): one for kind in ("link_length", "tilt") for one in segments(chain, kind)
-        }
-        if (one := known.get((cause.kind, cause.name))) is not None:
-            place, at = one.place, one.at
-        elif own_frame:
-            at = made.motion.arm.frames[place]
+        own = [one for one in segments(chain, "link_length") + segments(chain, "tilt") if one.place == place]
+        named = [one.at for one in own if one.name == cause.name]
+        places = named or [frames[place], at, *(one.at for one in own)]
+        at = places[frame % len(places)]
     elif cause.kind in ("base_shift", "base_rotation", "tool_shift", "tool_rotation"):
-        frames = made.motion.arm.frames
         place = 0 if cause.kind.startswith("base") else len(frames) - 1
         at = frames[place] if place else matrix(AXES, frames[0][:3, 3])
+    joints = tuple(chain.coordinates.index(one) for one in cause.joints if one in chain.coordinates)
+    axis = None if cause.axis is None else np.array(cause.axis)
     return Fault(cause.kind, value, joints, cause.name, axis, place, at, cause.from_sample or 0, cause.rows)
 
 
@@ -99,15 +95,7 @@ def agrees(cause: Cause, one: Fault, made: Trial) -> bool:
     named = fault_of(cause, made)
     if cause.kind != one.kind or not _of_the_same(cause, named, one, len(made.motion.t)):
         return False
-    sized = bool(one.value) and one.kind not in (
-        "joint_unit",
-        "path_unit",
-        "sag",
-        "outliers",
-        "turns",
-        *EDITS,
-    )
-    return not sized or _near(cause, named, one)
+    return one.kind in UNSIZED or not one.value or (bool(named.value) and _near(cause, named, one))
 
 
 def _of_the_same(cause: Cause, named: Fault, one: Fault, rows: int) -> bool:
@@ -142,25 +130,28 @@ def _near(cause: Cause, named: Fault, one: Fault) -> bool:
 
 def told_among(twins: Sequence[str], one: Fault, made: Trial) -> bool:
     """Return whether a true cause is among the twins of a named one."""
-    name = made.motion.chain.coordinates[one.joints[0]] if one.joints else one.name
-    words = TWIN_WORDS.get(one.kind, one.kind.replace("_", " ")).format(name)
-    if one.place is not None and not one.name and one.axis is not None:
-        words += " " + "xyz"[int(np.argmax(np.abs(one.axis)))]
-    return any(words in twin for twin in twins)
+    parts = [made.motion.chain.coordinates[j] for j in one.joints] or [one.name]
+    if one.kind.startswith(("base", "tool")):
+        parts = [one.kind[:4], "" if one.axis is None else "xyz"[int(np.argmax(np.abs(one.axis)))]]
+    words = ("",) if one.name else TWIN_WORDS.get(one.kind, (one.kind.replace("_", " "),))
+    return any(all(part in twin for part in parts) and any(w in twin for w in words) for twin in twins)
 
 
 def does_the_same(named: Sequence[Cause], made: Trial) -> bool:
     """Return whether named causes do what the true ones do, as far as the data can tell."""
+    if any(
+        one.kind.startswith(("base", "tool")) and not one.value and one.kind != "base_mirrored"
+        for one in named
+    ):
+        return False
     hidden = {row for rows in (one.rows for one in named) for row in rows}
     hidden |= {row for one in made.truth for row in one.rows}
     rows = [k for k in range(0, len(made.motion.t), made.every) if k not in hidden]
     lasting = 2.0 * LASTING / float(np.median(np.diff(made.motion.t[rows]))) if made.correlated else 1.0
     limit = made.sigma * np.sqrt(LOST_IN_NOISE * max(lasting, 1.0) / len(rows)) + SAME * made.effect
-    open_kinds = {one.kind for one in named} & {*EITHER_SIGN, "link_shift", "tilt", "link_length"}
-    for sign, own_frame in product(
-        (1.0, -1.0) if open_kinds else (1.0,), (True, False) if open_kinds else (True,)
-    ):
-        faults = [fault_of(one, made, sign, own_frame=own_frame) for one in named]
+    signs = (1.0, -1.0) if {one.kind for one in named} & {*EITHER_SIGN} else (1.0,)
+    for sign, frame in product(signs, range(6) if any(one.segment for one in named) else range(1)):
+        faults = [fault_of(one, made, sign, frame) for one in named]
         if rms(made.apart(faults, made.truth)[rows]) < limit:
             return True
     return False
@@ -203,7 +194,7 @@ def outcome(found: Diagnosis, made: Trial) -> str:
 def covered(found: Diagnosis, made: Trial) -> list[bool]:
     """Return of each number of a single cause that is named right whether its 95 % interval has it."""
     (one,), (cause,) = made.truth, found.causes
-    if made.kinds[0] not in SIZED or one.kind == "sag" or not cause.low:
+    if made.kinds[0] not in SIZED or not cause.low:
         return []
     true = np.array(one.value) + (one.kind == "joint_scale")
     if one.axis is not None and cause.axis is not None:

@@ -27,7 +27,7 @@ import urmpipe
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.chains.parameters import Parameter
-from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.robots.catalogue import load_robot, parse_offset
 from urmpipe_pipeline.runs.results import Run
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
@@ -215,27 +215,30 @@ class Motion:
         return CubicSpline(self.t, self.q)
 
     @cached_property
-    def second(self) -> CubicSpline:
-        """Their second derivatives in [rad/s2], without what the encoders add: of means over 30 ms."""
+    def rate(self) -> CubicSpline:
+        """Their rates in [rad/s], without what the encoders add: of means over 30 ms."""
         width = max(0.03 / float(np.median(np.diff(self.t))), 1.0)
-        return CubicSpline(self.t, gaussian_filter1d(self.q, width, axis=0, mode="nearest")).derivative(2)
+        return CubicSpline(self.t, gaussian_filter1d(self.q, width, axis=0, mode="nearest")).derivative()
+
+
+@cache
+def _rows(source: Source) -> tuple[Chain, FloatArray, FloatArray]:
+    """Return the arm of a log, and its times and joints thinned to about `ROWS`; of still poses 300."""
+    robot = str(SHARED / "cases/diagnosis/irb120.toml") if source.robot == "irb120" else source.robot
+    reading: dict[str, Any] = {} if source.still else {"unit": "rad"}
+    reading |= {"period": source.period} if source.period else {}
+    run = urmpipe.ingest(SHARED / "logs" / source.file, robot, **reading)
+    step = max(round(len(run.log.q) / (300 if source.still else ROWS)), 1)
+    assert run.robot is not None
+    t = run.log.t_ns[::step] / 1e9
+    return run.robot, t - t[0], run.log.q[::step].round(6)
 
 
 @cache
 def motion_of(source: Source, tool: bool) -> Motion:
-    """Return a motion from its file, thinned to about `ROWS`; of still poses 300."""
-    robot = str(SHARED / "cases/diagnosis/irb120.toml") if source.robot == "irb120" else source.robot
-    reading: dict[str, Any] = {} if source.still else {"unit": "rad"}
-    reading |= {"period": source.period} if source.period else {}
-    run = urmpipe.ingest(SHARED / "logs" / source.file, robot, tool=_tool(tool), **reading)
-    q, t = run.log.q, run.log.t_ns / 1e9
-    step = max(round(len(q) / (300 if source.still else ROWS)), 1)
-    assert run.robot is not None
-    return Motion(source, run.robot, t[::step] - t[0], q[::step].round(6))
-
-
-def _tool(known: bool) -> list[float] | None:
-    return [float(one) for one in TOOL.split(",")] if known else None
+    """Return a motion from its file, of the arm with the tool or without."""
+    chain, t, q = _rows(source)
+    return Motion(source, chain.placed(tool=parse_offset(TOOL)) if tool else chain, t, q)
 
 
 def _of_joint(kind: str, value: float) -> Drawn:
@@ -425,7 +428,10 @@ LARGEST = {
 }
 """Largest values that are drawn in SI; of angles and lengths 0.3."""
 
-ONE_SIGN = ("servo_lag", "backlash", "sag")  # the reference lags, or sags
+QUIET = 5e-4
+"""A joint that moves back by less in [rad] has not turned round: noise of encoders."""
+
+ONE_SIGN = ("backlash", "sag")  # the reference is behind, or sags
 
 
 def read(q: FloatArray, one: Fault, rows: FloatArray | IntArray, *, back: bool = False) -> FloatArray:
@@ -445,25 +451,30 @@ def read(q: FloatArray, one: Fault, rows: FloatArray | IntArray, *, back: bool =
     return q
 
 
-def lagged(t: FloatArray, q: FloatArray, lag: float) -> FloatArray:
-    """Return joints, shape (n, joints), behind a first-order lag T y' + y = q, exact between lines."""
-    rate = np.gradient(q, t, axis=0)
-    if lag <= 0.0:
-        return q - lag * rate
-    dt = float(np.median(np.diff(t)))
-    a = np.exp(-dt / lag)
-    b = lag / dt * (1.0 - a)
-    start = q[0] - lag * rate[0]
-    made, _ = lfilter([1.0 - b, b - a], [1.0, -a], q, axis=0, zi=[start - (1.0 - b) * q[0]])
-    return np.asarray(made)
+def mended_lag(t: FloatArray, q: FloatArray, rate: FloatArray, lag: float) -> FloatArray:
+    """Return the joints that a log, shape (n, joints), follows behind a first-order lag T y' + y = q.
+
+    Of a lag below 0 the reference is behind, exact where the log is a line from row to row.
+    """
+    if lag > 0.0:
+        return q + lag * rate
+    behind = q + lag * rate
+    for k, dt in enumerate(np.diff(t), 1):
+        slope = (q[k] - q[k - 1]) / dt
+        behind[k] = q[k] + lag * slope + (behind[k - 1] - q[k - 1] - lag * slope) * np.exp(dt / lag)
+    return behind
 
 
-def behind_play(q: FloatArray, width: float) -> FloatArray:
-    """Return a joint, shape (n,), behind a play of some width in [rad]: it moves once the play is used up."""
-    moved, there, half = q.copy(), q[0], abs(width) / 2.0
+def direction(q: FloatArray) -> FloatArray:
+    """Return which way a joint, shape (n,), moves or moved last; before, as it moves first."""
+    there, moves = q[0], np.zeros_like(q)
     for k, value in enumerate(q):
-        moved[k] = there = min(max(there, value - half), value + half)
-    return moved if width > 0.0 else 2.0 * q - moved
+        moved = min(max(there, value - QUIET / 2.0), value + QUIET / 2.0)
+        moves[k], there = np.sign(moved - there), moved
+    steps = np.flatnonzero(moves)
+    if not len(steps):
+        return moves
+    return np.asarray(moves[steps[np.maximum(np.searchsorted(steps, np.arange(len(q)), "right") - 1, 0)]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -515,16 +526,16 @@ class Trial:
         for one in by.get("joint_lag", ()):
             q[:, one.joints[0]] = self.log(at - one.value[0])[:, one.joints[0]]
         for one in by.get("servo_lag", ()):
-            q = lagged(t, q, one.value[0])
+            q = mended_lag(t, q, self.motion.rate(np.clip(at, t[0], t[-1])), one.value[0])
         for one in faults:
             q = read(q, one, np.arange(len(t))) if one.kind in EDITS else q
         factors = {"joint_offset": np.ones_like(q), "joint_scale": q.copy()}
-        factors["compliance"] = self.motion.second(np.clip(at, t[0], t[-1]))
+        factors["compliance"] = self.motion.rate(np.clip(at, t[0], t[-1]), 1)
         for one in faults:
             if one.kind in factors:
                 q[:, one.joints[0]] += one.value[0] * factors[one.kind][:, one.joints[0]]
         for one in by.get("backlash", ()):
-            q[:, one.joints[0]] = behind_play(q[:, one.joints[0]], one.value[0])
+            q[:, one.joints[0]] -= one.value[0] / 2.0 * direction(q[:, one.joints[0]])
         for one in by.get("sag", ()):
             q[:, one.joints[0]] += one.value[0] * self.motion.arm.torque(q, one.joints[0])
         return q
@@ -699,13 +710,15 @@ def scaled(made: Trial, one: Fault, size: float) -> Fault | None:
         one = replace(one, value=tuple(v * min(size / found, 1e3) for v in one.value))
         if np.abs(one.value).max() > LARGEST.get(one.kind, 0.3):
             return None
-    reached = abs(rms(made.apart([one], (), seen=False)) / size - 1.0) < 0.2
-    return one if reached and not (one.kind == "backlash" and _too_wide(made, one)) else None
+    if abs(rms(made.apart([one], (), seen=False)) / size - 1.0) > 0.2:
+        return None
+    return None if one.kind == "backlash" and _moves_one_way(made, one) else one
 
 
-def _too_wide(made: Trial, one: Fault) -> bool:
-    """Whether a joint moves by less than ten times its play."""
-    return bool(np.ptp(made.motion.q[:, one.joints[0]]) < 10.0 * abs(one.value[0]))
+def _moves_one_way(made: Trial, one: Fault) -> bool:
+    """Return whether a joint hardly turns round, or moves by less than ten times its play."""
+    q = made.motion.q[:, one.joints[0]]
+    return bool(abs(direction(q).mean()) > 0.8 or np.ptp(q) < 10.0 * one.value[0])
 
 
 def _clear(made: Trial, one: Fault) -> Fault | None:
