@@ -1,10 +1,10 @@
 """Real motions of robot arms as logs that deviate for a known reason, in 1000 seeded trials.
 
 1. A motion: joints of a real log of others (`MOTIONS`), thinned to about 1000 rows, or still poses.
-2. A truth: causes that are drawn, and scaled until the tool centre point moves by a wanted rms (`trial`).
+2. A truth: causes that are drawn, and scaled until the tool centre point moves by a given rms (`make_trial`).
 3. Data: where the arm is with them, by products of matrices, and noise (`Trial.data`).
 
-Needs the folder `shared` beside the checkout.
+Needs the folder `shared` next to the checkout.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ OTHERS = {
     "panda": ("iiwa14",), "iiwa14": ("panda",), "irb120": ("arm6", "ur5"),
 }  # fmt: skip
 
-KNOWN_BY = ("URM", "DH", "6R")  # sources of parameters with names of their own
+KNOWN_BY = ("URM", "DH", "6R")  # how the sources of parameters begin that have names in data sheets
 AXES = np.eye(3)
 
 
@@ -89,7 +89,7 @@ class Fault:
         kind: As `Cause.kind`.
         value: As `Cause.value`; of a scale what is added to 1.
         joints: Indices of its joints.
-        name: What the diagnosis should call it, where it has a name of its own.
+        name: What the diagnosis should call it; empty where its joints or its frame say it.
         axis: Unit vector along or about which a frame changes [-]; None: `value` has three numbers.
         place: Index of that frame in `Chain.frames`; None of other causes.
         at: The frame of the axis, in the frame before that one, shape (4, 4).
@@ -120,7 +120,7 @@ class Fault:
         return matrix(turn.as_matrix()) if self.turns else matrix(AXES, vector)
 
     def __str__(self) -> str:
-        """Return it for people, in SI."""
+        """Return a line for lists, in SI."""
         of = self.name or " and ".join(f"joint {j + 1}" for j in self.joints)
         axis = "" if self.axis is None else f" {np.round(self.axis, 3).tolist()}"
         where = f" from row {self.first}" * bool(self.first) + f", {len(self.rows)} rows" * bool(self.rows)
@@ -133,9 +133,9 @@ def _rpy(vector: FloatArray) -> Rotation:
 
 def matrix(rotation: ArrayLike, translation: ArrayLike = (0.0, 0.0, 0.0)) -> FloatArray:
     """Return a frame, shape (4, 4), of its rotation and its origin in [m]."""
-    made = np.eye(4)
-    made[:3, :3], made[:3, 3] = rotation, translation
-    return made
+    frame = np.eye(4)
+    frame[:3, :3], frame[:3, 3] = rotation, translation
+    return frame
 
 
 class Arm:
@@ -143,7 +143,7 @@ class Arm:
 
     def __init__(self, chain: Chain) -> None:
         self.chain = chain
-        self.frames = [matrix(one.rotation, one.translation) for one in chain.frames]
+        self.frames = [matrix(frame.rotation, frame.translation) for frame in chain.frames]
 
     def poses(
         self, q: FloatArray, faults: Sequence[Fault] = (), growth: FloatArray | None = None
@@ -155,10 +155,10 @@ class Arm:
             faults: What differs of the arm.
             growth: Factor of all lengths of its segments in each row, shape (n,).
         """
-        frames = [np.broadcast_to(one, (len(q), 4, 4)).copy() for one in self.frames]
-        for one in sorted(faults, key=lambda one: not one.turns):  # a shift is outermost
-            if one.place is not None:
-                frames[one.place] = one.at @ one.motion @ np.linalg.inv(one.at) @ frames[one.place]
+        frames = [np.broadcast_to(fault, (len(q), 4, 4)).copy() for fault in self.frames]
+        for fault in sorted(faults, key=lambda fault: not fault.turns):  # a shift is outermost
+            if fault.place is not None:
+                frames[fault.place] = fault.at @ fault.motion @ np.linalg.inv(fault.at) @ frames[fault.place]
         for frame in frames[1:-1] if growth is not None else ():
             frame[:, :3, 3] *= np.asarray(growth)[:, np.newaxis]
         at, links, columns = frames[0], [], iter(q.T)
@@ -177,10 +177,12 @@ class Arm:
         at = names.index(self.chain.coordinates[j])
         loads = [(1.0, tip[:, :3, 3])]
         if self.chain.inertials:
-            carried = [(one, names.index(one.joint)) for one in self.chain.inertials if one.joint in names]
+            carried = [
+                (fault, names.index(fault.joint)) for fault in self.chain.inertials if fault.joint in names
+            ]
             loads = [
-                (float(one.mass), links[k][:, :3, :3] @ np.array(one.centre) + links[k][:, :3, 3])
-                for one, k in carried
+                (float(fault.mass), links[k][:, :3, :3] @ np.array(fault.centre) + links[k][:, :3, 3])
+                for fault, k in carried
                 if k >= at
             ]
         axis, origin = links[at][:, :3, :3] @ np.array(self.chain.joints[at].axis), links[at][:, :3, 3]
@@ -260,31 +262,33 @@ def _of_frame(kind: str, count: int) -> Drawn:
 
 
 def _of_segment(kind: str) -> Drawn:
-    return lambda motion, rng: (found := segments(motion.chain, kind))[rng.integers(len(found))]
+    return lambda motion, rng: (known := segments(motion.chain, kind))[rng.integers(len(known))]
 
 
 @cache
 def segments(chain: Chain, kind: str) -> list[Fault]:
     """Return the lengths, tilts or sideways shifts that an arm has, by the names that people know."""
     named = [
-        one
-        for one in chain.parameters
-        if one.source.startswith(KNOWN_BY)
-        and 0 < one.frame_index <= len(chain.joints) + 1
-        and not one.name.startswith("theta_")
-        and (one.kind == "along") == (kind == "link_length")
+        parameter
+        for parameter in chain.parameters
+        if parameter.source.startswith(KNOWN_BY)
+        and 0 < parameter.frame_index <= len(chain.joints) + 1
+        and not parameter.name.startswith("theta_")
+        and (parameter.kind == "along") == (kind == "link_length")
     ]
     if kind == "link_shift":
         return [shift for place in range(1, len(chain.joints) + 2) for shift in _sideways(chain, place)]
     places = range(1, len(chain.joints) + 2)
-    return [_of_parameter(kind, one) for one in named] or [
-        one for place in places for one in _unnamed(chain, kind, place)
+    return [_of_parameter(kind, parameter) for parameter in named] or [
+        parameter for place in places for parameter in _unnamed(chain, kind, place)
     ]
 
 
-def _of_parameter(kind: str, one: Parameter) -> Fault:
-    at = matrix(one.before.rotation, one.before.translation)
-    return Fault(kind, (1e-4,), (), one.name, AXES["xyz".index(one.axis)], one.frame_index, at)
+def _of_parameter(kind: str, parameter: Parameter) -> Fault:
+    at = matrix(parameter.before.rotation, parameter.before.translation)
+    return Fault(
+        kind, (1e-4,), (), parameter.name, AXES["xyz".index(parameter.axis)], parameter.frame_index, at
+    )
 
 
 def _unnamed(chain: Chain, kind: str, place: int) -> Iterator[Fault]:
@@ -295,9 +299,9 @@ def _unnamed(chain: Chain, kind: str, place: int) -> Iterator[Fault]:
         axis = along / np.linalg.norm(along)
         yield Fault(kind, (1e-4,), name=f"segment to {names[place - 1]}", axis=axis, place=place)
     if kind == "tilt" and place <= len(chain.joints):
-        at, own = Arm(chain).frames[place], chain.joints[place - 1].axis
+        at, turning_axis = Arm(chain).frames[place], chain.joints[place - 1].axis
         for letter, axis in zip("xyz", AXES, strict=True):
-            if abs(axis @ own) < 1e-9:
+            if abs(axis @ turning_axis) < 1e-9:
                 yield Fault(
                     kind, (1e-4,), name=f"{names[place - 1]} about {letter}", axis=axis, place=place, at=at
                 )
@@ -306,9 +310,9 @@ def _unnamed(chain: Chain, kind: str, place: int) -> Iterator[Fault]:
 def _sideways(chain: Chain, place: int) -> Iterator[Fault]:
     """Yield the shifts of a segment across its lengths: what no length of it can do."""
     lengths = [
-        one.at[:3, :3] @ one.axis
-        for one in segments(chain, "link_length")
-        if one.place == place and one.axis is not None
+        fault.at[:3, :3] @ fault.axis
+        for fault in segments(chain, "link_length")
+        if fault.place == place and fault.axis is not None
     ]
     spanned = np.linalg.matrix_rank(np.array(lengths), tol=1e-6) if lengths else 0
     across = np.linalg.svd(np.array(lengths))[2][spanned:] if spanned else np.empty((0, 3))
@@ -431,30 +435,30 @@ LARGEST = {
 QUIET = 5e-4
 """A joint that moves back by less in [rad] has not turned round: noise of encoders."""
 
-ONE_SIGN = ("backlash", "sag")  # the reference is behind, or sags
+ONE_SIGN = ("backlash", "sag")  # the reference lags, or sags
 
 
-def read(q: FloatArray, one: Fault, rows: FloatArray | IntArray, *, back: bool = False) -> FloatArray:
+def read(q: FloatArray, fault: Fault, rows: FloatArray | IntArray, *, back: bool = False) -> FloatArray:
     """Return joints, shape (n, joints), as a fault of the reading corrects them; back: as it spoils them."""
-    q, later, sign = q.copy(), rows >= one.first, -1.0 if back else 1.0
-    j = one.joints[0]
-    if one.kind in ("joint_sign", "mirrored"):
+    q, later, sign = q.copy(), rows >= fault.first, -1.0 if back else 1.0
+    j = fault.joints[0]
+    if fault.kind in ("joint_sign", "mirrored"):
         q[later, j] *= -1.0
-    elif one.kind == "joints_swapped":
-        q[:, list(one.joints)] = q[:, list(one.joints[::-1])]
-    elif one.kind == "joint_unit":
-        q[:, j] *= one.value[0] ** sign
-    elif one.kind == "joint_coupled":
-        q[:, j] += sign * one.value[0] * q[:, one.joints[1]]
+    elif fault.kind == "joints_swapped":
+        q[:, list(fault.joints)] = q[:, list(fault.joints[::-1])]
+    elif fault.kind == "joint_unit":
+        q[:, j] *= fault.value[0] ** sign
+    elif fault.kind == "joint_coupled":
+        q[:, j] += sign * fault.value[0] * q[:, fault.joints[1]]
     else:
-        q[later, j] += sign * (np.pi if one.kind == "half_turn" else 2.0 * np.pi * one.value[0])
+        q[later, j] += sign * (np.pi if fault.kind == "half_turn" else 2.0 * np.pi * fault.value[0])
     return q
 
 
-def mended_lag(t: FloatArray, q: FloatArray, rate: FloatArray, lag: float) -> FloatArray:
-    """Return the joints that a log, shape (n, joints), follows behind a first-order lag T y' + y = q.
+def undo_lag(t: FloatArray, q: FloatArray, rate: FloatArray, lag: float) -> FloatArray:
+    """Return the joints that a log, shape (n, joints), follows with a first-order lag T y' + y = q.
 
-    Of a lag below 0 the reference is behind, exact where the log is a line from row to row.
+    Of a lag below 0 the reference lags: exact where the log is a line from row to row.
     """
     if lag > 0.0:
         return q + lag * rate
@@ -512,60 +516,63 @@ class Trial:
         t = self.motion.t
         inside = np.clip(at, t[0], t[-1])
         q, rows = self.motion.at(inside), np.interp(inside, t, np.arange(len(t))).round()
-        for one in reversed(self.truth):
-            q = read(q, one, rows, back=True) if one.kind in EDITS else q
+        for fault in reversed(self.truth):
+            q = read(q, fault, rows, back=True) if fault.kind in EDITS else q
         return np.asarray(q)
 
     def joints(self, faults: Sequence[Fault]) -> FloatArray:
         """Return the joints that the log means, if some faults are true, in [rad], shape (n, joints)."""
         t = self.motion.t
-        by = {kind: [one for one in faults if one.kind == kind] for kind in {one.kind for one in faults}}
-        at = t - sum(one.value[0] for one in by.get("time_lag", ()))
-        at -= sum(one.value[0] for one in by.get("clock_drift", ())) * (t - t[0])
+        by = {
+            kind: [fault for fault in faults if fault.kind == kind]
+            for kind in {fault.kind for fault in faults}
+        }
+        at = t - sum(fault.value[0] for fault in by.get("time_lag", ()))
+        at -= sum(fault.value[0] for fault in by.get("clock_drift", ())) * (t - t[0])
         q = self.log(at)
-        for one in by.get("joint_lag", ()):
-            q[:, one.joints[0]] = self.log(at - one.value[0])[:, one.joints[0]]
-        for one in by.get("servo_lag", ()):
-            q = mended_lag(t, q, self.motion.rate(np.clip(at, t[0], t[-1])), one.value[0])
-        for one in faults:
-            q = read(q, one, np.arange(len(t))) if one.kind in EDITS else q
+        for fault in by.get("joint_lag", ()):
+            q[:, fault.joints[0]] = self.log(at - fault.value[0])[:, fault.joints[0]]
+        for fault in by.get("servo_lag", ()):
+            q = undo_lag(t, q, self.motion.rate(np.clip(at, t[0], t[-1])), fault.value[0])
+        for fault in faults:
+            q = read(q, fault, np.arange(len(t))) if fault.kind in EDITS else q
         factors = {"joint_offset": np.ones_like(q), "joint_scale": q.copy()}
         factors["compliance"] = self.motion.rate(np.clip(at, t[0], t[-1]), 1)
-        for one in faults:
-            if one.kind in factors:
-                q[:, one.joints[0]] += one.value[0] * factors[one.kind][:, one.joints[0]]
-        for one in by.get("backlash", ()):
-            q[:, one.joints[0]] -= one.value[0] / 2.0 * direction(q[:, one.joints[0]])
-        for one in by.get("sag", ()):
-            q[:, one.joints[0]] += one.value[0] * self.motion.arm.torque(q, one.joints[0])
+        for fault in faults:
+            if fault.kind in factors:
+                q[:, fault.joints[0]] += fault.value[0] * factors[fault.kind][:, fault.joints[0]]
+        for fault in by.get("backlash", ()):
+            q[:, fault.joints[0]] -= fault.value[0] / 2.0 * direction(q[:, fault.joints[0]])
+        for fault in by.get("sag", ()):
+            q[:, fault.joints[0]] += fault.value[0] * self.motion.arm.torque(q, fault.joints[0])
         return q
 
     def tcp(self, faults: Sequence[Fault], growth: FloatArray | None = None) -> tuple[FloatArray, Rotation]:
         """Return where the tool centre point is, if some faults are true, in [m], shape (n, 3)."""
         arm = self.motion.arm
-        for one in faults:
-            if one.kind == "other_robot":
-                arm = Arm(load_robot(one.name).placed(arm.chain.base, arm.chain.tool))
+        for fault in faults:
+            if fault.kind == "other_robot":
+                arm = Arm(load_robot(fault.name).placed(arm.chain.base, arm.chain.tool))
         _, tip = arm.poses(self.joints(faults), faults, growth)
         position = tip[:, :3, 3]
-        for one in faults:
-            if one.kind == "base_mirrored":
-                position = position * [-1.0 if "-" in part else 1.0 for part in one.name.split(",")]
-            elif one.kind == "path_unit":
-                position = position / one.value[0]
+        for fault in faults:
+            if fault.kind == "base_mirrored":
+                position = position * [-1.0 if "-" in part else 1.0 for part in fault.name.split(",")]
+            elif fault.kind == "path_unit":
+                position = position / fault.value[0]
         return position, Rotation.from_matrix(tip[:, :3, :3])
 
-    def apart(self, one: Sequence[Fault], other: Sequence[Fault], *, seen: bool = True) -> FloatArray:
-        """Return how far two explanations are apart in each row, shape (n,).
+    def distance(self, first: Sequence[Fault], second: Sequence[Fault], *, seen: bool = True) -> FloatArray:
+        """Return how far two explanations are from each other in each row, shape (n,).
 
         Args:
-            one: Causes.
-            other: Others.
-            seen: Whether joints in [rad] are told apart where both sides have them; else places in [m].
+            first: Causes.
+            second: Other causes.
+            seen: Whether it is in [rad] where both sides have joints; else always of the places in [m].
         """
         if seen and self.both:
-            return np.asarray(np.linalg.norm(self.joints(one) - self.joints(other), axis=1))
-        (p, turn), (p_other, turn_other) = self.tcp(one), self.tcp(other)
+            return np.asarray(np.linalg.norm(self.joints(first) - self.joints(second), axis=1))
+        (p, turn), (p_other, turn_other) = self.tcp(first), self.tcp(second)
         squares = ((p - p_other) ** 2).sum(axis=1)
         if self.oriented:
             squares = squares + (LEVER * (turn * turn_other.inv()).magnitude()) ** 2
@@ -574,7 +581,7 @@ class Trial:
     @cached_property
     def effect(self) -> float:
         """How much the causes move the tool centre point in [m] rms."""
-        return rms(self.apart(self.truth, (), seen=False))
+        return rms(self.distance(self.truth, (), seen=False))
 
     def noise(self, rng: np.random.Generator, columns: int) -> FloatArray:
         """Return noise of each row, shape (n, columns), in [m] or [rad]."""
@@ -588,25 +595,25 @@ class Trial:
     def data(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return times and joints of the log, then times and values of the reference.
 
-        These are joints, or x, y, z in [m] with the quaternion behind if there are orientations.
+        These are joints, or x, y, z in [m] and a quaternion if there are orientations.
         """
         rng, t = np.random.default_rng([SEED, self.number, 1]), self.motion.t
         q, log_t = self.log(t), t.copy()
         growth = 1.0 + rng.uniform(5e-4, 2e-3) * t / t[-1] if self.kinds == ("thermal growth",) else None
         position, turn = self.tcp(self.truth, growth)
         values = self.joints(self.truth) if self.both else position
-        unit = next((one.value[0] for one in self.truth if one.kind == "path_unit"), 1.0)
+        unit = next((fault.value[0] for fault in self.truth if fault.kind == "path_unit"), 1.0)
         values = values + self.noise(rng, values.shape[1]) / unit
         if self.oriented:
             off = Rotation.from_rotvec(rng.normal(0.0, self.sigma / LEVER, (len(t), 3)))
             values = np.hstack([values, (off * turn).as_quat()])
-        for one in self.truth:
-            if one.name == "scattered":
-                away = rng.normal(size=(len(one.rows), 3))
+        for fault in self.truth:
+            if fault.name == "scattered":
+                away = rng.normal(size=(len(fault.rows), 3))
                 away *= (rng.uniform(0.03, 0.3, len(away)) / np.linalg.norm(away, axis=1))[:, np.newaxis]
-                values[list(one.rows), :3] += away
-            elif one.name == "a reset":
-                q[list(one.rows)] = 0.0
+                values[list(fault.rows), :3] += away
+            elif fault.name == "a reset":
+                q[list(fault.rows)] = 0.0
         if self.kinds == ("quantised joints",):
             step = np.radians(rng.uniform(0.02, 0.2))
             q = np.round(q / step) * step
@@ -624,9 +631,9 @@ class Trial:
         t, q, reference_t, values = self.data()
         when: list[dict[str, Any]] = [{"poses": True}] * 2 if still else [{"t": reference_t}, {"t": t}]
         named: dict[str, Any] = {"robot": chain, "names": chain.coordinates, "unit": "rad"}
-        asked = {"q": values, **named} if self.both else {"recorded_tcp": values}
+        reference = {"q": values, **named} if self.both else {"recorded_tcp": values}
         return (
-            urmpipe.ingest(name="reference", **asked, **when[0]),
+            urmpipe.ingest(name="reference", **reference, **when[0]),
             urmpipe.ingest(name="log", q=q, **named, **when[1]),
         )
 
@@ -635,9 +642,9 @@ class Trial:
         where = Path(self.motion.source.file).stem + ", tool" * any(self.motion.chain.tool.translation)
         flags = [name for name in ("correlated", "oriented", "both") if getattr(self, name)]
         flags += [f"each {self.every}th row"] * (self.every > 1)
-        told = "; ".join(map(str, self.truth)) or ", ".join(self.kinds)
+        causes = "; ".join(map(str, self.truth)) or ", ".join(self.kinds)
         moved = f"{1e3 * self.effect:.3g} mm, noise {1e3 * self.sigma:g} mm"
-        return f"{self.number} {self.group}: {told} | {moved} | {', '.join([where, *flags])}"
+        return f"{self.number} {self.group}: {causes} | {moved} | {', '.join([where, *flags])}"
 
 
 def rms(values: FloatArray) -> float:
@@ -664,21 +671,21 @@ def plan() -> list[Cell]:
 
 
 @cache
-def trial(number: int) -> Trial:
+def make_trial(number: int) -> Trial:
     """Return a trial: circumstances and causes are drawn until the causes move as much as they should."""
     group, kinds, size, sigma = plan()[number]
     rng = np.random.default_rng([SEED, number])
     for _ in range(300):
-        made = _circumstances(rng, number, group, kinds, size, sigma)
+        trial = _circumstances(rng, number, group, kinds, size, sigma)
         truth = []
         for kind in kinds if group in ("single", "pair") else ():
-            drawn = (SIZED | DISCRETE)[kind](made.motion, rng)
+            drawn = (SIZED | DISCRETE)[kind](trial.motion, rng)
             if kind in SIZED and kind not in ONE_SIGN:
                 drawn = replace(drawn, value=tuple(rng.choice([-1.0, 1.0]) * v for v in drawn.value))
-            one = scaled(made, drawn, size) if kind in SIZED else _clear(made, drawn)
-            truth += [] if one is None else [one]
+            fault = scaled(trial, drawn, size) if kind in SIZED else _clear(trial, drawn)
+            truth += [] if fault is None else [fault]
         if group not in ("single", "pair") or len(truth) == len(kinds):
-            return replace(made, truth=tuple(truth))
+            return replace(trial, truth=tuple(truth))
     raise RuntimeError(f"trial {number}: {kinds} of {size} m: no motion has it")
 
 
@@ -687,7 +694,7 @@ def _circumstances(
 ) -> Trial:
     """Return a trial without causes: its motion, noise and sides."""
     still = not {*kinds} & {*TIMED}
-    weights = np.array([one.weight * (still or not one.still) for one in MOTIONS])
+    weights = np.array([source.weight * (still or not source.still) for source in MOTIONS])
     source = MOTIONS[rng.choice(len(MOTIONS), p=weights / weights.sum())]
     chance = dict(zip(("tool", "correlated", "oriented", "both", "sparse"), rng.random(5), strict=True))
     both = {*kinds} <= {*BY_JOINTS} and (chance["both"] < 0.2 or "turns" in kinds)
@@ -701,34 +708,35 @@ def _circumstances(
     )  # fmt: skip
 
 
-def scaled(made: Trial, one: Fault, size: float) -> Fault | None:
+def scaled(trial: Trial, fault: Fault, size: float) -> Fault | None:
     """Return a cause that moves the tool centre point by a size in [m] rms; None where none does."""
     for _ in range(5):
-        found = rms(made.apart([one], (), seen=False))
-        if found < 1e-9:
+        moved = rms(trial.distance([fault], (), seen=False))
+        if moved < 1e-9:
             return None
-        one = replace(one, value=tuple(v * min(size / found, 1e3) for v in one.value))
-        if np.abs(one.value).max() > LARGEST.get(one.kind, 0.3):
+        fault = replace(fault, value=tuple(v * min(size / moved, 1e3) for v in fault.value))
+        if np.abs(fault.value).max() > LARGEST.get(fault.kind, 0.3):
             return None
-    if abs(rms(made.apart([one], (), seen=False)) / size - 1.0) > 0.2:
+    if abs(rms(trial.distance([fault], (), seen=False)) / size - 1.0) > 0.2:
         return None
-    return None if one.kind == "backlash" and _moves_one_way(made, one) else one
+    return None if fault.kind == "backlash" and _moves_one_way(trial, fault) else fault
 
 
-def _moves_one_way(made: Trial, one: Fault) -> bool:
-    """Return whether a joint hardly turns round, or moves by less than ten times its play."""
-    q = made.motion.q[:, one.joints[0]]
-    return bool(abs(direction(q).mean()) > 0.8 or np.ptp(q) < 10.0 * one.value[0])
+def _moves_one_way(trial: Trial, fault: Fault) -> bool:
+    """Return whether a joint moves one way most of the time, or by less than ten times its play."""
+    q = trial.motion.q[:, fault.joints[0]]
+    return bool(abs(direction(q).mean()) > 0.8 or np.ptp(q) < 10.0 * fault.value[0])
 
 
-def _clear(made: Trial, one: Fault) -> Fault | None:
+def _clear(trial: Trial, fault: Fault) -> Fault | None:
     """Return a cause without a size, if it moves something by 1 mm rms."""
-    if one.name == "a reset":
+    if fault.name == "a reset":
         zeros = (
-            made.motion.arm.poses(np.zeros_like(made.motion.q))[1] - made.motion.arm.poses(made.motion.q)[1]
+            trial.motion.arm.poses(np.zeros_like(trial.motion.q))[1]
+            - trial.motion.arm.poses(trial.motion.q)[1]
         )
-        return one if (np.linalg.norm(zeros[list(one.rows), :3, 3], axis=1) > 0.02).all() else None
-    if one.kind in ("outliers", "turns"):
-        return one
-    alone = replace(made, truth=(one,))
-    return one if alone.effect > MOVED else None
+        return fault if (np.linalg.norm(zeros[list(fault.rows), :3, 3], axis=1) > 0.02).all() else None
+    if fault.kind in ("outliers", "turns"):
+        return fault
+    single = replace(trial, truth=(fault,))
+    return fault if single.effect > MOVED else None
