@@ -135,7 +135,7 @@ def _near(cause: Cause, named: Fault, fault: Fault) -> bool:
 def is_among(twins: Sequence[str], fault: Fault, trial: Trial) -> bool:
     """Return whether a true cause is among the twins of a named one."""
     parts = [trial.motion.chain.coordinates[j] for j in fault.joints] or [fault.name]
-    if fault.kind.startswith(("base", "tool")):
+    if fault.kind in ("base_shift", "base_rotation", "tool_shift", "tool_rotation"):
         parts = [fault.kind[:4], "" if fault.axis is None else "xyz"[int(np.argmax(np.abs(fault.axis)))]]
     words = ("",) if fault.name else TWIN_WORDS.get(fault.kind, (fault.kind.replace("_", " "),))
     return any(all(part in twin for part in parts) and any(w in twin for w in words) for twin in twins)
