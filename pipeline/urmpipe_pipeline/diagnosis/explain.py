@@ -156,12 +156,20 @@ class ExplanationBuilder:
         rows = replace(self.found.rows, at=self.search.spread(COARSE))
         for one in others:
             mine, theirs = own - set(self._parts(one)), set(self._parts(one)) - own
+            if self._alike(mine, theirs) and self.search.is_equivalent(best.state, one.state, rows):
+                continue
             if len(mine) == len(theirs) == 1 and self._same_effect(best.state, one.state, rows.at):
                 (part,), (other,) = mine, theirs
                 twins.setdefault(part, []).append(self._short_name(other, one))
             else:
                 rivals.append(one)
         return rivals, twins
+
+    def _alike(self, mine: set[Part], theirs: set[Part]) -> bool:
+        """Tell whether causes are of the same kinds: a base turned by 180 deg, and one by a number about it."""
+        kinds = [sorted(self._kind(part) for part in parts) for parts in (mine, theirs)]
+        frames = {*kinds[0]} <= {"base_shift", "base_rotation", "tool_shift", "tool_rotation"}
+        return kinds[0] == kinds[1] and frames
 
     def _same_effect(self, first: State, second: State, rows: IntArray) -> bool:
         """Tell whether two explanations leave the same but for a hundredth of the noise floor."""

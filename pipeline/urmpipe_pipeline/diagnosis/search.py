@@ -8,8 +8,7 @@
    equivalent causes in place of its own where these leave less at full size.
 4. Explanations whose score is within `NEAR` of the best are its rivals.
 
-A subset that no engineer believes is never taken: causes that cancel each other, and, beside other causes,
-lengths, tilts and scales beyond `BESIDE`. What was left out so is kept: `SearchResult.refused`.
+Every subset passes the gate (gate.py); what it refuses is kept, with the reason: `SearchResult.refused`.
 """
 
 from __future__ import annotations
@@ -29,6 +28,7 @@ from urmpipe_pipeline.diagnosis.candidates import (
     residual_after_fit,
 )
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, cost, fitted, inliers, normal_equations, residual
+from urmpipe_pipeline.diagnosis.gate import NOT_CONSTANT, find_changing, find_unbelievable
 from urmpipe_pipeline.diagnosis.hypotheses import State, zero
 from urmpipe_pipeline.diagnosis.intervals import LONGEST, autocorrelation_time
 from urmpipe_pipeline.diagnosis.selection import Normal, Selection, Subset, without_twins
@@ -38,6 +38,7 @@ COARSE = 300  # rows, spread evenly, on which discrete causes are ranked
 MEDIUM = 600  # rows, spread evenly, on which starts are compared
 SOME = 2_000  # rows, spread evenly, that select before more of them settle it
 MANY = 20_000  # rows, spread evenly, that settle an explanation; standard errors fall with the root of them
+PROMISED = 0.5  # share of the square that what is left of an explanation leaves at most
 NOISE = 4.0  # a mean square, in weights of the noise, that is taken for it
 HOPELESS = 3.0  # a start is given up if it leaves e^(3 / 2) times the rms of the best so far
 STEPS = 6  # of a fit from a start; those of an explanation that is settled are more
@@ -45,23 +46,6 @@ ROUNDS = 6  # selections after each other: from a good start three are enough
 NEAR = 6.0  # explanations whose scores differ by less are rivals: odds of twenty to one
 FAR = 100.0  # an explanation whose score on some rows is so much above the best is no rival on more
 SHOWN = 5  # so many rivals are kept
-
-LARGEST: Mapping[str, float] = {
-    "joint_scale": 0.5,  # a joint that is read in other steps is off by less
-    "compliance": 0.02,  # s2: more would swing below 1.1 Hz
-    "clock_drift": 0.05,  # no clock is off by a twentieth
-    "servo_lag": 1.0,  # s: a slower drive follows nothing
-    "joint_lag": 1.0,  # s
-    "backlash": 0.1,  # rad: 6 deg
-}
-"""Beyond this a number is that of no such cause, by kind."""
-
-REACHED: Mapping[str, float] = {"link_length": 0.2, "link_shift": 0.2}
-BESIDE: Mapping[str, float] = {"tilt": np.radians(10.0), "joint_scale": 0.02}
-"""Beside other causes no length changes by more than a share of the reach, and no tilt or scale by more."""
-
-CANCELS = 3.0
-"""A cause among several that alone makes the rms so many times what it was only cancels another."""
 
 ORDER: Mapping[str, float] = {
     "tool_shift": 0.0, "tool_rotation": 0.0, "base_shift": 0.3, "base_rotation": 0.3, "base_mirrored": 0.3,
@@ -71,9 +55,6 @@ ORDER: Mapping[str, float] = {
     "link_length": 1.8, "backlash": 2.5, "compliance": 2.5, "sag": 2.5, "tilt": 2.5, "link_shift": 3.5,
 }  # fmt: skip
 """What each kind adds to a score (twice the log of odds): setup comes before structure, e^(1.2 / 2) = 1.8 to 1."""
-
-STRUCTURE = ("link_length", "link_shift", "tilt")
-
 
 class Explanation(NamedTuple):
     """Causes, with their sizes.
@@ -296,7 +277,8 @@ class Search:
         floor = float(np.mean((self.floor * rows.weight) ** 2))
         edits = state.edits
         numbers = sum(1 + (edit.first > 0) for edit in edits)
-        more = sum(ORDER.get(edit.kind, 0.0) for edit in edits)
+        begins = 2.0 * np.log(self.model.rows)  # it may begin at any row
+        more = sum(ORDER.get(edit.kind, 0.0) + begins * (edit.first > 0) for edit in edits)
         return Selection(
             normal, groups, normal.count / tau, floor, len(edits), numbers, len(among), whole,
             prior=self._prior, more=more,
@@ -364,42 +346,10 @@ class Search:
 
     def _unbelievable(self, state: State, subset: Subset, rows: Rows) -> set[int]:
         """Return the groups of a subset whose numbers no engineer believes, the reason noted."""
-        groups = self.model.groups
-        beyond = {
-            g for g in subset if np.abs(state.of(groups[g])).max() > LARGEST.get(groups[g].kind, np.inf)
-        }
-        if beyond or len(subset) + len(state.edits) < 2:
-            return beyond
-        reach = getattr(self.model, "reach", np.inf)
-        for g in subset:
-            limit = BESIDE.get(groups[g].kind, REACHED.get(groups[g].kind, np.inf) * reach)
-            if np.abs(state.of(groups[g])).max() > limit:
-                beyond.add(g)
-        if beyond:
-            self._note(state, subset, "a part of the arm would differ by more than any arm does")
-            return beyond
-        cancelling = self._cancelling(state, subset, rows)
-        if cancelling:
-            self._note(state, subset, "its causes cancel each other")
-        return cancelling
-
-    def _cancelling(self, state: State, subset: Subset, rows: Rows) -> set[int]:
-        """Return the groups that alone make the rms more than `CANCELS` times what it was before any."""
-        some = replace(rows, at=rows.at[:: max(len(rows.at) // COARSE, 1)])
-        before = cost(self.model, self.placed(self.zero, some), some)
-        most = CANCELS**2 * max(before, float(np.mean((self.floor * rows.weight) ** 2)))
-        worse = set()
-        for g in subset:
-            alone = np.zeros_like(state.values)
-            columns = list(self.model.groups[g].columns)
-            alone[columns] = state.values[columns]
-            if cost(self.model, self.placed(State(alone), some), some) > most:
-                worse.add(g)
-        structure = {g for g in worse if self.model.groups[g].kind in STRUCTURE}
-        return structure or worse
-
-    def _note(self, state: State, subset: Subset, reason: str) -> None:
-        self._refused.append((Explanation(state, subset, np.inf), reason))
+        beyond, reason = find_unbelievable(self, state, subset, rows)
+        if beyond and reason:
+            self._refused.append((Explanation(state, subset, np.inf), reason))
+        return beyond
 
     def _settled(self, rows: Rows, best: Explanation, others: Sequence[Explanation]) -> SearchResult:
         """Return what many rows decide, from what some select."""
@@ -417,7 +367,28 @@ class Search:
             found = search._stable(rows, found.state, found.subset)
         same = found.state.edits, found.subset
         near = [one for one in (*near, *rivals) if one.score < most and (one.state.edits, one.subset) != same]
-        return search._concluded(found, list(search._rescored(near, found)))
+        return search._without_changing(search._concluded(found, list(search._rescored(near, found))))
+
+    def _without_changing(self, found: SearchResult) -> SearchResult:
+        """Return what was found without the causes that change during the log, what is left fitted again."""
+        state, subset, _ = found.best
+        changing, edits = find_changing(self, state, subset, found.rows)
+        if not changing and not edits:
+            return found
+        kept = subset - changing
+        start = replace(state, edits=tuple(edit for edit in state.edits if edit not in edits))
+        there = self.beside_usual(self.fitted(start, kept, found.rows), kept, found.rows)
+        if cost(self.model, there, found.rows) > PROMISED * cost(self.model, self.zero, found.rows):
+            there, kept = self.placed(self.zero, found.rows), frozenset()
+        selection = self._selection(there, found.rows, found.tau)
+        variance = max(float(selection.left([kept])[0]), selection.floor)
+        best = Explanation(there, kept, float(selection.scores([kept])[0]))
+        refused = (Explanation(replace(state, edits=edits), frozenset(changing), np.inf), NOT_CONSTANT)
+        result = replace(
+            found, best=best, others=(), variance=variance, normal=selection.normal,
+            refused=(*found.refused, refused),
+        )  # fmt: skip
+        return self._without_changing(result)
 
     def _rescored(
         self, near: Sequence[Explanation], found: SelfConsistentFit
