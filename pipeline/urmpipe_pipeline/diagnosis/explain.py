@@ -285,6 +285,8 @@ class ExplanationBuilder:
         name = edit.name or " and ".join(self.own_names[j] for j in edit.joints)
         if edit.kind == "base_rotation":
             axis, angle = edit.axis_angle
+            if sum(axis) < 0.0:  # 90 deg about -x is -90 deg about x
+                axis, angle = (-axis[0] + 0.0, -axis[1] + 0.0, -axis[2] + 0.0), -angle
             return Cause(edit.kind, name, axis=axis, value=(angle,), unit="rad")
         value = (edit.value,) if edit.kind in ("path_unit", "joint_unit", "joint_coupled", "turns") else ()
         first = edit.first if edit.kind in ("half_turn", "mirrored", "turns") and edit.first else None

@@ -1,6 +1,6 @@
 """The gate that every named answer passes: causes that no engineer believes are refused, with the reason.
 
-1. A number beyond `LARGEST` is that of no such cause.
+1. A number beyond `LARGEST` is that of no such cause, unless it leaves the noise alone.
 2. Beside other causes no part of an arm differs by more than `REACHED` and `BESIDE`. A cause that alone leaves
    the noise may have any size.
 3. A cause that alone makes the rms more than `CANCELS` times what it was before any only cancels another.
@@ -39,6 +39,7 @@ BESIDE: Mapping[str, float] = {"tilt": np.radians(10.0), "joint_scale": 0.02}
 """Beside other causes no length changes by more than a share of the reach, and no tilt or scale by more."""
 
 STRUCTURE = ("link_length", "link_shift", "tilt")
+NOISE = 4.0  # a mean square, in weights of the noise, that is taken for it
 CANCELS = 3.0  # times the rms before any cause
 SEGMENTS = 6  # of a log, in which a number may differ
 CLOCK_SEGMENTS = 40  # the same of a clock: rows that are missing make it jump
@@ -93,7 +94,9 @@ def find_unbelievable(search: Fitter, state: State, subset: Subset, rows: Rows) 
     groups = search.model.groups
     largest = {g: float(np.abs(state.of(groups[g])).max()) for g in subset}
     beyond = {g for g in subset if largest[g] > LARGEST.get(groups[g].kind, np.inf)}
-    if beyond or len(subset) + len(state.edits) < 2:
+    if len(subset) + len(state.edits) < 2:
+        return (beyond, "") if beyond and cost(search.model, state, rows) > NOISE else (set(), "")
+    if beyond:
         return beyond, ""
     reach = getattr(search.model, "reach", np.inf)
     limit = {g: BESIDE.get(groups[g].kind, REACHED.get(groups[g].kind, np.inf) * reach) for g in subset}
@@ -153,7 +156,8 @@ def find_changing(search: Fitter, state: State, subset: Subset, rows: Rows) -> t
     owners += [-1 - k for k in range(len(changed))]
     changing = {
         owner for owner in set(owners)
-        if np.linalg.norm((spread * size)[np.array(owners) == owner])
+        if (owner < 0 or search.model.groups[owner].kind != "backlash")  # its sense is a guess at rest
+        and np.linalg.norm((spread * size)[np.array(owners) == owner])
         > (UNEVEN if owner >= 0 and search.model.groups[owner].kind in CLOCKS else CHANGING)
         * np.linalg.norm((np.array(values) * size)[np.array(owners) == owner])
     }  # fmt: skip

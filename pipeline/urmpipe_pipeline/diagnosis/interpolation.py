@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
-from urmpipe_pipeline.diagnosis.motion import Motion
+from urmpipe_pipeline.diagnosis.motion import STENCIL, Motion, five_point_rates
 from urmpipe_pipeline.gaps import gaps_behind
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
 
@@ -25,7 +25,6 @@ if TYPE_CHECKING:  # a comparison contains its diagnosis: no ring between the tw
     from urmpipe_pipeline.comparison.matching import Matched
     from urmpipe_pipeline.comparison.trajectory import Trajectory
 
-STENCIL = 5  # samples of a rate; the rate of three would leave h^3 x''' / 60
 MAX_NOISE_GAIN = 12.0  # rate times step: 0.95 at even times, 5.6 at an end; above, samples are too close
 REFINEMENT = 4.0  # error at twice the step / error: 16 if smooth, 4 where the acceleration jumps
 STRAIGHT = 0.5  # lines are taken if they leave less than this share of the mean square of cubics
@@ -69,7 +68,7 @@ class Cubics:
         t, x, joined = t_ns / 1e9, np.ascontiguousarray(values.T), _joined(t_ns, broken)
         step = np.diff(t)
         secant = np.diff(x) / step
-        rate, gain = _rates(t, x, joined)
+        rate, gain = five_point_rates(t, x, joined)
         known = np.where(joined, step, 0.0)
         longer = np.maximum(np.append(0.0, known), np.append(known, 0.0))
         rate[:, gain * longer > MAX_NOISE_GAIN] = np.nan
@@ -91,41 +90,6 @@ def _joined(t_ns: IntArray, broken: IntArray | None) -> BoolArray:
     joined[[] if broken is None else broken] = False
     return joined
 
-
-def _rates(t: FloatArray, x: FloatArray, joined: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Return the rate at each sample, shape (k, m), NaN where fewer than five are joined, and its noise gain.
-
-    With d_j the time from a sample to the four others, x' = sum_j w_j (x_j - x),
-    w_j = 1 / d_j prod_(i != j) d_i / (d_i - d_j). The gain is the norm of all five weights in [1/s].
-    """
-    count, pairs = len(t), range(STENCIL - 1)
-    if count < STENCIL:
-        return np.full(x.shape, np.nan), np.zeros(count)
-    index = np.arange(count)
-    first, last = _runs(joined)
-    start = np.clip(index - STENCIL // 2, first, np.maximum(last - STENCIL + 1, first))
-    start = np.minimum(start, count - STENCIL)  # of a short run, which has no rate
-    neighbours = [start + j + (start + j >= index) for j in pairs]
-    d = [t[neighbour] - t for neighbour in neighbours]
-    rate, squares, total = np.zeros_like(x), np.zeros(count), np.zeros(count)
-    for j in pairs:
-        weight = 1.0 / d[j]
-        for i in pairs:
-            weight *= d[i] / (d[i] - d[j]) if i != j else 1.0
-        for k, values in enumerate(x):
-            rate[k] += weight * (values[neighbours[j]] - values)
-        squares += weight**2
-        total += weight
-    rate[:, last - first + 1 < STENCIL] = np.nan
-    return rate, np.sqrt(squares + total**2)
-
-
-def _runs(joined: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return the first and the last sample of the run of joined ones that each belongs to, shape (m,)."""
-    ends = np.append(np.flatnonzero(~joined), len(joined))
-    starts = np.append(0, ends[:-1] + 1)
-    run = np.searchsorted(ends, np.arange(len(joined) + 1))
-    return starts[run], ends[run]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -28,18 +28,18 @@ from urmpipe_pipeline.diagnosis.candidates import (
     residual_after_fit,
 )
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, cost, fitted, inliers, normal_equations, residual
-from urmpipe_pipeline.diagnosis.gate import NOT_CONSTANT, find_changing, find_unbelievable
-from urmpipe_pipeline.diagnosis.hypotheses import State, zero
+from urmpipe_pipeline.diagnosis.gate import NOISE, NOT_CONSTANT, find_changing, find_unbelievable
+from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
 from urmpipe_pipeline.diagnosis.intervals import LONGEST, autocorrelation_time
 from urmpipe_pipeline.diagnosis.selection import Normal, Selection, Subset, without_twins
-from urmpipe_pipeline.log_edits import Edits
+from urmpipe_pipeline.log_edits import Edit, Edits
 
 COARSE = 300  # rows, spread evenly, on which discrete causes are ranked
 MEDIUM = 600  # rows, spread evenly, on which starts are compared
 SOME = 2_000  # rows, spread evenly, that select before more of them settle it
 MANY = 20_000  # rows, spread evenly, that settle an explanation; standard errors fall with the root of them
+MAJOR = 0.5  # share of the square that stays, where more than noise does, with a cause and not without it
 PROMISED = 0.5  # share of the square that what is left of an explanation leaves at most
-NOISE = 4.0  # a mean square, in weights of the noise, that is taken for it
 HOPELESS = 3.0  # a start is given up if it leaves e^(3 / 2) times the rms of the best so far
 STEPS = 6  # of a fit from a start; those of an explanation that is settled are more
 ROUNDS = 6  # selections after each other: from a good start three are enough
@@ -163,7 +163,7 @@ class Search:
         weight = self._weight(1.0 / self.floor, self.zero)
         coarse = Rows(self.spread(COARSE), weight)
         ranked = rank_discrete_causes(self.model, self.edits, self.zero, coarse, self.floor)
-        weight = self._weight(weight, replace(self.zero, edits=ranked[0]))
+        weight = self._weight(weight, replace(self.zero, edits=ranked[0]), self.model.groups)
         medium = Rows(self.spread(MEDIUM), weight, self._least(weight))
         every: list[Explanation] = []
         coarse = replace(coarse, weight=weight)
@@ -181,7 +181,7 @@ class Search:
             if found is None or found.score >= best.score:
                 break
             best, others = found, [best, *others]
-        weight = self._weight(weight, best.state)
+        weight = self._weight(weight, best.state, self.model.groups)
         rows = Rows(self.spread(MANY), weight, self._least(weight))
         return self._settled(rows, best, others)
 
@@ -256,9 +256,9 @@ class Search:
         """Return the noise floor of a whole row, in its weights."""
         return float(np.linalg.norm(self.floor * weight))
 
-    def _weight(self, weight: FloatArray, state: State) -> FloatArray:
+    def _weight(self, weight: FloatArray, state: State, groups: Sequence[Group] | None = None) -> FloatArray:
         """Return one over the noise of each component: what all numbers together leave, by blocks."""
-        left = residual_after_fit(self.model, state, self.spread(COARSE), weight)
+        left = residual_after_fit(self.model, state, self.spread(COARSE), weight, groups)
         left = left[:, inliers(left * weight[:, np.newaxis])]
         blocks = self.model.blocks
         noise = [np.sqrt(np.mean(left[blocks == b] ** 2)) if left.size else 0.0 for b in blocks]
@@ -367,7 +367,26 @@ class Search:
             found = search._stable(rows, found.state, found.subset)
         same = found.state.edits, found.subset
         near = [one for one in (*near, *rivals) if one.score < most and (one.state.edits, one.subset) != same]
-        return search._without_changing(search._concluded(found, list(search._rescored(near, found))))
+        found = search._without_minor(found)
+        result = search._concluded(found, list(search._rescored(near, found)))
+        return search._without_changing(result)
+
+    def _without_minor(self, found: SelfConsistentFit) -> SelfConsistentFit:
+        """Return an explanation without what explains little, where more than noise is left.
+
+        What is not among the causes that are looked for is otherwise shared out among many of them.
+        """
+        while (now := cost(self.model, found.state, found.rows)) > NOISE:
+            state, subset = found.state, found.subset
+            less = [(replace(state, edits=_but(state.edits, edit)), subset) for edit in state.edits]
+            less += [(state, subset - {g}) for g in sorted(subset)]
+            fits = [(self.beside_usual(self.fitted(*one, found.rows), one[1], found.rows), one[1]) for one in less]
+            costs = [cost(self.model, one, found.rows) for one, _ in fits]
+            if not costs or now <= MAJOR * min(costs):
+                break
+            there, kept = fits[int(np.argmin(costs))]
+            found = found._replace(state=there, subset=kept, selection=self._selection(there, found.rows, found.tau))
+        return found
 
     def _without_changing(self, found: SearchResult) -> SearchResult:
         """Return what was found without the causes that change during the log, what is left fitted again."""
@@ -532,3 +551,7 @@ class Search:
 
 def _score(one: Explanation) -> float:
     return one.score
+
+
+def _but(edits: Edits, gone: Edit) -> Edits:
+    return tuple(edit for edit in edits if edit != gone)

@@ -97,9 +97,9 @@ def test_a_polygon_stays_one(write: Write) -> None:
     corners = np.random.default_rng(2).uniform(0.2, 0.6, (len(SPARSE[::5]), 3))
     log = on_lines(SPARSE[::5], corners) + np.array([0.0, 0.002, 0.0])
     found = diagnosed(write("path", SPARSE[::5], tcp=corners), write("log", DENSE, tcp=log))
-    ((kind, value),) = [(cause.kind, cause.value) for cause in found.causes]
-    assert kind == "base_shift"
-    np.testing.assert_allclose(value, [0.0, -0.002, 0.0], atol=1e-9)
+    ((kind, axis, value),) = [(cause.kind, cause.axis, cause.value) for cause in found.causes]
+    assert (kind, axis) == ("base_shift", (0.0, 1.0, 0.0))
+    assert value == (pytest.approx(-0.002, abs=1e-9),)
 
 
 T = np.arange(0.0, 6.0, 0.008)

@@ -14,7 +14,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.diagnosis.fit import Rows, normal_equations
 from urmpipe_pipeline.diagnosis.hypotheses import State
-from urmpipe_pipeline.diagnosis.independence import autocorrelation_time
+from urmpipe_pipeline.diagnosis.intervals import autocorrelation_time
 from urmpipe_pipeline.diagnosis.selection import MOST, Selection, Subset, without_twins
 
 ROWS, GROUPS = 90, 7
