@@ -34,6 +34,8 @@ EXACT = 1e-9  # columns whose directions differ by less (1 - |cos|) are the same
 ABRUPT = 0.5  # share of its size by which a stretch of outliers begins and ends from one row to the next
 SEVERAL = 1.2  # outliers are a cause if all rows have so many times the rms of the others
 CLOCKS = ("time_lag", "clock_drift")
+RATES = (*CLOCKS, "servo_lag", "joint_lag", "compliance", "backlash")
+UNLIKE = 3.0  # outliers are so many times larger than what causes do that change with the rates of joints
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,19 @@ class ExplanationBuilder:
             return None
         if self.search.timed and not _begin_abruptly(left, size, far):
             return None
+        if float(size[far].max()) < UNLIKE * self._effect_of_rates():
+            return None
         return Part(rows=tuple(far.tolist()))
+
+    def _effect_of_rates(self) -> float:
+        """Return the largest deviation of causes that jump or grow where the arm turns back or is pushed."""
+        best = self.found.best
+        if not any(self.model.groups[g].kind in RATES for g in best.subset):
+            return 0.0
+        values = self.state.values.copy()
+        values[self._columns(g for g in best.subset if self.model.groups[g].kind in RATES)] = 0.0
+        made = self._deviation(self.state) - self._deviation(replace(self.state, values=values))
+        return float(np.nanmax(np.sqrt((made**2).sum(axis=0)), initial=0.0))
 
     def causes(self) -> tuple[tuple[Cause, ...], tuple[Alternative, ...]]:
         """Return the named causes in order, and the alternatives that the log does not decide between."""

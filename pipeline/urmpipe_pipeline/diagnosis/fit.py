@@ -129,9 +129,8 @@ def normal_equations(model: Model, state: State, rows: Rows, groups: Sequence[Gr
         flat_y = y.ravel()
         return Normal(flat @ flat.T, flat @ flat_y, float(flat_y @ flat_y), flat_y.size)
 
-    parts = side_by_side(of_block, row_blocks(len(rows.at), BLOCK))
-    whole = parts[0]
-    for part in parts[1:]:
+    whole = Normal(np.zeros((len(columns), len(columns))), np.zeros(len(columns)), 0.0, 0)
+    for part in side_by_side(of_block, row_blocks(len(rows.at), BLOCK)):
         whole = whole + part
     return whole
 

@@ -135,7 +135,7 @@ def find_changing(search: Fitter, state: State, subset: Subset, rows: Rows) -> t
     known = np.isfinite(left).all(axis=0)
     without = [replace(state, edits=tuple(one for one in state.edits if one != edit)) for edit in state.edits]
     changed = [model.residual(one, at) - left for one in without]
-    known &= np.isfinite([*changed, left]).all(axis=(0, 1))
+    known &= np.isfinite([*changed, left]).all(axis=(0, 1)) & np.isfinite(jacobian).all(axis=(0, 1))
     weight = rows.weight[:, np.newaxis]
     left, jacobian = left[:, known] * weight, jacobian[..., known] * weight
     kinds = [group.kind for group in own for _ in group.columns] + [edit.kind for edit in state.edits]

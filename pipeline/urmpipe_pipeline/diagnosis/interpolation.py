@@ -27,6 +27,8 @@ if TYPE_CHECKING:  # a comparison contains its diagnosis: no ring between the tw
 
 MAX_NOISE_GAIN = 12.0  # rate times step: 0.95 at even times, 5.6 at an end; above, samples are too close
 REFINEMENT = 4.0  # error at twice the step / error: 16 if smooth, 4 where the acceleration jumps
+SHARPER = 1.0  # times the noise of a sample by which a motion is elsewhere on cubics
+LOOKED_AT = 2000  # places between samples where that is measured
 STRAIGHT = 0.5  # lines are taken if they leave less than this share of the mean square of cubics
 
 
@@ -107,6 +109,26 @@ class SparseMotion(Motion):
         nearest, rate, second, inside = Motion.at(self, t)
         value = self.cubics.at(t)
         return np.where(np.isfinite(value), value, nearest), rate, second, inside
+
+
+def with_cubics(motion: Motion, t_ns: IntArray, q: FloatArray) -> Motion:
+    """Return a motion on cubics between its samples where these lie so far apart that more than noise is gained.
+
+    Args:
+        motion: The joints of a log.
+        t_ns: Its times in integer [ns], shape (m,).
+        q: Its joints in [rad] or [m], shape (m, joints).
+    """
+    if len(t_ns) < STENCIL + 1 or not np.isfinite(q).all():
+        return motion
+    some = slice(None, None, max(len(t_ns) // LOOKED_AT, 1))
+    middle = (0.5 * (motion.t[:-1] + motion.t[1:]))[some]
+    cubics = Cubics.through(t_ns, q)
+    gained = np.sqrt(np.nanmean((cubics.at(middle) - motion.at(middle)[0]) ** 2, axis=1))
+    noise = np.sqrt(np.mean(np.diff(q, STENCIL, axis=0) ** 2, axis=0) / 252.0)  # the sum of squares of its weights
+    if not (gained > SHARPER * noise).any():
+        return motion
+    return SparseMotion(motion.t, motion.value, motion.rate, motion.second, motion.noise, cubics=cubics)
 
 
 def interpolated(

@@ -28,7 +28,7 @@ from urmpipe_pipeline.diagnosis.candidates import (
     residual_after_fit,
 )
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, cost, fitted, inliers, normal_equations, residual
-from urmpipe_pipeline.diagnosis.gate import NOISE, NOT_CONSTANT, find_changing, find_unbelievable
+from urmpipe_pipeline.diagnosis.gate import NOISE, NOT_CONSTANT, TOO_LARGE, find_changing, find_unbelievable
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
 from urmpipe_pipeline.diagnosis.intervals import LONGEST, autocorrelation_time
 from urmpipe_pipeline.diagnosis.selection import Normal, Selection, Subset, without_twins
@@ -40,7 +40,7 @@ SOME = 2_000  # rows, spread evenly, that select before more of them settle it
 MANY = 20_000  # rows, spread evenly, that settle an explanation; standard errors fall with the root of them
 MAJOR = 0.5  # share of the square that stays, where more than noise does, with a cause and not without it
 PROMISED = 0.5  # share of the square that what is left of an explanation leaves at most
-HOPELESS = 3.0  # a start is given up if it leaves e^(3 / 2) times the rms of the best so far
+HOPELESS = 2.0  # a start is given up if it leaves e times the rms of the best so far
 STEPS = 6  # of a fit from a start; those of an explanation that is settled are more
 ROUNDS = 6  # selections after each other: from a good start three are enough
 NEAR = 6.0  # explanations whose scores differ by less are rivals: odds of twenty to one
@@ -171,7 +171,7 @@ class Search:
             best = min(every, key=_score, default=None)
             if best is not None and self._is_needless(start, best, coarse):
                 continue
-            most = np.inf if best is None else best.score + HOPELESS * len(medium.at)
+            most = np.inf if best is None else best.score + HOPELESS * len(medium.at) * len(weight)
             every.append(self._explained(medium, start, most=most))
         best, *others = sorted({(one.state.edits, one.subset): one for one in every}.values(), key=_score)
         while True:
@@ -181,6 +181,10 @@ class Search:
             if found is None or found.score >= best.score:
                 break
             best, others = found, [best, *others]
+        for edit in best.state.edits:  # what a start took for granted
+            found = self._explained(medium, replace(best.state, edits=_but(best.state.edits, edit)))
+            if found.score < best.score:
+                best, others = found, [best, *others]
         weight = self._weight(weight, best.state, self.model.groups)
         rows = Rows(self.spread(MANY), weight, self._least(weight))
         return self._settled(rows, best, others)
@@ -302,7 +306,8 @@ class Search:
                 now = Explanation(state, taken, float(selection.scores([taken])[0]))
                 best = now if best is None else min(best, now, key=_score)
             chosen = selection.best([g for g in self._distinct[0] if g not in beyond])
-            promised = selection.score_of(chosen) if best is None else best.score
+            count = selection.normal.count
+            promised = selection.score_of(chosen) - HOPELESS * count if best is None else best.score
             if chosen in seen or promised > most:
                 break
             seen.add(chosen)
@@ -347,6 +352,10 @@ class Search:
     def _unbelievable(self, state: State, subset: Subset, rows: Rows) -> set[int]:
         """Return the groups of a subset whose numbers no engineer believes, the reason noted."""
         beyond, reason = find_unbelievable(self, state, subset, rows)
+        if reason == TOO_LARGE and not state.edits:  # one of them that alone leaves noise is believed
+            for g in sorted(beyond):
+                if cost(self.model, self.fitted(state, frozenset((g,)), rows), rows) <= NOISE:
+                    return set(subset) - {g}
         if beyond and reason:
             self._refused.append((Explanation(state, subset, np.inf), reason))
         return beyond
@@ -376,6 +385,9 @@ class Search:
 
         What is not among the causes that are looked for is otherwise shared out among many of them.
         """
+        idle = [edit for edit in found.state.edits if self._does_nothing(found, edit)]
+        for edit in idle:
+            found = found._replace(state=replace(found.state, edits=_but(found.state.edits, edit)))
         while (now := cost(self.model, found.state, found.rows)) > NOISE:
             state, subset = found.state, found.subset
             less = [(replace(state, edits=_but(state.edits, edit)), subset) for edit in state.edits]
@@ -408,6 +420,12 @@ class Search:
             refused=(*found.refused, refused),
         )  # fmt: skip
         return self._without_changing(result)
+
+    def _does_nothing(self, found: SelfConsistentFit, edit: Edit) -> bool:
+        """Tell whether a discrete cause leaves no less than the floor on the rows that count."""
+        without = replace(found.state, edits=_but(found.state.edits, edit))
+        gain = cost(self.model, without, found.rows) - cost(self.model, found.state, found.rows)
+        return gain < found.selection.floor
 
     def _rescored(
         self, near: Sequence[Explanation], found: SelfConsistentFit

@@ -21,7 +21,7 @@ from urmpipe_pipeline.diagnosis.arm_groups import (
     tool_groups,
 )
 from urmpipe_pipeline.diagnosis.hypotheses import Group, numbered
-from urmpipe_pipeline.diagnosis.interpolation import Cubics, Interpolated, SparseMotion, interpolated
+from urmpipe_pipeline.diagnosis.interpolation import Cubics, Interpolated, SparseMotion, interpolated, with_cubics
 from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion, motion_of
 from urmpipe_pipeline.diagnosis.place import TOOL, PlaceModel
@@ -306,7 +306,8 @@ def _clock(matched: Matched, run: Run, *, log: bool) -> Clock:
 def _motion(run: Run) -> Motion:
     """Return the joints of a run on its log's rows, with their rates where they have times."""
     rows = run.on_rows
-    return motion_of(rows.t_ns / 1e9 if run.timed else None, rows.q.T)
+    motion = motion_of(rows.t_ns / 1e9 if run.timed else None, rows.q.T)
+    return with_cubics(motion, rows.t_ns, rows.q) if run.timed else motion
 
 
 def _turned(quat: FloatArray | None) -> FloatArray | None:
