@@ -43,7 +43,7 @@ def rank_discrete_causes(
 ) -> list[Edits]:
     """Return the discrete causes with which setup and zeros could leave little, the best first.
 
-    None of them is always among the result.
+    None of them is always among the result, and the first where it could leave little, too.
 
     Args:
         model: The side that is modelled, with its data.
@@ -70,7 +70,7 @@ def rank_discrete_causes(
     near = [i for i in np.argsort(left_over, kind="stable").tolist() if left_over[i] <= most][:MOST]
     bare = [i for i in range(len(tried)) if alone[tried[i]] <= most and i not in near][:MOST]
     near += bare
-    return [every[tried[i]] for i in (near if 0 in near else [*near, 0])]
+    return [every[tried[i]] for i in ([0, *(i for i in near if i)] if 0 in near else [*near, 0])]
 
 
 def add_discrete_cause(

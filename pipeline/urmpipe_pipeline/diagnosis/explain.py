@@ -135,24 +135,14 @@ class ExplanationBuilder:
         return named, tuple(Alternative(causes, needs) for causes in alternatives)
 
     def refused(self) -> tuple[Refused, ...]:
-        """Return the explanation that left the least of those that are not believed, if it left less."""
-        every = {(one.state.edits, one.subset): (one, reason) for one, reason in self.found.refused}
-        rows, found = self.search.spread(ORDERED), list[tuple[float, Explanation, str]]()
-        now = rms(self.model.deviation(self.state, rows).T)
-        for one, reason in every.values():
-            after = rms(self.model.deviation(self.search.placed(one.state, self.found.rows), rows).T)
-            found.append((after, one, reason))
-        if not found or min(found, key=lambda each: each[0])[0] > 0.9 * now:
-            return ()
-        _, one, reason = min(found, key=lambda each: each[0])
-        if not self._breaks_or_large(now):
-            return ()
-        causes = tuple(self._of_group(g, one, {}) for g in sorted(one.subset))
-        return (Refused(causes, reason, self._needs([one, self.found.best])),)
-
-    def _breaks_or_large(self, now: float) -> bool:
-        """Tell whether enough is left to speak of what was refused: more than the floor."""
-        return now > float(np.linalg.norm(self.search.floor[: 3 if self.metres else None]))
+        """Return what the gate refused though it leaves less."""
+        return tuple(
+            Refused(
+                tuple(self._of_part(part, one, 0.0, ()) for part in self._parts(one) if not part.rows),
+                reason, self._needs([one, self.found.best]),
+            )
+            for one, reason in self.found.refused
+        )  # fmt: skip
 
     def after(self) -> FloatArray:
         """Return what the causes leave in [m] or [rad], shape (k, n); NaN of rows that are left out."""

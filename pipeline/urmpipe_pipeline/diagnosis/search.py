@@ -167,22 +167,24 @@ class Search:
         medium = Rows(self.spread(MEDIUM), weight, self._least(weight))
         every: list[Explanation] = []
         coarse = replace(coarse, weight=weight)
+        tau = self._first_tau(replace(self.zero, edits=ranked[0]), medium)
         for start in self._starts(ranked, coarse):
             best = min(every, key=_score, default=None)
             if best is not None and self._is_needless(start, best, coarse):
                 continue
-            most = np.inf if best is None else best.score + HOPELESS * len(medium.at) * len(weight)
-            every.append(self._explained(medium, start, most=most))
+            margin = HOPELESS * len(medium.at) * len(weight) / tau
+            most = np.inf if best is None else best.score + margin
+            every.append(self._explained(medium, start, tau, most))
         best, *others = sorted({(one.state.edits, one.subset): one for one in every}.values(), key=_score)
         while True:
             coarse = replace(coarse, weight=weight)
             further = add_discrete_cause(self.model, self.edits, best.state, coarse, self.floor)
-            found = None if further is None else self._explained(medium, further)
+            found = None if further is None else self._explained(medium, further, tau)
             if found is None or found.score >= best.score:
                 break
             best, others = found, [best, *others]
         for edit in best.state.edits:  # what a start took for granted
-            found = self._explained(medium, replace(best.state, edits=_but(best.state.edits, edit)))
+            found = self._explained(medium, replace(best.state, edits=_but(best.state.edits, edit)), tau)
             if found.score < best.score:
                 best, others = found, [best, *others]
         weight = self._weight(weight, best.state, self.model.groups)
@@ -198,6 +200,14 @@ class Search:
         if hasattr(self.model, "motions") and not self.forced:
             for state in dict.fromkeys((states[0].edits, ())):
                 yield from find_large_causes(self.model, replace(self.zero, edits=state), coarse, single)
+
+    def _first_tau(self, state: State, rows: Rows) -> float:
+        """Return the autocorrelation time in rows of what all numbers together leave: at least that of noise."""
+        if not self.timed:
+            return 1.0
+        left = residual_after_fit(self.model, state, rows.at, rows.weight, self.model.groups)
+        left = left[:, np.isfinite(left).all(axis=0)]
+        return autocorrelation_time(left.T, float((self.floor**2).sum()))
 
     def _is_needless(self, start: State, best: Explanation, rows: Rows) -> bool:
         """Tell whether one cause, or none, leaves noise, and a start with discrete causes needs more."""
@@ -306,8 +316,8 @@ class Search:
                 now = Explanation(state, taken, float(selection.scores([taken])[0]))
                 best = now if best is None else min(best, now, key=_score)
             chosen = selection.best([g for g in self._distinct[0] if g not in beyond])
-            count = selection.normal.count
-            promised = selection.score_of(chosen) - HOPELESS * count if best is None else best.score
+            promised = selection.score_of(chosen) - HOPELESS * selection.independent
+            promised = promised if best is None else best.score
             if chosen in seen or promised > most:
                 break
             seen.add(chosen)
@@ -450,28 +460,36 @@ class Search:
         """
         search, rivals = self, []
         for _ in range(ROUNDS):
-            others = list(search._exchanged(rows, found))
-            scores = [other.score(found.tau) for _, other in others]
+            others = search._exchanged(found)
             now = found.score(found.tau)
-            rivals += [
-                Explanation(*other[:2], score) for (_, other), score in zip(others, scores, strict=True)
-            ]
-            if min(scores, default=np.inf) >= now:
+            rivals += [one for _, one in others]
+            better = [(twin, one) for twin, one in others if one.score < now + (len(found.subset) > 1)]
+            if not better:
+                break
+            twin, other = min(better, key=lambda each: each[1].score)
+            again = replace(search, first=(twin, *search.first))
+            there = again._stable(rows, other.state, None)
+            if there.score(found.tau) >= now:
                 break
             rivals.append(Explanation(*found[:2], now))
-            search, found = others[int(np.argmin(scores))]
+            search, found = again, there
         return search, found, rivals
 
-    def _exchanged(self, rows: Rows, found: SelfConsistentFit) -> Iterator[tuple[Search, SelfConsistentFit]]:
-        """Yield what is found where a twin that differs at full size stands for a cause."""
+    def _exchanged(self, found: SelfConsistentFit) -> list[tuple[int, Explanation]]:
+        """Return explanations with a twin that differs at full size in place of a cause, and that twin."""
         gram, some = found.selection.normal.gram, replace(found.rows, at=self.spread(COARSE))
+        left, least = float(found.selection.left([found.subset])[0]), cost(self.model, found.state, found.rows)
+        exchanged = []
         for twin, g in self._distinct[1].items():
             if g in found.subset:
-                c, d = self._columns([g, twin])
-                other = self.exchange(found.state, c, d, gram)
+                other = self.exchange(found.state, *self._columns([g, twin]), gram)
                 if not self.is_equivalent(found.state, other, some):
-                    search = replace(self, first=(twin, *self.first))
-                    yield search, search._stable(rows, other, None)
+                    subset = found.subset - {g} | {twin}
+                    there = self.fitted(other, subset, found.rows)
+                    after = left * cost(self.model, there, found.rows) / max(least, np.finfo(float).tiny)
+                    score = found.selection.score(after, subset)
+                    exchanged.append((twin, Explanation(there, subset, score)))
+        return exchanged
 
     def _concluded(self, found: SelfConsistentFit, near: list[Explanation]) -> SearchResult:
         """Return an explanation with what stays of it, and with those that are not told from it.
@@ -490,10 +508,23 @@ class Search:
         ]  # fmt: skip
         near = list({(one.state.edits, one.subset): one for one in near}.values())
         shown = tuple(sorted(near, key=_score)[:SHOWN])
-        refused = tuple(self._refused)
+        refused = tuple(self._preferred(found, final.score))
         return SearchResult(
             final, shown, rows, tau, variance, selection.normal, self._distinct[1], refused
         )
+
+    def _preferred(self, found: SelfConsistentFit, score: float) -> Iterator[tuple[Explanation, str]]:
+        """Yield what the gate refused and the criterion prefers: the best of each reason."""
+        least = max(cost(self.model, found.state, found.rows), np.finfo(float).tiny)
+        left = float(found.selection.left([found.subset])[0])
+        some = replace(found.rows, at=found.rows.at[:: max(len(found.rows.at) // COARSE, 1)])
+        for reason in dict.fromkeys(reason for _, reason in self._refused):
+            every = {one.subset: one for one, why in self._refused if why == reason}.values()
+            one = min(every, key=lambda each: cost(self.model, each.state, some))
+            after = left * cost(self.model, one.state, found.rows) / least
+            preferred = found.selection.score(after, one.subset)
+            if preferred < score:
+                yield Explanation(one.state, one.subset, preferred), reason
 
     def beside_usual(self, state: State, subset: Subset, rows: Rows) -> State:
         """Return an explanation with what arms usually differ by, fitted with its numbers and damped."""
