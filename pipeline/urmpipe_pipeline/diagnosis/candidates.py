@@ -25,6 +25,7 @@ SETUP = ("base_shift", "base_rotation", "tool_shift", "tool_rotation", "time_lag
 NEAREST = 8  # discrete causes that are fitted with these, those that leave the least by themselves
 PLAUSIBLE = 4.0  # a discrete cause is plausible if it leaves no more than this times the least square
 MOST = 5  # so many of them at most
+AS_WELL = 1.5  # times the least square that none of them may leave and still comes first
 UNSEEN = 1e-3  # share of the noise floor below which a discrete cause changes nothing
 HALF = 0.5  # a further discrete cause has to leave less than this share of the square
 RIDGE = 1e-10  # keeps the equations of equal columns solvable; columns have unit length
@@ -43,7 +44,7 @@ def rank_discrete_causes(
 ) -> list[Edits]:
     """Return the discrete causes with which setup and zeros could leave little, the best first.
 
-    None of them is always among the result, and the first where it could leave little, too.
+    None of them is always among the result, and the first where it leaves about as little.
 
     Args:
         model: The side that is modelled, with its data.
@@ -70,7 +71,9 @@ def rank_discrete_causes(
     near = [i for i in np.argsort(left_over, kind="stable").tolist() if left_over[i] <= most][:MOST]
     bare = [i for i in range(len(tried)) if alone[tried[i]] <= most and i not in near][:MOST]
     near += bare
-    return [every[tried[i]] for i in ([0, *(i for i in near if i)] if 0 in near else [*near, 0])]
+    if left_over[0] <= AS_WELL * left_over.min():
+        near.insert(0, 0)
+    return [every[tried[i]] for i in dict.fromkeys([*near, 0])]
 
 
 def add_discrete_cause(

@@ -27,11 +27,11 @@ TAIL = 1.6
 STEPS = 12
 """Steps of a fit: from a good start three are enough."""
 
-STILL = 1e-8
+STILL = 1e-6
 """A fit has come to rest when a step takes less than this share from what it leaves."""
 
-HALVED = 12
-"""A step that leaves more is halved so many times."""
+SHORTENED = 7
+"""A step that leaves more is shortened to a third so many times."""
 
 BLOCK = 8192
 """Rows whose Jacobian is in memory at a time, on each thread."""
@@ -161,7 +161,7 @@ def cost(model: Model, state: State, rows: Rows) -> float:
 def fitted(
     model: Model, state: State, groups: Sequence[Group], rows: Rows, *, others: bool = False, steps: int = STEPS
 ) -> State:
-    """Return an explanation whose numbers of some groups leave the least (Gauss-Newton, halved steps).
+    """Return an explanation whose numbers of some groups leave the least (Gauss-Newton, shortened steps).
 
     Args:
         model: What is held against what it should be.
@@ -184,14 +184,14 @@ def fitted(
         scaled = normal.gram / size / size[:, np.newaxis]
         target = np.linalg.lstsq(scaled, normal.moment / size, rcond=1e-13)[0] / size
         step = target - state.values[columns]
-        for _ in range(HALVED):
+        for _ in range(SHORTENED):
             values = state.values.copy()
             values[columns] += step
             there = replace(state, values=values)
             after = cost(model, there, rows)
             if after <= now:
                 break
-            step = step / 2.0
+            step = step / 3.0
         else:
             return state
         gained, state, now = now - after, there, after

@@ -215,7 +215,8 @@ class Selection:
         for g in several:
             starts += self.extended(frozenset((g,)), among)[:STARTS]
         starts = sorted(starts, key=lambda one: one[0])[:STARTS]
-        climbed = [self.climb(subset, score, among) for score, subset in starts]
+        passed: set[Subset] = set()
+        climbed = [self.climb(subset, score, among, passed) for score, subset in starts]
         return min(climbed, key=lambda one: one[1])[0]
 
     def _best_pairs(self, groups: Sequence[int]) -> list[tuple[float, Subset]]:
@@ -237,16 +238,23 @@ class Selection:
         common = self._penalties[0] * (2 + self.numbers) + self._penalties[3] + self.more
         return [(float(scores[i] + common), frozenset((groups[first[i]], groups[second[i]]))) for i in best]
 
-    def climb(self, subset: Subset, score: float, among: Sequence[int]) -> tuple[Subset, float]:
-        """Return where adding, dropping and exchanging groups leads from a subset, and the score there."""
-        while True:
+    def climb(
+        self, subset: Subset, score: float, among: Sequence[int], passed: set[Subset]
+    ) -> tuple[Subset, float]:
+        """Return where adding, dropping and exchanging groups leads from a subset, and the score there.
+
+        A climb ends where another one passed.
+        """
+        while subset not in passed:
+            passed.add(subset)
             near = [(self.score_of(subset - {gone}), subset - {gone}) for gone in sorted(subset)]
             near += self.exchanged(subset, among)
             near += self.extended(subset, among)[:1] if len(subset) < MOST else []
             best = min(near, key=lambda one: one[0], default=(np.inf, subset))
             if not best[0] < score - 1e-9:
-                return subset, score
+                break
             score, subset = best
+        return subset, score
 
     def exchanged(self, subset: Subset, among: Sequence[int]) -> list[tuple[float, Subset]]:
         """Return the best exchanges of each group of a subset for another, with their scores."""
