@@ -4,7 +4,7 @@
   leave little.
 - `add_discrete_cause`: one more of them, where something is left to explain.
 - `find_large_causes`: each rotation and each joint fitted alone, exactly. A turn by theta about the unit
-  vector w, which moves a point by v per radian to first order, moves it by sin(theta) v + (1 - cos(theta)) w x v.
+  vector w, which moves a point by v per radian at first, moves it by sin(theta) v + (1 - cos(theta)) w x v.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.fit import OUTLIER, Model, Rows, inliers
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.log_edits import Edits
@@ -34,7 +35,9 @@ ANGLES = (0.3, -0.3, 0.8, -0.8, 1.57, -1.57, 2.4, -2.4, np.pi)
 """Where fits of a single angle begin, in [rad], besides its linear estimate: a cosine has few minima."""
 
 FEW = 3  # of so many rows one shows what a single angle leaves
-LINEAR = 0.02  # an angle in [rad] below which the linear search needs no other start: its error is theta^2 / 2
+LINEAR = (
+    0.02  # an angle in [rad] below which the linear search needs no other start: its error is theta^2 / 2
+)
 STARTS = 4  # so many single causes are starts
 WORTH = 0.5  # of what the best single cause takes away a start takes away so much
 
@@ -62,7 +65,9 @@ def rank_discrete_causes(
     order = np.argsort(np.minimum(alone, shifted), kind="stable")
     seen = [i for i in order.tolist() if not np.allclose(raw[i] - raw[0], 0.0, 0.0, unseen, equal_nan=True)]
     tried = [0, *seen[:NEAREST]]
-    groups = [one for one in model.groups if one.kind in SETUP and (one.axis is None or one.joint is not None)]
+    groups = [
+        one for one in model.groups if one.kind in SETUP and (one.axis is None or one.joint is not None)
+    ]
     lefts = [
         residual_after_fit(model, replace(zero, edits=every[i]), rows.at, rows.weight, groups) for i in tried
     ]
@@ -100,7 +105,7 @@ def add_discrete_cause(
     return states[nearest - 1] if nearest and every[nearest] <= HALF * every[0] else None
 
 
-def find_large_causes(model: Model, state: State, rows: Rows, among: Sequence[int]) -> Iterator[State]:
+def find_large_causes(model: ArmModel, state: State, rows: Rows, among: Sequence[int]) -> Iterator[State]:
     """Yield explanations with one number besides discrete causes, where it is too large for a linear search.
 
     Args:

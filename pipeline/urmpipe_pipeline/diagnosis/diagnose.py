@@ -40,9 +40,9 @@ USUAL = {
     ("joint_offset", "rad"): 1e-3, ("joint_offset", "m"): 1e-3, ("joint_scale", ""): 5e-4,
     ("sag", "rad/(N m)"): 3e-5, ("sag", "rad/kg"): 3e-4,
 }  # fmt: skip
-"""How far an arm is usually from its data sheet, by kind and unit: where a device measured it, what is no more
-is its own geometry. Those of a UR10, fitted to 300 measured poses, were within twice this; its joints give way
-by 1e-5 to 3e-5 rad/(N m)."""
+"""How far an arm is usually from its data sheet, by kind and unit: where a device measured it, what is no
+more is its own geometry. Those of a UR10, fitted to 300 measured poses, were within twice this; its joints
+give way by 1e-5 to 3e-5 rad/(N m)."""
 
 UNLIKE = 0.5
 """A remainder of more than this share of the reference's motion leaves no likeness of the two motions."""

@@ -170,7 +170,7 @@ class ExplanationBuilder:
         return rivals, twins
 
     def _alike(self, mine: set[Part], theirs: set[Part]) -> bool:
-        """Tell whether causes are of the same kinds: a base turned by 180 deg, and one by a number about it."""
+        """Tell whether causes are of the same kinds: a base turned by 180 deg, and by a number."""
         kinds = [sorted(self._kind(part) for part in parts) for parts in (mine, theirs)]
         frames = {*kinds[0]} <= {"base_shift", "base_rotation", "tool_shift", "tool_rotation"}
         return kinds[0] == kinds[1] and frames
@@ -192,12 +192,14 @@ class ExplanationBuilder:
         """Return the causes of an explanation: rows, what is usual, edits, then groups."""
         rows = [] if self.outliers is None else [self.outliers]
         rows += [Part(usual=True)] if self._usual_columns(one) else []
-        return [*rows, *(Part(edit) for edit in one.state.edits), *(Part(group=g) for g in sorted(one.subset))]
+        return [
+            *rows,
+            *(Part(edit) for edit in one.state.edits),
+            *(Part(group=g) for g in sorted(one.subset)),
+        ]
 
-    def _causes(
-        self, one: Explanation, wanted: set[Part], twins: dict[Part, list[str]]
-    ) -> tuple[Cause, ...]:
-        """Return some causes of an explanation: clocks first, then what takes most away after those before."""
+    def _causes(self, one: Explanation, wanted: set[Part], twins: dict[Part, list[str]]) -> tuple[Cause, ...]:
+        """Return some causes of an explanation: clocks first, then what takes most away after them."""
         rest, order = self._parts(one), list[Part]()
         if not wanted:
             return ()
@@ -319,7 +321,9 @@ class ExplanationBuilder:
         """Return what a cause is called among twins."""
         if part.rows:
             return "outliers"
-        return short_name(self._of_edit(part.edit) if part.edit else self._bare(self.model.groups[part.group]))
+        return short_name(
+            self._of_edit(part.edit) if part.edit else self._bare(self.model.groups[part.group])
+        )
 
     def _bare(self, group: Group) -> Cause:
         """Return the cause of a group without numbers."""
@@ -432,4 +436,3 @@ def _begin_abruptly(left: FloatArray, size: FloatArray, far: IntArray) -> bool:
                 if step < ABRUPT * min(largest, float(size[inside])):
                     return False
     return True
-

@@ -63,11 +63,6 @@ class Model(Protocol):
     def residuals(self, edits: Sequence[Edits], rows: IntArray) -> FloatArray:
         """Return what each of some discrete causes leaves by itself in [m] and [rad], shape (k, c, n)."""
 
-    def motions(
-        self, state: State, rows: IntArray, groups: Sequence[Group]
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return what positions leave in [m], and how numbers move and turn them, shape (p, 3, n) each."""
-
     def deviation(self, state: State, rows: IntArray) -> FloatArray:
         """Return what an explanation leaves of what is judged, in [m] or [rad], shape (k, n)."""
 
@@ -159,7 +154,13 @@ def cost(model: Model, state: State, rows: Rows) -> float:
 
 
 def fitted(
-    model: Model, state: State, groups: Sequence[Group], rows: Rows, *, others: bool = False, steps: int = STEPS
+    model: Model,
+    state: State,
+    groups: Sequence[Group],
+    rows: Rows,
+    *,
+    others: bool = False,
+    steps: int = STEPS,
 ) -> State:
     """Return an explanation whose numbers of some groups leave the least (Gauss-Newton, shortened steps).
 

@@ -1,7 +1,7 @@
 """The gate that every named answer passes: causes that no engineer believes are refused, with the reason.
 
 1. A number beyond `LARGEST` is that of no such cause, unless it leaves the noise alone.
-2. Beside other causes no part of an arm differs by more than `REACHED` and `BESIDE`. A cause that alone leaves
+2. Beside other causes no part of an arm differs by more than `REACHED` and `BESIDE`. One that alone leaves
    the noise may have any size.
 3. A cause that alone makes the rms more than `CANCELS` times what it was before any only cancels another.
 4. What a number fits has to hold all the time: x_k is replaced by sum_m x_km h_m(row) over `SEGMENTS` hat
@@ -83,7 +83,7 @@ class Fitter(Protocol):
 
 
 def find_unbelievable(search: Fitter, state: State, subset: Subset, rows: Rows) -> tuple[set[int], str]:
-    """Return the groups of a subset whose numbers no engineer believes, and why; none and "" of no such cause.
+    """Return the groups of a subset whose numbers no engineer believes, and why.
 
     Args:
         search: What was looked for.

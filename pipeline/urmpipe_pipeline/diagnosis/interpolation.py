@@ -93,7 +93,6 @@ def _joined(t_ns: IntArray, broken: IntArray | None) -> BoolArray:
     return joined
 
 
-
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SparseMotion(Motion):
     """A motion whose rows lie apart from the times that are looked up: its values are those of cubics.
@@ -112,7 +111,7 @@ class SparseMotion(Motion):
 
 
 def with_cubics(motion: Motion, t_ns: IntArray, q: FloatArray) -> Motion:
-    """Return a motion on cubics between its samples where these lie so far apart that more than noise is gained.
+    """Return a motion on cubics where its samples lie so far apart that this gains more than noise.
 
     Args:
         motion: The joints of a log.
@@ -125,7 +124,9 @@ def with_cubics(motion: Motion, t_ns: IntArray, q: FloatArray) -> Motion:
     middle = (0.5 * (motion.t[:-1] + motion.t[1:]))[some]
     cubics = Cubics.through(t_ns, q)
     gained = np.sqrt(np.nanmean((cubics.at(middle) - motion.at(middle)[0]) ** 2, axis=1))
-    noise = np.sqrt(np.mean(np.diff(q, STENCIL, axis=0) ** 2, axis=0) / 252.0)  # the sum of squares of its weights
+    noise = np.sqrt(
+        np.mean(np.diff(q, STENCIL, axis=0) ** 2, axis=0) / 252.0
+    )  # the sum of squares of its weights
     if not (gained > SHARPER * noise).any():
         return motion
     return SparseMotion(motion.t, motion.value, motion.rate, motion.second, motion.noise, cubics=cubics)

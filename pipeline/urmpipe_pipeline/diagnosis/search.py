@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.candidates import (
     add_discrete_cause,
     find_large_causes,
@@ -54,7 +55,8 @@ ORDER: Mapping[str, float] = {
     "mirrored": 2.0, "turns": 1.0, "joint_offset": 1.2, "joint_scale": 2.0, "joint_lag": 2.0,
     "link_length": 1.8, "backlash": 2.5, "compliance": 2.5, "sag": 2.5, "tilt": 2.5, "link_shift": 3.5,
 }  # fmt: skip
-"""What each kind adds to a score (twice the log of odds): setup comes before structure, e^(1.2 / 2) = 1.8 to 1."""
+"""What each kind adds to a score (twice the log of odds): setup before structure, e^(1.2 / 2) = 1.8 to 1."""
+
 
 class Explanation(NamedTuple):
     """Causes, with their sizes.
@@ -70,7 +72,7 @@ class Explanation(NamedTuple):
     score: float
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """How many causes it takes."""
         return len(self.subset) + len(self.state.edits)
 
@@ -197,12 +199,12 @@ class Search:
         yield from states
         yield from self.starts
         single = [g for g in self._distinct[0] if len(self.model.groups[g].columns) == 1]
-        if hasattr(self.model, "motions") and not self.forced:
+        if isinstance(self.model, ArmModel) and not self.forced:
             for state in dict.fromkeys((states[0].edits, ())):
                 yield from find_large_causes(self.model, replace(self.zero, edits=state), coarse, single)
 
     def _first_tau(self, state: State, rows: Rows) -> float:
-        """Return the autocorrelation time in rows of what all numbers together leave: at least that of noise."""
+        """Return the autocorrelation time in rows of what all numbers leave: at least that of noise."""
         if not self.timed:
             return 1.0
         left = residual_after_fit(self.model, state, rows.at, rows.weight, self.model.groups)
@@ -211,7 +213,7 @@ class Search:
 
     def _is_needless(self, start: State, best: Explanation, rows: Rows) -> bool:
         """Tell whether one cause, or none, leaves noise, and a start with discrete causes needs more."""
-        if not start.edits or best.count > 1 or cost(self.model, best.state, rows) > NOISE:
+        if not start.edits or best.size > 1 or cost(self.model, best.state, rows) > NOISE:
             return False
         return cost(self.model, start, rows) > NOISE
 
@@ -240,7 +242,7 @@ class Search:
         return replace(state, values=values)
 
     def is_equivalent(self, state: State, other: State, rows: Rows) -> bool:
-        """Tell whether two explanations leave the same at full size: rms of the difference below the floor."""
+        """Tell whether two explanations leave the same at full size: a difference below the floor."""
         one, two = (self.model.residual(self.placed(each, rows), rows.at) for each in (state, other))
         between = (one - two) / self.floor[:, np.newaxis]
         known = np.isfinite(between).all(axis=0)
@@ -330,7 +332,7 @@ class Search:
     def _within(
         self, state: State, subset: Subset, rows: Rows, selection: Selection, steps: int = 2 * STEPS
     ) -> tuple[State, set[int]]:
-        """Return an explanation with the best numbers of a subset that is believed, and the groups it lacks."""
+        """Return the best numbers of what is believed of a subset, and the groups it lacks."""
         gone: set[int] = set()
         guess = self._guess(state, subset, selection)
         while True:
@@ -402,12 +404,16 @@ class Search:
             state, subset = found.state, found.subset
             less = [(replace(state, edits=_but(state.edits, edit)), subset) for edit in state.edits]
             less += [(state, subset - {g}) for g in sorted(subset)]
-            fits = [(self.beside_usual(self.fitted(*one, found.rows), one[1], found.rows), one[1]) for one in less]
+            fits = [
+                (self.beside_usual(self.fitted(*one, found.rows), one[1], found.rows), one[1]) for one in less
+            ]
             costs = [cost(self.model, one, found.rows) for one, _ in fits]
             if not costs or now <= MAJOR * min(costs):
                 break
             there, kept = fits[int(np.argmin(costs))]
-            found = found._replace(state=there, subset=kept, selection=self._selection(there, found.rows, found.tau))
+            found = found._replace(
+                state=there, subset=kept, selection=self._selection(there, found.rows, found.tau)
+            )
         return found
 
     def _without_changing(self, found: SearchResult) -> SearchResult:
@@ -437,19 +443,21 @@ class Search:
         gain = cost(self.model, without, found.rows) - cost(self.model, found.state, found.rows)
         return gain < found.selection.floor
 
-    def _rescored(
-        self, near: Sequence[Explanation], found: SelfConsistentFit
-    ) -> Iterator[Explanation]:
+    def _rescored(self, near: Sequence[Explanation], found: SelfConsistentFit) -> Iterator[Explanation]:
         """Yield rivals with their numbers and scores on the rows that decided, those that are still near."""
-        selection, rows = found.selection, found.rows
-        left, least = float(selection.left([found.subset])[0]), cost(self.model, found.state, rows)
+        most = found.score(found.tau) + NEAR
         for one in near:
-            if found.state.edits == one.state.edits:
-                state = self.fitted(one.state, one.subset, rows)
-                after = left * cost(self.model, state, rows) / max(least, np.finfo(float).tiny)
-                one = Explanation(state, one.subset, selection.score(after, one.subset))
-            if one.score < selection.score(left, found.subset) + NEAR or found.state.edits != one.state.edits:
+            if one.state.edits != found.state.edits:
                 yield one
+            elif (there := self._refitted(found, one.state, one.subset)).score < most:
+                yield there
+
+    def _refitted(self, found: SelfConsistentFit, start: State, subset: Subset) -> Explanation:
+        """Return another subset with the same discrete causes, and its score at full size."""
+        there = self.fitted(start, subset, found.rows)
+        least = max(cost(self.model, found.state, found.rows), np.finfo(float).tiny)
+        left = float(found.selection.left([found.subset])[0]) * cost(self.model, there, found.rows) / least
+        return Explanation(there, subset, found.selection.score(left, subset))
 
     def _with_twins(
         self, rows: Rows, found: SelfConsistentFit
@@ -478,17 +486,13 @@ class Search:
     def _exchanged(self, found: SelfConsistentFit) -> list[tuple[int, Explanation]]:
         """Return explanations with a twin that differs at full size in place of a cause, and that twin."""
         gram, some = found.selection.normal.gram, replace(found.rows, at=self.spread(COARSE))
-        left, least = float(found.selection.left([found.subset])[0]), cost(self.model, found.state, found.rows)
         exchanged = []
         for twin, g in self._distinct[1].items():
             if g in found.subset:
-                other = self.exchange(found.state, *self._columns([g, twin]), gram)
+                c, d = self._columns([g, twin])
+                other = self.exchange(found.state, c, d, gram)
                 if not self.is_equivalent(found.state, other, some):
-                    subset = found.subset - {g} | {twin}
-                    there = self.fitted(other, subset, found.rows)
-                    after = left * cost(self.model, there, found.rows) / max(least, np.finfo(float).tiny)
-                    score = found.selection.score(after, subset)
-                    exchanged.append((twin, Explanation(there, subset, score)))
+                    exchanged.append((twin, self._refitted(found, other, found.subset - {g} | {twin})))
         return exchanged
 
     def _concluded(self, found: SelfConsistentFit, near: list[Explanation]) -> SearchResult:
@@ -499,37 +503,34 @@ class Search:
         state, subset, tau, rows, selection = found
         final = Explanation(state, subset, float(selection.scores([subset])[0]))
         variance = max(float(selection.left([subset])[0]), selection.floor)
-        near += self._neighbours(selection, final, rows)
-        simple, least = final.count, cost(self.model, state, rows)
+        near += self._neighbours(found, final.score + NEAR)
+        simple, least = final.size, cost(self.model, state, rows)
         near = [
             one for one in near
-            if (one.count <= simple or cost(self.model, one.state, rows) < least)
+            if (one.size <= simple or cost(self.model, one.state, rows) < least)
             and (one.state.edits != state.edits or selection.moving(one.subset) == one.subset)
         ]  # fmt: skip
         near = list({(one.state.edits, one.subset): one for one in near}.values())
         shown = tuple(sorted(near, key=_score)[:SHOWN])
         refused = tuple(self._preferred(found, final.score))
-        return SearchResult(
-            final, shown, rows, tau, variance, selection.normal, self._distinct[1], refused
-        )
+        return SearchResult(final, shown, rows, tau, variance, selection.normal, self._distinct[1], refused)
 
     def _preferred(self, found: SelfConsistentFit, score: float) -> Iterator[tuple[Explanation, str]]:
         """Yield what the gate refused and the criterion prefers: the best of each reason."""
-        least = max(cost(self.model, found.state, found.rows), np.finfo(float).tiny)
-        left = float(found.selection.left([found.subset])[0])
         some = replace(found.rows, at=found.rows.at[:: max(len(found.rows.at) // COARSE, 1)])
         for reason in dict.fromkeys(reason for _, reason in self._refused):
             every = {one.subset: one for one, why in self._refused if why == reason}.values()
             one = min(every, key=lambda each: cost(self.model, each.state, some))
-            after = left * cost(self.model, one.state, found.rows) / least
-            preferred = found.selection.score(after, one.subset)
-            if preferred < score:
-                yield Explanation(one.state, one.subset, preferred), reason
+            again = self._refitted(found, one.state, one.subset)
+            if again.score < score:
+                yield again, reason
 
     def beside_usual(self, state: State, subset: Subset, rows: Rows) -> State:
         """Return an explanation with what arms usually differ by, fitted with its numbers and damped."""
         among = set(self._distinct[0])
-        usual = [(c, size) for g, size in self.usual.items() if g in among - subset for c in self._columns([g])]
+        usual = [
+            (c, size) for g, size in self.usual.items() if g in among - subset for c in self._columns([g])
+        ]
         if not usual or not (subset or state.edits):
             return state
         own = self._columns([*self.forced, *sorted(subset)])
@@ -538,7 +539,9 @@ class Search:
         damped = normal.gram[np.ix_(columns, columns)]
         damped += np.diag([*(0.0 for _ in own), *(size**-2.0 for _, size in usual)])
         size = np.sqrt(np.maximum(np.diag(damped), np.finfo(float).tiny))
-        solved = np.linalg.lstsq(damped / size / size[:, np.newaxis], normal.moment[columns] / size, rcond=1e-13)
+        solved = np.linalg.lstsq(
+            damped / size / size[:, np.newaxis], normal.moment[columns] / size, rcond=1e-13
+        )
         values = state.values.copy()
         values[columns] = solved[0] / size
         there = replace(state, values=values)
@@ -581,21 +584,15 @@ class Search:
             autocorrelation_time(left[one].T, float((self.floor[one] ** 2).sum())) for one in of_blocks
         )
 
-    def _neighbours(self, selection: Selection, final: Explanation, rows: Rows) -> Iterator[Explanation]:
-        """Yield other subsets of nearly the same score, neither a part of the best nor around it.
-
-        Their score is that of what they leave at full size, after a fit.
-        """
-        left, least = float(selection.left([final.subset])[0]), cost(self.model, final.state, rows)
-        for score, subset in selection.exchanged(final.subset, self._distinct[0])[:SHOWN]:
-            if score >= final.score + NEAR:
+    def _neighbours(self, found: SelfConsistentFit, most: float) -> Iterator[Explanation]:
+        """Yield other subsets with a score below `most`, neither a part of the best nor around it."""
+        for score, subset in found.selection.exchanged(found.subset, self._distinct[0])[:SHOWN]:
+            if score >= most:
                 break
-            state = self.fitted(final.state, subset, rows)
-            moved = all(state.of(self.model.groups[g]).any() for g in subset)  # else the fit got nowhere
-            after = left * cost(self.model, state, rows) / max(least, np.finfo(float).tiny)
-            score = selection.score(after, subset)
-            if score < final.score + NEAR and moved and not self._unbelievable(state, subset, rows):
-                yield Explanation(state, subset, score)
+            one = self._refitted(found, found.state, subset)
+            moved = all(one.state.of(self.model.groups[g]).any() for g in subset)  # else the fit got nowhere
+            if one.score < most and moved and not self._unbelievable(one.state, subset, found.rows):
+                yield one
 
 
 def _score(one: Explanation) -> float:

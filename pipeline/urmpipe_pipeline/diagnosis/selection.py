@@ -265,7 +265,7 @@ class Selection:
         return sorted(found, key=lambda one: one[0])
 
     def extended(self, subset: Subset, among: Sequence[int]) -> list[tuple[float, Subset]]:
-        """Return a subset with each other group besides, with the scores, the best first (Schur complement)."""
+        """Return a subset with each other group, and the scores, the best first (Schur complement)."""
         others = [g for g in among if g not in subset]
         if not others:
             return []
@@ -273,7 +273,9 @@ class Selection:
         columns, square = self.columns(subset), self.normal.square
         if columns:
             across = np.linalg.solve(gram[np.ix_(columns, columns)], gram[columns])
-            square -= float(moment[columns] @ np.linalg.solve(gram[np.ix_(columns, columns)], moment[columns]))
+            square -= float(
+                moment[columns] @ np.linalg.solve(gram[np.ix_(columns, columns)], moment[columns])
+            )
             gram, moment = gram - gram[:, columns] @ across, moment - moment[columns] @ across
         own = np.diag(gram)
         gain = np.where(own > TWIN, moment**2 / np.maximum(own, TWIN), 0.0)
@@ -284,7 +286,9 @@ class Selection:
             inner = gram[np.ix_(at, at)] + TWIN * np.eye(len(at))
             gains[i] = moment[at] @ np.linalg.solve(inner, moment[at])
         left = np.maximum(square - gains, 0.0) / max(self.normal.count, 1)
-        penalty = self._penalties[0] * (len(columns) + sizes + self.numbers) + self._penalties[2 + len(subset)]
+        penalty = (
+            self._penalties[0] * (len(columns) + sizes + self.numbers) + self._penalties[2 + len(subset)]
+        )
         prior = self._priors[others] + sum(self._priors[g] for g in subset) + self.more
         scores = self.independent * np.log(np.maximum(left, self.floor)) + penalty + prior
         order = np.argsort(scores, kind="stable").tolist()

@@ -21,7 +21,13 @@ from urmpipe_pipeline.diagnosis.arm_groups import (
     tool_groups,
 )
 from urmpipe_pipeline.diagnosis.hypotheses import Group, numbered
-from urmpipe_pipeline.diagnosis.interpolation import Cubics, Interpolated, SparseMotion, interpolated, with_cubics
+from urmpipe_pipeline.diagnosis.interpolation import (
+    Cubics,
+    Interpolated,
+    SparseMotion,
+    interpolated,
+    with_cubics,
+)
 from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion, motion_of
 from urmpipe_pipeline.diagnosis.place import TOOL, PlaceModel
@@ -137,7 +143,8 @@ def _of_joints(matched: Matched, reference: Side, log: Side) -> Question:
     )  # fmt: skip
     rounding = np.sqrt(_rounding(run.on_rows.q, run) ** 2 + _rounding(samples, run) ** 2 + q.error**2)
     told = NotLookedFor(
-        (*STRUCTURE, *FRAMES, "base_mirrored", "path_unit", "other_robot"), _why_joints_show_none(reference, log)
+        (*STRUCTURE, *FRAMES, "base_mirrored", "path_unit", "other_robot"),
+        _why_joints_show_none(reference, log),
     )
     turning = tuple(not one for one in sliding)
     edits = (

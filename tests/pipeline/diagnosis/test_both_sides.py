@@ -99,7 +99,7 @@ def test_a_polygon_stays_one(write: Write) -> None:
     found = diagnosed(write("path", SPARSE[::5], tcp=corners), write("log", DENSE, tcp=log))
     ((kind, axis, value),) = [(cause.kind, cause.axis, cause.value) for cause in found.causes]
     assert (kind, axis) == ("base_shift", (0.0, 1.0, 0.0))
-    assert value == (pytest.approx(-0.002, abs=1e-9),)
+    assert value == pytest.approx((-0.002,), abs=1e-9)
 
 
 T = np.arange(0.0, 6.0, 0.008)
