@@ -1,6 +1,7 @@
 """What an explanation is worth: its causes in order, their sizes with intervals, twins, what would decide.
 
-1. Causes are ordered: clocks first, then what takes the most away after those before it.
+1. Causes are ordered: those that are decided, then the others; of each clocks first, then what takes the
+   most away after those before it.
 2. Each number has a 95 % interval that knows the correlation of the noise (intervals.py).
 3. Rows that no explanation fits are a cause of their own, and left out.
 4. Twins do exactly the same; rivals differ by less than the noise: these stay undecided.
@@ -20,6 +21,7 @@ from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.deciding import deciding_joint
 from urmpipe_pipeline.diagnosis.fit import BLOCK, Model, deviation, inliers
 from urmpipe_pipeline.diagnosis.formatting import short_name
+from urmpipe_pipeline.diagnosis.gate import LARGEST
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.diagnosis.intervals import batch_covariance, student_quantile
 from urmpipe_pipeline.diagnosis.joints import JointsModel
@@ -127,11 +129,11 @@ class ExplanationBuilder:
         every = [best, *(one for one in self.found.others if self._relevant(one))]
         rivals, twins = self._without_twins(every)
         common = set.intersection(*(set(self._parts(one)) for one in rivals))
-        named = self._causes(best, common, twins)
+        named = self._causes(best, common, twins)[: len(common)]
         if len(rivals) == 1:
             return named, ()
         needs = self._needs(rivals)
-        alternatives = (self._causes(one, set(self._parts(one)) - common, {}) for one in rivals)
+        alternatives = (self._causes(one, common, {})[len(common) :] for one in rivals)
         return named, tuple(Alternative(causes, needs) for causes in alternatives)
 
     def refused(self) -> tuple[Refused, ...]:
@@ -164,7 +166,8 @@ class ExplanationBuilder:
                 continue
             if len(mine) == len(theirs) == 1 and self._same_effect(best.state, one.state, rows.at):
                 (part,), (other,) = mine, theirs
-                twins.setdefault(part, []).append(self._short_name(other, one))
+                if other.group < 0 or self._is_usual_size(other.group, one.state):
+                    twins.setdefault(part, []).append(self._short_name(other, one))
             else:
                 rivals.append(one)
         return rivals, twins
@@ -198,17 +201,19 @@ class ExplanationBuilder:
             *(Part(group=g) for g in sorted(one.subset)),
         ]
 
-    def _causes(self, one: Explanation, wanted: set[Part], twins: dict[Part, list[str]]) -> tuple[Cause, ...]:
-        """Return some causes of an explanation: clocks first, then what takes most away after them."""
+    def _causes(self, one: Explanation, common: set[Part], twins: dict[Part, list[str]]) -> tuple[Cause, ...]:
+        """Return the causes of an explanation: what all explanations have in common, then the others.
+
+        Of both clocks first, then what takes the most away after those before it.
+        """
         rest, order = self._parts(one), list[Part]()
-        if not wanted:
-            return ()
         few = self.search.spread(ORDERED)
         if self.outliers is not None:
             few = np.union1d(few, self.outliers.rows)
         while rest:
-            clocks = [part for part in rest if self._kind(part) in CLOCKS]
-            left = {part: self._left(one.state, [*order, part], few) for part in clocks or rest}
+            next_ones = [part for part in rest if part in common] or rest
+            clocks = [part for part in next_ones if self._kind(part) in CLOCKS]
+            left = {part: self._left(one.state, [*order, part], few) for part in clocks or next_ones}
             order.append(min(left, key=lambda part: left[part]))
             rest.remove(order[-1])
         after = [self._left(one.state, order[:k]) for k in range(len(order) + 1)]
@@ -227,7 +232,7 @@ class ExplanationBuilder:
                     effect=effect, breaks=self.breaks(made),
                 )
             )  # fmt: skip
-        return tuple(cause for cause, part in zip(causes, order, strict=True) if part in wanted)
+        return tuple(causes)
 
     def _of_part(self, part: Part, one: Explanation, effect: float, twins: Sequence[str]) -> Cause:
         """Return a cause without what it changes."""
@@ -400,7 +405,13 @@ class ExplanationBuilder:
         """Tell whether a number in place of another leaves the same at its full size."""
         other = self.search.exchange(state, c, d, self.found.normal.gram)
         some = replace(self.found.rows, at=self.search.spread(COARSE))
-        return self.search.is_equivalent(state, other, some)
+        (h,) = (h for h, group in enumerate(self.model.groups) if group.columns == (d,))
+        return self._is_usual_size(h, other) and self.search.is_equivalent(state, other, some)
+
+    def _is_usual_size(self, g: int, state: State) -> bool:
+        """Tell whether a number is that of a cause of its kind: no backlash has half a turn."""
+        group = self.model.groups[g]
+        return bool(np.abs(state.of(group)).max() <= LARGEST.get(group.kind, np.inf))
 
     def _same(self, c: int, d: int) -> bool:
         """Tell whether two columns have one direction."""
