@@ -27,8 +27,11 @@ UNITS = {
 }  # fmt: skip  # displayed unit and its number per SI unit
 MAX_DECIMALS = 4  # 0.1 micrometres, 2 microradians, as of lengths and angles elsewhere
 MAX_CAUSES = 3  # in a summary, with all that break the tolerance; a table has the others
-MAX_LISTED = 2  # undecided explanations in a summary; a table has the others
+MAX_LISTED = 2  # undecided explanations in a summary, or one if two have too many causes; a table has all
+MAX_UNDECIDED = 4  # causes of two such explanations together
 MIN_EXPLAINED = 1.0 / 3.0  # fraction of the rms; with less, the summary says that it explains little
+NOTHING = 0.01  # fraction of the rms of a passed log; less would go unnoticed
+ROUNDING = 1e-9  # mm or deg: less is the rounding of the numbers that were subtracted
 CLOCKS = ("time_lag", "clock_drift")
 PASSES = "passes; "
 
@@ -51,20 +54,46 @@ def format_summary(diagnosis: Diagnosis) -> str:
 
 
 def select_causes(causes: Sequence[Cause]) -> list[Cause]:
-    """Return the causes of a summary in their order: all that break the tolerance, others up to three."""
+    """Return the causes of a summary in their order: all that break the tolerance, others up to three.
+
+    With them those that they partly cancel.
+    """
     listed = [cause for cause in causes if cause.breaks]
     listed += [cause for cause in causes if not cause.breaks][: max(MAX_CAUSES - len(listed), 0)]
-    return [cause for cause in causes if cause in listed]
+    return [cause for step in _split_steps(causes) if any(one in listed for one in step) for cause in step]
+
+
+def _split_steps(causes: Sequence[Cause]) -> list[list[Cause]]:
+    """Return causes in steps that each lower the rms: those that partly cancel each other stand in one."""
+    steps: list[list[Cause]] = []
+    for cause in causes:
+        if steps and _is_joinable(steps[-1], cause) and not _lowers(steps[-1]):
+            steps[-1].append(cause)
+        else:
+            steps.append([cause])
+    while len(steps) > 1 and _is_joinable(steps[-2], *steps[-1]) and not _lowers(steps[-1]):
+        steps[-2:] = [[*steps[-2], *steps[-1]]]
+    return steps
+
+
+def _is_joinable(step: Sequence[Cause], *causes: Cause) -> bool:
+    return not any(cause.kind in (*CLOCKS, "outliers") for cause in (*step, *causes))
+
+
+def _lowers(step: Sequence[Cause]) -> bool:
+    return step[-1].rms_after < step[0].rms_before
 
 
 def _format_avoidable(diagnosis: Diagnosis) -> str:
     """Return how much of the deviation of a passed log would go, and under which condition."""
     unit, listed = diagnosis.unit, select_causes(diagnosis.causes)
     some, all_of_it = diagnosis.rms - diagnosis.remainder.rms, diagnosis.rms
-    amounts = f"{format_amount(some, unit)} of {format_amount(all_of_it, unit)} rms"
+    little = "only " if some < MIN_EXPLAINED * all_of_it else ""
+    amount = "next to nothing" if some < NOTHING * all_of_it else f"{little}{format_amount(some, unit)}"
+    amounts = f"{amount} of {format_amount(all_of_it, unit)} rms"
     undecided = format_undecided(diagnosis.undecided) if diagnosis.undecided else ""
     if not listed:
-        return f"{amounts} have a cause: {undecided}"
+        return f"{amounts} is explained: {undecided}"
     conditions = text.enumerated([build_remedy(cause).conditional() for cause in listed])
     return "; ".join(
         filter(None, (f"{amounts} would go if {conditions}", _format_more(diagnosis, listed), undecided))
@@ -82,14 +111,16 @@ def _format_chain(diagnosis: Diagnosis) -> str:
             parts.append(f"{clauses}; after that {format_amount(clocks[-1].rms_after, unit)} rms")
         else:
             parts.append(f"{clauses}: {format_change(clocks[0].rms_before, clocks[-1].rms_after, unit)}")
-    for cause in listed[len(clocks) :]:
-        if cause.kind == "outliers":
-            change = f"; {_format_others(cause, diagnosis, is_last=cause is diagnosis.causes[-1])}"
+    steps = [step for step in _split_steps(diagnosis.causes) if step[0] in listed[len(clocks) :]]
+    for step in steps:
+        if step[0].kind == "outliers":
+            change = f"; {_format_others(step[0], diagnosis, is_last=step[0] is diagnosis.causes[-1])}"
         else:
-            change = format_change(cause.rms_before, cause.rms_after, unit)
-            is_alone = len(diagnosis.causes) == 1 and not diagnosis.undecided
+            change = format_change(step[0].rms_before, step[-1].rms_after, unit)
+            is_alone = len(step) == len(diagnosis.causes) and not diagnosis.undecided
             change = f": {change if is_alone else _in_chain(change, is_first=not parts)}"
-        parts.append(f"{'then ' if parts else ''}{format_cause(cause)}{change}")
+        clauses = text.enumerated([format_cause(cause) for cause in step])
+        parts.append(f"{'then ' if parts else ''}{clauses}{change}")
     more = _format_more(diagnosis, listed)
     parts += [more] if more else []
     if diagnosis.undecided:
@@ -139,8 +170,10 @@ def format_own_tcp(side: OwnTcp) -> str:
 
 def format_undecided(alternatives: Sequence[Alternative]) -> str:
     """Return what a log does not decide between: "either A or B (a motion of phi5 would decide)"."""
-    clauses = [format_explanation(alternative) for alternative in alternatives[:MAX_LISTED]]
-    more = len(alternatives) - MAX_LISTED
+    listed = alternatives[:MAX_LISTED]
+    listed = listed[:1] if sum(len(one.causes) for one in listed) > MAX_UNDECIDED else listed
+    clauses = [format_explanation(alternative) for alternative in listed]
+    more = len(alternatives) - len(listed)
     clauses += [f"{more} more" if more > 1 else "another"] if more > 0 else []
     needs = list(dict.fromkeys(alternative.needs for alternative in alternatives if alternative.needs))
     decides = f"a motion of {text.enumerated(needs)} would decide" if needs else "this log cannot decide"
@@ -176,6 +209,7 @@ def format_amount(value: float, unit: str) -> str:
 
 def _format_number(value: float) -> str:
     """Return five digits, at most four of them decimals; of less than that two."""
+    value = value if abs(value) >= ROUNDING else 0.0
     rounded = float(f"{round(value, MAX_DECIMALS):.5g}")
     return f"{rounded if rounded or not value else float(f'{value:.1e}'):.5g}"
 
@@ -601,7 +635,11 @@ KIND_TEXTS: Mapping[str, KindText] = {
             if cause.value[0] > 0.0
             else f"all joints are ahead by {format_value(cause)}"
         ),
-        lambda cause: Remedy("compensate", f"the servo lag of {format_value(cause)}"),
+        lambda cause: (
+            Remedy("compensate", f"the servo lag of {format_value(cause)}")
+            if cause.value[0] > 0.0
+            else Remedy("delay", "all joints", f"by {format_value(cause)}")
+        ),
     ),
     "other_robot": KindText(
         "another robot",

@@ -65,7 +65,7 @@ TEXTS: Sequence[tuple[Cause, str, str, str]] = [
     (of_joint("joint_coupled", COUPLED, 1.0), "elbow_joint includes the negative of shoulder_lift_joint", "shoulder_lift_joint were added to elbow_joint", f"coupling of {COUPLED}"),
     (of_joint("joint_lag", "q3", -0.0165, unit="s"), "joint q3 is 16.5 ms late", "the times of joint q3 were made 16.5 ms earlier", "lag of q3"),
     (number("servo_lag", "all joints", 0.03, unit="s"), "all joints lag by 30 ms, as a servo does", "the servo lag of 30 ms were compensated", "servo lag"),
-    (number("servo_lag", "all joints", -0.03, unit="s"), "all joints are ahead by 30 ms", "the servo lag of 30 ms were compensated", "servo lag"),
+    (number("servo_lag", "all joints", -0.03, unit="s"), "all joints are ahead by 30 ms", "all joints were delayed by 30 ms", "servo lag"),
     (of_joint("sag", "slide", 1e-5, unit="m/N"), "joint slide sags by 0.01 mm/N", "joint slide were corrected for a sag of 0.01 mm/N", "sag of slide"),
     (of_joint("compliance", "q1", 1.3e-4, unit="s2"), "joint q1 is compliant: +0.00013 s2 of its acceleration", "joint q1 were corrected by +0.00013 s2 of its acceleration", "compliance of q1"),
     (of_joint("backlash", "q1", 0.2 * DEG, unit="rad"), "joint q1 has a backlash of 0.2 deg", "joint q1 were corrected for a backlash of 0.2 deg", "backlash of q1"),
@@ -127,7 +127,7 @@ def test_an_interval_has_the_sign_of_the_clause(cause: Cause, interval: str) -> 
 @pytest.mark.parametrize(
     ("value", "unit", "expected"),
     [
-        (0.41657442, "m", "416.57 mm"), (1.25e-7, "m", "0.0001 mm"), (4e-8, "m", "4e-05 mm"),
+        (0.41657442, "m", "416.57 mm"), (1.25e-7, "m", "0.0001 mm"), (4e-8, "m", "4e-05 mm"), (2e-15, "rad", "0 deg"),
         (0.0, "m", "0 mm"), (12.3456, "m", "12346 mm"), (0.01, "rad", "0.573 deg"),
     ],
 )  # fmt: skip
@@ -174,6 +174,13 @@ def chain(*causes: Cause, last: float = 0.0002, **fields: Any) -> Diagnosis:
     )
 
 
+def off_by(*left: float, **fields: Any) -> Diagnosis:
+    """Return a diagnosis of joints that read too high, with the rms in [m] before the first and after each."""
+    steps = zip(HIGH, left, left[1:], strict=False)
+    causes = [replace(cause, rms_before=before, rms_after=after) for cause, before, after in steps]
+    return replace(chain(last=left[-1], **fields), causes=tuple(causes))
+
+
 LATE = number("time_lag", "clock", -1.35, unit="s", breaks=True)
 DRIFT = number("clock_drift", "clock", 1e-4, unit="s/s")
 WRONG_ROWS = number("outliers", "rows", 0.245, rows=(1, 2))
@@ -200,7 +207,14 @@ SENTENCES: Sequence[tuple[Callable[[], Diagnosis], str]] = [
     (lambda: chain(OFFSET, own_tcp=BOTH_TCP), "module 1 (phi1) reads 0.1146 deg too low: rms 300 mm -> 0.2 mm"),
     (lambda: chain(OFFSET, verdict="pass", last=0.1), "passes; 200 mm of 300 mm rms would go if module 1 (phi1) were corrected by +0.1146 deg"),
     (lambda: chain(*HIGH[:4], verdict="pass"), "passes; 299.8 mm of 300 mm rms would go if joint q1 were corrected by -1 deg, joint q2 were corrected by -2 deg and joint q3 were corrected by -3 deg; 1 more in the table"),
-    (lambda: chain(verdict="pass", undecided=UNDECIDED[:2], last=0.1), "passes; 200 mm of 300 mm rms have a cause: either the base needs a turn of (0, 0, +0.1146) deg or module 1 (phi1) reads 0.1146 deg too low (a motion of phi5 would decide)"),
+    (lambda: chain(verdict="pass", undecided=UNDECIDED[:2], last=0.1), "passes; 200 mm of 300 mm rms is explained: either the base needs a turn of (0, 0, +0.1146) deg or module 1 (phi1) reads 0.1146 deg too low (a motion of phi5 would decide)"),
+    (lambda: chain(OFFSET, verdict="pass", last=0.28), "passes; only 20 mm of 300 mm rms would go if module 1 (phi1) were corrected by +0.1146 deg"),
+    (lambda: chain(OFFSET, verdict="pass", last=0.299), "passes; next to nothing of 300 mm rms would go if module 1 (phi1) were corrected by +0.1146 deg"),
+    (lambda: off_by(0.3, 0.4, 0.003), "joint q1 reads 1 deg too high and joint q2 reads 2 deg too high: rms 300 mm -> 3 mm"),
+    (lambda: off_by(0.3, 0.2, 0.3, 0.003), "joint q1 reads 1 deg too high: rms 300 -> 200 mm; then joint q2 reads 2 deg too high and joint q3 reads 3 deg too high: 200 -> 3 mm"),
+    (lambda: off_by(0.3, 0.2, 0.1, 0.25, 0.003), "joint q1 reads 1 deg too high: rms 300 -> 200 mm; then joint q2 reads 2 deg too high: 200 -> 100 mm; then joint q3 reads 3 deg too high and joint q4 reads 4 deg too high: 100 -> 3 mm"),
+    (lambda: off_by(0.3, 0.15, 0.16, undecided=UNDECIDED[:2]), "joint q1 reads 1 deg too high and joint q2 reads 2 deg too high: rms 300 -> 160 mm; then either the base needs a turn of (0, 0, +0.1146) deg or module 1 (phi1) reads 0.1146 deg too low (a motion of phi5 would decide); rms 160 mm remains"),
+    (lambda: chain(undecided=(Alternative(tuple(HIGH[:3])), Alternative(tuple(HIGH[2:5]))), last=0.1), "either joint q1 reads 1 deg too high, joint q2 reads 2 deg too high and joint q3 reads 3 deg too high or another (this log cannot decide): rms 300 mm -> 100 mm"),
     (lambda: chain(verdict="pass", last=0.3), "no cause found: rms 300 mm remains"),
     (lambda: chain(last=0.3, remainder=Remainder(0.3, 1.0, "the log is at rest")), "no cause found: rms 300 mm remains (the log is at rest)"),
     (lambda: chain(last=0.3, refused=(Refused((LENGTH,), "r_4 and r_5 cancel", "phi5"),)), "not determined by this motion: r_4 and r_5 cancel; a motion of phi5 would determine it; rms 300 mm remains"),
