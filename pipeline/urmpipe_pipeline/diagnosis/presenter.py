@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from urmpipe_models.messages import Hint
+from urmpipe_pipeline import text
 from urmpipe_pipeline.diagnosis.formatting import (
     KIND_TEXTS,
     PASSES,
@@ -19,6 +20,7 @@ from urmpipe_pipeline.diagnosis.formatting import (
     format_undecided,
     format_value,
     select_causes,
+    short_name,
 )
 from urmpipe_pipeline.diagnosis.result import Alternative, Cause, Diagnosis, Refused
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, table_of
@@ -29,7 +31,8 @@ NOTE = (
     " and the rms if this cause alone is removed."
 )
 
-DETAILS = ("value", "from_row", "rms_alone", "breaks_tolerance")  # columns that only a page has room for
+MAX_NAMED = 3  # twins, and kinds not tested for one reason, in a line of a terminal; a page has all
+DETAILS = ("value", "from_row", "rms_alone", "twins", "breaks_tolerance")  # only a page has room for these
 
 
 def present(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> Presentation:
@@ -39,8 +42,10 @@ def present(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> Presentation:
         diagnosis: The diagnosis.
         hints: Parameters that remove causes.
     """
+    untested = "; ".join(_untested(diagnosis, MAX_NAMED))
     facts = tuple(
-        replace(fact, brief=fact.name != "Undecided") for fact in diagnosis_facts(diagnosis, hints)[1:]
+        replace(fact, brief=fact.name != "Undecided")
+        for fact in (*diagnosis_facts(diagnosis, hints)[1:-1], Fact("Not tested", untested))
     )
     tables = tuple(diagnosis_tables(diagnosis))
     body = Section(f"Diagnosis of {diagnosis.name}", None, facts, tables, warnings=diagnosis.warnings)
@@ -65,7 +70,7 @@ def diagnosis_facts(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> tuple[F
         Fact("Meaning", _meaning(diagnosis, hints), brief=False, leads=True),
         Fact("95 % interval", format_interval(single) if single else "", brief=False, page=False),
         Fact("Undecided", undecided, brief=False, page=False),  # the cause and a table say it
-        Fact("Twins", "; ".join(_twins(diagnosis)), page=False),  # tables of a page say it
+        Fact("Twins", _twins(single) if single and not undecided else "", page=False),  # tables have all
         Fact("Remaining deviation", residual, brief=False, page=False),
         Fact("Own TCP", "" if diagnosis.origin else own_tcp, brief=False),
         Fact("Not tested", "; ".join(_untested(diagnosis)), brief=False),
@@ -87,20 +92,23 @@ def _meaning(diagnosis: Diagnosis, hints: Sequence[Hint]) -> Advice | None:
     return Advice("; ".join(steps), tuple(hints))
 
 
-def _twins(diagnosis: Diagnosis) -> Iterator[str]:
-    """Yield causes with their twins, which the log does not distinguish."""
-    alternatives = (cause for each in diagnosis.undecided for cause in each.causes)
-    for cause in (*diagnosis.causes, *alternatives):
-        if cause.twins:
-            yield f"{format_cause(cause)}, or its twin {' or '.join(cause.twins)}"
+def _twins(cause: Cause) -> str:
+    """Return a cause and what the log does not distinguish from it."""
+    return " or ".join([short_name(cause), *_named(cause.twins, MAX_NAMED)]) if cause.twins else ""
 
 
-def _untested(diagnosis: Diagnosis) -> Iterator[str]:
+def _untested(diagnosis: Diagnosis, most: int | None = None) -> Iterator[str]:
     """Yield which kinds were not tested, and why; without the reason that the answer gives."""
     for untested in diagnosis.not_looked_for:
         if untested.reason != diagnosis.remainder.words:
-            labels = (KIND_TEXTS[kind].label for kind in untested.kinds)
-            yield f"{', '.join(labels)} ({untested.reason})"
+            labels = [KIND_TEXTS[kind].label for kind in untested.kinds]
+            yield f"{text.enumerated(_named(labels, most))} ({untested.reason})"
+
+
+def _named(names: Sequence[str], most: int | None) -> list[str]:
+    """Return at most so many names, and how many more there are."""
+    more = 0 if most is None else len(names) - most
+    return [*names[:most], f"{more} more"] if more > 1 else list(names)
 
 
 def diagnosis_tables(diagnosis: Diagnosis) -> Iterator[Table]:
@@ -109,7 +117,7 @@ def diagnosis_tables(diagnosis: Diagnosis) -> Iterator[Table]:
         several = len(diagnosis.causes) > 1 or diagnosis.remainder.different
         shown = several or bool(diagnosis.causes[0].low)  # the answer has all of a cause without an interval
         columns = (
-            replace(column, brief=column.key not in DETAILS)
+            replace(column, brief=column.key not in DETAILS, page=column.key != "few_twins")
             for column in columns_of(diagnosis.causes, _heads(diagnosis.unit))
         )
         yield Table("Causes", tuple(columns), NOTE, several, page=shown)
@@ -164,6 +172,7 @@ def _heads(unit: str) -> Heads[Cause]:
         "rms_before": ("rms before", lambda cause: Value(cause.rms_before, unit)),
         "rms_after": ("rms after", lambda cause: Value(cause.rms_after, unit)),
         "rms_alone": ("without it alone", lambda cause: Value(cause.rms_alone, unit)),
+        "few_twins": ("twins", lambda cause: ", ".join(_named(cause.twins, MAX_NAMED))),
         "twins": ("twins", lambda cause: ", ".join(cause.twins)),
         "breaks_tolerance": ("alone out of tolerance", lambda cause: "yes" if cause.breaks else "no"),
     }

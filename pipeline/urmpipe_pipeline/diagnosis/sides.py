@@ -215,11 +215,7 @@ def _of_arm(matched: Matched, reference: Side, log: Side) -> Question:
     )  # fmt: skip
     edits += () if open_frames else tuple(unit_edits("reference" if log.by_joints else "log"))
     forced = tuple(g for g, group in enumerate(groups) if open_frames and _whole_frame(group))
-    told = [
-        NotLookedFor(
-            ("turns",), "whole turns do not move the tool centre point: only joints on both sides show them"
-        )
-    ]
+    told = [NotLookedFor(("turns",), "only joints on both sides show them")]
     if rotation is None:
         told.append(NotLookedFor(("tool_rotation",), "a side has no orientation"))
     if open_frames:

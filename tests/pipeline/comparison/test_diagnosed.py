@@ -72,6 +72,7 @@ def test_causes_and_what_is_undecided_are_tables_and_what_was_not_looked_for_is_
         "rms_before": [SIGN.rms_before, LENGTH.rms_before],
         "rms_after": [SIGN.rms_after, LENGTH.rms_after],
         "rms_alone": [SIGN.rms_alone, LENGTH.rms_alone],
+        "few_twins": ["", "d_5, tool shift z"],
         "breaks_tolerance": ["yes", "no"],
     }
     undecided = cells(tables["Undecided between"])
