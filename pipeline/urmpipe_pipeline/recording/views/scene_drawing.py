@@ -63,6 +63,9 @@ OPACITY = 90
 LABELLED = 8
 """Reasons that are written beside the targets missed; of more each is told where its point is selected."""
 
+LINE = 0.14
+"""Height of a label, as a share of the radius of everything in view: two that are closer cover each other."""
+
 LABEL_COLOUR = "#ffffff"
 """Labels: they stand on lines of any colour."""
 
@@ -86,10 +89,12 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
     labels = drawn_labels(labelled, 2.0 * size, row)
     for key, path in zip(keys([one.path.name for one in paths]), paths, strict=True):
         _draw_path(stream, path, key, size)
-    for number, spot in enumerate(spot for spot in scene.spots if spot.always):
+    spots = [spot for spot in scene.spots if spot.always]
+    lifts = _label_lifts(arm, spots, opens_at_ns, LINE * size)
+    for number, spot in enumerate(spots):
         # A place on the path of the tool is inside the outermost link when the arm is there.
         radius = max(SPOT * size, AROUND * (arm.tip_radius if arm else 0.0))
-        _draw_spot(stream, spot, f"spot {number}", radius)
+        _draw_spot(stream, spot, f"spot {number}", radius, lifts[number])
     if scene.arrows is not None:
         _draw_arrows(stream, scene.arrows, size)
     if scene.balls is not None:
@@ -102,9 +107,31 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
         _draw_label(stream, label, shown_path("scene", "label", str(number)))
     if arm is not None:
         inside = arm.masses.size > 0 or (arm.shows_joints and len(ghosts) > 0)
-        _draw_arm(stream, arm, size, seen_through=inside)
+        _draw_arm(stream, arm, size, lifts[len(spots) :], seen_through=inside)
     hidden = draw_solids(stream, scene.solids, THREAD * size)
     return _view(scene.title, points, hidden)
+
+
+def _label_lifts(arm: DrawnArm | None, spots: Sequence[Spot], opens_at_ns: int, line: float) -> FloatArray:
+    """Return how far labels of spots, then of an arm's marks, are raised in [m] to be read as a view opens.
+
+    Args:
+        arm: The arm with its marks; None without one.
+        spots: Places with a label.
+        opens_at_ns: The time in [ns] at which the view opens.
+        line: Height of a label in [m].
+    """
+    places = [spot.position for spot in spots]
+    if arm is not None and arm.marks:
+        t_ns, rows = arm.moving.t_ns, arm.moving.rows
+        at = 0 if t_ns is None else int(np.abs(np.asarray(t_ns)[rows] - opens_at_ns).argmin())
+        places += [tuple(arm.place(mark)[at].tolist()) for mark in arm.marks]
+    raised = float(seen(np.array([0.0, 0.0, 1.0]))[1])  # how far 1 m of height is upwards in the picture
+    heights = seen(np.array(places).reshape(-1, 3))[:, 1]
+    order, steps = np.argsort(heights, kind="stable"), line * np.arange(len(places))
+    lifts = np.zeros(len(places))
+    lifts[order] = np.maximum.accumulate(heights[order] - steps) + steps - heights[order]
+    return lifts / raised
 
 
 def _view(title: str, points: FloatArray, hidden: Sequence[str]) -> Spatial3DView:
@@ -139,8 +166,13 @@ def _send_gone(stream: RecordingStream, entity: str, moving: Moving, columns: Co
         stream.send_columns(entity, times_at(moving.t_ns, moving.gone), parts)
 
 
-def _draw_arm(stream: RecordingStream, arm: DrawnArm, size: float, *, seen_through: bool) -> None:
-    """Draw the links, and a ball at each joint in its colour, or at the tip alone where the joints show."""
+def _draw_arm(
+    stream: RecordingStream, arm: DrawnArm, size: float, lifts: FloatArray, *, seen_through: bool
+) -> None:
+    """Draw the links, and a ball at each joint in its colour, or at the tip alone where the joints show.
+
+    The labels of its marks are raised by lifts in [m], shape (marks,).
+    """
     import rerun as rr
 
     moving, entity = arm.moving, shown_path("scene", "robot", "tip" if arm.shows_joints else "joints")
@@ -159,7 +191,7 @@ def _draw_arm(stream: RecordingStream, arm: DrawnArm, size: float, *, seen_throu
     if arm.masses.size:
         _draw_masses(stream, arm, size)
     for number, mark in enumerate(arm.marks):
-        _draw_mark(stream, arm, mark, shown_path("scene", "robot", "mark", str(number)), size)
+        _draw_mark(stream, arm, mark, shown_path("scene", "robot", "mark", str(number)), size, lifts[number])
 
 
 def _draw_masses(stream: RecordingStream, arm: DrawnArm, size: float) -> None:
@@ -176,15 +208,18 @@ def _draw_masses(stream: RecordingStream, arm: DrawnArm, size: float) -> None:
     _send_gone(stream, entity, moving, rr.Points3D.columns(positions=[]))
 
 
-def _draw_mark(stream: RecordingStream, arm: DrawnArm, mark: ArmMark, entity: str, size: float) -> None:
+def _draw_mark(
+    stream: RecordingStream, arm: DrawnArm, mark: ArmMark, entity: str, size: float, lift: float
+) -> None:
     """Draw a ball with a word that moves with a point of an arm."""
     import rerun as rr
 
     radius = max(MARK * size, AROUND * arm.thickness(mark))
     stream.log(entity, rr.Points3D.from_fields(colors=[rgb(mark.colour)], radii=[radius]), static=True)
     stream.log(f"{entity}/label", _label(mark.words), static=True)
-    for one in (entity, f"{entity}/label"):
-        columns = rr.Points3D.columns(positions=arm.place(mark).astype(np.float32))
+    for one, raised in ((entity, 0.0), (f"{entity}/label", lift)):
+        place = np.add(arm.place(mark), (0.0, 0.0, raised))
+        columns = rr.Points3D.columns(positions=place.astype(np.float32))
         _send(stream, one, arm.moving, columns, 1)
         _send_gone(stream, one, arm.moving, rr.Points3D.columns(positions=[]))
 
@@ -223,14 +258,15 @@ def _draw_path(stream: RecordingStream, drawn: DrawnPath, key: str, size: float)
         _send_gone(stream, entity, drawn.moving, rr.Points3D.columns(positions=[]))
 
 
-def _draw_spot(stream: RecordingStream, spot: Spot, key: str, radius: float) -> None:
-    """Draw a place that is there at all times, as a ball of a radius in [m], with its label."""
+def _draw_spot(stream: RecordingStream, spot: Spot, key: str, radius: float, lift: float) -> None:
+    """Draw a place that is there at all times, as a ball of a radius in [m], with its label raised by [m]."""
     import rerun as rr
 
     point = rr.Points3D([spot.position], colors=[rgb(spot.colour)], radii=[radius])
     stream.log(shown_path("scene", key), point, static=True)
     entity = shown_path("scene", key, "label")
-    stream.log(entity, rr.Points3D.from_fields(positions=[spot.position]), static=True)
+    raised = np.add(spot.position, (0.0, 0.0, lift))
+    stream.log(entity, rr.Points3D.from_fields(positions=[raised]), static=True)
     stream.log(entity, _label(spot.words), static=True)
 
 
