@@ -177,7 +177,10 @@ class Search:
             margin = HOPELESS * len(medium.at) * len(weight) / tau
             most = np.inf if best is None else best.score + margin
             every.append(self._explained(medium, start, tau, most))
-        best, *others = sorted({(one.state.edits, one.subset): one for one in every}.values(), key=_score)
+        distinct: dict[object, Explanation] = {}
+        for one in sorted(every, key=_score):
+            distinct.setdefault((one.state.edits, one.subset), one)
+        best, *others = distinct.values()
         while True:
             coarse = replace(coarse, weight=weight)
             further = add_discrete_cause(self.model, self.edits, best.state, coarse, self.floor)
