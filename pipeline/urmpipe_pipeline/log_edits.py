@@ -101,7 +101,7 @@ class Edit:
                 values[j] = np.where(later, -values[j], values[j])
         elif self.kind == "joint_unit":
             for values in changed:
-                values[j] *= self.value
+                values[list(self.joints)] *= self.value
         elif self.kind == "joint_coupled":
             for values in changed:
                 values[j] += self.value * values[other[0]]
@@ -127,9 +127,10 @@ def swap_edits(joints: int) -> Iterator[Edits]:
 
 
 def joint_unit_edits(turning: Sequence[bool]) -> Iterator[Edits]:
-    """Yield that one joint that turns is in deg and was read as rad, or in rad and was read as deg."""
-    for j in np.flatnonzero(turning).tolist():
-        yield from ((Edit("joint_unit", (j,), factor),) for factor in (math.pi / 180.0, 180.0 / math.pi))
+    """Yield that a joint that turns, or all of them, are in deg and were read as rad, or in rad, as deg."""
+    joints = np.flatnonzero(turning).tolist()
+    for some in [*((j,) for j in joints), *([tuple(joints)] if len(joints) > 1 else [])]:
+        yield from ((Edit("joint_unit", some, factor),) for factor in (math.pi / 180.0, 180.0 / math.pi))
 
 
 def coupling_edits(turning: Sequence[bool]) -> Iterator[Edits]:

@@ -564,7 +564,9 @@ KIND_TEXTS: Mapping[str, KindText] = {
     "joint_unit": KindText(
         "unit of a joint",
         lambda cause: f"unit of {cause.name}",
-        lambda cause: f"{_joints(cause)} is in {_units(cause)[0]}, read as {_units(cause)[1]}",
+        lambda cause: "{} {} in {}, read as {}".format(
+            _joints(cause), "are" if len(joint_names(cause)) > 1 else "is", *_units(cause)
+        ),
         lambda cause: Remedy("read", _joints(cause), f"in {_units(cause)[0]}"),
     ),
     "joint_coupled": KindText(
