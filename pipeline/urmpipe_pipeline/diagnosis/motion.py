@@ -140,13 +140,14 @@ class Motion:
             t: Times in [s], shape (n,).
 
         Returns:
-            The first three in their units, shape (k, n), and which times lie within [s], shape (n,).
+            The first three in their units, shape (k, n), and which times lie within and have all values,
+            shape (n,): one that moves nothing at the start may still move what an explanation adds.
         """
         nearest = self.nearest(t)
         dt = t - self.t[nearest]
         value, rate, second = (part[:, nearest] for part in (self.value, self.rate, self.second))
         edge = 0.5 * (self.t[-1] - self.t[0]) / max(len(self.t) - 1, 1)
-        inside = (t >= self.t[0] - edge) & (t <= self.t[-1] + edge)
+        inside = (t >= self.t[0] - edge) & (t <= self.t[-1] + edge) & np.isfinite(value).all(axis=0)
         if dt.any():
             value = value + dt * (rate + 0.5 * dt * second)
             rate = rate + dt * second
