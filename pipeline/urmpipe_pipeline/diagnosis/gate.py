@@ -1,6 +1,7 @@
 """The gate that every named answer passes: causes that no engineer believes are refused, with the reason.
 
-1. A number beyond `LARGEST` is that of no such cause, unless it leaves the noise alone.
+1. A number beyond `LARGEST` is that of no such cause, unless it alone leaves the noise. A factor below 0 is a
+   sign, and a backlash of a turn is one.
 2. Beside other causes no part of an arm differs by more than `REACHED` and `BESIDE`. One that alone leaves
    the noise may have any size.
 3. A cause that alone makes the rms more than `CANCELS` times what it was before any only cancels another.
@@ -95,7 +96,9 @@ def find_unbelievable(search: Fitter, state: State, subset: Subset, rows: Rows) 
     largest = {g: float(np.abs(state.of(groups[g])).max()) for g in subset}
     beyond = {g for g in subset if largest[g] > LARGEST.get(groups[g].kind, np.inf)}
     if len(subset) + len(state.edits) < 2:
-        return (beyond, "") if beyond and cost(search.model, state, rows) > NOISE else (set(), "")
+        signs = {g for g in beyond if groups[g].kind == "joint_scale" and state.of(groups[g])[0] <= -1.0}
+        signs |= {g for g in beyond if groups[g].kind == "backlash"}
+        return (beyond if cost(search.model, state, rows) > NOISE else signs), ""
     if beyond:
         return beyond, ""
     reach = getattr(search.model, "reach", np.inf)

@@ -49,6 +49,21 @@ def test_joints_that_agree_have_no_cause() -> None:
     assert answer(against_joints(joints())) == []
 
 
+@pytest.mark.parametrize(("kind", "step"), [("joint_sign", 0), ("joint_sign", 97), ("joint_offset", 97)])
+def test_one_cause_is_named_alone_also_where_cells_of_a_joint_that_moves_no_point_are_empty(
+    kind: str, step: int
+) -> None:
+    chain = load_robot("ur5e")
+    s = np.clip((times(400) / DURATION - 0.2) / 0.6, 0.0, 1.0)
+    q = np.outer(s**3 * (10.0 - 15.0 * s + 6.0 * s**2), np.linspace(0.5, 1.2, 6)) + np.linspace(0.1, 0.3, 6)
+    position = poses(chain, q, oriented=False)[0] + np.random.default_rng(1).normal(0.0, 5e-5, (3, 400))
+    q[:, 1] = -q[:, 1] if kind == "joint_sign" else q[:, 1] + 0.01
+    if step:
+        q[::step, 5] = np.nan
+    found = diagnosed(path_run(position.T, tsp=DURATION / 399), run_of(q, chain, tsp=DURATION / 399))
+    assert answer(found) == [(kind, ("q2",), None)]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("j", "seed"), [(0, 0), (3, 1), (5, 2)])
 def test_a_joint_that_counts_the_other_way_is_named_and_not_by_a_factor(j: int, seed: int) -> None:
