@@ -336,6 +336,9 @@ def gravity_torques(chain: Chain, q: FloatArray) -> FloatArray:
 QUIET = 0.05
 """Share of a derivative that the noise of the samples may make, root mean square."""
 
+SHARP_GAIN = (0.95, 1.12)
+"""Noise of the first and second derivative by five samples, per noise of a sample and power of the step."""
+
 WIDEST = 20
 """A derivative is told from a part of a log of at most one in so many."""
 
@@ -374,7 +377,8 @@ def _derivative(t: FloatArray, values: FloatArray, order: int) -> tuple[FloatArr
         mean = _mean(values, reach)
         found = _sharp(t, mean, order) if reach == 1 else _difference(t, mean, reach, order)
         step = reach * float(np.median(np.diff(t)))
-        left = noise / np.sqrt(reach) * (np.sqrt(0.5) / step if order == 1 else np.sqrt(6.0) / step**2)
+        gain = SHARP_GAIN[order - 1] if reach == 1 else np.sqrt((0.5, 6.0)[order - 1] / reach)
+        left = noise * gain / step**order
         if left <= QUIET * float(np.sqrt(np.mean(found**2))) or 2 * reach * WIDEST > len(t):
             return found, float(left)
         reach *= 2
