@@ -132,7 +132,8 @@ def diagnosis_tables(diagnosis: Diagnosis) -> Iterator[Table]:
             (format_explanation(alternative), *_details(alternative), alternative.needs or "none")
             for alternative in diagnosis.undecided
         ]
-        yield table_of("Undecided between", heads, rows, brief=True)
+        table = table_of("Undecided between", heads, rows, brief=True)
+        yield replace(table, columns=(*table.columns[:-1], replace(table.columns[-1], brief=False)))
     if diagnosis.refused:
         heads = {
             "explanation": "Explanation",

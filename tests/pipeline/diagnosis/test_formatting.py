@@ -20,12 +20,13 @@ from urmpipe_pipeline.diagnosis.formatting import (
     format_rows,
     short_name,
 )
-from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts
+from urmpipe_pipeline.diagnosis.presenter import diagnosis_facts, present
 from urmpipe_pipeline.diagnosis.result import (
     Alternative,
     Cause,
     Diagnosis,
     Kind,
+    NotLookedFor,
     OwnTcp,
     Refused,
     Remainder,
@@ -230,6 +231,19 @@ SENTENCES: Sequence[tuple[Callable[[], Diagnosis], str]] = [
 @pytest.mark.parametrize(("build", "sentence"), SENTENCES)
 def test_the_answer_is_one_sentence(build: Callable[[], Diagnosis], sentence: str) -> None:
     assert build().sentence == sentence
+
+
+def test_a_line_names_three_twins_and_three_kinds_that_were_not_tested() -> None:
+    kinds = ("time_lag", "clock_drift", "servo_lag", "joint_lag", "backlash")
+    found = replace(
+        chain(replace(LENGTH, twins=tuple("abcde"))), not_looked_for=(NotLookedFor(kinds, "why"),)
+    )
+    lines = {fact.name: fact.value for fact in present(found).body.facts}
+    assert lines["Twins"] == "r_4 or a or b or c or 2 more"
+    few = "offset of the clock, drift of the clock, lag of all joints"
+    assert lines["Not tested"] == f"{few} and 2 more (why)"
+    page = {fact.name: fact.value for fact in diagnosis_facts(found)}
+    assert page["Not tested"] == f"{few}, lag of a joint and backlash of a joint (why)"
 
 
 def test_the_meaning_says_what_to_do_and_a_place_once() -> None:
