@@ -169,6 +169,19 @@ def test_paths_and_places_are_drawn_with_their_words(tmp_path: Path) -> None:
     assert not entities(path, f"{SCENE}/spot\\ 1")
 
 
+def test_labels_of_places_close_to_each_other_are_raised_until_each_is_read(tmp_path: Path) -> None:
+    one = toy(columns=3)
+    spots = tuple(Spot((1.0, 2.0, 3.0 - k / 100.0), str(k), "#fe046c") for k in range(2))
+    ways = (Way("a", one.values, one.t_ns, "#c25000"),)
+    path = recorded(shown(scene=Scene("Paths", paths=ways, spots=spots)), tmp_path, one)
+    high, low = (
+        np.array(static(path, f"{SCENE}/spot\\ {k}/label", "Points3D:positions"))[0] for k in range(2)
+    )
+    np.testing.assert_allclose(low, spots[1].position, atol=1e-6)
+    np.testing.assert_allclose(high[:2], low[:2], atol=1e-6)
+    assert high[2] - low[2] > 0.05 * float(np.linalg.norm(np.ptp(one.values, axis=0)))
+
+
 def test_there_is_no_3d_view_of_nothing(make_run: MakeRun, tmp_path: Path) -> None:
     run = replace(make_run(rows=20), robot=None, tcp=None)
     path = write_recording(run, tmp_path / "run.rrd")

@@ -465,6 +465,10 @@ def test_four_logs_take_a_page_each_and_three_for_the_rest(browser: Browser, tmp
         printed = printed_pages(page)
         assert len(printed) <= 10
         assert {(round(width), round(height)) for width, height in printed} == {(595, 842)}  # A4 in points
+        page.emulate_media(media="print")
+        logs_of_page = "[...document.querySelectorAll('.level3')]"
+        breaks = page.evaluate(f"{logs_of_page}.map(p => getComputedStyle(p).breakBefore)")
+        assert breaks == ["auto", "page", "page", "page"]  # the worst is printed below the verdict
 
 
 def test_without_scripts_the_numbers_are_there(browser: Browser, report: Path) -> None:
