@@ -56,6 +56,11 @@ MANY = 5
 
 ALIKE = "the joint values differ, but their tool centre points do not"
 
+SAME = "both sides agree"
+
+EQUAL = 1e-9
+"""Root mean square difference of joints in [rad] and [m] that rounding leaves."""
+
 ELSEWHERE = "no change of joints or clock makes the tool centre points agree"
 
 LENGTHS = ("axis", "norm", "path")
@@ -98,11 +103,15 @@ def _diagnosed(deviation: Deviation, asked: Question, lag: float | None) -> Diag
     causes, undecided = built.causes()
     state, after = built.state, built.after()
     whole, stays = rms(built.before.T), rms(after.T)
+    if stays >= whole:  # what was fitted on some rows leaves no less on all
+        causes, undecided, state, after, stays = (), (), search.zero, built.before, whole
     turns = any(edit.kind == "turns" for edit in state.edits)  # these the joints alone tell
     if isinstance(model, JointsModel) and model.chain is not None and not turns and not _judged(deviation):
         least = FLOOR * _tolerance(deviation, LENGTHS, DEFAULT_TOLERANCE)
         if whole <= least or stays > whole + least:
-            return _nothing(deviation, asked, ALIKE if whole <= least else ELSEWHERE)
+            apart = residual(model, search.zero, np.arange(model.rows))
+            equal = rms(apart.T) <= float(np.linalg.norm(asked.rounding)) + EQUAL
+            return _nothing(deviation, asked, ELSEWHERE if whole > least else SAME if equal else ALIKE)
     return Diagnosis(
         name=deviation.name,
         verdict=deviation.verdict,
@@ -147,12 +156,16 @@ def _later(asked: Question) -> Iterator[Edits]:
 
 
 def _late(model: Model, lag: float | None) -> Iterator[State]:
-    """Yield the explanation that the clocks are an offset in [s] apart."""
+    """Yield the explanations that the clocks are an offset in [s] apart, and that half of it is a servo's."""
     for group in model.groups:
         if group.kind == "time_lag" and lag is not None:
             late = zero(model.groups)
             late.values[list(group.columns)] = lag
             yield late
+            for servo in (one for one in model.groups if one.kind == "servo_lag"):
+                both = replace(late, values=late.values / 2.0)
+                both.values[list(servo.columns)] = -lag / 2.0
+                yield both
 
 
 def _found(search: Search) -> tuple[Search, SearchResult]:

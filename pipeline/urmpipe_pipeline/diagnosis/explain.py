@@ -137,14 +137,16 @@ class ExplanationBuilder:
         return named, tuple(Alternative(causes, needs) for causes in alternatives)
 
     def refused(self) -> tuple[Refused, ...]:
-        """Return what the gate refused though it leaves less."""
-        return tuple(
-            Refused(
-                tuple(self._of_part(part, one, 0.0, ()) for part in self._parts(one) if not part.rows),
-                reason, self._needs([one, self.found.best]),
-            )
-            for one, reason in self.found.refused
-        )  # fmt: skip
+        """Return what the gate refused though it leaves less, each with the rms before and after all."""
+        rows = self.search.spread(ORDERED)
+        before, found = self._left(self.search.zero, (), rows), list[Refused]()
+        for one, reason in self.found.refused:
+            after = rms(self.model.deviation(self.search.placed(one.state, self.found.rows), rows).T)
+            parts = [part for part in self._parts(one) if not part.rows and not part.usual]
+            causes = (self._of_part(part, one, 0.0, ()) for part in parts)
+            changed = tuple(replace(cause, rms_before=before, rms_after=after) for cause in causes)
+            found.append(Refused(changed, reason, self._needs([one, self.found.best])))
+        return tuple(found)
 
     def after(self) -> FloatArray:
         """Return what the causes leave in [m] or [rad], shape (k, n); NaN of rows that are left out."""

@@ -44,7 +44,7 @@ def format_summary(diagnosis: Diagnosis) -> str:
         fitted = f"the causes found leave {after} of it" if causes or alternatives else "no cause found"
         return f"probably different motions: rms {before}, {fitted}"
     if not causes and not alternatives:
-        if diagnosis.refused:
+        if diagnosis.refused and diagnosis.verdict != "pass":
             return f"{format_refusal(diagnosis.refused[0])}; rms {after} remains"
         return f"no cause found: rms {before} remains{f' ({residual.words})' if residual.words else ''}"
     if diagnosis.verdict == "pass":
@@ -187,8 +187,10 @@ def format_explanation(explanation: Alternative | Refused) -> str:
 
 def format_refusal(refused: Refused) -> str:
     """Return why causes are not believed, and which motion would determine them."""
+    if len(refused.causes) > MAX_LISTED:  # no motion of one joint determines so many
+        return f"not determined by this motion: {refused.reason}"
     needs = f"; a motion of {refused.needs} would determine it" if refused.needs else ""
-    return f"not determined by this motion: {refused.reason}{needs}"
+    return f"not determined by this motion: {format_explanation(refused)} ({refused.reason}){needs}"
 
 
 def format_residual(residual: Remainder, unit: str) -> str:

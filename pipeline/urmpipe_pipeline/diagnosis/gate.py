@@ -51,8 +51,8 @@ SIGNIFICANT = 5.0  # standard deviations of F, sqrt(2 / numbers more) each, by w
 FEW = 300  # rows, spread evenly, on which causes are applied alone
 SOME = 2_000  # rows, spread evenly, on which numbers may change
 
-TOO_LARGE = "a part of the arm would differ by more than any arm does"
-CANCELLING = "its causes cancel each other"
+TOO_LARGE = "more than any arm differs by"
+CANCELLING = "they cancel each other"
 NOT_CONSTANT = "what would fit changes during the log"
 
 

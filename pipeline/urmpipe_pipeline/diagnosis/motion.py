@@ -73,6 +73,7 @@ class Joints:
         own_rate: q' of that in [rad/s] or [m/s], shape (joints, n).
         second: q'' of that in [rad/s2] or [m/s2], shape (joints, n).
         inside: Which rows lie within the time of their side, shape (n,).
+        servo_rate: q' that a servo lag moves the joints along, shape (joints, n); q' itself where it leads.
         direction: Returns which way a joint moves, or moved last, shape (n,): 1 or -1; 0 if it never moves.
         torque: Returns the static torque of gravity on a joint in [N m] or [N], shape (n,); of an arm without
             masses for each [kg] at its tool centre point.
@@ -84,13 +85,14 @@ class Joints:
     own_rate: FloatArray
     second: FloatArray
     inside: BoolArray
+    servo_rate: FloatArray
     direction: Callable[[int], FloatArray]
     torque: Callable[[int], FloatArray]
 
     def factors(self, group: Group, clock: Clock, rows: IntArray) -> Iterator[tuple[int, Element]]:
         """Yield the joints that a number of a group moves at rows, shape (n,), and by how much per unit."""
         if group.kind == "servo_lag":
-            yield from ((j, -clock.direction * rate) for j, rate in enumerate(self.own_rate))
+            yield from ((j, -clock.direction * rate) for j, rate in enumerate(self.servo_rate))
         elif group.joint is None:
             by = clock.flow(group, rows)
             yield from ((j, rate * by) for j, rate in enumerate(self.rate))
@@ -102,8 +104,8 @@ class Joints:
             return self.own[j]
         if kind == "compliance":
             return self.second[j]
-        if kind == "joint_lag":
-            return clock.direction * self.rate[j]
+        if kind == "joint_lag":  # of the modelled joint, whichever side that is
+            return -self.rate[j]
         if kind == "backlash":
             return 0.5 * self.direction(j)
         return self.torque(j) if kind == "sag" else 1.0
@@ -128,7 +130,7 @@ class Motion:
     noise: FloatArray | None = None
     _directions: dict[tuple[Edits, int], FloatArray] = field(default_factory=dict, init=False)
     _torques: dict[Edits, tuple[FloatArray, BoolArray]] = field(default_factory=dict, init=False)
-    _behinds: dict[float, Motion] = field(default_factory=dict, init=False)
+    _behinds: dict[float, tuple[Motion, Motion]] = field(default_factory=dict, init=False)
 
     def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
         """Return value, rate and second derivative at some times, and which lie within its own.
@@ -185,14 +187,14 @@ class Motion:
         taken = [(group, value) for group, value in taken if value]
         for group, value in taken:
             if group.kind == "joint_lag" and group.joint is not None:
-                late = self._edited(edits, at + clock.direction * value, sample[rows])
+                late = self._edited(edits, at - value, sample[rows])
                 for part, other in zip((own, own_rate, second), late[:3], strict=True):
                     part[group.joint] = other[group.joint]
                 inside = inside & late[3]
         nearest = cache(partial(self.nearest, at))
         q, rate = own.copy(), own_rate.copy()
         joints = Joints(
-            q, rate, own, own_rate, second, inside,
+            q, rate, own, own_rate, second, inside, own_rate.copy(),
             partial(self._direction, edits, clock, sample, nearest),
             partial(self._torque, edits, clock, sample, nearest, chain),
         )  # fmt: skip
@@ -200,9 +202,11 @@ class Motion:
             if group.kind in SHIFTING_TIME:
                 continue
             if group.kind == "servo_lag" and clock.direction * value > 0.0:
-                there, speed = self._behind(clock.direction * value)._edited(edits, at, sample[rows])[:2]
+                behind, further = self._behind(clock.direction * value)
+                there, speed = behind._edited(edits, at, sample[rows])[:2]
                 q += there - own
                 rate += speed - own_rate
+                joints.servo_rate[:] = further._edited(edits, at, sample[rows])[1]
                 continue
             for j, factor in joints.factors(group, clock, rows):
                 q[j] += value * factor
@@ -213,13 +217,22 @@ class Motion:
                 rate += ahead * second
         return joints
 
-    def _behind(self, constant: float) -> Motion:
-        """Return what a servo with a time constant in [s] makes of this motion, that of one of them once."""
+    def _behind(self, constant: float) -> tuple[Motion, Motion]:
+        """Return y, what a servo of a time constant T in [s] makes of this motion, and y with dy / dT.
+
+        y = x - T x' + T^2 z, z being what the servo makes of x''; y' = x' - T z, and dy / dT, as a rate, is
+        what it makes of y', with the opposite sign. Those of one constant are computed once.
+        """
         if constant not in self._behinds:
-            value = first_order_lag(self.t, self.value, self.rate, constant)
-            rate = (self.value - value) / constant
+            second = first_order_lag(self.t, self.second, constant)
+            rate = self.rate - constant * second
+            value = self.value - constant * self.rate + constant**2 * second
+            slope = rate - constant * first_order_lag(self.t, second, constant)
             self._behinds.clear()
-            self._behinds[constant] = Motion(self.t, value, rate, (self.rate - rate) / constant)
+            self._behinds[constant] = (
+                Motion(self.t, value, rate, second),
+                Motion(self.t, value, slope, second),
+            )
         return self._behinds[constant]
 
     def _edited(
@@ -236,12 +249,14 @@ class Motion:
     ) -> FloatArray:
         """Return which way a joint moves at some samples, or moved last, shape of these.
 
-        Noise does not move it: it moves where its rate is beyond that; before, it is as it moves first.
+        Noise does not move it: it moves where its rate is beyond that; before, it is as it moves first. The
+        rate is that of three samples: one of five overshoots before a corner.
         """
         if not any(j in edit.joints for edit in edits):
             edits = ()
         if (edits, j) not in self._directions:
-            rate, noise = self.rate, np.zeros(len(self.rate)) if self.noise is None else self.noise
+            rate = self.value if len(self.t) < 2 else np.gradient(self.value, self.t, axis=1)
+            noise = np.zeros(len(rate)) if self.noise is None else self.noise  # of five samples: more
             parts = np.diag(noise)  # a joint that includes another has the noise of both
             for edit in edits:
                 log_rows = self._log_rows(clock, sample, np.arange(len(self.t)))
@@ -281,23 +296,20 @@ class Motion:
         return sample[np.minimum(np.searchsorted(clock.t, self.t[at]), len(sample) - 1)]
 
 
-def first_order_lag(t: FloatArray, value: FloatArray, rate: FloatArray, constant: float) -> FloatArray:
-    """Return y with T y' + y = x, x in lines between its samples, and y' = x' at the first of them.
+def first_order_lag(t: FloatArray, values: FloatArray, constant: float) -> FloatArray:
+    """Return y with T y' + y = x, x in lines between its samples, and y = x at the first of them.
 
     y_i+1 = e y_i + (1 - e) x_i + (x_i+1 - x_i) (1 - (1 - e) T / h), e = exp(-h / T): a scan in log2(m) steps.
 
     Args:
         t: Times in [s], shape (m,).
-        value: x in any unit, shape (k, m).
-        rate: x' in that unit per [s], shape (k, m).
+        values: x in any unit, shape (k, m).
         constant: T in [s], above 0.
     """
-    step = np.diff(t)
-    fades = np.exp(-step / constant)
-    part = np.where(step > 0.0, 1.0 - (1.0 - fades) * constant / np.maximum(step, 1e-12), 0.0)
-    first = value[:, :1] - constant * rate[:, :1]
-    fade = np.append(0.0, fades)
-    gain = np.append(first, (1.0 - fades) * value[:, :-1] + part * np.diff(value), axis=1)
+    step = np.maximum(np.diff(t), np.finfo(float).tiny)
+    fade = np.append(0.0, np.exp(-step / constant))
+    part = 1.0 - (1.0 - fade[1:]) * constant / step
+    gain = np.append(values[:, :1], (1.0 - fade[1:]) * values[:, :-1] + part * np.diff(values), axis=1)
     reach = 1
     while reach < len(t):
         gain[:, reach:] = gain[:, reach:] + fade[reach:] * gain[:, :-reach]

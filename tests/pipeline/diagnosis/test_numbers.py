@@ -60,7 +60,8 @@ def tcp(q: FloatArray, causes: Sequence[Cause]) -> FloatArray:
         else:
             assert cause.kind in ("time_lag", "outliers"), cause
     for k in reversed(range(6)):  # Rz(q) Tz(d) Tx(a) Rx(alpha), from the tool to the base
-        point = Rotation.from_rotvec([rows["alpha"][k], 0.0, 0.0]).apply(point) + [rows["a"][k], 0.0, rows["d"][k]]
+        along = np.array([rows["a"][k], 0.0, rows["d"][k]])
+        point = Rotation.from_rotvec([rows["alpha"][k], 0.0, 0.0]).apply(point) + along
         point = Rotation.from_rotvec(np.outer(q[:, k], Z)).apply(point)
     return np.asarray(point + base)
 
@@ -78,8 +79,10 @@ def write(folder: Path, causes: Sequence[Cause], noise: float) -> None:
     log = moved(t + lag)
     for cause in causes:
         log[list(cause.rows)] = 0.0
-    joints = ", ".join(f"{{d = {d}, a = {a}, alpha = {alpha}}}" for d, a, alpha in zip(D, A, ALPHA, strict=True))
-    arm = f'kind = "dh"\nname = "arm"\njoints = [{joints}]\ntool = {{translation = [{", ".join(map(str, TOOL))}]}}'
+    rows = zip(D, A, ALPHA, strict=True)
+    joints = ", ".join(f"{{d = {d}, a = {a}, alpha = {alpha}}}" for d, a, alpha in rows)
+    tool = ", ".join(map(str, TOOL))
+    arm = f'kind = "dh"\nname = "arm"\njoints = [{joints}]\ntool = {{translation = [{tool}]}}'
     (folder / "arm.toml").write_text(arm, "utf-8")
     for name, table, head in (("path", path[::4], "x,y,z"), ("log", log, "q1,q2,q3,q4,q5,q6")):
         rows = np.column_stack([t[:: len(t) // len(table)], table])
