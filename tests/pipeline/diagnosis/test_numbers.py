@@ -60,8 +60,8 @@ def tcp(q: FloatArray, causes: Sequence[Cause]) -> FloatArray:
         else:
             assert cause.kind in ("time_lag", "outliers"), cause
     for k in reversed(range(6)):  # Rz(q) Tz(d) Tx(a) Rx(alpha), from the tool to the base
-        along = np.array([rows["a"][k], 0.0, rows["d"][k]])
-        point = Rotation.from_rotvec([rows["alpha"][k], 0.0, 0.0]).apply(point) + along
+        point = Rotation.from_rotvec([rows["alpha"][k], 0.0, 0.0]).apply(point)
+        point += np.array([rows["a"][k], 0.0, rows["d"][k]])
         point = Rotation.from_rotvec(np.outer(q[:, k], Z)).apply(point)
     return np.asarray(point + base)
 
@@ -69,7 +69,7 @@ def tcp(q: FloatArray, causes: Sequence[Cause]) -> FloatArray:
 def write(folder: Path, causes: Sequence[Cause], noise: float) -> None:
     """Write arm, path and log: the path is where the log's arm is with the causes, in noise in [m]."""
     rest, wide = np.array([[0.2, -1.0, 0.9, 0.3, 1.0, -0.5], [0.7, 0.4, 0.5, 0.9, 0.6, 1.0]])
-    t, rates = np.arange(COUNT) * PERIOD, np.array([0.7, 0.9, 1.1, 1.3, 0.8, 1.5])
+    t, rates = PERIOD * np.arange(COUNT, dtype=float), np.array([0.7, 0.9, 1.1, 1.3, 0.8, 1.5])
 
     def moved(at: FloatArray) -> FloatArray:
         return np.asarray(rest + wide * np.sin(np.outer(at, rates) + np.arange(6.0)))
@@ -79,10 +79,11 @@ def write(folder: Path, causes: Sequence[Cause], noise: float) -> None:
     log = moved(t + lag)
     for cause in causes:
         log[list(cause.rows)] = 0.0
-    rows = zip(D, A, ALPHA, strict=True)
-    joints = ", ".join(f"{{d = {d}, a = {a}, alpha = {alpha}}}" for d, a, alpha in rows)
-    tool = ", ".join(map(str, TOOL))
-    arm = f'kind = "dh"\nname = "arm"\njoints = [{joints}]\ntool = {{translation = [{tool}]}}'
+    joints = ", ".join(
+        f"{{d = {d}, a = {a}, alpha = {alpha}}}" for d, a, alpha in zip(D, A, ALPHA, strict=True)
+    )
+    tool = f"tool = {{translation = [{', '.join(map(str, TOOL))}]}}"
+    arm = f'kind = "dh"\nname = "arm"\njoints = [{joints}]\n{tool}'
     (folder / "arm.toml").write_text(arm, "utf-8")
     for name, table, head in (("path", path[::4], "x,y,z"), ("log", log, "q1,q2,q3,q4,q5,q6")):
         rows = np.column_stack([t[:: len(t) // len(table)], table])
@@ -107,7 +108,7 @@ def rms(off: FloatArray) -> float:
 
 
 def numbers(cause: Cause) -> list[float]:
-    """Return the numbers of a clause, in mm, deg, ms or s: a zero and a clock have their sign in words."""
+    """Return the numbers of a clause, in mm, deg, ms or s: a zero and a clock have no sign."""
     factor = np.degrees(1.0) if cause.unit == "rad" else 1.0 if cause.kind == "time_lag" else 1e3
     values = [factor * value for value in cause.value]
     segment = [float(cause.name.split()[1])] if cause.kind == "link_shift" else []

@@ -30,7 +30,7 @@ def drawn(seed: int) -> tuple[np.random.Generator, FloatArray, FloatArray, Float
 
 
 def is_of(cause: Cause, name: str) -> bool:
-    """Tell whether a cause is the zero of a joint, or moves the tool centre point in the very same way."""
+    """Return whether a cause is the zero of a joint, or moves the tool centre point in the very same way."""
     return (cause.kind == "joint_offset" and cause.name == name) or f"offset of {name}" in cause.twins
 
 
@@ -46,11 +46,8 @@ def missing(found: Diagnosis, names: list[str]) -> list[str]:
 def test_of_joints_on_both_sides(seed: int) -> None:
     rng, t, q, off = drawn(seed)
     reference = q + off + rng.normal(0.0, np.radians(0.01), q.shape)
-    sides = [
-        urmpipe.ingest(name=name, q=values, t=t, unit="rad", names=NAMES)
-        for name, values in (("reference", reference), ("log", q))
-    ]
-    found = urmpipe.diagnose(*sides, tolerance={"joint": float(np.radians(0.5))})
+    asked, log = (urmpipe.ingest(q=values, t=t, unit="rad", names=NAMES) for values in (reference, q))
+    found = urmpipe.diagnose(asked, log, tolerance={"joint": float(np.radians(0.5))})
     large = [name for name, size in zip(NAMES, off, strict=True) if abs(size) > np.radians(0.5)]
     assert [name for name in large if name not in found.sentence] == [], found.sentence
 

@@ -1,0 +1,145 @@
+"""What a diagnosis does not believe, and why; and how often its intervals cover the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import urmpipe
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import FARTHEST, Chain
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.diagnosis.result import Cause, Diagnosis
+
+PERIOD = 0.02  # [s]
+ARM = "{d = 0.12, alpha = 1.4}, {a = 0.22, alpha = 0.3}, {a = 0.19, d = 0.05}"
+REACH = 0.58  # [m], the sum of its lengths
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Chain:
+    (tmp_path / "small.toml").write_text(f'kind = "dh"\nname = "small"\njoints = [{ARM}]\n', "utf-8")
+    return load_robot(tmp_path / "small.toml")
+
+
+def joints(rows: int, wide: float = 1.0, seed: int = 0) -> FloatArray:
+    """Return joints in [rad], shape (rows, 3), that swing by some share of 0.8 rad at most."""
+    rates = np.random.default_rng(seed).uniform(0.5, 1.5, 3)
+    waves = np.sin(np.outer(PERIOD * np.arange(rows), rates) + np.arange(3.0))
+    return np.asarray([0.2, 0.9, -0.8] + wide * np.array([0.8, 0.5, 0.7]) * waves)
+
+
+def diagnosed(
+    arm: Chain, path: FloatArray, q: FloatArray, every: int = 1, base: Sequence[float] | None = None
+) -> Diagnosis:
+    """Return the diagnosis of a log against each so manieth row of a path."""
+    t = PERIOD * np.arange(len(path))
+    reference = urmpipe.ingest(name="reference", recorded_tcp=path[::every], t=t[::every])
+    log = urmpipe.ingest(name="log", q=q, t=t[: len(q)], robot=arm, unit="rad")
+    return urmpipe.diagnose(reference, log, arm, base=base)
+
+
+def white(seed: int, rows: int, size: float) -> FloatArray:
+    return np.asarray(np.random.default_rng(seed).normal(0.0, size, (rows, 3)))
+
+
+def is_too_large(cause: Cause) -> bool:
+    size = max(map(abs, cause.value))
+    limits = {"link_length": REACH / 5.0, "link_shift": REACH / 5.0, "tilt": np.radians(10.0)}
+    return size > limits.get(cause.kind, np.inf) or (cause.kind == "joint_scale" and abs(size - 1.0) > 0.02)
+
+
+def cancels(cause: Cause, rms: float) -> bool:
+    """Return whether a base or tool alone makes the rms more than three times as large."""
+    return cause.kind in ("tool_shift", "base_shift") and math.hypot(*cause.value) > 4.0 * rms
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "wide", "reason"),
+    [
+        ("waves", 0.3, "its causes cancel each other"),
+        ("square", 0.1, "a part of the arm would differ by more than any arm does"),
+    ],
+)
+def test_what_is_not_known_is_not_explained_by_what_no_arm_has(
+    arm: Chain, fault: str, wide: float, reason: str
+) -> None:
+    q = joints(600, wide)
+    meant, swing = q.copy(), q[:, 1]
+    meant[:, 1] += 0.01 * np.sin(7.0 * swing / wide) if fault == "waves" else swing**2
+    found = diagnosed(arm, poses_over_log(arm, meant)[0] + white(0, 600, 5e-5), q)
+    (refused,) = found.refused
+    assert refused.reason == reason
+    if fault == "waves":
+        assert any(cancels(cause, found.rms) for cause in refused.causes)
+        assert (found.causes, found.undecided) == ((), ())
+        assert found.sentence.startswith(f"not determined by this motion: {reason}; a motion of q")
+    else:
+        assert any(is_too_large(cause) for cause in refused.causes)
+        assert not any(is_too_large(cause) for cause in found.causes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", ["growth", "drifting base", "dropped rows"])
+def test_what_changes_during_the_log_is_no_constant_cause(arm: Chain, fault: str) -> None:
+    q = joints(600)
+    position, time = poses_over_log(arm, q)[0], np.linspace(0.0, 1.0, 600)[:, np.newaxis]
+    if fault == "growth":
+        position = position * (1.0 + 0.002 * time)
+    elif fault == "drifting base":
+        position = position + [0.0, 0.0, 0.003] * time
+    else:
+        q = np.delete(q, [*range(150, 154), *range(420, 423)], axis=0)
+    found = diagnosed(arm, position + white(0, 600, 5e-5), q)
+    assert (found.causes, found.undecided) == ((), ())
+    (refused,) = found.refused
+    if fault == "drifting base":
+        assert (refused.reason, refused.causes[0].kind) == (
+            "what would fit changes during the log",
+            "base_shift",
+        )
+    assert found.sentence.startswith(f"not determined by this motion: {refused.reason}; rms ")
+
+
+@pytest.mark.slow
+def test_a_step_beyond_the_bounds_of_an_arm_is_halved(arm: Chain) -> None:
+    q, far = joints(600), FARTHEST - 0.004
+    path = poses_over_log(arm, q)[0] + [far + 0.005, 0.0, 0.0] + white(1, 600, 1e-4)
+    found = diagnosed(arm, path, q, base=(far, 0.0, 0.0))
+    (cause,) = found.causes
+    assert (cause.kind, cause.axis) == ("base_shift", (1.0, 0.0, 0.0))
+    assert 0.0039 < cause.value[0] <= 0.004
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "rows", "every"), [("white", 400, 1), ("correlated", 800, 1), ("sparse", 400, 4)]
+)
+def test_intervals_cover_the_truth_in_95_of_100_logs(arm: Chain, kind: str, rows: int, every: int) -> None:
+    """With a true share of 90 % at least 50 of 60 do (54 - 2 * 2.3, binomial).
+
+    No more than all can: that intervals are not too wide is seen by the error in their standard deviations,
+    whose rms is 0.84 at 98 % and 1.19 at 90 %, each +-0.2 (2 / sqrt(2 * 60)).
+    """
+    seeds, inside, errors = range(60), 0, []
+    for seed in seeds:
+        rng, q = np.random.default_rng([7, seed]), joints(rows, seed=seed)
+        off = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.01, 0.03))
+        noise = rng.normal(0.0, 2e-4, (500 + rows, 3))
+        if kind == "correlated":  # 0.1 s
+            a = np.exp(-PERIOD / 0.1)
+            noise = np.sqrt(1.0 - a * a) * lfilter([1.0], [1.0, -a], noise, axis=0)
+        found = diagnosed(arm, poses_over_log(arm, q + off * np.eye(3)[1])[0] + noise[500:], q, every)
+        (cause,) = found.causes
+        assert (cause.kind, cause.name, found.undecided) == ("joint_offset", "q2", ())
+        inside += cause.low[0] <= off <= cause.high[0]
+        errors.append((cause.value[0] - off) / ((cause.high[0] - cause.low[0]) / (2.0 * 1.96)))
+    assert inside >= 50
+    assert 0.64 < np.sqrt(np.mean(np.square(errors))) < 1.39
