@@ -110,7 +110,7 @@ def find_large_causes(model: ArmModel, state: State, rows: Rows, among: Sequence
 
     Args:
         model: The side that is modelled, with its data.
-        state: What is taken for granted; its numbers are 0.
+        state: What is taken for granted; the numbers of `among` are 0.
         rows: Some rows.
         among: Groups with one number each.
     """

@@ -32,6 +32,7 @@ LARGEST: Mapping[str, float] = {
     "servo_lag": 1.0,  # s: a slower drive follows nothing
     "joint_lag": 1.0,  # s
     "backlash": 0.1,  # rad: 6 deg
+    "sag": 0.01,  # rad/kg or rad/(N m): no arm gives way by half a degree under 1 kg
 }
 """Beyond this a number is that of no such cause, by kind."""
 

@@ -58,6 +58,9 @@ ORDER: Mapping[str, float] = {
 """What each kind adds to a score (twice the log of odds): setup before structure, e^(1.2 / 2) = 1.8 to 1."""
 
 
+FRAMES = ("tool_shift", "base_shift", "base_rotation")
+
+
 class Explanation(NamedTuple):
     """Causes, with their sizes.
 
@@ -167,20 +170,9 @@ class Search:
         ranked = rank_discrete_causes(self.model, self.edits, self.zero, coarse, self.floor)
         weight = self._weight(weight, replace(self.zero, edits=ranked[0]), self.model.groups)
         medium = Rows(self.spread(MEDIUM), weight, self._least(weight))
-        every: list[Explanation] = []
         coarse = replace(coarse, weight=weight)
         tau = self._first_tau(replace(self.zero, edits=ranked[0]), medium)
-        for start in self._starts(ranked, coarse):
-            best = min(every, key=_score, default=None)
-            if best is not None and self._is_needless(start, best, coarse):
-                continue
-            margin = HOPELESS * len(medium.at) * len(weight) / tau
-            most = np.inf if best is None else best.score + margin
-            every.append(self._explained(medium, start, tau, most))
-        distinct: dict[object, Explanation] = {}
-        for one in sorted(every, key=_score):
-            distinct.setdefault((one.state.edits, one.subset), one)
-        best, *others = distinct.values()
+        best, *others = self._explored(ranked, coarse, medium, tau)
         while True:
             coarse = replace(coarse, weight=weight)
             further = add_discrete_cause(self.model, self.edits, best.state, coarse, self.floor)
@@ -192,9 +184,29 @@ class Search:
             found = self._explained(medium, replace(best.state, edits=_but(best.state.edits, edit)), tau)
             if found.score < best.score:
                 best, others = found, [best, *others]
+        search = self
+        if best.size > 2 or cost(self.model, best.state, coarse) > NOISE:
+            zeros, found = self._with_zeros(medium, tau)
+            if found.score < best.score:
+                search, best, others = zeros, found, [best, *others]
         weight = self._weight(weight, best.state, self.model.groups)
         rows = Rows(self.spread(MANY), weight, self._least(weight))
-        return self._settled(rows, best, others)
+        return search._settled(rows, best, others)
+
+    def _explored(self, ranked: Sequence[Edits], coarse: Rows, medium: Rows, tau: float) -> list[Explanation]:
+        """Return what is found from each start, the best first, each once."""
+        every: list[Explanation] = []
+        for start in self._starts(ranked, coarse):
+            best = min(every, key=_score, default=None)
+            if best is not None and self._is_needless(start, best, coarse):
+                continue
+            margin = HOPELESS * len(medium.at) * len(medium.weight) / tau
+            most = np.inf if best is None else best.score + margin
+            every.append(self._explained(medium, start, tau, most))
+        distinct: dict[object, Explanation] = {}
+        for one in sorted(every, key=_score):
+            distinct.setdefault((one.state.edits, one.subset), one)
+        return [*distinct.values()]
 
     def _starts(self, ranked: Sequence[Edits], coarse: Rows) -> Iterator[State]:
         """Yield where selections begin: the discrete causes, the clock, and single large causes."""
@@ -205,6 +217,15 @@ class Search:
         if isinstance(self.model, ArmModel) and not self.forced:
             for state in dict.fromkeys((states[0].edits, ())):
                 yield from find_large_causes(self.model, replace(self.zero, edits=state), coarse, single)
+
+    def _with_zeros(self, rows: Rows, tau: float) -> tuple[Search, Explanation]:
+        """Return what is found from the zeros of all joints, and what finds it: they stand for their twins.
+
+        A lost calibration makes many of them large at once; some are a shift or turn of a frame alone.
+        """
+        zeros = tuple(g for g, group in enumerate(self.model.groups) if group.kind == "joint_offset")
+        search = replace(self, first=zeros)
+        return search, search._explained(rows, self.fitted(self.zero, frozenset(zeros), rows), tau)
 
     def _first_tau(self, state: State, rows: Rows) -> float:
         """Return the autocorrelation time in rows of what all numbers leave: at least that of noise."""
@@ -385,7 +406,8 @@ class Search:
             if one.score < found.score(found.tau):
                 again = self._stable(some, one.state, None)
                 found = min(found, again, key=lambda each, tau=found.tau: each.score(tau))  # type: ignore[misc]
-        search, found, rivals = self._with_twins(some, found)
+        search, found = self._simplified(some, found)
+        search, found, rivals = search._with_twins(some, found)
         most = found.score(found.tau) + NEAR
         if len(rows.at) > len(some.at):
             found = search._stable(rows, found.state, found.subset)
@@ -394,6 +416,50 @@ class Search:
         found = search._without_minor(found)
         result = search._concluded(found, list(search._rescored(near, found)))
         return search._without_changing(result)
+
+    def _simplified(self, rows: Rows, found: SelfConsistentFit) -> tuple[Search, SelfConsistentFit]:
+        """Return an explanation with one cause at full size for several numbers, and what finds it.
+
+        The zero of the last joint is a shift of the tool that takes up to three numbers; a base turned by
+        half a turn and back by a number is turned by one.
+        """
+        search = self
+        for state, subset in [*self._single_causes(rows, found), *self._turned_at_once(found)]:
+            again = replace(self, first=(*(subset & self._distinct[1].keys()), *self.first))
+            there = again._stable(rows, self.fitted(state, subset, found.rows), None)
+            if self._fitted_score(there, found) < self._fitted_score(found, found):
+                search, found = again, there
+        return search, found
+
+    def _fitted_score(self, one: SelfConsistentFit, beside: SelfConsistentFit) -> float:
+        """Return the score of what an explanation really leaves, on the rows and with the tau of another."""
+        selection = replace(one.selection, independent=beside.selection.independent)
+        return selection.score(cost(self.model, one.state, beside.rows), one.subset)
+
+    def _single_causes(self, rows: Rows, found: SelfConsistentFit) -> Iterator[tuple[State, Subset]]:
+        """Yield explanations with one number in place of those of a frame."""
+        groups = self.model.groups
+        every = sorted({*self._distinct[0], *self._distinct[1]} - found.subset)
+        single = [g for g in every if len(groups[g].columns) == 1]
+        for kind in FRAMES:
+            own = frozenset(g for g in found.subset if groups[g].kind == kind)
+            if isinstance(self.model, ArmModel) and not self.forced and len(self._columns(sorted(own))) > 1:
+                rest = self._bare(found.state, found.subset - own)
+                for state in find_large_causes(self.model, rest, rows, single):
+                    (c,) = np.flatnonzero(state.values != rest.values)
+                    alone = next(g for g in single if groups[g].columns == (c,))
+                    yield state, found.subset - own | {alone}
+
+    def _turned_at_once(self, found: SelfConsistentFit) -> Iterator[tuple[State, Subset]]:
+        """Yield explanations with a number alone in place of a turned base and that number about its axis."""
+        for edit in found.state.edits:
+            for g in found.subset if edit.kind == "base_rotation" else ():
+                group = self.model.groups[g]
+                if group.kind == edit.kind and group.axis is not None:
+                    axis, angle = edit.axis_angle
+                    values = found.state.values.copy()
+                    values[list(group.columns)] += angle * np.dot(axis, group.axis)
+                    yield State(values, _but(found.state.edits, edit)), found.subset
 
     def _without_minor(self, found: SelfConsistentFit) -> SelfConsistentFit:
         """Return an explanation without what explains little, where more than noise is left.
@@ -562,12 +628,12 @@ class Search:
             rows = every.trimmed(residual(self.model, state, every.at))
             selection = self._selection(state, rows, tau)
             chosen = selection.best(among)
-            state, beyond = self._within(state, chosen, rows, selection)
-            if beyond:
+            there, beyond = self._within(state, chosen, rows, selection)
+            if beyond:  # what is left is selected anew where all of it still fitted
                 among = [g for g in among if g not in beyond]
                 chosen -= beyond
                 continue
-            state = self.beside_usual(state, chosen, rows)
+            state = self.beside_usual(there, chosen, rows)
             if self.timed:
                 tau = max(tau, self._tau(state, rows))
             selection = replace(selection, independent=selection.normal.count / tau)
@@ -575,7 +641,8 @@ class Search:
                 break
             subset = chosen
         kept = selection.moving(chosen)
-        state = state if kept == chosen else self.beside_usual(self.fitted(state, kept, rows), kept, rows)
+        if kept != chosen or beyond:
+            state = self.beside_usual(self.fitted(state, kept, rows), kept, rows)
         return SelfConsistentFit(state, kept, tau, rows, selection)
 
     def _tau(self, state: State, rows: Rows) -> float:
