@@ -116,9 +116,9 @@ def find_large_causes(model: ArmModel, state: State, rows: Rows, among: Sequence
     """
     groups = [model.groups[g] for g in among]
     left, velocity, turn = model.motions(state, rows.at[::FEW], groups)
-    known = np.isfinite(left).all(axis=0)
-    known[known] = inliers(left[:, known])
-    if not known.any() or not groups:
+    known = np.flatnonzero(np.isfinite(left).all(axis=0))
+    known = known[inliers(left[:, known])] if len(known) else known
+    if not len(known) or not groups:
         return
     left, velocity, turn = left[:, known], velocity[:, :, known], turn[:, :, known]
     values, squares = fit_alone(left, velocity, turn)

@@ -188,7 +188,7 @@ def format_explanation(explanation: Alternative | Refused) -> str:
 def format_refusal(refused: Refused) -> str:
     """Return why causes are not believed, and which motion would determine them."""
     if len(refused.causes) > MAX_LISTED:  # no motion of one joint determines so many
-        return f"not determined by this motion: {refused.reason}"
+        return f"not determined by this motion: {len(refused.causes)} causes ({refused.reason})"
     needs = f"; a motion of {refused.needs} would determine it" if refused.needs else ""
     return f"not determined by this motion: {format_explanation(refused)} ({refused.reason}){needs}"
 

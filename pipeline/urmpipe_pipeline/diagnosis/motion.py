@@ -7,7 +7,7 @@ that of the log at its own time, changed by `log_edits`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
 
@@ -182,15 +182,10 @@ class Motion:
         """
         at = clock.at(state, groups, rows)
         edits = tuple(edit for edit in state.edits if edit.joints)
-        own, own_rate, second, inside = self._edited(edits, at, sample[rows])
-        taken = [(group, float(state.values[group.columns[0]])) for group in groups if not group.twists]
+        taken = [(one, float(state.values[one.columns[0]])) for one in groups if not one.twists]
         taken = [(group, value) for group, value in taken if value]
-        for group, value in taken:
-            if group.kind == "joint_lag" and group.joint is not None:
-                late = self._edited(edits, at - value, sample[rows])
-                for part, other in zip((own, own_rate, second), late[:3], strict=True):
-                    part[group.joint] = other[group.joint]
-                inside = inside & late[3]
+        late = {group.joint: value for group, value in taken if group.kind == "joint_lag"}
+        own, own_rate, second, inside = self._looked_up(edits, at, sample[rows], late)
         nearest = cache(partial(self.nearest, at))
         q, rate = own.copy(), own_rate.copy()
         joints = Joints(
@@ -203,10 +198,10 @@ class Motion:
                 continue
             if group.kind == "servo_lag" and clock.direction * value > 0.0:
                 behind, further = self._behind(clock.direction * value)
-                there, speed = behind._edited(edits, at, sample[rows])[:2]
+                there, speed = behind._looked_up(edits, at, sample[rows], late)[:2]
                 q += there - own
                 rate += speed - own_rate
-                joints.servo_rate[:] = further._edited(edits, at, sample[rows])[1]
+                joints.servo_rate[:] = further._looked_up(edits, at, sample[rows], late)[1]
                 continue
             for j, factor in joints.factors(group, clock, rows):
                 q[j] += value * factor
@@ -234,6 +229,19 @@ class Motion:
                 Motion(self.t, value, slope, second),
             )
         return self._behinds[constant]
+
+    def _looked_up(
+        self, edits: Edits, at: FloatArray, log_rows: IntArray, late: Mapping[int | None, float]
+    ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+        """Return `_edited` with some joints at times of their own, by a lag in [s] each."""
+        *parts, inside = self._edited(edits, at, log_rows)
+        for joint, lag in late.items():
+            *others, known = self._edited(edits, at - lag, log_rows)
+            for part, other in zip(parts, others, strict=True):
+                part[joint] = other[joint]
+            inside = inside & known
+        value, rate, second = parts
+        return value, rate, second, inside
 
     def _edited(
         self, edits: Edits, at: FloatArray, log_rows: IntArray
@@ -400,9 +408,11 @@ def _sharp(t: FloatArray, values: FloatArray, order: int) -> FloatArray:
     """Return the first or second derivative by five samples, of fewer by three."""
     joined = np.ones(len(t) - 1, dtype=bool)
     if len(t) < STENCIL:
-        return np.gradient(values, t) if order == 1 else _difference(t, values, 1, order)
-    rate = five_point_rates(t, values[np.newaxis], joined)[0]
-    return rate[0] if order == 1 else five_point_rates(t, rate, joined)[0][0]
+        return np.asarray(np.gradient(values, t)) if order == 1 else _difference(t, values, 1, order)
+    derivative = values[np.newaxis]
+    for _ in range(order):
+        derivative, _ = five_point_rates(t, derivative, joined)
+    return np.asarray(derivative[0])
 
 
 def _mean(values: FloatArray, width: int) -> FloatArray:

@@ -446,8 +446,8 @@ class Search:
             if isinstance(self.model, ArmModel) and not self.forced and len(self._columns(sorted(own))) > 1:
                 rest = self._bare(found.state, found.subset - own)
                 for state in find_large_causes(self.model, rest, rows, single):
-                    (c,) = np.flatnonzero(state.values != rest.values)
-                    alone = next(g for g in single if groups[g].columns == (c,))
+                    (c,) = np.flatnonzero(state.values != rest.values).tolist()
+                    alone = next(g for g in single if groups[g].columns[0] == c)
                     yield state, found.subset - own | {alone}
 
     def _turned_at_once(self, found: SelfConsistentFit) -> Iterator[tuple[State, Subset]]:
