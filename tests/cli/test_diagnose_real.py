@@ -45,8 +45,10 @@ def test_the_poses_of_a_library_that_rounds_a_ur10() -> None:
     path = LOGS / "pybotics-ur10-fk" / "ur10-joints-poses.csv"
     found = urmpipe.diagnose(path, robot="ur10")
     causes = by_name(found)
-    assert set(causes) == {"d_1", "a_2", "a_3"}
-    for name, rounded in (("d_1", -9.3e-3), ("a_2", -0.7e-3), ("a_3", 0.7e-3)):
+    assert set(causes) == {"base", "a_2", "a_3"}
+    assert causes["base"].axis == (0.0, 0.0, 1.0)
+    assert "d_1" in causes["base"].twins
+    for name, rounded in (("base", -9.3e-3), ("a_2", -0.7e-3), ("a_3", 0.7e-3)):
         assert causes[name].value[0] == pytest.approx(rounded, abs=2e-5)
         assert causes[name].low[0] < rounded < causes[name].high[0]
     assert found.undecided == ()

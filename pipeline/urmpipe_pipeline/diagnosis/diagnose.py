@@ -115,6 +115,7 @@ def _diagnosed(deviation: Deviation, asked: Question, lag: float | None) -> Diag
             apart = residual(model, search.zero, np.arange(model.rows))
             equal = rms(apart.T) <= float(np.linalg.norm(asked.rounding)) + EQUAL
             return _nothing(deviation, asked, ELSEWHERE if whole > least else SAME if equal else ALIKE)
+    unnamed = search.usual and all(cause.kind != "own_geometry" for cause in causes)
     return Diagnosis(
         name=deviation.name,
         verdict=deviation.verdict,
@@ -126,7 +127,7 @@ def _diagnosed(deviation: Deviation, asked: Question, lag: float | None) -> Diag
         undecided=undecided,
         refused=built.refused(),
         not_looked_for=asked.not_looked_for,
-        remainder=_remainder(deviation, model, whole, stays, OWN if search.usual else ""),
+        remainder=_remainder(deviation, model, whole, stays, OWN if unnamed else ""),
         sample=asked.sample,
         mended=asked.sign * after.T,
     )
