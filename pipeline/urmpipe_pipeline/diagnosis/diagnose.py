@@ -97,7 +97,7 @@ def diagnose(
 
 def _diagnosed(deviation: Deviation, asked: Question, lag: float | None) -> Diagnosis:
     model, timed = asked.model, deviation.run.timed
-    edits = (*asked.edits, *(_later(asked) if timed else ()))
+    edits = (*asked.edits, *_later(asked, timed=timed))
     starts = tuple(_late(model, lag))
     search, found = _found(Search(model, edits, _floor(deviation, asked), asked.forced, starts, timed=timed))
     built = ExplanationBuilder(
@@ -148,11 +148,12 @@ def _remainder(deviation: Deviation, model: Model, whole: float, stays: float, w
     return Remainder(stays, share, UNRELATED if different else words, different)
 
 
-def _later(asked: Question) -> Iterator[Edits]:
+def _later(asked: Question, *, timed: bool) -> Iterator[Edits]:
     """Yield what may begin at some row: half turns, mirrored angles, whole turns of joints on both sides."""
     model, nothing = asked.model, zero(asked.model.groups)
     joints_alone = isinstance(model, JointsModel)
-    yield from later_edits(model, asked.sample, asked.turning, nothing, both_ways=joints_alone)
+    if timed:
+        yield from later_edits(model, asked.sample, asked.turning, nothing, both_ways=joints_alone)
     if joints_alone:
         left = residual(model, nothing, np.arange(model.rows))
         if turns := turn_edits(left, asked.sample, asked.turning):

@@ -65,7 +65,7 @@ def later_edits(
 
 
 def turn_edits(left: FloatArray, sample: IntArray, turning: Sequence[bool]) -> Edits:
-    """Return the whole turns that joints gain on the way, each from a row on.
+    """Return the whole turns that joints have from the start or gain on the way, each from a row on.
 
     Args:
         left: reference - log of each joint in [rad], shape (joints, n).
@@ -79,7 +79,7 @@ def turn_edits(left: FloatArray, sample: IntArray, turning: Sequence[bool]) -> E
         known = np.flatnonzero(np.isfinite(left[j]))
         whole = np.rint(left[j, known] / FULL_TURN).astype(np.int64)
         steps = (np.flatnonzero(np.diff(whole)) + 1).tolist()
-        for step, end in pairwise([*steps, len(whole)]):
+        for step, end in pairwise([0, *steps, len(whole)]):
             if end - step > LASTING:
                 found.append((j, int(sample[known[step]]), int(whole[step])))
     return tuple(_turns(found))
