@@ -263,8 +263,8 @@ def test_what_to_do_removes_the_causes(setup: dict[str, Any], parameters: list[s
     given = setup | {hint.parameter: hint.value for hint in meaning.hints}
     assert [hint.parameter for hint in meaning.hints] == parameters
     (run,) = urmpipe.compare(PATH, RIGHT, "urm6", unit="rad", **given).runs
-    # lines between rows 0.2 s apart leave 0.1 mm that the diagnosis does not have
-    assert there(run.statistics["norm"]).rms == pytest.approx(diagnosis.remainder.rms, abs=1e-4)
+    # 4 ms from rows 0.2 s apart lines leave 0.26 mm (4 ms x 196 ms / 2 of 0.65 m/s2), the diagnosis cubics
+    assert there(run.statistics["norm"]).rms == pytest.approx(diagnosis.remainder.rms, abs=2.6e-4)
 
 
 def test_the_unit_of_a_joint_is_an_option(folder: Path) -> None:

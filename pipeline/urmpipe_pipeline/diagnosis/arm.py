@@ -126,7 +126,7 @@ class ArmModel:
         return self._left(tip_pose(self.arm(state)[0], list(joints.q)), state.edits, rows, joints.inside)
 
     def residuals(self, every: Sequence[Edits], rows: IntArray) -> FloatArray:
-        """Return the residual of explanations without numbers, shape (len(every), c, n).
+        """Return the residual of explanations without numbers in [m] and [rad], shape (len(every), c, n).
 
         Each is that of `residual`; what edits make of the joints goes through the arm in one go.
 

@@ -133,7 +133,7 @@ def find_large_causes(model: ArmModel, state: State, rows: Rows, among: Sequence
 
 
 def fit_alone(left: FloatArray, velocity: FloatArray, turn: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the number of each cause that leaves the least by itself, and the sum of squares it leaves.
+    """Return the number [-] of each cause that leaves the least by itself, and its squares, shape (p,) each.
 
     Args:
         left: data - model in [m], shape (3, n).

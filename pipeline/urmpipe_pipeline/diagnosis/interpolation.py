@@ -104,7 +104,7 @@ class SparseMotion(Motion):
     cubics: Cubics
 
     def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-        """Return value, rate and second derivative at times in [s], and which lie within its own."""
+        """Return value and its two derivatives at times in [s], shape (n,), and which lie within its own."""
         nearest, rate, second, inside = Motion.at(self, t)
         value = self.cubics.at(t)
         return np.where(np.isfinite(value), value, nearest), rate, second, inside
@@ -141,8 +141,8 @@ def interpolated(
         matched: Both sides at the same times.
         reference: The reference at its own samples.
         values: What is interpolated of it in [m] or [rad], shape (m, k).
-        linear: The same on lines, at the rows of the log, shape (n, k).
-        log: The same of the log, shape (n, k).
+        linear: The same on lines in [m] or [rad], at the rows of the log, shape (n, k).
+        log: The same of the log in [m] or [rad], shape (n, k).
     """
     known_ns, at_ns = reference.t_ns, matched.t_ns + round(matched.sync.offset * 1e9)
     none = Interpolated(linear, np.zeros(linear.shape[1]), False)

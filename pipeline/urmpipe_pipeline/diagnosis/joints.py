@@ -57,7 +57,7 @@ class JointsModel:
         return np.asarray(np.where(joints.inside, self.q[:, rows] - joints.q, np.nan))
 
     def residuals(self, every: Sequence[Edits], rows: IntArray) -> FloatArray:
-        """Return the residual of explanations without numbers, by edits, shape (len(every), joints, n)."""
+        """Return residuals of explanations without numbers in [rad] or [m], shape (len(every), joints, n)."""
         joints = self._joints(zero(self.groups), rows)
         left = [self.q[:, rows] - edited(edits, self.sample[rows], joints.q) for edits in every]
         return np.where(joints.inside, np.array(left).reshape(-1, *joints.q.shape), np.nan)

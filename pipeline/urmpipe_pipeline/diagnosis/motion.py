@@ -73,7 +73,7 @@ class Joints:
         own_rate: q' of that in [rad/s] or [m/s], shape (joints, n).
         second: q'' of that in [rad/s2] or [m/s2], shape (joints, n).
         inside: Which rows lie within the time of their side, shape (n,).
-        servo_rate: q' that a servo lag moves the joints along, shape (joints, n); q' itself where it leads.
+        servo_rate: q' in [rad/s] or [m/s] that a servo lag moves the joints along, shape (joints, n).
         direction: Returns which way a joint moves, or moved last, shape (n,): 1 or -1; 0 if it never moves.
         torque: Returns the static torque of gravity on a joint in [N m] or [N], shape (n,); of an arm without
             masses for each [kg] at its tool centre point.
@@ -305,7 +305,7 @@ class Motion:
 
 
 def first_order_lag(t: FloatArray, values: FloatArray, constant: float) -> FloatArray:
-    """Return y with T y' + y = x, x in lines between its samples, and y = x at the first of them.
+    """Return y [-] with T y' + y = x, in lines between samples, y = x at the first, shape (k, m).
 
     y_i+1 = e y_i + (1 - e) x_i + (x_i+1 - x_i) (1 - (1 - e) T / h), e = exp(-h / T): a scan in log2(m) steps.
 
@@ -440,10 +440,18 @@ def _difference(t: FloatArray, values: FloatArray, reach: int, order: int) -> Fl
 
 
 def five_point_rates(t: FloatArray, x: FloatArray, joined: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """Return the rate at each sample, shape (k, m), NaN where fewer than five are joined, and its noise gain.
+    """Return rates [1/s], shape (k, m), NaN where fewer than five samples are joined, and noise gains.
 
     With d_j the time from a sample to the four others, x' = sum_j w_j (x_j - x),
     w_j = 1 / d_j prod_(i != j) d_i / (d_i - d_j). The gain is the norm of all five weights in [1/s].
+
+    Args:
+        t: Times in [s], shape (m,).
+        x: Samples in any unit [-], shape (k, m).
+        joined: Which samples a motion joins to the next one, shape (m - 1,).
+
+    Returns:
+        Rates in that unit per [s], shape (k, m), and gains in [1/s], shape (m,).
     """
     count, pairs = len(t), range(STENCIL - 1)
     if count < STENCIL:

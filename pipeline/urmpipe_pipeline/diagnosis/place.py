@@ -79,7 +79,7 @@ class PlaceModel:
         return self.linear(state, rows, ())[0]
 
     def residuals(self, every: Sequence[Edits], rows: IntArray) -> FloatArray:
-        """Return the residual of explanations without numbers, by their edits, shape (len(every), c, n)."""
+        """Return the residual of explanations without numbers in [m] and [rad], shape (len(every), c, n)."""
         nothing = zero(self.groups)
         lefts = [self.residual(replace(nothing, edits=edits), rows) for edits in every]
         return np.array(lefts).reshape(-1, len(self.blocks), len(rows))

@@ -622,7 +622,8 @@ class Search:
         The autocorrelation time is that of what stays: of the whole, the causes themselves would count as
         noise. It only grows from one selection to the next.
         """
-        tau = 1.0
+        tau = self._first_tau(replace(self.zero, edits=state.edits), replace(every, at=self.spread(MEDIUM)))
+        tau *= len(every.at) / len(self.spread(MEDIUM)) if tau > 1.0 else 1.0
         among = list(self._distinct[0])
         for _ in range(ROUNDS):
             rows = every.trimmed(residual(self.model, state, every.at))

@@ -106,7 +106,7 @@ class Selection:
         hypotheses: K, among how many causes is chosen.
         whole: J^T J [-] before numbers of a usual size were taken away, shape (p, p): by it a group moves
             what it moves, though the usual could do so too; None where none were.
-        prior: What each group adds to a score by its kind, shape (groups,); None for nothing.
+        prior: What each group adds to a score [-] by its kind, shape (groups,); None for nothing.
         more: The same of the causes that are taken besides.
     """
 
@@ -192,7 +192,7 @@ class Selection:
         return float(penalty + prior + self.more)
 
     def solution(self, columns: Sequence[int]) -> FloatArray:
-        """Return the numbers of some columns that leave the least, shape (len(columns),)."""
+        """Return the numbers [-] of some columns that leave the least, shape (len(columns),)."""
         gram, moment, _ = self._scaled
         size = np.sqrt(np.maximum(np.diag(self.normal.gram)[list(columns)], np.finfo(float).tiny))
         at = list(columns)

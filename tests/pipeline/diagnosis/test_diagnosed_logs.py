@@ -240,5 +240,8 @@ def test_a_sign_and_a_zero_of_a_real_arm_are_found_by_a_laser_tracker() -> None:
     turned, off = run.q.copy(), run.q.copy()
     turned[:, 2] *= -1.0
     off[:, 3] += np.radians(0.5)
-    assert answer(diagnosed_record(drawn(run, rows, turned))) == [("joint_sign", ("elbow_joint",), None)]
-    assert answer(diagnosed_record(drawn(run, rows, off))) == [("joint_offset", ("wrist_1_joint",), None)]
+    own = ("own_geometry", (), None)  # fitted with each cause, and named with it
+    wanted = [("joint_sign", ("elbow_joint",), None), own]
+    assert answer(diagnosed_record(drawn(run, rows, turned))) == wanted
+    wanted = [("joint_offset", ("wrist_1_joint",), None), own]
+    assert answer(diagnosed_record(drawn(run, rows, off))) == wanted
