@@ -224,6 +224,6 @@ def _middle(left: FloatArray) -> FloatArray:
 
 
 def _mean(values: FloatArray) -> float:
-    """Return the mean of what is known; inf of nothing."""
+    """Return the mean without NaN; inf if there is no other value."""
     known = values[np.isfinite(values)]
     return float(known.mean()) if len(known) else np.inf

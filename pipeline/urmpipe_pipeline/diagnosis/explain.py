@@ -243,7 +243,7 @@ class ExplanationBuilder:
             return Cause("outliers", "rows", rows=rows, value=(effect,), unit="m" if self.metres else "rad")
         if part.usual:
             return Cause("own_geometry", "arm")
-        cause = self._of_edit(part.edit) if part.edit else self._of_group(part.group, one, {})
+        cause = self._of_edit(part.edit) if part.edit else self._of_group(part.group, one)
         return replace(cause, twins=(*cause.twins, *(name for name in twins if name not in cause.twins)))
 
     def _usual_columns(self, one: Explanation) -> list[int]:
@@ -278,7 +278,7 @@ class ExplanationBuilder:
         return self._deviations[key]
 
     def _only(self, state: State, mended: Iterable[Part]) -> State:
-        """Return an explanation with some of its causes alone, and with what is always fitted."""
+        """Remove all causes but some from an explanation, and fit the groups that are always fitted again."""
         kept = set(mended)
         values = np.zeros_like(state.values)
         for g in [*self.search.forced, *(part.group for part in kept if part.group >= 0)]:
@@ -306,7 +306,7 @@ class ExplanationBuilder:
         unit = "turns" if edit.kind == "turns" else ""
         return Cause(edit.kind, name, joints, value=value, unit=unit, from_sample=first)
 
-    def _of_group(self, g: int, one: Explanation, twins: dict[Part, list[str]]) -> Cause:
+    def _of_group(self, g: int, one: Explanation) -> Cause:
         """Return a cause of some size, with its interval and its twins."""
         group = self.model.groups[g]
         values, reach = one.state.of(group), self._half_width(one, g)

@@ -219,7 +219,7 @@ class Search:
                 yield from find_large_causes(self.model, replace(self.zero, edits=state), coarse, single)
 
     def _with_zeros(self, rows: Rows, tau: float) -> tuple[Search, Explanation]:
-        """Return what is found from the zeros of all joints, and what finds it: they stand for their twins.
+        """Search from a fit of all joint zeros; return a search that prefers zeros to twins, and its result.
 
         A lost calibration makes many of them large at once; some are a shift or turn of a frame alone.
         """
@@ -247,7 +247,7 @@ class Search:
         return fitted(self.model, state, taken, rows, steps=steps)
 
     def placed(self, state: State, rows: Rows) -> State:
-        """Return an explanation with the best numbers of what is always fitted, its others as they are."""
+        """Fit only the groups that are always fitted; all other numbers stay as they are."""
         numbers = [self.model.groups[g] for g in self.forced]
         return fitted(self.model, state, numbers, rows, others=True) if numbers else state
 
@@ -371,7 +371,7 @@ class Search:
             guess = None
 
     def _bare(self, state: State, subset: Subset) -> State:
-        """Return an explanation with the numbers of a subset, and of what is always fitted, alone."""
+        """Set all numbers to 0 but those of a subset and of the groups that are always fitted."""
         values, columns = np.zeros_like(state.values), self._columns([*self.forced, *subset])
         values[columns] = state.values[columns]
         return replace(state, values=values)
