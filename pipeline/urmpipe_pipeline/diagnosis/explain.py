@@ -389,12 +389,12 @@ class ExplanationBuilder:
         """Yield the names of what would do the very same as a group, or as one of its three numbers."""
         groups, group = self.model.groups, self.model.groups[g]
         for h, other in enumerate(groups):
-            like = self.found.twins.get(h) == g
+            stands = self.found.twins.get(h)
             single = len(group.columns) == len(other.columns) == 1
-            if h == g or not (like or (h not in self.found.twins and not single)):
+            apart = single if stands is None else not groups[stands].is_of_frame(group)
+            if apart or other.is_of_frame(group):
                 continue
-            if other.name == group.name and other.kind == group.kind:  # an axis of the same frame
-                continue
+            like = stands == g
             for k, c in enumerate(group.columns):
                 own = f" ({'xyz'[k]})" if len(group.columns) > 1 else ""
                 if len(other.columns) > 1:  # its single axes are groups of their own

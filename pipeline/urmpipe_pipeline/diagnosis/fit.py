@@ -120,8 +120,9 @@ def normal_equations(model: Model, state: State, rows: Rows, groups: Sequence[Gr
         left, jacobian = model.linear(state, rows.at[block], taken)
         known = np.isfinite(left).all(axis=0)
         y = (left + np.tensordot(now, jacobian, 1))[:, known] * rows.weight[:, np.newaxis]
-        flat = (jacobian[:, :, known] * rows.weight[:, np.newaxis]).reshape(len(columns), -1)
-        flat_y = y.ravel()
+        jacobian = jacobian if known.all() else jacobian[:, :, known]
+        jacobian *= rows.weight[:, np.newaxis]
+        flat, flat_y = jacobian.reshape(len(columns), -1), y.ravel()
         return Normal(flat @ flat.T, flat @ flat_y, float(flat_y @ flat_y), flat_y.size)
 
     whole = Normal(np.zeros((len(columns), len(columns))), np.zeros(len(columns)), 0.0, 0)

@@ -41,6 +41,10 @@ class Group:
     axis: Axis | None = None
     twists: tuple[Twist, ...] = ()
 
+    def is_of_frame(self, other: Group) -> bool:
+        """Tell whether both are the same, or axes of the same frame."""
+        return (self.kind, self.name) == (other.kind, other.name)
+
 
 @dataclass(frozen=True)
 class State:

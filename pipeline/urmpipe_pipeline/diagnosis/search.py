@@ -42,6 +42,7 @@ MANY = 20_000  # rows, spread evenly, that settle an explanation; standard error
 MAJOR = 0.35  # share of the square that stays, where more than noise does, with a cause and not without it
 PROMISED = 0.5  # share of the square that what is left of an explanation leaves at most
 HOPELESS = 2.0  # a start is given up if it leaves e times the rms of the best so far
+CLEAR = 100.0  # times the noise that a deviation is which one cause that explains it leaves without a rival
 STEPS = 6  # of a fit from a start; those of an explanation that is settled are more
 ROUNDS = 6  # selections after each other: from a good start three are enough
 NEAR = 6.0  # explanations whose scores differ by less are rivals: odds of twenty to one
@@ -181,9 +182,11 @@ class Search:
                 break
             best, others = found, [best, *others]
         for edit in best.state.edits:  # what a start took for granted
-            found = self._explained(medium, replace(best.state, edits=_but(best.state.edits, edit)), tau)
-            if found.score < best.score:
-                best, others = found, [best, *others]
+            without = replace(best.state, edits=_but(best.state.edits, edit))
+            if not self._is_needless(without, best, coarse):
+                found = self._explained(medium, without, tau)
+                if found.score < best.score:
+                    best, others = found, [best, *others]
         search = self
         if best.size > 2 or cost(self.model, best.state, coarse) > NOISE:
             zeros, found = self._with_zeros(medium, tau)
@@ -236,10 +239,14 @@ class Search:
         return autocorrelation_time(left.T, float((self.floor**2).sum()))
 
     def _is_needless(self, start: State, best: Explanation, rows: Rows) -> bool:
-        """Tell whether one cause, or none, leaves noise, and a start with discrete causes needs more."""
-        if not start.edits or best.size > 1 or cost(self.model, best.state, rows) > NOISE:
+        """Tell whether one cause, or none, leaves noise, and a start with discrete causes needs more.
+
+        Where it is a discrete one that takes nearly all away, no start that needs more is worth a search.
+        """
+        if best.size > 1 or cost(self.model, best.state, rows) > NOISE:
             return False
-        return cost(self.model, start, rows) > NOISE
+        clear = best.state.edits and cost(self.model, self.zero, rows) > CLEAR * NOISE
+        return bool(start.edits or clear) and cost(self.model, start, rows) > NOISE
 
     def fitted(self, state: State, subset: Subset, rows: Rows, steps: int = 2 * STEPS) -> State:
         """Return an explanation with the best numbers of a subset, and of what is always fitted."""
@@ -424,10 +431,13 @@ class Search:
         half a turn and back by a number is turned by one.
         """
         search = self
-        for state, subset in [*self._single_causes(rows, found), *self._turned_at_once(found)]:
+        for state, subset in [*self._single_causes(found), *self._turned_at_once(found)]:
+            now, start = self._fitted_score(found, found), self.fitted(state, subset, found.rows)
+            if found.selection.score(cost(self.model, start, found.rows), subset) > now + FAR:
+                continue
             again = replace(self, first=(*(subset & self._distinct[1].keys()), *self.first))
-            there = again._stable(rows, self.fitted(state, subset, found.rows), None)
-            if self._fitted_score(there, found) < self._fitted_score(found, found):
+            there = again._stable(rows, start, None)
+            if self._fitted_score(there, found) < now:
                 search, found = again, there
         return search, found
 
@@ -436,16 +446,17 @@ class Search:
         selection = replace(one.selection, independent=beside.selection.independent)
         return selection.score(cost(self.model, one.state, beside.rows), one.subset)
 
-    def _single_causes(self, rows: Rows, found: SelfConsistentFit) -> Iterator[tuple[State, Subset]]:
+    def _single_causes(self, found: SelfConsistentFit) -> Iterator[tuple[State, Subset]]:
         """Yield explanations with one number in place of those of a frame."""
         groups = self.model.groups
         every = sorted({*self._distinct[0], *self._distinct[1]} - found.subset)
         single = [g for g in every if len(groups[g].columns) == 1]
+        coarse = replace(found.rows, at=self.spread(COARSE))
         for kind in FRAMES:
             own = frozenset(g for g in found.subset if groups[g].kind == kind)
             if isinstance(self.model, ArmModel) and not self.forced and len(self._columns(sorted(own))) > 1:
                 rest = self._bare(found.state, found.subset - own)
-                for state in find_large_causes(self.model, rest, rows, single):
+                for state in find_large_causes(self.model, rest, coarse, single):
                     (c,) = np.flatnonzero(state.values != rest.values).tolist()
                     alone = next(g for g in single if groups[g].columns[0] == c)
                     yield state, found.subset - own | {alone}
