@@ -29,6 +29,7 @@ from faulty_logs import (
     EDITS,
     LASTING,
     MOTIONS,
+    MOVED,
     SHARED,
     SIZED,
     TOOL,
@@ -48,7 +49,6 @@ import urmpipe
 import urmpipe_pipeline
 from urmpipe_pipeline.diagnosis.result import Cause, Diagnosis
 
-MOVED = 1e-3  # m rms: what singles have to move to count
 LOST_IN_NOISE = 30.0  # chi-square of two explanations below which these samples do not separate them
 SAME = 3e-3  # share of the effect, likewise: interpolation between samples
 

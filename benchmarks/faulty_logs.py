@@ -39,23 +39,22 @@ LEVER = 0.2  # m: a turn of the tool counts as what it moves at this distance
 ROWS = 1000
 GRAVITY = np.array([0.0, 0.0, -9.81])
 MOVED = 1e-3  # m rms: what singles have to move to count
-LOST_IN_NOISE = 30.0  # chi-square of two explanations below which these samples do not separate them
-SAME = 3e-3  # share of the effect, likewise: interpolation between samples
 
 
 class Source(NamedTuple):
-    """A log of others: file, robot, how often its motion is drawn, whether still, and how to read it."""
+    """A log of others: file, robot, how often its motion is drawn, whether still, or of encoders."""
 
     file: str
     robot: str
     weight: float
     still: bool = False
     period: float | None = None
+    encoders: bool = True
 
 
 MOTIONS = (
     Source("traj-recorder-ros2/salva.csv", "ur5e", 4),
-    Source("ur5e-isaaclab/joint_log.csv", "ur5e", 1),
+    Source("ur5e-isaaclab/joint_log.csv", "ur5e", 1, encoders=False),
     Source("ur5-mujoco-rttsa/joint_trajectory.csv", "ur5", 0.4),
     Source("panda-matlab-ascii/q_Traj1_Grad.txt", "panda", 2),
     Source("panda-matlab-ascii/q_Traj1_PI.txt", "panda", 2),
@@ -219,6 +218,8 @@ class Motion:
     @cached_property
     def rate(self) -> CubicSpline:
         """Their rates in [rad/s], without what the encoders add: of means over 30 ms."""
+        if not self.source.encoders:
+            return self.at.derivative()
         width = max(0.03 / float(np.median(np.diff(self.t))), 1.0)
         return CubicSpline(self.t, gaussian_filter1d(self.q, width, axis=0, mode="nearest")).derivative()
 

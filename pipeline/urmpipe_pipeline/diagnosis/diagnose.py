@@ -61,6 +61,9 @@ SAME = "both sides agree"
 WORSE = 1.01
 """Times the deviation that an explanation may leave: the ends of a log that a lag moves out of it count."""
 
+WORTH = 0.05
+"""Share of the rms that causes have to take away together, unless one of them breaks the tolerance."""
+
 EQUAL = 1e-9
 """Root mean square difference of joints in [rad] and [m] that rounding leaves."""
 
@@ -106,7 +109,7 @@ def _diagnosed(deviation: Deviation, asked: Question, lag: float | None) -> Diag
     causes, undecided = built.causes()
     state, after = built.state, built.after()
     whole, stays = rms(built.before.T), rms(after.T)
-    if stays > WORSE * whole:  # turns and tools leave the same; what was fitted on some rows may leave more
+    if stays > WORSE * whole or not built.explains(WORTH):  # what was fitted on some rows may leave more
         causes, undecided, state, after, stays = (), (), search.zero, built.before, whole
     turns = any(edit.kind == "turns" for edit in state.edits)  # these the joints alone tell
     if isinstance(model, JointsModel) and model.chain is not None and not turns and not _judged(deviation):

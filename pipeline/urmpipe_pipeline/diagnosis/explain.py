@@ -19,7 +19,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.row_blocks import row_blocks, side_by_side
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.deciding import deciding_joint
-from urmpipe_pipeline.diagnosis.fit import BLOCK, Model, deviation, inliers
+from urmpipe_pipeline.diagnosis.fit import BLOCK, Model, cost, deviation, inliers
 from urmpipe_pipeline.diagnosis.formatting import short_name
 from urmpipe_pipeline.diagnosis.gate import LARGEST
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
@@ -37,6 +37,8 @@ ABRUPT = 0.5  # share of its size by which a stretch of outliers begins and ends
 SEVERAL = 1.2  # outliers are a cause if all rows have so many times the rms of the others
 CLOCKS = ("time_lag", "clock_drift")
 RATES = (*CLOCKS, "servo_lag", "joint_lag", "compliance", "backlash")
+APART = 2.0  # times the largest other deviation that the median of outliers is
+ALONG = 0.9  # share of the square of outliers that points along what such a cause changes: it is no outlier
 UNLIKE = 3.0  # outliers are so many times larger than what causes do that change with the rates of joints
 
 
@@ -109,19 +111,22 @@ class ExplanationBuilder:
             return None
         if self.search.timed and not _begin_abruptly(left, size, far):
             return None
-        if float(size[far].max()) < UNLIKE * self._effect_of_rates():
+        if np.median(size[far]) < APART * size[rest].max():
+            return None
+        made = self._made_by_rates()
+        length = np.sqrt((made**2).sum(axis=0))
+        along = (left * made).sum(axis=0)[far] / np.maximum(length[far], np.finfo(float).tiny)
+        alike = (along**2).sum() > ALONG * (size[far] ** 2).sum()
+        if alike or float(size[far].max()) < UNLIKE * float(np.nanmax(length, initial=0.0)):
             return None
         return Part(rows=tuple(far.tolist()))
 
-    def _effect_of_rates(self) -> float:
-        """Return the largest deviation of causes that jump or grow where the arm turns back or is pushed."""
-        best = self.found.best
-        if not any(self.model.groups[g].kind in RATES for g in best.subset):
-            return 0.0
+    def _made_by_rates(self) -> FloatArray:
+        """Return what causes change that jump or grow where the arm turns back or is pushed, shape (k, n)."""
         values = self.state.values.copy()
-        values[self._columns(g for g in best.subset if self.model.groups[g].kind in RATES)] = 0.0
-        made = self._deviation(self.state) - self._deviation(replace(self.state, values=values))
-        return float(np.nanmax(np.sqrt((made**2).sum(axis=0)), initial=0.0))
+        rates = [g for g in self.found.best.subset if self.model.groups[g].kind in RATES]
+        values[self._columns(rates)] = 0.0
+        return self._deviation(self.state) - self._deviation(replace(self.state, values=values))
 
     def causes(self) -> tuple[tuple[Cause, ...], tuple[Alternative, ...]]:
         """Return the named causes in order, and the alternatives that the log does not decide between."""
@@ -135,6 +140,14 @@ class ExplanationBuilder:
         needs = self._needs(rivals)
         alternatives = (self._causes(one, common, {})[len(common) :] for one in rivals)
         return named, tuple(Alternative(causes, needs) for causes in alternatives)
+
+    def explains(self, share: float) -> bool:
+        """Tell whether causes take a share of the rms of all that was fitted away, or break a tolerance."""
+        rows, nothing = self.found.rows, self._only(self.search.zero, ())
+        left = cost(self.model, self.state, rows)
+        if self.outliers is not None or left < (1.0 - share) ** 2 * cost(self.model, nothing, rows):
+            return True
+        return self.breaks(self.before - self._deviation(self.state))
 
     def refused(self) -> tuple[Refused, ...]:
         """Return what the gate refused though it leaves less, each with the rms before and after all."""

@@ -5,9 +5,9 @@
 2. Beside other causes no part of an arm differs by more than `REACHED` and `BESIDE`. One that alone leaves
    the noise may have any size.
 3. A cause that alone makes the rms more than `CANCELS` times what it was before any only cancels another.
-4. What a number fits has to hold all the time: x_k is replaced by sum_m x_km h_m(row) over `SEGMENTS` hat
-   functions h_m. It changes during the log if these leave significantly less (F test, in rows that are
-   independent of each other), and differ from x_k by more than `CHANGING` of it.
+4. What a number fits has to hold all the time: x_k is replaced by sum_m x_km h_m(row) over two and over
+   `SEGMENTS` hat functions h_m. It changes during the log if these leave significantly less (F test, in rows
+   that are independent of each other), and differ from x_k by more than `CHANGING` of it.
 """
 
 from __future__ import annotations
@@ -142,29 +142,31 @@ def find_changing(search: Fitter, state: State, subset: Subset, rows: Rows) -> t
     known &= np.isfinite([*changed, left]).all(axis=(0, 1)) & np.isfinite(jacobian).all(axis=(0, 1))
     weight = rows.weight[:, np.newaxis]
     left, jacobian = left[:, known] * weight, jacobian[..., known] * weight
-    kinds = [group.kind for group in own for _ in group.columns] + [edit.kind for edit in state.edits]
-    columns = [*jacobian[: len(kinds) - len(changed)], *(one[:, known] * weight for one in changed)]
-    segments = [CLOCK_SEGMENTS if kind in CLOCKS else SEGMENTS for kind in kinds]
-    if not kinds or left.shape[1] < 4 * sum(segments):
-        return set(), ()
-    parts = [
-        (column * _hats(count, left.shape[1])[:, np.newaxis]).reshape(count, -1)
-        for column, count in zip(columns, segments, strict=True)
+    count = len(jacobian) - sum(len(model.groups[g].columns) for g in search.forced)
+    columns = [*jacobian[:count], *(one[:, known] * weight for one in changed)]
+    owners = [g for g in sorted(subset) for _ in model.groups[g].columns] + [
+        -1 - k for k in range(len(without))
     ]
-    fitted = jacobian[len(kinds) - len(changed) :].reshape(-1, left.size) if search.forced else None
+    values = np.concatenate([*(state.of(group) for group in own), np.ones(len(without))])
+    fitted = jacobian[count:].reshape(-1, left.size) if search.forced else None
     floor = float(np.mean((search.floor * rows.weight) ** 2))
-    spread = _spread(left, fitted, parts, search.timed, floor)
-    size = np.array([np.linalg.norm(part) for part in parts])
-    values = [*np.concatenate([state.of(group) for group in own] or [np.zeros(0)]), *(1.0 for _ in changed)]
-    owners = [g for g, group in zip(sorted(subset), own, strict=True) for _ in group.columns]
-    owners += [-1 - k for k in range(len(changed))]
-    changing = {
-        owner for owner in set(owners)
-        if (owner < 0 or search.model.groups[owner].kind != "backlash")  # its sense is a guess at rest
-        and np.linalg.norm((spread * size)[np.array(owners) == owner])
-        > (UNEVEN if owner >= 0 and search.model.groups[owner].kind in CLOCKS else CHANGING)
-        * np.linalg.norm((np.array(values) * size)[np.array(owners) == owner])
-    }  # fmt: skip
+    clocks = [g >= 0 and model.groups[g].kind in CLOCKS for g in owners]
+    changing = set[int]()
+    for segments in ([2] * len(owners), [CLOCK_SEGMENTS if clock else SEGMENTS for clock in clocks]):
+        if not owners or left.shape[1] < 4 * sum(segments):
+            continue
+        parts = [
+            (column * _hats(count, left.shape[1])[:, np.newaxis]).reshape(count, -1)
+            for column, count in zip(columns, segments, strict=True)
+        ]
+        size = np.array([np.linalg.norm(part) for part in parts])
+        spread = size * _spread(left, fitted, parts, search.timed, floor)
+        for g, clock in zip(owners, clocks, strict=True):
+            its = np.array(owners) == g
+            most = (UNEVEN if clock else CHANGING) * np.linalg.norm((values * size)[its])
+            if np.linalg.norm(spread[its]) > most:
+                changing.add(g)
+    changing -= {g for g in subset if model.groups[g].kind == "backlash"}  # its sense is a guess at rest
     return {g for g in changing if g >= 0}, tuple(state.edits[-1 - g] for g in changing if g < 0)
 
 

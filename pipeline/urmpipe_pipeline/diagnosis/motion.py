@@ -366,7 +366,8 @@ WIDEST = 20
 def motion_of(t: FloatArray | None, values: FloatArray) -> Motion:
     """Return samples as a motion, with derivatives from so many of them that noise is little of these.
 
-    Noise of q'' is otherwise the noise of q once more: it would pass for a joint that gives way.
+    Noise of q'' is otherwise the noise of q once more: it would pass for a joint that gives way. Where it is
+    too much of q'' all the same, or the rows are too far apart, q'' is 0: it is not known.
 
     Args:
         t: Times in [s], shape (m,); None without times, and then without derivatives.
@@ -381,7 +382,8 @@ def motion_of(t: FloatArray | None, values: FloatArray) -> Motion:
         known = np.isfinite(row)
         if known.sum() > 3:
             whole = np.interp(t, t[known], row[known])
-            (rate[k], noise[k]), (second[k], _) = (_derivative(t, whole, order) for order in (1, 2))
+            (rate[k], noise[k]), (found, left) = (_derivative(t, whole, order) for order in (1, 2))
+            second[k] = found if left <= QUIET * np.sqrt(np.mean(found**2)) else 0.0
     return Motion(t, values, rate, second, noise)
 
 

@@ -12,6 +12,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import jacobian, positions_over_log
 from urmpipe_models.orientation import matrices
 from urmpipe_models.transform import Transform
+from urmpipe_pipeline import text
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.arm_groups import (
     base_groups,
@@ -162,7 +163,7 @@ def _of_joints(matched: Matched, reference: Side, log: Side) -> Question:
         rounding,
         (),
         1.0,
-        (told, *bare, *_untimed(run)),
+        (told, *bare, *_unknown_rates(run, model.motion)),
     )
 
 
@@ -224,7 +225,7 @@ def _of_arm(matched: Matched, reference: Side, log: Side) -> Question:
         )
     return Question(
         model, edits, turning, names, _own_names(run), matched.sample, rounding, forced,
-        1.0 if log.by_joints else -1.0, (*told, *_untimed(log.run)),
+        1.0 if log.by_joints else -1.0, (*told, *_unknown_rates(run, motion)),
     )  # fmt: skip
 
 
@@ -263,7 +264,7 @@ def _of_places(matched: Matched, reference: Side, log: Side) -> Question:
         rounding,
         (),
         1.0,
-        (*told, *_untimed(run)),
+        (*told, *_unknown_rates(run)),
     )
 
 
@@ -292,10 +293,18 @@ def _own_names(run: Run) -> tuple[str, ...]:
     return run.log.joints if run.robot is None else run.robot.coordinates
 
 
-def _untimed(run: Run) -> Iterator[NotLookedFor]:
-    """Yield that still poses tell nothing of time."""
+def _unknown_rates(run: Run, motion: Motion | None = None) -> Iterator[NotLookedFor]:
+    """Yield that still poses tell nothing of time, and which joints of a log have no known accelerations."""
     if not run.timed:
         yield NotLookedFor(TIME, "still poses have no time")
+    elif motion is not None:
+        moves = np.fmax.reduce(motion.value, axis=1) - np.fmin.reduce(motion.value, axis=1) > AT_REST
+        unknown = np.flatnonzero(moves & ~motion.second.any(axis=1)).tolist()
+        if unknown:
+            names = text.enumerated([run.log.joints[j] for j in unknown])
+            yield NotLookedFor(
+                ("compliance",), f"the rows do not show how {names} accelerate{'s' * (len(unknown) == 1)}"
+            )
 
 
 def _clock(matched: Matched, run: Run, *, log: bool) -> Clock:
