@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -53,7 +53,7 @@ class ArmModel:
     frames_open: bool = False
     judged: FloatArray | None = None
     _placed: dict[Edits, Chain] = field(default_factory=dict)
-    _of_others: dict[str, tuple[Group, ...]] = field(default_factory=dict, init=False)
+    _twists: dict[str, list[tuple[Twist, int]]] = field(default_factory=dict, init=False)
 
     @property
     def rows(self) -> int:
@@ -65,25 +65,30 @@ class ArmModel:
         """Which components share a noise: positions 0, orientations 1, shape (c,)."""
         return np.repeat([0, 1], 3)[: 3 if self.rotation is None else 6]
 
-    def arm(self, state: State) -> tuple[Chain, list[tuple[Twist, int]]]:
-        """Return the arm as an explanation has it, and its twists there with the places of their numbers."""
-        chain = self._robot(state.edits)
-        twists = ordered_twists(self._groups_of(chain, state.edits))
-        there, located = changed(chain, [(twist, float(state.values[c])) for twist, c in twists])
+    def arm(self, state: State, wanted: Collection[int] = ()) -> tuple[Chain, list[tuple[Twist, int]]]:
+        """Return the arm as an explanation has it, and its twists there with the places of their numbers.
+
+        Args:
+            state: The explanation.
+            wanted: Places of numbers whose twists are returned though they are 0.
+        """
+        chain, values = self._robot(state.edits), state.values.tolist()
+        twists = [one for one in self._twists_of(chain, state.edits) if values[one[1]] or one[1] in wanted]
+        there, located = changed(chain, [(twist, values[c]) for twist, c in twists])
         return there, [(twist, c) for twist, (_, c) in zip(located, twists, strict=True)]
 
-    def _groups_of(self, chain: Chain, edits: Edits) -> tuple[Group, ...]:
-        """Return the groups with the twists of the robot that some edits speak of: those of the same name."""
-        name = next((edit.name for edit in edits if edit.robot is not None), None)
-        if name is None:
-            return self.groups
-        if name not in self._of_others:
-            joints = [group.name for group in self.groups if group.kind == "joint_offset"]
-            every = cause_groups(chain, joints, turned=self.rotation is not None, timed=False)
-            twists = {_key(group): group.twists for group in every}
-            groups = (replace(group, twists=twists.get(_key(group), ())) for group in self.groups)
-            self._of_others[name] = tuple(groups)
-        return self._of_others[name]
+    def _twists_of(self, chain: Chain, edits: Edits) -> list[tuple[Twist, int]]:
+        """Return the twists of all groups, those of the same name of a robot that some edits speak of."""
+        name = next((edit.name for edit in edits if edit.robot is not None), "")
+        if name not in self._twists:
+            groups: Iterable[Group] = self.groups
+            if name:
+                joints = [group.name for group in self.groups if group.kind == "joint_offset"]
+                every = cause_groups(chain, joints, turned=self.rotation is not None, timed=False)
+                twists = {_key(group): group.twists for group in every}
+                groups = (replace(group, twists=twists.get(_key(group), ())) for group in self.groups)
+            self._twists[name] = ordered_twists(groups)
+        return self._twists[name]
 
     def _robot(self, edits: Edits) -> Chain:
         """Return the arm that some edits speak of, on a turned base or where it fits best if that is open."""
@@ -228,10 +233,10 @@ class ArmModel:
         self, state: State, rows: IntArray, taken: Sequence[Group], components: int
     ) -> tuple[FloatArray, FloatArray]:
         joints = self._joints(state, rows)
-        chain, located = self.arm(state)
+        wanted = {c for g in taken for c in g.columns}
+        chain, located = self.arm(state, wanted)
         q = list(joints.q)
         left = self._left(tip_pose(chain, q), state.edits, rows, joints.inside)
-        wanted = {c for g in taken for c in g.columns}
         twists = [(twist, c) for twist, c in located if c in wanted]
         distinct = {id(twist): twist for twist, _ in twists}  # one axis of a frame alone, and of all three
         velocities = dict(zip(distinct, sensitivities(chain, q, [*distinct.values()]), strict=True))

@@ -61,7 +61,7 @@ SAME = "both sides agree"
 WORSE = 1.01
 """Times the deviation that an explanation may leave: the ends of a log that a lag moves out of it count."""
 
-WORTH = 0.05
+WORTH = 0.03
 """Share of the rms that causes have to take away together, unless one of them breaks the tolerance."""
 
 EQUAL = 1e-9

@@ -169,14 +169,14 @@ def format_own_tcp(side: OwnTcp) -> str:
 
 
 def format_undecided(alternatives: Sequence[Alternative]) -> str:
-    """Return what a log does not decide between: "either A or B (a motion of phi5 would decide)"."""
+    """Return what a log does not decide between: "either A or B (more motion of phi5 would decide)"."""
     listed = alternatives[:MAX_LISTED]
     listed = listed[:1] if sum(len(one.causes) for one in listed) > MAX_UNDECIDED else listed
     clauses = [format_explanation(alternative) for alternative in listed]
     more = len(alternatives) - len(listed)
     clauses += [f"{more} more" if more > 1 else "another"] if more > 0 else []
     needs = list(dict.fromkeys(alternative.needs for alternative in alternatives if alternative.needs))
-    decides = f"a motion of {text.enumerated(needs)} would decide" if needs else "this log cannot decide"
+    decides = f"more motion of {text.enumerated(needs)} would decide" if needs else "this log cannot decide"
     return f"either {' or '.join(clauses)} ({decides})"
 
 
@@ -189,7 +189,7 @@ def format_refusal(refused: Refused) -> str:
     """Return why causes are not believed, and which motion would determine them."""
     if len(refused.causes) > MAX_LISTED:  # no motion of one joint determines so many
         return f"not determined by this motion: {len(refused.causes)} causes ({refused.reason})"
-    needs = f"; a motion of {refused.needs} would determine it" if refused.needs else ""
+    needs = f"; more motion of {refused.needs} would determine it" if refused.needs else ""
     return f"not determined by this motion: {format_explanation(refused)} ({refused.reason}){needs}"
 
 

@@ -126,7 +126,7 @@ def diagnosis_tables(diagnosis: Diagnosis) -> Iterator[Table]:
             "explanation": "Explanation",
             "interval": "95 % interval",
             "twins": "twins",
-            "needs": "a motion that would decide",
+            "needs": "more motion of this decides",
         }
         rows = [
             (format_explanation(alternative), *_details(alternative), alternative.needs or "none")
@@ -141,7 +141,7 @@ def diagnosis_tables(diagnosis: Diagnosis) -> Iterator[Table]:
             "twins": "twins",
             "rms_after": "rms after",
             "reason": "reason",
-            "needs": "a motion that would determine it",
+            "needs": "more motion of this determines it",
         }
         refused_rows = [
             (

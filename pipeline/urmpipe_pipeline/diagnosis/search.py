@@ -29,7 +29,7 @@ from urmpipe_pipeline.diagnosis.candidates import (
     residual_after_fit,
 )
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, cost, fitted, inliers, normal_equations, residual
-from urmpipe_pipeline.diagnosis.gate import NOISE, NOT_CONSTANT, TOO_LARGE, find_changing, find_unbelievable
+from urmpipe_pipeline.diagnosis.gate import CANCELLING, NOISE, NOT_CONSTANT, find_changing, find_unbelievable
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
 from urmpipe_pipeline.diagnosis.intervals import LONGEST, autocorrelation_time
 from urmpipe_pipeline.diagnosis.selection import Normal, Selection, Subset, without_twins
@@ -395,7 +395,9 @@ class Search:
     def _unbelievable(self, state: State, subset: Subset, rows: Rows) -> set[int]:
         """Return the groups of a subset whose numbers no engineer believes, the reason noted."""
         beyond, reason = find_unbelievable(self, state, subset, rows)
-        if reason == TOO_LARGE and not state.edits:  # one of them that alone leaves noise is believed
+        if (
+            reason != CANCELLING and len(subset) > 1 and not state.edits
+        ):  # one of them that alone leaves noise is believed
             for g in sorted(beyond):
                 if cost(self.model, self.fitted(state, frozenset((g,)), rows), rows) <= NOISE:
                     return set(subset) - {g}
