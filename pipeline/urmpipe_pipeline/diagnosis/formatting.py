@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from itertools import takewhile
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -31,6 +32,7 @@ MAX_LISTED = 2  # undecided explanations in a summary, or one if two have too ma
 MAX_UNDECIDED = 4  # causes of two such explanations together
 MIN_EXPLAINED = 1.0 / 3.0  # fraction of the rms; with less, the summary says that it explains little
 NOTHING = 0.01  # fraction of the rms of a passed log; less would go unnoticed
+UNMOVED = 1e-6  # m; a cause that moves no position by more is not one of the rms
 ROUNDING = 1e-9  # mm or deg: less is the rounding of the numbers that were subtracted
 CLOCKS = ("time_lag", "clock_drift")
 PASSES = "passes; "
@@ -47,10 +49,22 @@ def format_summary(diagnosis: Diagnosis) -> str:
         if diagnosis.refused and diagnosis.verdict != "pass":
             return f"{format_refusal(diagnosis.refused[0])}; rms {after} remains"
         return f"no cause found: rms {before} remains{f' ({residual.words})' if residual.words else ''}"
+    unseen = [cause for cause in causes if _moves_nothing(cause, diagnosis.unit)]
+    if unseen:
+        seen = tuple(cause for cause in causes if cause not in unseen)
+        rest = format_summary(replace(diagnosis, causes=seen)) if seen or alternatives else ""
+        start = f"{rest}; " if rest else PASSES if diagnosis.verdict == "pass" else ""
+        return f"{start}{text.enumerated(list(map(format_cause, unseen)))} (this does not move the TCP)"
     if diagnosis.verdict == "pass":
         return f"{PASSES}{_format_avoidable(diagnosis)}"
     little = diagnosis.rms - residual.rms < MIN_EXPLAINED * diagnosis.rms
     return f"{'explains little: ' if little else ''}{_format_chain(diagnosis)}{_format_origin(diagnosis)}"
+
+
+def _moves_nothing(cause: Cause, unit: str) -> bool:
+    """Tell whether a cause leaves all positions: a turn about the tool centre point, whole turns."""
+    still = cause.effect < UNMOVED and abs(cause.rms_after - cause.rms_before) < UNMOVED
+    return unit == "m" and still and cause.kind not in ("outliers", "own_geometry")
 
 
 def select_causes(causes: Sequence[Cause]) -> list[Cause]:

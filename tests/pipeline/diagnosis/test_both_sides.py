@@ -55,11 +55,11 @@ def write(tmp_path: Path) -> Write:
     return file
 
 
-def diagnosed(reference: Path, log: Path) -> Diagnosis:
+def diagnosed(reference: Path, log: Path, tolerance: float | str = 3.5e-3) -> Diagnosis:
     """Return why a log deviates; that a path is no log is not what is tested."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", urmpipe.UrmpipeWarning)
-        return urmpipe.diagnose(reference, log, robot="ur5e")
+        return urmpipe.diagnose(reference, log, robot="ur5e", tolerance=tolerance)
 
 
 def on_lines(t: FloatArray, values: FloatArray) -> FloatArray:
@@ -140,7 +140,7 @@ def test_the_side_that_disagrees_with_its_tool_centre_point_has_the_causes(
         sides.append(write(name, T, q, tcp))
         if q is not None and tcp is not None:
             apart[name] = np.linalg.norm(place(q) - tcp, axis=1)
-    found = diagnosed(*sides)
+    found = diagnosed(sides[0], sides[1])
     assert {one.name: one.agrees for one in found.own_tcp} == agree
     for one in found.own_tcp:
         assert one.rms == pytest.approx(np.sqrt((apart[one.name] ** 2).mean()), rel=1e-9)
@@ -148,3 +148,15 @@ def test_the_side_that_disagrees_with_its_tool_centre_point_has_the_causes(
     assert found.origin == origin
     reasons = [one.reason for one in found.not_looked_for if "link_length" in one.kinds]
     assert [reason in one for one in reasons] == ([True] if reason else [])
+
+
+@pytest.mark.parametrize("elbow", [0.0, 0.5])
+def test_a_joint_that_turns_about_the_tool_centre_point_is_named_apart(write: Write, elbow: float) -> None:
+    """The last joint of a UR5e moves no tool centre point, and here breaks its own tolerance."""
+    off = np.radians([0.0, 0.0, elbow, 0.0, 0.0, 1.0])
+    found = diagnosed(write("one", T, Q), write("two", T, Q + off), "axis=3.5mm,joint=0.6deg")
+    assert {cause.name for cause in found.causes} == {*["elbow_joint"] * (elbow > 0.0), "wrist_3_joint"}
+    chain, _, apart = found.sentence.rpartition("wrist_3_joint")
+    assert apart == " reads 1 deg too high (this does not move the TCP)"
+    assert ("elbow_joint reads 0.5 deg too high: rms" in chain) is (elbow > 0.0)
+    assert found.verdict == "fail"
