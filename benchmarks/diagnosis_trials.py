@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from faulty_arms import AXES, Fault, matrix, segments
 from faulty_logs import (
-    AXES,
     COUNT,
     EDITS,
     LASTING,
@@ -33,14 +33,11 @@ from faulty_logs import (
     SHARED,
     SIZED,
     TOOL,
-    Fault,
     Trial,
     make_trial,
-    matrix,
     motion_of,
     plan,
     rms,
-    segments,
 )  # fmt: skip
 from pairs import Bound, machine, write_results
 from scipy.spatial.transform import Rotation
@@ -249,7 +246,7 @@ def code() -> str:
         *(package / "comparison").glob("*.py"),
     ]
     files = [file for file in files if file.name not in ("wording.py", "presenter.py", "facts.py")]
-    files += Path(__file__).parent.glob("*_logs.py")
+    files += Path(__file__).parent.glob("faulty_*.py")
     return hashlib.sha256(
         b"".join(file.read_bytes() for file in [*sorted(files), Path(__file__)])
     ).hexdigest()[:12]
