@@ -22,7 +22,7 @@ from urmpipe_pipeline.diagnosis.one_pose import tool_hypotheses
 from urmpipe_pipeline.diagnosis.own_tcp import ask_both_sides
 from urmpipe_pipeline.diagnosis.result import Diagnosis, NotLookedFor, Remainder, rms
 from urmpipe_pipeline.diagnosis.search import Search, SearchResult
-from urmpipe_pipeline.diagnosis.sides import AT_REST, Question, Side, question
+from urmpipe_pipeline.diagnosis.sides import AT_REST, Question, Side, build_question
 from urmpipe_pipeline.log_edits import Edits
 
 if TYPE_CHECKING:  # a comparison holds its diagnosis: no ring between the two
@@ -89,54 +89,56 @@ def diagnose(
         lag: An offset of the clocks in [s], besides how they were put together, at which both move alike.
     """
     with threadpool_limits(1, "blas"):  # blocks of rows run side by side already
-        asked = question(matched, reference, log)
+        question = build_question(matched, reference, log)
         length = _tolerance(deviation, LENGTHS, DEFAULT_TOLERANCE)
-        if reason := _tells_nothing(asked):
-            found = _nothing(deviation, asked, reason, length if reference.run is log.run else 0.0)
+        if reason := _tells_nothing(question):
+            diagnosis = _nothing(deviation, question, reason, length if reference.run is log.run else 0.0)
         else:
-            found = _diagnosed(deviation, asked, lag)
-        return ask_both_sides(found, matched, reference, log, length)
+            diagnosis = _diagnosed(deviation, question, lag)
+        return ask_both_sides(diagnosis, matched, reference, log, length)
 
 
-def _diagnosed(deviation: Deviation, asked: Question, lag: float | None) -> Diagnosis:
-    model, timed = asked.model, deviation.run.timed
-    edits = (*asked.edits, *_later(asked, timed=timed))
+def _diagnosed(deviation: Deviation, question: Question, lag: float | None) -> Diagnosis:
+    model, timed = question.model, deviation.run.timed
+    edits = (*question.edits, *_later(question, timed=timed))
     starts = tuple(_late(model, lag))
-    search, found = _found(Search(model, edits, _floor(deviation, asked), asked.forced, starts, timed=timed))
+    search, result = _found(
+        Search(model, edits, _floor(deviation, question), question.forced, starts, timed=timed)
+    )
     built = ExplanationBuilder(
-        search, found, asked.names, asked.own_names, asked.sample, partial(_breaks, deviation)
+        search, result, question.names, question.own_names, question.sample, partial(_breaks, deviation)
     )
     causes, undecided = built.causes()
     state, after = built.state, built.after()
-    whole, stays = rms(built.before.T), rms(after.T)
-    if stays > WORSE * whole or not built.explains(WORTH):  # what was fitted on some rows may leave more
-        causes, undecided, state, after, stays = (), (), search.zero, built.before, whole
+    before, left = rms(built.before.T), rms(after.T)
+    if left > WORSE * before or not built.explains(WORTH):  # what was fitted on some rows may leave more
+        causes, undecided, state, after, left = (), (), search.zero, built.before, before
     turns = any(edit.kind == "turns" for edit in state.edits)  # these the joints alone tell
     if isinstance(model, JointsModel) and model.chain is not None and not turns and not _judged(deviation):
         least = FLOOR * _tolerance(deviation, LENGTHS, DEFAULT_TOLERANCE)
-        if whole <= least or stays > whole + least:
+        if before <= least or left > before + least:
             apart = residual(model, search.zero, np.arange(model.rows))
-            equal = rms(apart.T) <= float(np.linalg.norm(asked.rounding)) + EQUAL
-            return _nothing(deviation, asked, ELSEWHERE if whole > least else SAME if equal else ALIKE)
+            equal = rms(apart.T) <= float(np.linalg.norm(question.rounding)) + EQUAL
+            return _nothing(deviation, question, ELSEWHERE if before > least else SAME if equal else ALIKE)
     unnamed = search.usual and all(cause.kind != "own_geometry" for cause in causes)
     return Diagnosis(
         name=deviation.name,
         verdict=deviation.verdict,
         seen={name: share.value for name, share in deviation.shares.items()},
         samples=model.rows,
-        unit=_unit(asked),
-        rms=whole,
+        unit=_unit(question),
+        rms=before,
         causes=causes,
         undecided=undecided,
         refused=built.refused(),
-        not_looked_for=asked.not_looked_for,
-        remainder=_remainder(deviation, model, whole, stays, OWN if unnamed else ""),
-        sample=asked.sample,
-        mended=asked.sign * after.T,
+        not_looked_for=question.not_looked_for,
+        remainder=_remainder(deviation, model, before, left, OWN if unnamed else ""),
+        sample=question.sample,
+        mended=question.sign * after.T,
     )
 
 
-def _remainder(deviation: Deviation, model: Model, whole: float, stays: float, words: str) -> Remainder:
+def _remainder(deviation: Deviation, model: Model, before: float, left: float, words: str) -> Remainder:
     """Return what stays of a whole deviation, root mean squares in [m] or [rad].
 
     Where it is out of tolerance, and more than half of how far the reference moves about its mean, no cause
@@ -145,21 +147,21 @@ def _remainder(deviation: Deviation, model: Model, whole: float, stays: float, w
     wanted = model.wanted(np.arange(model.rows))
     moves = rms((wanted - np.nanmean(wanted, axis=1, keepdims=True)).T)
     kinds = LENGTHS if _in_metres(model) else ("joint",)
-    held = _tolerance(deviation, kinds, DEFAULT_TOLERANCE)
-    different = stays > max(held, UNLIKE * moves)
-    share = (stays / whole) ** 2 if whole else 0.0
-    return Remainder(stays, share, UNRELATED if different else words, different)
+    tolerance = _tolerance(deviation, kinds, DEFAULT_TOLERANCE)
+    different = left > max(tolerance, UNLIKE * moves)
+    share = (left / before) ** 2 if before else 0.0
+    return Remainder(left, share, UNRELATED if different else words, different)
 
 
-def _later(asked: Question, *, timed: bool) -> Iterator[Edits]:
+def _later(question: Question, *, timed: bool) -> Iterator[Edits]:
     """Yield what may begin at some row: half turns, mirrored angles, whole turns of joints on both sides."""
-    model, nothing = asked.model, zero(asked.model.groups)
+    model, nothing = question.model, zero(question.model.groups)
     joints_alone = isinstance(model, JointsModel)
     if timed:
-        yield from later_edits(model, asked.sample, asked.turning, nothing, both_ways=joints_alone)
+        yield from later_edits(model, question.sample, question.turning, nothing, both_ways=joints_alone)
     if joints_alone:
         left = residual(model, nothing, np.arange(model.rows))
-        if turns := turn_edits(left, asked.sample, asked.turning):
+        if turns := turn_edits(left, question.sample, question.turning):
             yield turns
 
 
@@ -189,33 +191,33 @@ def _found(search: Search) -> tuple[Search, SearchResult]:
     own = replace(search, usual=usual)
     if search.forced:
         return own, own.find()
-    found = search.find()
-    taken = found.best.subset & set(usual)
+    result = search.find()
+    taken = result.best.subset & set(usual)
     structure = any(groups[g].kind in STRUCTURE for g in taken)
-    return (own, own.find()) if len(taken) >= MANY and structure else (search, found)
+    return (own, own.find()) if len(taken) >= MANY and structure else (search, result)
 
 
 def _judged(deviation: Deviation) -> bool:
     """Tell whether the joints themselves have a tolerance."""
-    return any(one.kind == "joint" and one.tolerance for one in deviation.all_statistics)
+    return any(statistic.kind == "joint" and statistic.tolerance for statistic in deviation.all_statistics)
 
 
-def _floor(deviation: Deviation, asked: Question) -> FloatArray:
+def _floor(deviation: Deviation, question: Question) -> FloatArray:
     """Return what means nothing, of each component in [m] or [rad]: a share of the tolerance, or rounding."""
     length = _tolerance(deviation, LENGTHS, DEFAULT_TOLERANCE)
     turn = _tolerance(deviation, ("angle",), length / ARM)
-    if isinstance(asked.model, JointsModel):
+    if isinstance(question.model, JointsModel):
         joint = _tolerance(deviation, ("joint",), length / ARM)
-        least = np.full(len(asked.model.blocks), joint)
+        least = np.full(len(question.model.blocks), joint)
     else:
-        least = np.where(asked.model.blocks == 0, length, turn)
-    return np.maximum(FLOOR * least, asked.rounding)
+        least = np.where(question.model.blocks == 0, length, turn)
+    return np.maximum(FLOOR * least, question.rounding)
 
 
 def _tolerance(deviation: Deviation, kinds: tuple[str, ...], otherwise: float) -> float:
     """Return the least tolerance of some kinds in [m] or [rad]."""
-    held = [one.tolerance for one in deviation.all_statistics if one.kind in kinds and one.tolerance]
-    return min((one for one in held if one is not None), default=otherwise)
+    every = deviation.all_statistics
+    return min((one.tolerance for one in every if one.kind in kinds and one.tolerance), default=otherwise)
 
 
 def _breaks(deviation: Deviation, made: FloatArray) -> bool:
@@ -228,13 +230,13 @@ def _breaks(deviation: Deviation, made: FloatArray) -> bool:
     sizes = {"axis": float(largest.max()), "norm": length, "path": length, "joint": float(largest.max())}
     sizes |= dict(zip("xyz", map(float, largest), strict=False))
     kinds = ("joint",) if not deviation.statistics else ("axis", "norm", "path", *"xyz")
-    held = [one for one in deviation.all_statistics if one.tolerance and one.kind in kinds]
-    return any(sizes[one.kind] > one.tolerance for one in held if one.tolerance)
+    limits = (statistic for statistic in deviation.all_statistics if statistic.kind in kinds)
+    return any(limit.tolerance and sizes[limit.kind] > limit.tolerance for limit in limits)
 
 
-def _tells_nothing(asked: Question) -> str:
+def _tells_nothing(question: Question) -> str:
     """Return why nothing can be told; empty where something can."""
-    model = asked.model
+    model = question.model
     if model.rows < LEAST_SAMPLES:
         return f"{model.rows} samples: fewer than {LEAST_SAMPLES}"
     moved = np.nanmax(
@@ -243,9 +245,9 @@ def _tells_nothing(asked: Question) -> str:
     return "the log is at rest: one pose" if moved < AT_REST else ""
 
 
-def _unit(asked: Question) -> Literal["m", "rad"]:
+def _unit(question: Question) -> Literal["m", "rad"]:
     """Return the unit of what is judged: that of joints alone is taken as rad."""
-    return "m" if _in_metres(asked.model) else "rad"
+    return "m" if _in_metres(question.model) else "rad"
 
 
 def _in_metres(model: Model) -> bool:
@@ -253,33 +255,34 @@ def _in_metres(model: Model) -> bool:
     return not isinstance(model, JointsModel) or model.chain is not None
 
 
-def _nothing(deviation: Deviation, asked: Question, reason: str, held: float = 0.0) -> Diagnosis:
+def _nothing(deviation: Deviation, question: Question, reason: str, tolerance: float = 0.0) -> Diagnosis:
     """Return a diagnosis that names nothing, and says why.
 
     Args:
         deviation: The comparison.
-        asked: What was held against what.
+        question: What was compared with what.
         reason: Why nothing can be told.
-        held: What the tool that a log recorded may be off in [m]: beyond it, one that agrees is a hypothesis.
+        tolerance: By how much the tool that a log recorded may be off in [m]; one that agrees is then a
+            hypothesis.
     """
-    model = asked.model
+    model = question.model
     left = model.deviation(zero(model.groups), np.arange(model.rows))
     before = rms(left.T)
-    undecided, mended = tool_hypotheses(model, held) if before > held > 0.0 else ((), left)
+    undecided, mended = tool_hypotheses(model, tolerance) if before > tolerance > 0.0 else ((), left)
     kinds = tuple(
-        dict.fromkeys([*(g.kind for g in model.groups), *(e.kind for edits in asked.edits for e in edits)])
+        dict.fromkeys([*(g.kind for g in model.groups), *(e.kind for edits in question.edits for e in edits)])
     )
     return Diagnosis(
         name=deviation.name,
         verdict=deviation.verdict,
         seen={name: share.value for name, share in deviation.shares.items()},
         samples=model.rows,
-        unit=_unit(asked),
+        unit=_unit(question),
         rms=before,
         causes=(),
         undecided=undecided,
-        not_looked_for=(NotLookedFor(kinds, reason), *asked.not_looked_for),
+        not_looked_for=(NotLookedFor(kinds, reason), *question.not_looked_for),
         remainder=Remainder(rms(mended.T), (rms(mended.T) / before) ** 2 if before else 1.0, reason),
-        sample=asked.sample,
-        mended=asked.sign * mended.T,
+        sample=question.sample,
+        mended=question.sign * mended.T,
     )

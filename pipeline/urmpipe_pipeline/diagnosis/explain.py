@@ -73,7 +73,7 @@ class ExplanationBuilder:
     """
 
     search: Search
-    found: SearchResult
+    result: SearchResult
     names: tuple[str, ...]
     own_names: tuple[str, ...]
     sample: IntArray
@@ -93,7 +93,7 @@ class ExplanationBuilder:
     @cached_property
     def state(self) -> State:
         """The explanation that is reported."""
-        best = self.found.best
+        best = self.result.best
         return best.state if best.subset or best.state.edits else self.search.zero
 
     @cached_property
@@ -124,26 +124,26 @@ class ExplanationBuilder:
     def _made_by_rates(self) -> FloatArray:
         """Return what causes change that jump or grow where the arm turns back or is pushed, shape (k, n)."""
         values = self.state.values.copy()
-        rates = [g for g in self.found.best.subset if self.model.groups[g].kind in RATES]
+        rates = [g for g in self.result.best.subset if self.model.groups[g].kind in RATES]
         values[self._columns(rates)] = 0.0
         return self._deviation(self.state) - self._deviation(replace(self.state, values=values))
 
     def causes(self) -> tuple[tuple[Cause, ...], tuple[Alternative, ...]]:
         """Return the named causes in order, and the alternatives that the log does not decide between."""
-        best = self.found.best
-        every = [best, *(one for one in self.found.others if self._relevant(one))]
+        best = self.result.best
+        every = [best, *(explanation for explanation in self.result.others if self._relevant(explanation))]
         rivals, twins = self._without_twins(every)
-        common = set.intersection(*(set(self._parts(one)) for one in rivals))
+        common = set.intersection(*(set(self._parts(explanation)) for explanation in rivals))
         named = self._causes(best, common, twins)[: len(common)]
         if len(rivals) == 1:
             return named, ()
         needs = self._needs(rivals)
-        alternatives = (self._causes(one, common, {})[len(common) :] for one in rivals)
+        alternatives = (self._causes(explanation, common, {})[len(common) :] for explanation in rivals)
         return named, tuple(Alternative(causes, needs) for causes in alternatives)
 
     def explains(self, share: float) -> bool:
         """Tell whether causes take a share of the rms of all that was fitted away, or break a tolerance."""
-        rows, nothing = self.found.rows, self._only(self.search.zero, ())
+        rows, nothing = self.result.rows, self._only(self.search.zero, ())
         left = cost(self.model, self.state, rows)
         if self.outliers is not None or left < (1.0 - share) ** 2 * cost(self.model, nothing, rows):
             return True
@@ -152,14 +152,14 @@ class ExplanationBuilder:
     def refused(self) -> tuple[Refused, ...]:
         """Return what the gate refused though it leaves less, each with the rms before and after all."""
         rows = self.search.spread(ORDERED)
-        before, found = self._left(self.search.zero, (), rows), list[Refused]()
-        for one, reason in self.found.refused:
-            after = rms(self.model.deviation(self.search.placed(one.state, self.found.rows), rows).T)
-            parts = [part for part in self._parts(one) if not part.rows and not part.usual]
-            causes = (self._of_part(part, one, 0.0, ()) for part in parts)
+        before, refusals = self._left(self.search.zero, (), rows), list[Refused]()
+        for explanation, reason in self.result.refused:
+            after = rms(self.model.deviation(self.search.placed(explanation.state, self.result.rows), rows).T)
+            parts = [part for part in self._parts(explanation) if not part.rows and not part.usual]
+            causes = (self._of_part(part, explanation, 0.0, ()) for part in parts)
             changed = tuple(replace(cause, rms_before=before, rms_after=after) for cause in causes)
-            found.append(Refused(changed, reason, self._needs([one, self.found.best])))
-        return tuple(found)
+            refusals.append(Refused(changed, reason, self._needs([explanation, self.result.best])))
+        return tuple(refusals)
 
     def after(self) -> FloatArray:
         """Return what the causes leave in [m] or [rad], shape (k, n); NaN of rows that are left out."""
@@ -174,17 +174,17 @@ class ExplanationBuilder:
         best, *others = every
         rivals, twins = [best], dict[Part, list[str]]()
         own = set(self._parts(best))
-        rows = replace(self.found.rows, at=self.search.spread(COARSE))
-        for one in others:
-            mine, theirs = own - set(self._parts(one)), set(self._parts(one)) - own
-            if self._alike(mine, theirs) and self.search.is_equivalent(best.state, one.state, rows):
+        rows = replace(self.result.rows, at=self.search.spread(COARSE))
+        for explanation in others:
+            mine, theirs = own - set(self._parts(explanation)), set(self._parts(explanation)) - own
+            if self._alike(mine, theirs) and self.search.is_equivalent(best.state, explanation.state, rows):
                 continue
-            if len(mine) == len(theirs) == 1 and self._same_effect(best.state, one.state, rows.at):
+            if len(mine) == len(theirs) == 1 and self._same_effect(best.state, explanation.state, rows.at):
                 (part,), (other,) = mine, theirs
-                if other.group < 0 or self._is_usual_size(other.group, one.state):
-                    twins.setdefault(part, []).append(self._short_name(other, one))
+                if other.group < 0 or self._is_usual_size(other.group, explanation.state):
+                    twins.setdefault(part, []).append(self._short_name(other, explanation))
             else:
-                rivals.append(one)
+                rivals.append(explanation)
         return rivals, twins
 
     def _alike(self, mine: set[Part], theirs: set[Part]) -> bool:
@@ -200,69 +200,72 @@ class ExplanationBuilder:
         known = np.isfinite(between).all(axis=0)
         return bool(known.any() and np.sqrt(np.mean(between[:, known] ** 2)) < 0.01)
 
-    def _relevant(self, one: Explanation) -> bool:
+    def _relevant(self, explanation: Explanation) -> bool:
         """Tell whether each cause of an explanation has a number whose interval lies beside 0."""
         return all(
-            (np.abs(one.state.of(self.model.groups[g])) > self._half_width(one, g)).any() for g in one.subset
+            (np.abs(explanation.state.of(self.model.groups[g])) > self._half_width(explanation, g)).any()
+            for g in explanation.subset
         )
 
-    def _parts(self, one: Explanation) -> list[Part]:
+    def _parts(self, explanation: Explanation) -> list[Part]:
         """Return the causes of an explanation: rows, what is usual, edits, then groups."""
         rows = [] if self.outliers is None else [self.outliers]
-        rows += [Part(usual=True)] if self._usual_columns(one) else []
+        rows += [Part(usual=True)] if self._usual_columns(explanation) else []
         return [
             *rows,
-            *(Part(edit) for edit in one.state.edits),
-            *(Part(group=g) for g in sorted(one.subset)),
+            *(Part(edit) for edit in explanation.state.edits),
+            *(Part(group=g) for g in sorted(explanation.subset)),
         ]
 
-    def _causes(self, one: Explanation, common: set[Part], twins: dict[Part, list[str]]) -> tuple[Cause, ...]:
+    def _causes(
+        self, explanation: Explanation, common: set[Part], twins: dict[Part, list[str]]
+    ) -> tuple[Cause, ...]:
         """Return the causes of an explanation: what all explanations have in common, then the others.
 
         Of both clocks first, then what takes the most away after those before it.
         """
-        rest, order = self._parts(one), list[Part]()
+        rest, order = self._parts(explanation), list[Part]()
         few = self.search.spread(ORDERED)
         if self.outliers is not None:
             few = np.union1d(few, self.outliers.rows)
         while rest:
             next_ones = [part for part in rest if part in common] or rest
             clocks = [part for part in next_ones if self._kind(part) in CLOCKS]
-            left = {part: self._left(one.state, [*order, part], few) for part in clocks or next_ones}
+            left = {part: self._left(explanation.state, [*order, part], few) for part in clocks or next_ones}
             order.append(min(left, key=lambda part: left[part]))
             rest.remove(order[-1])
-        after = [self._left(one.state, order[:k]) for k in range(len(order) + 1)]
+        after = [self._left(explanation.state, order[:k]) for k in range(len(order) + 1)]
         nothing = self.before
         causes = []
         for k, part in enumerate(order):
-            alone = self._deviation(self._only(one.state, (part,)))
+            alone = self._deviation(self._only(explanation.state, (part,)))
             made = nothing[:, list(part.rows)] if part.rows else nothing - alone
             size = np.sqrt((made**2).sum(axis=0)) if self.metres else np.abs(made).max(axis=0)
             effect = float(np.nanmax(size, initial=0.0))
             causes.append(
                 replace(
-                    self._of_part(part, one, effect, twins.get(part, ())),
+                    self._of_part(part, explanation, effect, twins.get(part, ())),
                     rms_before=after[k], rms_after=after[k + 1],
-                    rms_alone=self._left(one.state, (part,)),
+                    rms_alone=self._left(explanation.state, (part,)),
                     effect=effect, breaks=self.breaks(made),
                 )
             )  # fmt: skip
         return tuple(causes)
 
-    def _of_part(self, part: Part, one: Explanation, effect: float, twins: Sequence[str]) -> Cause:
+    def _of_part(self, part: Part, explanation: Explanation, effect: float, twins: Sequence[str]) -> Cause:
         """Return a cause without what it changes."""
         if part.rows:
             rows = tuple(self.sample[list(part.rows)].tolist())
             return Cause("outliers", "rows", rows=rows, value=(effect,), unit="m" if self.metres else "rad")
         if part.usual:
             return Cause("own_geometry", "arm")
-        cause = self._of_edit(part.edit) if part.edit else self._of_group(part.group, one)
+        cause = self._of_edit(part.edit) if part.edit else self._of_group(part.group, explanation)
         return replace(cause, twins=(*cause.twins, *(name for name in twins if name not in cause.twins)))
 
-    def _usual_columns(self, one: Explanation) -> list[int]:
+    def _usual_columns(self, explanation: Explanation) -> list[int]:
         """Return the places of what arms usually differ by, where it was fitted beside a cause."""
-        columns = self._columns(set(self.search.usual) - one.subset)
-        return [c for c in columns if one.state.values[c]]
+        columns = self._columns(set(self.search.usual) - explanation.subset)
+        return [c for c in columns if explanation.state.values[c]]
 
     def _kind(self, part: Part) -> str:
         if part.rows or part.usual:
@@ -298,10 +301,10 @@ class ExplanationBuilder:
             columns = list(self.model.groups[g].columns)
             values[columns] = state.values[columns]
         if Part(usual=True) in kept:
-            columns = self._columns(set(self.search.usual) - self.found.best.subset)
+            columns = self._columns(set(self.search.usual) - self.result.best.subset)
             values[columns] = state.values[columns]
         edits = tuple(edit for edit in state.edits if Part(edit) in kept)
-        rows = self.found.rows
+        rows = self.result.rows
         few = replace(rows, at=rows.at[:: max(len(rows.at) // PLACED, 1)])
         return self.search.placed(State(values, edits), few)
 
@@ -319,10 +322,10 @@ class ExplanationBuilder:
         unit = "turns" if edit.kind == "turns" else ""
         return Cause(edit.kind, name, joints, value=value, unit=unit, from_sample=first)
 
-    def _of_group(self, g: int, one: Explanation) -> Cause:
+    def _of_group(self, g: int, explanation: Explanation) -> Cause:
         """Return a cause of some size, with its interval and its twins."""
         group = self.model.groups[g]
-        values, reach = one.state.of(group), self._half_width(one, g)
+        values, reach = explanation.state.of(group), self._half_width(explanation, g)
         nominal = 1.0 if group.kind == "joint_scale" else 0.0
         low, middle, high = (
             tuple((nominal + part).tolist()) for part in (values - reach, values, values + reach)
@@ -330,14 +333,14 @@ class ExplanationBuilder:
         joint = () if group.joint is None else (self.names[group.joint],)
         return Cause(
             group.kind, self._name(group), joint, group.segment, group.axis, middle, group.unit, low, high,
-            twins=tuple(dict.fromkeys(self._twins(g, one.state))),
+            twins=tuple(dict.fromkeys(self._twins(g, explanation.state))),
         )  # fmt: skip
 
     def _name(self, group: Group) -> str:
         """Return what a cause is of, a joint as the arm calls it."""
         return group.name if group.joint is None else self.own_names[group.joint]
 
-    def _short_name(self, part: Part, one: Explanation) -> str:
+    def _short_name(self, part: Part, explanation: Explanation) -> str:
         """Return what a cause is called among twins."""
         if part.rows:
             return "outliers"
@@ -350,37 +353,37 @@ class ExplanationBuilder:
         joint = () if group.joint is None else (self.names[group.joint],)
         return Cause(group.kind, self._name(group), joint, group.segment, group.axis, unit=group.unit)
 
-    def _half_width(self, one: Explanation, g: int) -> FloatArray:
+    def _half_width(self, explanation: Explanation, g: int) -> FloatArray:
         """Return half the 95 % interval of a group's numbers, all numbers of the explanation fitted together.
 
         By batch means in correlated noise, not below what noise of the floor would make.
         """
-        columns = self._columns(one.subset)
-        covariance, free = self._covariance(one)
+        columns = self._columns(explanation.subset)
+        covariance, free = self._covariance(explanation)
         own = [columns.index(c) for c in self.model.groups[g].columns]
         return np.asarray(student_quantile(free) * np.sqrt(np.maximum(np.diag(covariance)[own], 0.0)))
 
     def _columns(self, subset: Iterable[int]) -> list[int]:
         return [c for h in sorted(subset) for c in self.model.groups[h].columns]
 
-    def _covariance(self, one: Explanation) -> tuple[FloatArray, int]:
+    def _covariance(self, explanation: Explanation) -> tuple[FloatArray, int]:
         """Return the covariance of the numbers of an explanation, and its degrees of freedom."""
-        key = one.state.edits, one.subset
+        key = explanation.key
         if key not in self._covariances:
-            self._covariances[key] = self._estimate_covariance(one)
+            self._covariances[key] = self._estimate_covariance(explanation)
         return self._covariances[key]
 
     @cached_property
     def _covariances(self) -> dict[object, tuple[FloatArray, int]]:
         return {}
 
-    def _estimate_covariance(self, one: Explanation) -> tuple[FloatArray, int]:
-        taken = one.subset | set(self.search.forced)
-        rows, groups = self.found.rows, [self.model.groups[h] for h in sorted(taken)]
+    def _estimate_covariance(self, explanation: Explanation) -> tuple[FloatArray, int]:
+        taken = explanation.subset | set(self.search.forced)
+        rows, groups = self.result.rows, [self.model.groups[h] for h in sorted(taken)]
         columns = self._columns(taken)
 
         def scores_of(block: slice) -> tuple[FloatArray, FloatArray]:
-            left, jacobian = self.model.linear(one.state, rows.at[block], groups)
+            left, jacobian = self.model.linear(explanation.state, rows.at[block], groups)
             known = np.isfinite(left).all(axis=0)
             left, jacobian = (part[..., known] * rows.weight[:, np.newaxis] for part in (left, jacobian))
             flat = jacobian.reshape(len(columns), -1)
@@ -391,18 +394,18 @@ class ExplanationBuilder:
         size = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
         inverse = np.linalg.pinv(gram / size / size[:, np.newaxis], rcond=1e-12, hermitian=True)
         inverse = inverse / size / size[:, np.newaxis]
-        tau = self.found.tau if self.search.timed else 1.0
+        tau = self.result.tau if self.search.timed else 1.0
         omega, free = batch_covariance(scores - scores.mean(axis=0), tau)
         floor = float(np.mean((self.search.floor * rows.weight) ** 2))
         covariance = inverse @ omega @ inverse + floor * inverse
-        at = np.searchsorted(columns, self._columns(one.subset))
+        at = np.searchsorted(columns, self._columns(explanation.subset))
         return covariance[np.ix_(at, at)], free
 
     def _twins(self, g: int, state: State) -> Iterator[str]:
         """Yield the names of what would do the very same as a group, or as one of its three numbers."""
         groups, group = self.model.groups, self.model.groups[g]
         for h, other in enumerate(groups):
-            stands = self.found.twins.get(h)
+            stands = self.result.twins.get(h)
             single = len(group.columns) == len(other.columns) == 1
             apart = single if stands is None else not groups[stands].is_of_frame(group)
             if apart or other.is_of_frame(group):
@@ -418,8 +421,8 @@ class ExplanationBuilder:
 
     def _stays_same(self, state: State, c: int, d: int) -> bool:
         """Tell whether a number in place of another leaves the same at its full size."""
-        other = self.search.exchange(state, c, d, self.found.normal.gram)
-        some = replace(self.found.rows, at=self.search.spread(COARSE))
+        other = self.search.exchange(state, c, d, self.result.normal.gram)
+        some = replace(self.result.rows, at=self.search.spread(COARSE))
         (h,) = (h for h, group in enumerate(self.model.groups) if group.columns == (d,))
         return self._is_usual_size(h, other) and self.search.is_equivalent(state, other, some)
 
@@ -430,26 +433,26 @@ class ExplanationBuilder:
 
     def _same(self, c: int, d: int) -> bool:
         """Tell whether two columns have one direction."""
-        gram = self.found.normal.gram
+        gram = self.result.normal.gram
         size = float(np.sqrt(max(gram[c, c], 0.0) * max(gram[d, d], 0.0)))  # rounding may leave less than 0
         return size > 0.0 and 1.0 - abs(float(gram[c, d])) / size < EXACT
 
     def _needs(self, every: Sequence[Explanation]) -> str:
         """Return the joint whose motion would decide between explanations; empty if none would."""
-        joints = {j for one in every for j in self._joints_of(one)}
+        joints = {j for explanation in every for j in self._joints_of(explanation)}
         if len(joints) == 1:
             (only,) = joints
             return "" if only is None else self.own_names[only]
         if not isinstance(self.model, ArmModel):
             return ""
-        first, second = (one.state for one in every[:2])
+        first, second = (explanation.state for explanation in every[:2])
         decides = deciding_joint(self.model, first, second, self.search.spread(SWEPT))
         return "" if decides is None else self.own_names[decides]
 
-    def _joints_of(self, one: Explanation) -> set[int | None]:
+    def _joints_of(self, explanation: Explanation) -> set[int | None]:
         """Return the joints that an explanation changes, with None if a part of it changes no joint."""
-        of_edits: set[int | None] = {j for edit in one.state.edits for j in edit.joints}
-        return of_edits | {self.model.groups[g].joint for g in one.subset}
+        of_edits: set[int | None] = {j for edit in explanation.state.edits for j in edit.joints}
+        return of_edits | {self.model.groups[g].joint for g in explanation.subset}
 
 
 def _begin_abruptly(left: FloatArray, size: FloatArray, far: IntArray) -> bool:

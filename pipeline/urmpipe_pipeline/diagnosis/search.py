@@ -80,6 +80,11 @@ class Explanation(NamedTuple):
         """How many causes it takes."""
         return len(self.subset) + len(self.state.edits)
 
+    @property
+    def key(self) -> tuple[Edits, Subset]:
+        """Which causes it takes, whatever their sizes."""
+        return self.state.edits, self.subset
+
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
@@ -177,21 +182,21 @@ class Search:
         while True:
             coarse = replace(coarse, weight=weight)
             further = add_discrete_cause(self.model, self.edits, best.state, coarse, self.floor)
-            found = None if further is None else self._explained(medium, further, tau)
-            if found is None or found.score >= best.score:
+            candidate = None if further is None else self._explained(medium, further, tau)
+            if candidate is None or candidate.score >= best.score:
                 break
-            best, others = found, [best, *others]
+            best, others = candidate, [best, *others]
         for edit in best.state.edits:  # what a start took for granted
             without = replace(best.state, edits=_but(best.state.edits, edit))
             if not self._is_needless(without, best, coarse):
-                found = self._explained(medium, without, tau)
-                if found.score < best.score:
-                    best, others = found, [best, *others]
+                candidate = self._explained(medium, without, tau)
+                if candidate.score < best.score:
+                    best, others = candidate, [best, *others]
         search = self
         if best.size > 2 or cost(self.model, best.state, coarse) > NOISE:
-            zeros, found = self._with_zeros(medium, tau)
-            if found.score < best.score:
-                search, best, others = zeros, found, [best, *others]
+            zeros, candidate = self._with_zeros(medium, tau)
+            if candidate.score < best.score:
+                search, best, others = zeros, candidate, [best, *others]
         weight = self._weight(weight, best.state, self.model.groups)
         rows = Rows(self.spread(MANY), weight, self._least(weight))
         return search._settled(rows, best, others)
@@ -207,8 +212,8 @@ class Search:
             most = np.inf if best is None else best.score + margin
             every.append(self._explained(medium, start, tau, most))
         distinct: dict[object, Explanation] = {}
-        for one in sorted(every, key=_score):
-            distinct.setdefault((one.state.edits, one.subset), one)
+        for candidate in sorted(every, key=_score):
+            distinct.setdefault(candidate.key, candidate)
         return [*distinct.values()]
 
     def _starts(self, ranked: Sequence[Edits], coarse: Rows) -> Iterator[State]:
@@ -274,8 +279,8 @@ class Search:
 
     def is_equivalent(self, state: State, other: State, rows: Rows) -> bool:
         """Tell whether two explanations leave the same at full size: a difference below the floor."""
-        one, two = (self.model.residual(self.placed(each, rows), rows.at) for each in (state, other))
-        between = (one - two) / self.floor[:, np.newaxis]
+        first, second = (self.model.residual(self.placed(each, rows), rows.at) for each in (state, other))
+        between = (first - second) / self.floor[:, np.newaxis]
         known = np.isfinite(between).all(axis=0)
         return bool(known.any() and np.mean(between[:, known] ** 2) < 1.0)
 
@@ -408,141 +413,142 @@ class Search:
     def _settled(self, rows: Rows, best: Explanation, others: Sequence[Explanation]) -> SearchResult:
         """Return what many rows decide, from what some select."""
         some = replace(rows, at=self.spread(SOME))
-        found = self._stable(some, best.state, None)
-        near = sorted((one for one in others if one.score < best.score + FAR), key=_score)
-        near = [self._explained(found.rows, one.state, found.tau) for one in near[:SHOWN]]
-        for one in near:
-            if one.score < found.score(found.tau):
-                again = self._stable(some, one.state, None)
-                found = min(found, again, key=lambda each, tau=found.tau: each.score(tau))  # type: ignore[misc]
-        search, found = self._simplified(some, found)
-        search, found, rivals = search._with_twins(some, found)
-        most = found.score(found.tau) + NEAR
+        fit = self._stable(some, best.state, None)
+        near = sorted((candidate for candidate in others if candidate.score < best.score + FAR), key=_score)
+        near = [self._explained(fit.rows, candidate.state, fit.tau) for candidate in near[:SHOWN]]
+        for candidate in near:
+            if candidate.score < fit.score(fit.tau):
+                again = self._stable(some, candidate.state, None)
+                fit = min(fit, again, key=lambda each, tau=fit.tau: each.score(tau))  # type: ignore[misc]
+        search, fit = self._simplified(some, fit)
+        search, fit, rivals = search._with_twins(some, fit)
+        most = fit.score(fit.tau) + NEAR
         if len(rows.at) > len(some.at):
-            found = search._stable(rows, found.state, found.subset)
-        same = found.state.edits, found.subset
-        near = [one for one in (*near, *rivals) if one.score < most and (one.state.edits, one.subset) != same]
-        found = search._without_minor(found)
-        result = search._concluded(found, list(search._rescored(near, found)))
+            fit = search._stable(rows, fit.state, fit.subset)
+        same = fit.state.edits, fit.subset
+        near = [
+            candidate for candidate in (*near, *rivals) if candidate.score < most and candidate.key != same
+        ]
+        fit = search._without_minor(fit)
+        result = search._concluded(fit, list(search._rescored(near, fit)))
         return search._without_changing(result)
 
-    def _simplified(self, rows: Rows, found: SelfConsistentFit) -> tuple[Search, SelfConsistentFit]:
+    def _simplified(self, rows: Rows, fit: SelfConsistentFit) -> tuple[Search, SelfConsistentFit]:
         """Return an explanation with one cause at full size for several numbers, and what finds it.
 
         The zero of the last joint is a shift of the tool that takes up to three numbers; a base turned by
         half a turn and back by a number is turned by one.
         """
         search = self
-        for state, subset in [*self._single_causes(found), *self._turned_at_once(found)]:
-            now, start = self._fitted_score(found, found), self.fitted(state, subset, found.rows)
-            if found.selection.score(cost(self.model, start, found.rows), subset) > now + FAR:
+        for state, subset in [*self._single_causes(fit), *self._turned_at_once(fit)]:
+            now, start = self._fitted_score(fit, fit), self.fitted(state, subset, fit.rows)
+            if fit.selection.score(cost(self.model, start, fit.rows), subset) > now + FAR:
                 continue
             again = replace(self, first=(*(subset & self._distinct[1].keys()), *self.first))
             there = again._stable(rows, start, None)
-            if self._fitted_score(there, found) < now:
-                search, found = again, there
-        return search, found
+            if self._fitted_score(there, fit) < now:
+                search, fit = again, there
+        return search, fit
 
-    def _fitted_score(self, one: SelfConsistentFit, beside: SelfConsistentFit) -> float:
+    def _fitted_score(self, fit: SelfConsistentFit, other: SelfConsistentFit) -> float:
         """Return the score of what an explanation really leaves, on the rows and with the tau of another."""
-        selection = replace(one.selection, independent=beside.selection.independent)
-        return selection.score(cost(self.model, one.state, beside.rows), one.subset)
+        selection = replace(fit.selection, independent=other.selection.independent)
+        return selection.score(cost(self.model, fit.state, other.rows), fit.subset)
 
-    def _single_causes(self, found: SelfConsistentFit) -> Iterator[tuple[State, Subset]]:
+    def _single_causes(self, fit: SelfConsistentFit) -> Iterator[tuple[State, Subset]]:
         """Yield explanations with one number in place of those of a frame."""
         groups = self.model.groups
-        every = sorted({*self._distinct[0], *self._distinct[1]} - found.subset)
+        every = sorted({*self._distinct[0], *self._distinct[1]} - fit.subset)
         single = [g for g in every if len(groups[g].columns) == 1]
-        coarse = replace(found.rows, at=self.spread(COARSE))
+        coarse = replace(fit.rows, at=self.spread(COARSE))
         for kind in FRAMES:
-            own = frozenset(g for g in found.subset if groups[g].kind == kind)
+            own = frozenset(g for g in fit.subset if groups[g].kind == kind)
             if isinstance(self.model, ArmModel) and not self.forced and len(self._columns(sorted(own))) > 1:
-                rest = self._bare(found.state, found.subset - own)
+                rest = self._bare(fit.state, fit.subset - own)
                 for state in find_large_causes(self.model, rest, coarse, single):
                     (c,) = np.flatnonzero(state.values != rest.values).tolist()
                     alone = next(g for g in single if groups[g].columns[0] == c)
-                    yield state, found.subset - own | {alone}
+                    yield state, fit.subset - own | {alone}
 
-    def _turned_at_once(self, found: SelfConsistentFit) -> Iterator[tuple[State, Subset]]:
+    def _turned_at_once(self, fit: SelfConsistentFit) -> Iterator[tuple[State, Subset]]:
         """Yield explanations with a number alone in place of a turned base and that number about its axis."""
-        for edit in found.state.edits:
-            for g in found.subset if edit.kind == "base_rotation" else ():
+        for edit in fit.state.edits:
+            for g in fit.subset if edit.kind == "base_rotation" else ():
                 group = self.model.groups[g]
                 if group.kind == edit.kind and group.axis is not None:
                     axis, angle = edit.axis_angle
-                    values = found.state.values.copy()
+                    values = fit.state.values.copy()
                     values[list(group.columns)] += angle * np.dot(axis, group.axis)
-                    yield State(values, _but(found.state.edits, edit)), found.subset
+                    yield State(values, _but(fit.state.edits, edit)), fit.subset
 
-    def _without_minor(self, found: SelfConsistentFit) -> SelfConsistentFit:
+    def _without_minor(self, fit: SelfConsistentFit) -> SelfConsistentFit:
         """Return an explanation without what explains little, where more than noise is left.
 
         What is not among the causes that are looked for is otherwise shared out among many of them.
         """
-        idle = [edit for edit in found.state.edits if self._does_nothing(found, edit)]
+        idle = [edit for edit in fit.state.edits if self._does_nothing(fit, edit)]
         for edit in idle:
-            found = found._replace(state=replace(found.state, edits=_but(found.state.edits, edit)))
-        while (now := cost(self.model, found.state, found.rows)) > NOISE:
-            state, subset = found.state, found.subset
+            fit = fit._replace(state=replace(fit.state, edits=_but(fit.state.edits, edit)))
+        while (now := cost(self.model, fit.state, fit.rows)) > NOISE:
+            state, subset = fit.state, fit.subset
             less = [(replace(state, edits=_but(state.edits, edit)), subset) for edit in state.edits]
             less += [(state, subset - {g}) for g in sorted(subset)]
             fits = [
-                (self.beside_usual(self.fitted(*one, found.rows), one[1], found.rows), one[1]) for one in less
+                (self.beside_usual(self.fitted(start, kept, fit.rows), kept, fit.rows), kept)
+                for start, kept in less
             ]
-            costs = [cost(self.model, one, found.rows) for one, _ in fits]
+            costs = [cost(self.model, candidate, fit.rows) for candidate, _ in fits]
             if not costs or now <= MAJOR * min(costs):
                 break
             there, kept = fits[int(np.argmin(costs))]
-            found = found._replace(
-                state=there, subset=kept, selection=self._selection(there, found.rows, found.tau)
-            )
-        return found
+            fit = fit._replace(state=there, subset=kept, selection=self._selection(there, fit.rows, fit.tau))
+        return fit
 
-    def _without_changing(self, found: SearchResult) -> SearchResult:
+    def _without_changing(self, result: SearchResult) -> SearchResult:
         """Return what was found without the causes that change during the log, what is left fitted again."""
-        state, subset, _ = found.best
-        changing, edits = find_changing(self, state, subset, found.rows)
+        state, subset, _ = result.best
+        changing, edits = find_changing(self, state, subset, result.rows)
         if not changing and not edits:
-            return found
+            return result
         kept = subset - changing
         start = replace(state, edits=tuple(edit for edit in state.edits if edit not in edits))
-        there = self.beside_usual(self.fitted(start, kept, found.rows), kept, found.rows)
-        if cost(self.model, there, found.rows) > PROMISED * cost(self.model, self.zero, found.rows):
-            there, kept = self.placed(self.zero, found.rows), frozenset()
-        selection = self._selection(there, found.rows, found.tau)
+        there = self.beside_usual(self.fitted(start, kept, result.rows), kept, result.rows)
+        if cost(self.model, there, result.rows) > PROMISED * cost(self.model, self.zero, result.rows):
+            there, kept = self.placed(self.zero, result.rows), frozenset()
+        selection = self._selection(there, result.rows, result.tau)
         variance = max(float(selection.left([kept])[0]), selection.floor)
         best = Explanation(there, kept, float(selection.scores([kept])[0]))
         refused = (Explanation(replace(state, edits=edits), frozenset(changing), np.inf), NOT_CONSTANT)
         result = replace(
-            found, best=best, others=(), variance=variance, normal=selection.normal,
-            refused=(*found.refused, refused),
+            result, best=best, others=(), variance=variance, normal=selection.normal,
+            refused=(*result.refused, refused),
         )  # fmt: skip
         return self._without_changing(result)
 
-    def _does_nothing(self, found: SelfConsistentFit, edit: Edit) -> bool:
+    def _does_nothing(self, fit: SelfConsistentFit, edit: Edit) -> bool:
         """Tell whether a discrete cause leaves no less than the floor on the rows that count."""
-        without = replace(found.state, edits=_but(found.state.edits, edit))
-        gain = cost(self.model, without, found.rows) - cost(self.model, found.state, found.rows)
-        return gain < found.selection.floor
+        without = replace(fit.state, edits=_but(fit.state.edits, edit))
+        gain = cost(self.model, without, fit.rows) - cost(self.model, fit.state, fit.rows)
+        return gain < fit.selection.floor
 
-    def _rescored(self, near: Sequence[Explanation], found: SelfConsistentFit) -> Iterator[Explanation]:
+    def _rescored(self, near: Sequence[Explanation], fit: SelfConsistentFit) -> Iterator[Explanation]:
         """Yield rivals with their numbers and scores on the rows that decided, those that are still near."""
-        most = found.score(found.tau) + NEAR
-        for one in near:
-            if one.state.edits != found.state.edits:
-                yield one
-            elif (there := self._refitted(found, one.state, one.subset)).score < most:
+        most = fit.score(fit.tau) + NEAR
+        for candidate in near:
+            if candidate.state.edits != fit.state.edits:
+                yield candidate
+            elif (there := self._refitted(fit, candidate.state, candidate.subset)).score < most:
                 yield there
 
-    def _refitted(self, found: SelfConsistentFit, start: State, subset: Subset) -> Explanation:
+    def _refitted(self, fit: SelfConsistentFit, start: State, subset: Subset) -> Explanation:
         """Return another subset with the same discrete causes, and its score at full size."""
-        there = self.fitted(start, subset, found.rows)
-        least = max(cost(self.model, found.state, found.rows), np.finfo(float).tiny)
-        left = float(found.selection.left([found.subset])[0]) * cost(self.model, there, found.rows) / least
-        return Explanation(there, subset, found.selection.score(left, subset))
+        there = self.fitted(start, subset, fit.rows)
+        least = max(cost(self.model, fit.state, fit.rows), np.finfo(float).tiny)
+        left = float(fit.selection.left([fit.subset])[0]) * cost(self.model, there, fit.rows) / least
+        return Explanation(there, subset, fit.selection.score(left, subset))
 
     def _with_twins(
-        self, rows: Rows, found: SelfConsistentFit
+        self, rows: Rows, fit: SelfConsistentFit
     ) -> tuple[Search, SelfConsistentFit, list[Explanation]]:
         """Return the best explanation with twins in place of its causes, what finds it, and its rivals.
 
@@ -550,60 +556,62 @@ class Search:
         """
         search, rivals = self, []
         for _ in range(ROUNDS):
-            others = search._exchanged(found)
-            now = found.score(found.tau)
-            rivals += [one for _, one in others]
-            better = [(twin, one) for twin, one in others if one.score < now + (len(found.subset) > 1)]
+            others = search._exchanged(fit)
+            now = fit.score(fit.tau)
+            rivals += [candidate for _, candidate in others]
+            most = now + (len(fit.subset) > 1)
+            better = [(twin, candidate) for twin, candidate in others if candidate.score < most]
             if not better:
                 break
             twin, other = min(better, key=lambda each: each[1].score)
             again = replace(search, first=(twin, *search.first))
             there = again._stable(rows, other.state, None)
-            if there.score(found.tau) >= now:
+            if there.score(fit.tau) >= now:
                 break
-            rivals.append(Explanation(*found[:2], now))
-            search, found = again, there
-        return search, found, rivals
+            rivals.append(Explanation(*fit[:2], now))
+            search, fit = again, there
+        return search, fit, rivals
 
-    def _exchanged(self, found: SelfConsistentFit) -> list[tuple[int, Explanation]]:
+    def _exchanged(self, fit: SelfConsistentFit) -> list[tuple[int, Explanation]]:
         """Return explanations with a twin that differs at full size in place of a cause, and that twin."""
-        gram, some = found.selection.normal.gram, replace(found.rows, at=self.spread(COARSE))
+        gram, some = fit.selection.normal.gram, replace(fit.rows, at=self.spread(COARSE))
         exchanged = []
         for twin, g in self._distinct[1].items():
-            if g in found.subset:
+            if g in fit.subset:
                 c, d = self._columns([g, twin])
-                other = self.exchange(found.state, c, d, gram)
-                if not self.is_equivalent(found.state, other, some):
-                    exchanged.append((twin, self._refitted(found, other, found.subset - {g} | {twin})))
+                other = self.exchange(fit.state, c, d, gram)
+                if not self.is_equivalent(fit.state, other, some):
+                    exchanged.append((twin, self._refitted(fit, other, fit.subset - {g} | {twin})))
         return exchanged
 
-    def _concluded(self, found: SelfConsistentFit, near: list[Explanation]) -> SearchResult:
+    def _concluded(self, fit: SelfConsistentFit, near: list[Explanation]) -> SearchResult:
         """Return an explanation with what stays of it, and with those that are not told from it.
 
         Who takes more causes has to leave less, and each of them moves the floor or more.
         """
-        state, subset, tau, rows, selection = found
+        state, subset, tau, rows, selection = fit
+        moving = selection.moving
         final = Explanation(state, subset, float(selection.scores([subset])[0]))
         variance = max(float(selection.left([subset])[0]), selection.floor)
-        near += self._neighbours(found, final.score + NEAR)
+        near += self._neighbours(fit, final.score + NEAR)
         simple, least = final.size, cost(self.model, state, rows)
         near = [
-            one for one in near
-            if (one.size <= simple or cost(self.model, one.state, rows) < least)
-            and (one.state.edits != state.edits or selection.moving(one.subset) == one.subset)
+            candidate for candidate in near
+            if (candidate.size <= simple or cost(self.model, candidate.state, rows) < least)
+            and (candidate.state.edits != state.edits or moving(candidate.subset) == candidate.subset)
         ]  # fmt: skip
-        near = list({(one.state.edits, one.subset): one for one in near}.values())
+        near = list({candidate.key: candidate for candidate in near}.values())
         shown = tuple(sorted(near, key=_score)[:SHOWN])
-        refused = tuple(self._preferred(found, final.score))
+        refused = tuple(self._preferred(fit, final.score))
         return SearchResult(final, shown, rows, tau, variance, selection.normal, self._distinct[1], refused)
 
-    def _preferred(self, found: SelfConsistentFit, score: float) -> Iterator[tuple[Explanation, str]]:
+    def _preferred(self, fit: SelfConsistentFit, score: float) -> Iterator[tuple[Explanation, str]]:
         """Yield what the gate refused and the criterion prefers: the best of each reason."""
-        some = replace(found.rows, at=found.rows.at[:: max(len(found.rows.at) // COARSE, 1)])
+        some = replace(fit.rows, at=fit.rows.at[:: max(len(fit.rows.at) // COARSE, 1)])
         for reason in dict.fromkeys(reason for _, reason in self._refused):
-            every = {one.subset: one for one, why in self._refused if why == reason}.values()
-            one = min(every, key=lambda each: cost(self.model, each.state, some))
-            again = self._refitted(found, one.state, one.subset)
+            every = {each.subset: each for each, why in self._refused if why == reason}.values()
+            candidate = min(every, key=lambda each: cost(self.model, each.state, some))
+            again = self._refitted(fit, candidate.state, candidate.subset)
             if again.score < score:
                 yield again, reason
 
@@ -668,19 +676,20 @@ class Search:
             autocorrelation_time(left[one].T, float((self.floor[one] ** 2).sum())) for one in of_blocks
         )
 
-    def _neighbours(self, found: SelfConsistentFit, most: float) -> Iterator[Explanation]:
+    def _neighbours(self, fit: SelfConsistentFit, most: float) -> Iterator[Explanation]:
         """Yield other subsets with a score below `most`, neither a part of the best nor around it."""
-        for score, subset in found.selection.exchanged(found.subset, self._distinct[0])[:SHOWN]:
+        for score, subset in fit.selection.exchanged(fit.subset, self._distinct[0])[:SHOWN]:
             if score >= most:
                 break
-            one = self._refitted(found, found.state, subset)
-            moved = all(one.state.of(self.model.groups[g]).any() for g in subset)  # else the fit got nowhere
-            if one.score < most and moved and not self._unbelievable(one.state, subset, found.rows):
-                yield one
+            candidate = self._refitted(fit, fit.state, subset)
+            numbers = (candidate.state.of(self.model.groups[g]) for g in subset)
+            moved = all(number.any() for number in numbers)  # else the fit got nowhere
+            if candidate.score < most and moved and not self._unbelievable(candidate.state, subset, fit.rows):
+                yield candidate
 
 
-def _score(one: Explanation) -> float:
-    return one.score
+def _score(explanation: Explanation) -> float:
+    return explanation.score
 
 
 def _but(edits: Edits, gone: Edit) -> Edits:

@@ -119,7 +119,7 @@ class Question:
     not_looked_for: tuple[NotLookedFor, ...]
 
 
-def question(matched: Matched, reference: Side, log: Side) -> Question:
+def build_question(matched: Matched, reference: Side, log: Side) -> Question:
     """Return what two sides, at the same times, allow to be asked."""
     if reference.run.timed and reference.run is not log.run:
         reference = replace(reference, trajectory=reference.trajectory.rows_with_value())
