@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.arrays import FloatArray, IntArray
 
 BLOCK = 16384
 """Rows worked on at a time: long enough that NumPy outweighs Python, short enough for a core's cache."""
@@ -23,6 +23,11 @@ Result = TypeVar("Result")
 def row_blocks(count: int, size: int = BLOCK) -> list[slice]:
     """Return the slices that part `count` rows into blocks of `size`, the last one shorter."""
     return [slice(start, min(start + size, count)) for start in range(0, count, size)]
+
+
+def spread_rows(count: int, most: int) -> IntArray:
+    """Return at most so many indices of `count` rows, spread evenly from first to last, shape (k,)."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
 
 
 def norms(vectors: FloatArray) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from urmpipe_models.elementwise import Element, Vector, scale
 from urmpipe_models.hand_eye import hand_eye
 from urmpipe_models.kinematics.forward import jacobian, poses_over_log, tip_pose
 from urmpipe_models.kinematics.identification import Twist, changed, sensitivities
+from urmpipe_models.row_blocks import spread_rows
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline.diagnosis.arm_groups import cause_groups
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
@@ -54,6 +56,16 @@ class ArmModel:
     judged: FloatArray | None = None
     _placed: dict[Edits, Chain] = field(default_factory=dict)
     _twists: dict[str, list[tuple[Twist, int]]] = field(default_factory=dict, init=False)
+
+    @property
+    def unit(self) -> Literal["m", "rad"]:
+        """Of what is judged."""
+        return "m"
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether the joints themselves are judged, not positions."""
+        return False
 
     @property
     def rows(self) -> int:
@@ -106,7 +118,7 @@ class ArmModel:
 
     def _where_it_fits(self, chain: Chain, edits: Edits) -> Chain:
         """Return an arm on the base and with the tool of the least misses."""
-        rows = np.unique(np.linspace(0, self.rows - 1, min(self.rows, FITTED)).round().astype(np.int64))
+        rows = spread_rows(self.rows, FITTED)
         state = replace(zero(self.groups), edits=edits)
         q = self._joints(state, rows).q
         position, rotation = poses_over_log(chain, q.T)

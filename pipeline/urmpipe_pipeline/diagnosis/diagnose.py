@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.row_blocks import spread_rows
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.diagnosis.edits import later_edits, turn_edits
 from urmpipe_pipeline.diagnosis.explain import ExplanationBuilder
@@ -72,6 +73,8 @@ ELSEWHERE = "no change of joints or clock makes the tool centre points agree"
 LENGTHS = ("axis", "norm", "path")
 """What a tolerance of a length may be of."""
 
+SOME = 2_000  # rows, spread evenly, of which it is counted how many have all values
+
 LEAST_SAMPLES = 10
 """Of fewer samples nothing is named: a cause takes up to three numbers of three a sample."""
 
@@ -106,7 +109,7 @@ def _diagnosed(deviation: Deviation, question: Question, lag: float | None) -> D
         Search(model, edits, _floor(deviation, question), question.forced, starts, timed=timed)
     )
     built = ExplanationBuilder(
-        search, result, question.names, question.own_names, question.sample, partial(_breaks, deviation)
+        search, result, question.names, question.own_names, partial(_breaks, deviation)
     )
     causes, undecided = built.causes()
     state, after = built.state, built.after()
@@ -126,14 +129,14 @@ def _diagnosed(deviation: Deviation, question: Question, lag: float | None) -> D
         verdict=deviation.verdict,
         seen={name: share.value for name, share in deviation.shares.items()},
         samples=model.rows,
-        unit=_unit(question),
+        unit=model.unit,
         rms=before,
         causes=causes,
         undecided=undecided,
         refused=built.refused(),
         not_looked_for=question.not_looked_for,
         remainder=_remainder(deviation, model, before, left, OWN if unnamed else ""),
-        sample=question.sample,
+        sample=model.sample,
         mended=question.sign * after.T,
     )
 
@@ -146,7 +149,7 @@ def _remainder(deviation: Deviation, model: Model, before: float, left: float, w
     """
     wanted = model.wanted(np.arange(model.rows))
     moves = rms((wanted - np.nanmean(wanted, axis=1, keepdims=True)).T)
-    kinds = LENGTHS if _in_metres(model) else ("joint",)
+    kinds = ("joint",) if model.of_joints else LENGTHS
     tolerance = _tolerance(deviation, kinds, DEFAULT_TOLERANCE)
     different = left > max(tolerance, UNLIKE * moves)
     share = (left / before) ** 2 if before else 0.0
@@ -158,10 +161,10 @@ def _later(question: Question, *, timed: bool) -> Iterator[Edits]:
     model, nothing = question.model, zero(question.model.groups)
     joints_alone = isinstance(model, JointsModel)
     if timed:
-        yield from later_edits(model, question.sample, question.turning, nothing, both_ways=joints_alone)
+        yield from later_edits(model, model.sample, question.turning, nothing, both_ways=joints_alone)
     if joints_alone:
         left = residual(model, nothing, np.arange(model.rows))
-        if turns := turn_edits(left, question.sample, question.turning):
+        if turns := turn_edits(left, model.sample, question.turning):
             yield turns
 
 
@@ -220,39 +223,38 @@ def _tolerance(deviation: Deviation, kinds: tuple[str, ...], otherwise: float) -
     return min((one.tolerance for one in every if one.kind in kinds and one.tolerance), default=otherwise)
 
 
-def _breaks(deviation: Deviation, made: FloatArray) -> bool:
-    """Tell whether a deviation in [m] or [rad], shape (k, n), is out of tolerance."""
+def _breaks(deviation: Deviation, made: FloatArray, joints: bool, along: bool) -> bool:
+    """Tell whether a deviation in [m] or [rad], shape (k, n), is out of tolerance.
+
+    Args:
+        deviation: The comparison.
+        made: What a cause makes.
+        joints: Whether it is of joints; else of positions.
+        along: Whether it is along the path, and no distance from it.
+    """
     known = made[:, np.isfinite(made).all(axis=0)]
     if not known.size:
         return False
-    largest = np.abs(known).max(axis=1)
-    length = float(np.sqrt((known**2).sum(axis=0).max()))
-    sizes = {"axis": float(largest.max()), "norm": length, "path": length, "joint": float(largest.max())}
-    sizes |= dict(zip("xyz", map(float, largest), strict=False))
-    kinds = ("joint",) if not deviation.statistics else ("axis", "norm", "path", *"xyz")
-    limits = (statistic for statistic in deviation.all_statistics if statistic.kind in kinds)
-    return any(limit.tolerance and sizes[limit.kind] > limit.tolerance for limit in limits)
+    largest = np.abs(known).max(axis=1).tolist()
+    if joints:
+        sizes = dict(zip(deviation.joint_statistics, largest, strict=True))
+    else:
+        norm = float(np.sqrt((known**2).sum(axis=0).max()))
+        sizes = {**dict(zip("xyz", largest, strict=True)), "norm": norm, "path": 0.0 if along else norm}
+    every = deviation.all_statistics
+    return any(one.tolerance and sizes.get(one.quantity, 0.0) > one.tolerance for one in every)
 
 
 def _tells_nothing(question: Question) -> str:
     """Return why nothing can be told; empty where something can."""
     model = question.model
-    if model.rows < LEAST_SAMPLES:
-        return f"{model.rows} samples: fewer than {LEAST_SAMPLES}"
-    moved = np.nanmax(
-        np.ptp(model.motion.value[:, ~np.isnan(model.motion.value).any(axis=0)], axis=1), initial=0.0
-    )
-    return "the log is at rest: one pose" if moved < AT_REST else ""
-
-
-def _unit(question: Question) -> Literal["m", "rad"]:
-    """Return the unit of what is judged: that of joints alone is taken as rad."""
-    return "m" if _in_metres(question.model) else "rad"
-
-
-def _in_metres(model: Model) -> bool:
-    """Tell whether positions are judged, not joints alone."""
-    return not isinstance(model, JointsModel) or model.chain is not None
+    some = spread_rows(model.rows, SOME)
+    known = int(np.isfinite(model.residual(zero(model.groups), some)).all(axis=0).sum())
+    if known < LEAST_SAMPLES:
+        return f"{known} samples{' with all values' * (known < model.rows)}: fewer than {LEAST_SAMPLES}"
+    moved = np.fmax.reduce(model.motion.value, axis=1) - np.fmin.reduce(model.motion.value, axis=1)
+    side = "log" if question.sign > 0.0 else "reference"
+    return f"the {side} is at rest: one pose" if np.nanmax(moved, initial=0.0) < AT_REST else ""
 
 
 def _nothing(deviation: Deviation, question: Question, reason: str, tolerance: float = 0.0) -> Diagnosis:
@@ -277,12 +279,12 @@ def _nothing(deviation: Deviation, question: Question, reason: str, tolerance: f
         verdict=deviation.verdict,
         seen={name: share.value for name, share in deviation.shares.items()},
         samples=model.rows,
-        unit=_unit(question),
+        unit=model.unit,
         rms=before,
         causes=(),
         undecided=undecided,
         not_looked_for=(NotLookedFor(kinds, reason), *question.not_looked_for),
         remainder=Remainder(rms(mended.T), (rms(mended.T) / before) ** 2 if before else 1.0, reason),
-        sample=question.sample,
+        sample=model.sample,
         mended=question.sign * mended.T,
     )

@@ -9,6 +9,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.repolarizer import FULL_TURN
+from urmpipe_models.row_blocks import spread_rows
 from urmpipe_pipeline.diagnosis.fit import Model
 from urmpipe_pipeline.diagnosis.hypotheses import State
 from urmpipe_pipeline.log_edits import Edit, EditKind, Edits
@@ -45,7 +46,7 @@ def later_edits(
         both_ways: Whether half a turn ahead is another thing than half a turn back.
     """
     kinds = _LATER if both_ways else _LATER[1:]
-    rows = np.unique(np.linspace(0, model.rows - 1, min(SPREAD, model.rows)).round().astype(np.int64))
+    rows = spread_rows(model.rows, SPREAD)
     before = _squares(model.residual(start, rows))
     for j, turns in enumerate(turning):
         for kind, value in kinds if turns else ():

@@ -50,13 +50,13 @@ class Part:
         edit: The discrete cause; None of others.
         group: Place of the group; -1 of others.
         rows: Places of the rows among those compared.
-        usual: Whether it is what arms usually differ by, all of it together.
+        usual: Places of the numbers that arms usually differ by, all of them one cause; none of others.
     """
 
     edit: Edit | None = None
     group: int = -1
     rows: tuple[int, ...] = ()
-    usual: bool = False
+    usual: tuple[int, ...] = field(default=(), compare=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,27 +68,21 @@ class ExplanationBuilder:
         found: What was found.
         names: What the log calls its joints.
         own_names: What the arm calls them.
-        sample: Rows of the log that were compared, shape (n,).
-        breaks: Tells whether a deviation in [m] or [rad], shape (k, n), is out of tolerance.
+        breaks: Tells whether a deviation in [m] or [rad], shape (k, n), is out of tolerance, of joints or of
+            positions, along the path or not.
     """
 
     search: Search
     result: SearchResult
     names: tuple[str, ...]
     own_names: tuple[str, ...]
-    sample: IntArray
-    breaks: Callable[[FloatArray], bool]
+    breaks: Callable[[FloatArray, bool, bool], bool]
     _deviations: dict[tuple[bytes, Edits], FloatArray] = field(default_factory=dict)
 
     @property
     def model(self) -> Model:
         """The side that is modelled, with its data."""
         return self.search.model
-
-    @property
-    def metres(self) -> bool:
-        """Whether positions are judged, not joints alone."""
-        return not isinstance(self.model, JointsModel) or self.model.chain is not None
 
     @cached_property
     def state(self) -> State:
@@ -107,7 +101,7 @@ class ExplanationBuilder:
             return None
         size = np.sqrt((left**2).sum(axis=0))
         rest = np.setdiff1d(np.flatnonzero(known), far)
-        if rms(left.T) < SEVERAL * rms(left[:, rest].T) and not self.breaks(left[:, far]):
+        if rms(left.T) < SEVERAL * rms(left[:, rest].T) and not self._is_out(left[:, far]):
             return None
         if self.search.timed and not _begin_abruptly(left, size, far):
             return None
@@ -147,15 +141,28 @@ class ExplanationBuilder:
         left = cost(self.model, self.state, rows)
         if self.outliers is not None or left < (1.0 - share) ** 2 * cost(self.model, nothing, rows):
             return True
-        return self.breaks(self.before - self._deviation(self.state))
+        return self._is_out(self.before - self._deviation(self.state))
+
+    def _is_out(self, made: FloatArray, along: bool = False) -> bool:
+        return self.breaks(made, self.model.of_joints, along)
+
+    def _breaks_a_tolerance(self, part: Part, made: FloatArray, mended: State) -> bool:
+        """Tell whether a cause alone breaks a tolerance, of what is judged or of joints."""
+        if self._is_out(made, self._kind(part) in CLOCKS):
+            return True
+        if not isinstance(self.model, JointsModel) or self.model.of_joints or part.rows:
+            return False
+        rows = self.search.spread(ORDERED)
+        nothing = self.model.residual(self.search.zero, rows)
+        return self.breaks(nothing - self.model.residual(mended, rows), True, False)
 
     def refused(self) -> tuple[Refused, ...]:
         """Return what the gate refused though it leaves less, each with the rms before and after all."""
         rows = self.search.spread(ORDERED)
         before, refusals = self._left(self.search.zero, (), rows), list[Refused]()
-        for explanation, reason in self.result.refused:
+        for explanation, reason, subset, edits in self.result.refused:
             after = rms(self.model.deviation(self.search.placed(explanation.state, self.result.rows), rows).T)
-            parts = [part for part in self._parts(explanation) if not part.rows and not part.usual]
+            parts = [*map(Part, edits), *(Part(group=g) for g in sorted(subset))]
             causes = (self._of_part(part, explanation, 0.0, ()) for part in parts)
             changed = tuple(replace(cause, rms_before=before, rms_after=after) for cause in causes)
             refusals.append(Refused(changed, reason, self._needs([explanation, self.result.best])))
@@ -210,7 +217,8 @@ class ExplanationBuilder:
     def _parts(self, explanation: Explanation) -> list[Part]:
         """Return the causes of an explanation: rows, what is usual, edits, then groups."""
         rows = [] if self.outliers is None else [self.outliers]
-        rows += [Part(usual=True)] if self._usual_columns(explanation) else []
+        usual = self._usual_columns(explanation)
+        rows += [Part(usual=usual)] if usual else []
         return [
             *rows,
             *(Part(edit) for edit in explanation.state.edits),
@@ -238,16 +246,17 @@ class ExplanationBuilder:
         nothing = self.before
         causes = []
         for k, part in enumerate(order):
-            alone = self._deviation(self._only(explanation.state, (part,)))
-            made = nothing[:, list(part.rows)] if part.rows else nothing - alone
-            size = np.sqrt((made**2).sum(axis=0)) if self.metres else np.abs(made).max(axis=0)
+            mended = self._only(explanation.state, (part,))
+            made = nothing[:, list(part.rows)] if part.rows else nothing - self._deviation(mended)
+            by_joint = self.model.of_joints
+            size = np.abs(made).max(axis=0) if by_joint else np.sqrt((made**2).sum(axis=0))
             effect = float(np.nanmax(size, initial=0.0))
             causes.append(
                 replace(
                     self._of_part(part, explanation, effect, twins.get(part, ())),
                     rms_before=after[k], rms_after=after[k + 1],
                     rms_alone=self._left(explanation.state, (part,)),
-                    effect=effect, breaks=self.breaks(made),
+                    effect=effect, breaks=self._breaks_a_tolerance(part, made, mended),
                 )
             )  # fmt: skip
         return tuple(causes)
@@ -255,17 +264,17 @@ class ExplanationBuilder:
     def _of_part(self, part: Part, explanation: Explanation, effect: float, twins: Sequence[str]) -> Cause:
         """Return a cause without what it changes."""
         if part.rows:
-            rows = tuple(self.sample[list(part.rows)].tolist())
-            return Cause("outliers", "rows", rows=rows, value=(effect,), unit="m" if self.metres else "rad")
+            rows = tuple(self.model.sample[list(part.rows)].tolist())
+            return Cause("outliers", "rows", rows=rows, value=(effect,), unit=self.model.unit)
         if part.usual:
             return Cause("own_geometry", "arm")
         cause = self._of_edit(part.edit) if part.edit else self._of_group(part.group, explanation)
         return replace(cause, twins=(*cause.twins, *(name for name in twins if name not in cause.twins)))
 
-    def _usual_columns(self, explanation: Explanation) -> list[int]:
+    def _usual_columns(self, explanation: Explanation) -> tuple[int, ...]:
         """Return the places of what arms usually differ by, where it was fitted beside a cause."""
         columns = self._columns(set(self.search.usual) - explanation.subset)
-        return [c for c in columns if explanation.state.values[c]]
+        return tuple(c for c in columns if explanation.state.values[c])
 
     def _kind(self, part: Part) -> str:
         if part.rows or part.usual:
@@ -300,12 +309,11 @@ class ExplanationBuilder:
         for g in [*self.search.forced, *(part.group for part in kept if part.group >= 0)]:
             columns = list(self.model.groups[g].columns)
             values[columns] = state.values[columns]
-        if Part(usual=True) in kept:
-            columns = self._columns(set(self.search.usual) - self.result.best.subset)
-            values[columns] = state.values[columns]
+        columns = [c for part in kept for c in part.usual]
+        values[columns] = state.values[columns]
         edits = tuple(edit for edit in state.edits if Part(edit) in kept)
         rows = self.result.rows
-        few = replace(rows, at=rows.at[:: max(len(rows.at) // PLACED, 1)])
+        few = rows.thinned(PLACED)
         return self.search.placed(State(values, edits), few)
 
     def _of_edit(self, edit: Edit) -> Cause:

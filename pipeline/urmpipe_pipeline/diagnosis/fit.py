@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -46,7 +46,19 @@ class Model(Protocol):
 
     @property
     def rows(self) -> int:
-        """How many rows are held against each other."""
+        """How many rows are compared."""
+
+    @property
+    def unit(self) -> Literal["m", "rad"]:
+        """Of what is judged."""
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether the joints themselves are judged, not positions."""
+
+    @property
+    def sample(self) -> IntArray:
+        """Rows of the log, shape (n,)."""
 
     @property
     def blocks(self) -> IntArray:
@@ -83,6 +95,10 @@ class Rows:
     at: IntArray
     weight: FloatArray
     least: float = 0.0
+
+    def thinned(self, count: int) -> Rows:
+        """Return every so manieth of them, so that about `count` or up to twice as many are left."""
+        return replace(self, at=self.at[:: max(len(self.at) // count, 1)])
 
     def trimmed(self, left: FloatArray) -> Rows:
         """Return those that are no outliers, by what is left of them in [m] and [rad], shape (c, n)."""

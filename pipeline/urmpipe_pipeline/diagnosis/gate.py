@@ -109,7 +109,7 @@ def find_unbelievable(search: Fitter, state: State, subset: Subset, rows: Rows) 
 
 
 def _find_cancelling(search: Fitter, state: State, subset: Subset, rows: Rows) -> set[int]:
-    some = replace(rows, at=rows.at[:: max(len(rows.at) // FEW, 1)])
+    some = rows.thinned(FEW)
     before = cost(search.model, search.placed(search.zero, some), some)
     most = CANCELS**2 * max(before, float(np.mean((search.floor * rows.weight) ** 2)))
     worse = set()
@@ -134,7 +134,7 @@ def find_changing(search: Fitter, state: State, subset: Subset, rows: Rows) -> t
         rows: The rows that count.
     """
     model, own = search.model, [search.model.groups[g] for g in sorted(subset)]
-    at = rows.at[:: max(len(rows.at) // SOME, 1)]
+    at = rows.thinned(SOME).at
     left, jacobian = model.linear(state, at, [*own, *(model.groups[g] for g in search.forced)])
     known = np.isfinite(left).all(axis=0)
     without = [replace(state, edits=tuple(one for one in state.edits if one != edit)) for edit in state.edits]

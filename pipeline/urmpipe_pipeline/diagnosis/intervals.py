@@ -72,7 +72,7 @@ def batch_covariance(scores: FloatArray, tau: float) -> tuple[FloatArray, int]:
 
 
 def student_quantile(free: int) -> float:
-    """Return the 97.5 % quantile of Student's t [-], within 1 % from 3 degrees of freedom on.
+    """Return the 97.5 % quantile of Student's t [-], within 1 % from 5 degrees of freedom on.
 
     z + (z^3 + z) / (4 n) + (5 z^5 + 16 z^3 + 3 z) / (96 n^2), z = 1.96.
 

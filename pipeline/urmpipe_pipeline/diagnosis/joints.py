@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -40,6 +41,16 @@ class JointsModel:
     sliding: tuple[bool, ...]
     chain: Chain | None = None
     judged: FloatArray | None = None
+
+    @property
+    def unit(self) -> Literal["m", "rad"]:
+        """Of what is judged: of joints that turn and slide all are taken as rad."""
+        return "rad" if self.of_joints and not all(self.sliding) else "m"
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether the joints themselves are judged, not positions."""
+        return self.chain is None
 
     @property
     def rows(self) -> int:

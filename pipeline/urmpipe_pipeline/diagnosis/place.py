@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -54,6 +55,16 @@ class PlaceModel:
     position: FloatArray
     rotation: FloatArray | None
     judged: FloatArray | None = None
+
+    @property
+    def unit(self) -> Literal["m", "rad"]:
+        """Of what is judged."""
+        return "m"
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether the joints themselves are judged, not positions."""
+        return False
 
     @property
     def rows(self) -> int:

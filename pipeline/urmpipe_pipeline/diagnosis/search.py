@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.row_blocks import spread_rows
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.candidates import (
     add_discrete_cause,
@@ -86,6 +87,22 @@ class Explanation(NamedTuple):
         return self.state.edits, self.subset
 
 
+class Refusal(NamedTuple):
+    """An explanation that leaves less, and that no engineer believes.
+
+    Attributes:
+        explanation: The explanation.
+        reason: Why.
+        subset: Its groups that this is about.
+        edits: Its discrete causes that this is about.
+    """
+
+    explanation: Explanation
+    reason: str
+    subset: Subset
+    edits: Edits
+
+
 @dataclass(frozen=True, eq=False)
 class SearchResult:
     """What a search found.
@@ -95,20 +112,18 @@ class SearchResult:
         others: Those that the log does not tell from it.
         rows: The rows that counted: without outliers, in the weights of their noise.
         tau: The autocorrelation time of what stays, in rows.
-        variance: Mean square of what stays of a component in its weight, not below the floor.
         normal: The normal equations there.
         twins: Which groups stand for another that does exactly the same.
-        refused: Explanations that leave less, and that no engineer believes, each with the reason.
+        refused: What the gate refused.
     """
 
     best: Explanation
     others: tuple[Explanation, ...]
     rows: Rows
     tau: float
-    variance: float
     normal: Normal
     twins: dict[int, int]
-    refused: tuple[tuple[Explanation, str], ...] = ()
+    refused: tuple[Refusal, ...] = ()
 
 
 class SelfConsistentFit(NamedTuple):
@@ -157,7 +172,7 @@ class Search:
     usual: Mapping[int, float] = field(default_factory=dict)
     timed: bool = True
     first: tuple[int, ...] = ()
-    _refused: list[tuple[Explanation, str]] = field(default_factory=list)
+    _refused: list[Refusal] = field(default_factory=list)
 
     @property
     def zero(self) -> State:
@@ -166,8 +181,7 @@ class Search:
 
     def spread(self, count: int) -> IntArray:
         """Return the indices of so many rows, spread evenly over all, shape (count,)."""
-        rows = self.model.rows
-        return np.unique(np.linspace(0, rows - 1, min(rows, count)).round().astype(np.int64))
+        return spread_rows(self.model.rows, count)
 
     def find(self) -> SearchResult:
         """Return the causes of a deviation."""
@@ -320,7 +334,7 @@ class Search:
         """Return what subsets of the groups are scored by, near an explanation."""
         among, _ = self._distinct
         forced = self._columns(self.forced)
-        usual = [(c, size) for g, size in self.usual.items() if g in among for c in self._columns([g])]
+        usual = self._usual_columns(frozenset())
         damping = np.array([*(0.0 for _ in forced), *(size**-2.0 for _, size in usual)])
         every = normal_equations(self.model, state, rows)
         normal = every.without([*forced, *(c for c, _ in usual)], damping)
@@ -336,7 +350,7 @@ class Search:
             prior=self._prior, more=more,
         )  # fmt: skip
 
-    def _explained(self, rows: Rows, state: State, tau: float = 1.0, most: float = np.inf) -> Explanation:
+    def _explained(self, rows: Rows, state: State, tau: float, most: float = np.inf) -> Explanation:
         """Return the best explanation with some edits, selected anew where the last fit led until it stays.
 
         It is given up if its score stays above `most`.
@@ -407,7 +421,8 @@ class Search:
                 if cost(self.model, self.fitted(state, frozenset((g,)), rows), rows) <= NOISE:
                     return set(subset) - {g}
         if beyond and reason:
-            self._refused.append((Explanation(state, subset, np.inf), reason))
+            refused = Explanation(state, subset, np.inf)
+            self._refused.append(Refusal(refused, reason, subset, state.edits))
         return beyond
 
     def _settled(self, rows: Rows, best: Explanation, others: Sequence[Explanation]) -> SearchResult:
@@ -516,14 +531,11 @@ class Search:
         if cost(self.model, there, result.rows) > PROMISED * cost(self.model, self.zero, result.rows):
             there, kept = self.placed(self.zero, result.rows), frozenset()
         selection = self._selection(there, result.rows, result.tau)
-        variance = max(float(selection.left([kept])[0]), selection.floor)
         best = Explanation(there, kept, float(selection.scores([kept])[0]))
-        refused = (Explanation(replace(state, edits=edits), frozenset(changing), np.inf), NOT_CONSTANT)
-        result = replace(
-            result, best=best, others=(), variance=variance, normal=selection.normal,
-            refused=(*result.refused, refused),
-        )  # fmt: skip
-        return self._without_changing(result)
+        refused = (*result.refused, Refusal(result.best, NOT_CONSTANT, frozenset(changing), edits))
+        return self._without_changing(
+            replace(result, best=best, others=(), normal=selection.normal, refused=refused)
+        )
 
     def _does_nothing(self, fit: SelfConsistentFit, edit: Edit) -> bool:
         """Tell whether a discrete cause leaves no less than the floor on the rows that count."""
@@ -541,11 +553,13 @@ class Search:
                 yield there
 
     def _refitted(self, fit: SelfConsistentFit, start: State, subset: Subset) -> Explanation:
-        """Return another subset with the same discrete causes, and its score at full size."""
-        there = self.fitted(start, subset, fit.rows)
+        """Return another explanation, fitted, and its score at full size."""
+        there = self.beside_usual(self.fitted(start, subset, fit.rows), subset, fit.rows)
+        alike = there.edits == fit.state.edits
+        selection = fit.selection if alike else self._selection(there, fit.rows, fit.tau)
         least = max(cost(self.model, fit.state, fit.rows), np.finfo(float).tiny)
         left = float(fit.selection.left([fit.subset])[0]) * cost(self.model, there, fit.rows) / least
-        return Explanation(there, subset, fit.selection.score(left, subset))
+        return Explanation(there, subset, selection.score(left, subset))
 
     def _with_twins(
         self, rows: Rows, fit: SelfConsistentFit
@@ -592,7 +606,6 @@ class Search:
         state, subset, tau, rows, selection = fit
         moving = selection.moving
         final = Explanation(state, subset, float(selection.scores([subset])[0]))
-        variance = max(float(selection.left([subset])[0]), selection.floor)
         near += self._neighbours(fit, final.score + NEAR)
         simple, least = final.size, cost(self.model, state, rows)
         near = [
@@ -603,24 +616,21 @@ class Search:
         near = list({candidate.key: candidate for candidate in near}.values())
         shown = tuple(sorted(near, key=_score)[:SHOWN])
         refused = tuple(self._preferred(fit, final.score))
-        return SearchResult(final, shown, rows, tau, variance, selection.normal, self._distinct[1], refused)
+        return SearchResult(final, shown, rows, tau, selection.normal, self._distinct[1], refused)
 
-    def _preferred(self, fit: SelfConsistentFit, score: float) -> Iterator[tuple[Explanation, str]]:
+    def _preferred(self, fit: SelfConsistentFit, score: float) -> Iterator[Refusal]:
         """Yield what the gate refused and the criterion prefers: the best of each reason."""
-        some = replace(fit.rows, at=fit.rows.at[:: max(len(fit.rows.at) // COARSE, 1)])
-        for reason in dict.fromkeys(reason for _, reason in self._refused):
-            every = {each.subset: each for each, why in self._refused if why == reason}.values()
-            candidate = min(every, key=lambda each: cost(self.model, each.state, some))
-            again = self._refitted(fit, candidate.state, candidate.subset)
+        some = fit.rows.thinned(COARSE)
+        for reason in dict.fromkeys(refusal.reason for refusal in self._refused):
+            every = {each.explanation.key: each for each in self._refused if each.reason == reason}.values()
+            refusal = min(every, key=lambda each: cost(self.model, each.explanation.state, some))
+            again = self._refitted(fit, refusal.explanation.state, refusal.subset)
             if again.score < score:
-                yield again, reason
+                yield refusal._replace(explanation=again)
 
     def beside_usual(self, state: State, subset: Subset, rows: Rows) -> State:
         """Return an explanation with what arms usually differ by, fitted with its numbers and damped."""
-        among = set(self._distinct[0])
-        usual = [
-            (c, size) for g, size in self.usual.items() if g in among - subset for c in self._columns([g])
-        ]
+        usual = self._usual_columns(subset)
         if not usual or not (subset or state.edits):
             return state
         own = self._columns([*self.forced, *sorted(subset)])
@@ -636,6 +646,11 @@ class Search:
         values[columns] = solved[0] / size
         there = replace(state, values=values)
         return there if cost(self.model, there, rows) <= cost(self.model, state, rows) else state
+
+    def _usual_columns(self, subset: Subset) -> list[tuple[int, float]]:
+        """Return the places of numbers that arms usually differ by, without a subset, each with its size."""
+        among = set(self._distinct[0]) - subset
+        return [(c, size) for g, size in self.usual.items() if g in among for c in self._columns([g])]
 
     def _stable(self, every: Rows, state: State, subset: Subset | None) -> SelfConsistentFit:
         """Return an explanation that is selected again where its fit leads.

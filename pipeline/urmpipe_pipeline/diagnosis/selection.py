@@ -178,12 +178,22 @@ class Selection:
         columns = [self.columns(subset) for subset in subsets]
         left = self._left_by(columns)
         penalty = [self.penalty(len(at), one) for at, one in zip(columns, subsets, strict=True)]
-        return np.asarray(self.independent * np.log(np.maximum(left, self.floor)) + np.array(penalty))
+        return np.asarray(self._misfit(left) + np.array(penalty))
+
+    def _misfit(self, left: FloatArray) -> FloatArray:
+        """Return n ln(mean square) [-] of mean squares, shape (k,); below the floor that of the floor.
+
+        Where numbers of a usual size were taken away, a mean square has what their sizes cost. This counts
+        below the floor, too: by the tangent of the logarithm there.
+        """
+        over = left / self.floor
+        below = 0.0 if self.whole is None else np.minimum(over, 1.0) - 1.0
+        return np.asarray(self.independent * (np.log(self.floor * np.maximum(over, 1.0)) + below))
 
     def score(self, left: float, subset: Subset) -> float:
         """Return the score [-] of a subset that leaves a mean square [-]."""
         size = sum(len(self._columns[g]) for g in subset)
-        return self.independent * log(max(left, self.floor)) + self.penalty(size, subset)
+        return float(self._misfit(np.array(left))) + self.penalty(size, subset)
 
     def penalty(self, columns: int, subset: Subset) -> float:
         """Return what a subset with some columns in all pays."""
@@ -233,7 +243,7 @@ class Selection:
         explained[rest <= TWIN * a * b] = 0.0  # one of the two does all that both do
         left = np.maximum(self.normal.square - explained, 0.0) / max(self.normal.count, 1)
         prior = self._priors[list(groups)]
-        scores = self.independent * np.log(np.maximum(left, self.floor)) + prior[first] + prior[second]
+        scores = self._misfit(left) + prior[first] + prior[second]
         best = np.argsort(scores, kind="stable")[:STARTS].tolist()
         common = self._penalties[0] * (2 + self.numbers) + self._penalties[3] + self.more
         return [(float(scores[i] + common), frozenset((groups[first[i]], groups[second[i]]))) for i in best]
@@ -290,7 +300,7 @@ class Selection:
             self._penalties[0] * (len(columns) + sizes + self.numbers) + self._penalties[2 + len(subset)]
         )
         prior = self._priors[others] + sum(self._priors[g] for g in subset) + self.more
-        scores = self.independent * np.log(np.maximum(left, self.floor)) + penalty + prior
+        scores = self._misfit(left) + penalty + prior
         order = np.argsort(scores, kind="stable").tolist()
         return [(float(scores[i]), subset | {others[i]}) for i in order]
 

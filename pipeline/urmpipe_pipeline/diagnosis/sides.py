@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import jacobian, positions_over_log
 from urmpipe_models.orientation import matrices
+from urmpipe_models.row_blocks import spread_rows
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline import text
 from urmpipe_pipeline.diagnosis.arm import ArmModel
@@ -21,6 +22,7 @@ from urmpipe_pipeline.diagnosis.arm_groups import (
     time_groups,
     tool_groups,
 )
+from urmpipe_pipeline.diagnosis.gate import STRUCTURE
 from urmpipe_pipeline.diagnosis.hypotheses import Group, numbered
 from urmpipe_pipeline.diagnosis.interpolation import (
     Cubics,
@@ -65,7 +67,6 @@ PARTS = (1, 2, 5, 10)
 WHOLE = 0.01
 """A value is a multiple of a step if it is no further off than this share of one."""
 
-STRUCTURE = ("link_length", "link_shift", "tilt")
 JOINTS = (
     "joint_sign", "joints_swapped", "joint_unit", "joint_coupled", "half_turn", "mirrored",
     "joint_offset", "joint_scale", "joint_lag", "servo_lag", "compliance", "backlash", "sag",
@@ -100,7 +101,6 @@ class Question:
         turning: Which joints turn, shape (joints,); none without joints.
         names: What the log calls its joints.
         own_names: What the arm calls them; as the log without one.
-        sample: Rows of the log, shape (n,).
         rounding: What rounding and interpolation leave, of each component in [m] or [rad], shape (c,).
         forced: Groups that are unknown, and always taken.
         sign: 1 if the model is the log's, -1 if it is the reference's: of what stays, as reference - log.
@@ -112,7 +112,6 @@ class Question:
     turning: tuple[bool, ...]
     names: tuple[str, ...]
     own_names: tuple[str, ...]
-    sample: IntArray
     rounding: FloatArray
     forced: tuple[int, ...]
     sign: float
@@ -140,7 +139,8 @@ def _of_joints(matched: Matched, reference: Side, log: Side) -> Question:
     q = interpolated(matched, reference.trajectory, samples, lines, np.asarray(matched.actual_q))
     model = JointsModel(
         groups, _motion(run), _clock(matched, run, log=True), matched.sample, q.values.T.copy(), sliding,
-        run.robot, _judged(matched, reference, log) if q.between else None,
+        run.robot,
+        _judged(matched, reference, log) if q.between or run.robot != reference.run.robot else None,
     )  # fmt: skip
     rounding = np.sqrt(_rounding(run.on_rows.q, run) ** 2 + _rounding(samples, run) ** 2 + q.error**2)
     told = NotLookedFor(
@@ -159,7 +159,6 @@ def _of_joints(matched: Matched, reference: Side, log: Side) -> Question:
         turning,
         run.log.joints,
         _own_names(run),
-        matched.sample,
         rounding,
         (),
         1.0,
@@ -224,7 +223,7 @@ def _of_arm(matched: Matched, reference: Side, log: Side) -> Question:
             NotLookedFor((*FRAMES, "path_unit"), "measured in a frame of its own: base and tool are unknown")
         )
     return Question(
-        model, edits, turning, names, _own_names(run), matched.sample, rounding, forced,
+        model, edits, turning, names, _own_names(run), rounding, forced,
         1.0 if log.by_joints else -1.0, (*told, *_unknown_rates(run, motion)),
     )  # fmt: skip
 
@@ -260,7 +259,6 @@ def _of_places(matched: Matched, reference: Side, log: Side) -> Question:
         (),
         (),
         (),
-        matched.sample,
         rounding,
         (),
         1.0,
@@ -279,11 +277,11 @@ def _reference_place(matched: Matched, reference: Side) -> Interpolated:
 
 
 def _judged(matched: Matched, reference: Side, log: Side) -> FloatArray:
-    """Return what is judged of a reference with joints: its place on lines, else that of joints on lines."""
+    """Return what is judged of a reference with joints: its place, else where they lead the log's arm."""
     robot, q = log.run.robot, np.asarray(matched.reference_q)
     if robot is None:
         return q.T.copy()
-    if robot == reference.run.robot and np.isfinite(matched.reference).all():
+    if robot != reference.run.robot or np.isfinite(matched.reference).all():
         return matched.reference.T.copy()
     return positions_over_log(robot, q).T.copy()
 
@@ -357,7 +355,7 @@ def _step(values: FloatArray) -> float:
 
 def _by_joints(model: ArmModel, rounding: FloatArray) -> FloatArray:
     """Return what the rounding of joints leaves of a position in [m], shape (3,)."""
-    rows = np.unique(np.linspace(0, model.rows - 1, min(model.rows, 100)).round().astype(np.int64))
+    rows = spread_rows(model.rows, 100)
     q = model.motion.at(model.clock.t[rows])[0]
     columns = np.array([[np.nanmean(np.square(part * np.ones(len(rows)))) for part in column[:3]]
                         for column in jacobian(model.chain, list(q))])  # fmt: skip

@@ -62,7 +62,7 @@ def said(numbers: Numbers, edits: Edits = (), **how: object) -> tuple[Named, fro
 def causes_of(search: Search, result: SearchResult) -> tuple[tuple[Cause, ...], tuple[Alternative, ...]]:
     """Return the causes of a search in the words of the result; none of them is out of tolerance."""
     names, rows = tuple(URM6.coordinates), np.arange(search.model.rows)
-    return ExplanationBuilder(search, result, names, names, rows, lambda _: False).causes()
+    return ExplanationBuilder(search, result, names, names, lambda *_: False).causes()
 
 
 def numbers_of(**sizes: float | list[float]) -> Numbers:
