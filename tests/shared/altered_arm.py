@@ -290,19 +290,3 @@ def noisy(model: ArmModel, rng: np.random.Generator, noise: Noise, data: Posed) 
     return replace(
         model, position=noise(rng, position), rotation=None if rotation is None else turned(rng, rotation)
     )
-
-
-def rippled(q: FloatArray, joint: int, size: float) -> FloatArray:
-    """Return joints, shape (n, joints), one of them off by a sine, four waves a turn; size in [rad]."""
-    q = q.copy()
-    q[:, joint] += size * np.sin(4.0 * q[:, joint])
-    return q
-
-
-def slack(q: FloatArray, joint: int, size: float) -> FloatArray:
-    """Return joints, shape (n, joints), one of them behind a play of +-size in [rad]."""
-    q = q.copy()
-    there = q[0, joint]
-    for k, value in enumerate(q[:, joint]):
-        q[k, joint] = there = min(max(there, value - size), value + size)
-    return q

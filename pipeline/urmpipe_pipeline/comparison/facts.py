@@ -230,7 +230,7 @@ def remedy_hints(one: Deviation) -> list[Hint]:
             hints.append(Hint("sync", round(one.sync.offset + cause.value[0], 6), "sets the clocks"))
         elif cause.kind == "joint_unit":
             unit = "deg" if cause.value[0] < 1.0 else "rad"
-            hints.append(Hint("unit", {cause.joints[0]: unit}, "reads it so"))
+            hints.append(Hint("unit", dict.fromkeys(cause.joints, unit), "reads it so"))
         elif cause.kind == "other_robot":
             hints.append(Hint("robot", cause.name, "takes this arm"))
     by_joints = all("joint_offset" not in untested.kinds for untested in diagnosis.not_looked_for)

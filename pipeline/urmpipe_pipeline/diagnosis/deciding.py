@@ -10,6 +10,7 @@ from urmpipe_models.arrays import IntArray
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.hypotheses import State
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
+from urmpipe_pipeline.diagnosis.result import rms
 
 SWEEP = 1.5
 """How far each joint is moved to both sides, in [rad]; one that slides by so many fifths of a [m]."""
@@ -40,9 +41,7 @@ def deciding_joint(model: ArmModel, first: State, second: State, rows: IntArray)
 
 def _apart(model: ArmModel, first: State, second: State, rows: IntArray) -> float:
     """Return how far two explanations put the tool centre point apart, root mean square in [m]."""
-    between = model.deviation(first, rows) - model.deviation(second, rows)
-    known = np.isfinite(between).all(axis=0)
-    return float(np.sqrt((between[:, known] ** 2).sum(axis=0).mean())) if known.any() else 0.0
+    return rms((model.deviation(first, rows) - model.deviation(second, rows)).T)
 
 
 def _with_moved(model: ArmModel, j: int, rows: IntArray) -> ArmModel:

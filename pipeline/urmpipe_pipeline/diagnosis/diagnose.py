@@ -16,12 +16,11 @@ from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.diagnosis.edits import later_edits, turn_edits
 from urmpipe_pipeline.diagnosis.explain import ExplanationBuilder
 from urmpipe_pipeline.diagnosis.fit import Model, residual
-from urmpipe_pipeline.diagnosis.gate import STRUCTURE
 from urmpipe_pipeline.diagnosis.hypotheses import State, zero
 from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.one_pose import tool_hypotheses
 from urmpipe_pipeline.diagnosis.own_tcp import ask_both_sides
-from urmpipe_pipeline.diagnosis.result import Diagnosis, NotLookedFor, Remainder, rms
+from urmpipe_pipeline.diagnosis.result import STRUCTURE, Diagnosis, NotLookedFor, Remainder, rms
 from urmpipe_pipeline.diagnosis.search import Search, SearchResult
 from urmpipe_pipeline.diagnosis.sides import AT_REST, Question, Side, build_question
 from urmpipe_pipeline.log_edits import Edits
@@ -119,10 +118,11 @@ def _diagnosed(deviation: Deviation, question: Question, lag: float | None) -> D
     turns = any(edit.kind == "turns" for edit in state.edits)  # these the joints alone tell
     if isinstance(model, JointsModel) and model.chain is not None and not turns and not _judged(deviation):
         least = FLOOR * _tolerance(deviation, LENGTHS, DEFAULT_TOLERANCE)
-        if before <= least or left > before + least:
-            apart = residual(model, search.zero, np.arange(model.rows))
-            equal = rms(apart.T) <= float(np.linalg.norm(question.rounding)) + EQUAL
-            return _nothing(deviation, question, ELSEWHERE if before > least else SAME if equal else ALIKE)
+        apart = residual(model, search.zero, np.arange(model.rows))
+        equal = rms(apart.T) <= float(np.linalg.norm(question.rounding)) + EQUAL
+        if before <= least or left > before + least or (equal and not causes):
+            words = ELSEWHERE if before > least else SAME if equal else ALIKE
+            return _nothing(deviation, question, words, tested=True)
     unnamed = search.usual and all(cause.kind != "own_geometry" for cause in causes)
     return Diagnosis(
         name=deviation.name,
@@ -257,7 +257,9 @@ def _tells_nothing(question: Question) -> str:
     return f"the {side} is at rest: one pose" if np.nanmax(moved, initial=0.0) < AT_REST else ""
 
 
-def _nothing(deviation: Deviation, question: Question, reason: str, tolerance: float = 0.0) -> Diagnosis:
+def _nothing(
+    deviation: Deviation, question: Question, reason: str, tolerance: float = 0.0, *, tested: bool = False
+) -> Diagnosis:
     """Return a diagnosis that names nothing, and says why.
 
     Args:
@@ -266,6 +268,7 @@ def _nothing(deviation: Deviation, question: Question, reason: str, tolerance: f
         reason: Why nothing can be told.
         tolerance: By how much the tool that a log recorded may be off in [m]; one that agrees is then a
             hypothesis.
+        tested: Whether the causes were looked for all the same.
     """
     model = question.model
     left = model.deviation(zero(model.groups), np.arange(model.rows))
@@ -283,8 +286,8 @@ def _nothing(deviation: Deviation, question: Question, reason: str, tolerance: f
         rms=before,
         causes=(),
         undecided=undecided,
-        not_looked_for=(NotLookedFor(kinds, reason), *question.not_looked_for),
-        remainder=Remainder(rms(mended.T), (rms(mended.T) / before) ** 2 if before else 1.0, reason),
+        not_looked_for=(*(() if tested else (NotLookedFor(kinds, reason),)), *question.not_looked_for),
+        remainder=Remainder(rms(mended.T), (rms(mended.T) / before) ** 2 if before else 0.0, reason),
         sample=model.sample,
         mended=question.sign * mended.T,
     )

@@ -81,7 +81,7 @@ def turn_edits(left: FloatArray, sample: IntArray, turning: Sequence[bool]) -> E
         whole = np.rint(left[j, known] / FULL_TURN).astype(np.int64)
         steps = (np.flatnonzero(np.diff(whole)) + 1).tolist()
         for step, end in pairwise([0, *steps, len(whole)]):
-            if end - step > LASTING:
+            if end - step >= LASTING:
                 found.append((j, int(sample[known[step]]), int(whole[step])))
     return tuple(_turns(found))
 

@@ -25,17 +25,16 @@ from urmpipe_pipeline.diagnosis.gate import LARGEST
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.diagnosis.intervals import batch_covariance, student_quantile
 from urmpipe_pipeline.diagnosis.joints import JointsModel
-from urmpipe_pipeline.diagnosis.result import Alternative, Cause, Refused, rms
+from urmpipe_pipeline.diagnosis.result import CLOCKS, Alternative, Cause, Refused, rms
 from urmpipe_pipeline.diagnosis.search import COARSE, Explanation, Search, SearchResult
+from urmpipe_pipeline.diagnosis.selection import TWIN
 from urmpipe_pipeline.log_edits import Edit, Edits
 
 ORDERED = 1_000  # rows, spread evenly, on which the order of causes is found
 PLACED = 4_000  # rows, spread evenly, on which what is always fitted follows
 SWEPT = 120  # poses on which the joint is found whose motion tells two explanations apart
-EXACT = 1e-9  # columns whose directions differ by less (1 - |cos|) are the same but for rounding
 ABRUPT = 0.5  # share of its size by which a stretch of outliers begins and ends from one row to the next
 SEVERAL = 1.2  # outliers are a cause if all rows have so many times the rms of the others
-CLOCKS = ("time_lag", "clock_drift")
 RATES = (*CLOCKS, "servo_lag", "joint_lag", "compliance", "backlash")
 APART = 2.0  # times the largest other deviation that the median of outliers is
 ALONG = 0.9  # share of the square of outliers that points along what such a cause changes: it is no outlier
@@ -78,6 +77,7 @@ class ExplanationBuilder:
     own_names: tuple[str, ...]
     breaks: Callable[[FloatArray, bool, bool], bool]
     _deviations: dict[tuple[bytes, Edits], FloatArray] = field(default_factory=dict)
+    _covariances: dict[object, tuple[FloatArray, int]] = field(default_factory=dict)
 
     @property
     def model(self) -> Model:
@@ -326,8 +326,10 @@ class ExplanationBuilder:
                 axis, angle = (-axis[0] + 0.0, -axis[1] + 0.0, -axis[2] + 0.0), -angle
             return Cause(edit.kind, name, axis=axis, value=(angle,), unit="rad")
         value = (edit.value,) if edit.kind in ("path_unit", "joint_unit", "joint_coupled", "turns") else ()
-        first = edit.first if edit.kind in ("half_turn", "mirrored", "turns") and edit.first else None
         unit = "turns" if edit.kind == "turns" else ""
+        if edit.kind == "half_turn" and isinstance(self.model, JointsModel):  # of positions no sense shows
+            value, unit = (edit.value * np.pi,), "rad"
+        first = edit.first if edit.kind in ("half_turn", "mirrored", "turns") and edit.first else None
         return Cause(edit.kind, name, joints, value=value, unit=unit, from_sample=first)
 
     def _of_group(self, g: int, explanation: Explanation) -> Cause:
@@ -380,10 +382,6 @@ class ExplanationBuilder:
         if key not in self._covariances:
             self._covariances[key] = self._estimate_covariance(explanation)
         return self._covariances[key]
-
-    @cached_property
-    def _covariances(self) -> dict[object, tuple[FloatArray, int]]:
-        return {}
 
     def _estimate_covariance(self, explanation: Explanation) -> tuple[FloatArray, int]:
         taken = explanation.subset | set(self.search.forced)
@@ -443,7 +441,7 @@ class ExplanationBuilder:
         """Tell whether two columns have one direction."""
         gram = self.result.normal.gram
         size = float(np.sqrt(max(gram[c, c], 0.0) * max(gram[d, d], 0.0)))  # rounding may leave less than 0
-        return size > 0.0 and 1.0 - abs(float(gram[c, d])) / size < EXACT
+        return size > 0.0 and 1.0 - abs(float(gram[c, d])) / size < TWIN
 
     def _needs(self, every: Sequence[Explanation]) -> str:
         """Return the joint whose motion would decide between explanations; empty if none would."""

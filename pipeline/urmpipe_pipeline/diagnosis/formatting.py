@@ -64,7 +64,7 @@ def format_summary(diagnosis: Diagnosis) -> str:
 def _moves_nothing(cause: Cause, unit: str) -> bool:
     """Tell whether a cause leaves all positions: a turn about the tool centre point, whole turns."""
     still = cause.effect < UNMOVED and abs(cause.rms_after - cause.rms_before) < UNMOVED
-    return unit == "m" and still and cause.kind not in ("outliers", "own_geometry")
+    return unit == "m" and still and cause.kind not in ("tool_rotation", "outliers", "own_geometry")
 
 
 def select_causes(causes: Sequence[Cause]) -> list[Cause]:
@@ -227,7 +227,7 @@ def _format_number(value: float) -> str:
     """Return five digits, at most four of them decimals; of less than that two."""
     value = value if abs(value) >= ROUNDING else 0.0
     rounded = float(f"{round(value, MAX_DECIMALS):.5g}")
-    return f"{rounded if rounded or not value else float(f'{value:.1e}'):.5g}"
+    return f"{rounded if rounded or not value else float(f'{value:.1e}'):.10g}"
 
 
 def format_cause(cause: Cause) -> str:
@@ -299,6 +299,8 @@ def _displayed_unit(cause: Cause) -> tuple[str, float]:
     """Return the displayed unit of a cause, and its number per SI unit: seconds from one second on."""
     if cause.unit == "s" and cause.value and abs(cause.value[0]) >= 1.0:
         return "s", 1.0
+    if cause.unit == "turns" and cause.value and abs(cause.value[0]) == 1.0:
+        return "turn", 1.0
     return UNITS.get(cause.unit, (cause.unit, 1.0))
 
 
@@ -481,13 +483,10 @@ def _parameter_kind(label: str) -> KindText:
     )
 
 
-def _segment(cause: Cause) -> str:
-    """Return "segment 4", or the name of a segment without a number."""
-    return f"segment {cause.segment.removeprefix('p')}" if cause.segment else cause.name
-
-
-def _sideways(cause: Cause) -> str:
-    return "" if cause.axis is None else _axis_name(cause.axis)
+def _segment(cause: Cause) -> tuple[str, str, str]:
+    """Return the segment of a sideways shift, its value and its axis: segment 4, +3 mm, y."""
+    segment, _, axis = cause.name.partition(" sideways ")
+    return segment, format_value(cause), axis
 
 
 def _mirrored_base(cause: Cause) -> str:
@@ -529,6 +528,11 @@ def _clock(cause: Cause) -> str:
     return f"the clocks differ by {size} (the log is {way})"
 
 
+def _half_turn(cause: Cause) -> str:
+    value = format_value(cause)
+    return f"{_joints(cause)} needs half a turn{f' ({value})' if value else ''}"
+
+
 def _outliers(cause: Cause) -> str:
     return f"{format_rows(cause.rows)} {'are' if len(cause.rows) > 1 else 'is'} off by {format_value(cause)}"
 
@@ -566,7 +570,7 @@ KIND_TEXTS: Mapping[str, KindText] = {
     ),
     "half_turn": _joint_kind(
         "half a turn", "half a turn of {}", "needs half a turn", "turn", "by half a turn"
-    ),
+    )._replace(clause=_half_turn),
     "mirrored": _joint_kind(
         "mirrored joint", "mirrored {}", "is mirrored", "count", "the other way"
     ),
@@ -603,11 +607,9 @@ KIND_TEXTS: Mapping[str, KindText] = {
     "tilt": _parameter_kind("tilt of a link"),
     "link_shift": KindText(
         "sideways shift of a segment",
-        lambda cause: f"{_segment(cause)} sideways {_sideways(cause)}".strip(),
-        lambda cause: f"{_segment(cause)} needs {format_value(cause)} sideways ({_sideways(cause)})",
-        lambda cause: Remedy(
-            "move", _segment(cause), f"by {format_value(cause)} sideways ({_sideways(cause)})"
-        ),
+        lambda cause: cause.name,
+        lambda cause: "{} needs {} sideways ({})".format(*_segment(cause)),
+        lambda cause: Remedy("move", _segment(cause)[0], "by {} sideways ({})".format(*_segment(cause)[1:])),
     ),
     "own_geometry": KindText(
         "the arm's own geometry",

@@ -22,6 +22,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, cost
 from urmpipe_pipeline.diagnosis.hypotheses import State
 from urmpipe_pipeline.diagnosis.intervals import autocorrelation_time
+from urmpipe_pipeline.diagnosis.result import CLOCKS, STRUCTURE
 from urmpipe_pipeline.diagnosis.selection import Subset
 from urmpipe_pipeline.log_edits import Edits
 
@@ -40,12 +41,10 @@ REACHED: Mapping[str, float] = {"link_length": 0.2, "link_shift": 0.2}
 BESIDE: Mapping[str, float] = {"tilt": np.radians(10.0), "joint_scale": 0.02}
 """Beside other causes no length changes by more than a share of the reach, and no tilt or scale by more."""
 
-STRUCTURE = ("link_length", "link_shift", "tilt")
 NOISE = 4.0  # a mean square, in weights of the noise, that is taken for it
 CANCELS = 3.0  # times the rms before any cause
 SEGMENTS = 6  # of a log, in which a number may differ
 CLOCK_SEGMENTS = 40  # the same of a clock: rows that are missing make it jump
-CLOCKS = ("time_lag", "clock_drift")
 CHANGING = 0.3  # share of a number by which it changes, rms over the segments
 UNEVEN = 0.1  # the same of a clock, which nothing of an arm resembles
 SIGNIFICANT = 5.0  # standard deviations of F, sqrt(2 / numbers more) each, by which it lies above 1

@@ -1,7 +1,7 @@
 """The side that is modelled, at any time: its joints as an explanation has them.
 
-q + offset + scale q + compliance q'' + lag q' + play / 2 sign(q') + sag times the torque of gravity, q being
-that of the log at its own time, changed by `log_edits`.
+q + offset + scale q + compliance q'' + play / 2 sign(q') + sag times the torque of gravity, q being that of
+the log, changed by `log_edits`, at its own time: that of its clock and of its joint, behind a servo.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ class Motion:
     noise: FloatArray | None = None
     _directions: dict[tuple[Edits, int], FloatArray] = field(default_factory=dict, init=False)
     _torques: dict[Edits, tuple[FloatArray, BoolArray]] = field(default_factory=dict, init=False)
-    _behinds: dict[float, tuple[Motion, Motion]] = field(default_factory=dict, init=False)
+    _behinds: dict[float, tuple[Motion, Motion, Motion]] = field(default_factory=dict, init=False)
 
     def at(self, t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
         """Return value, rate and second derivative at some times, and which lie within its own.
@@ -197,11 +197,13 @@ class Motion:
             if group.kind in SHIFTING_TIME:
                 continue
             if group.kind == "servo_lag" and clock.direction * value > 0.0:
-                behind, further = self._behind(clock.direction * value)
-                there, speed = behind._looked_up(edits, at, sample[rows], late)[:2]
-                q += there - own
-                rate += speed - own_rate
-                joints.servo_rate[:] = further._looked_up(edits, at, sample[rows], late)[1]
+                parts = self._behind(clock.direction * value)
+                (x, slope), (y, speed), (_, further) = (
+                    part._looked_up(edits, at, sample[rows], late)[:2] for part in parts
+                )
+                q += y - x
+                rate += speed - slope
+                joints.servo_rate[:] = further
                 continue
             for j, factor in joints.factors(group, clock, rows):
                 q[j] += value * factor
@@ -212,23 +214,26 @@ class Motion:
                 rate += ahead * second
         return joints
 
-    def _behind(self, constant: float) -> tuple[Motion, Motion]:
-        """Return y, what a servo of a time constant T in [s] makes of this motion, and y with dy / dT.
+    def _behind(self, constant: float) -> tuple[Motion, Motion, Motion]:
+        """Return x, y, what a servo of a time constant T in [s] makes of it, and y with dy / dT as its rate.
 
         y = x - T x' + T^2 z, z being what the servo makes of x''; y' = x' - T z, and dy / dT, as a rate, is
         what it makes of y', with the opposite sign. Those of one constant are computed once.
         """
-        if constant not in self._behinds:
+        parts = self._behinds.get(constant)
+        if parts is None:
             second = first_order_lag(self.t, self.second, constant)
             rate = self.rate - constant * second
             value = self.value - constant * self.rate + constant**2 * second
             slope = rate - constant * first_order_lag(self.t, second, constant)
-            self._behinds.clear()
-            self._behinds[constant] = (
+            parts = (
+                Motion(self.t, self.value, self.rate, self.second),
                 Motion(self.t, value, rate, second),
                 Motion(self.t, value, slope, second),
             )
-        return self._behinds[constant]
+            self._behinds.clear()
+            self._behinds[constant] = parts
+        return parts
 
     def _looked_up(
         self, edits: Edits, at: FloatArray, log_rows: IntArray, late: Mapping[int | None, float]

@@ -78,8 +78,9 @@ def ask_both_sides(
 def _own_tcp(side: Side, tolerance: float) -> OwnTcp | None:
     """Return how far a side is from its recorded tool centre point; None without one."""
     run = side.run
-    by_kinematics = side.by_joints and run.tcp is not None
-    distance = distances_from_recorded(run, side.trajectory.position if by_kinematics else None)
+    position = side.trajectory.position
+    by_kinematics = side.by_joints and run.tcp is not None and np.isfinite(position).any()
+    distance = distances_from_recorded(run, position if by_kinematics else None)
     poses = RecordedPoses.of(run.robot, run.log)
     if not len(distance) or run.robot is None or poses is None:
         return None

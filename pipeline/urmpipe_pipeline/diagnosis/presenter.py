@@ -32,6 +32,7 @@ NOTE = (
 )
 
 MAX_NAMED = 3  # twins, and kinds not tested for one reason, in a line of a terminal; a page has all
+EXPLAINED = {"explanation": "Explanation", "interval": "95 % interval", "twins": "twins"}
 DETAILS = ("value", "from_row", "rms_alone", "twins", "breaks_tolerance")  # only a page has room for these
 
 
@@ -122,42 +123,30 @@ def diagnosis_tables(diagnosis: Diagnosis) -> Iterator[Table]:
         )
         yield Table("Causes", tuple(columns), NOTE, several, page=shown)
     if diagnosis.undecided:
-        heads = {
-            "explanation": "Explanation",
-            "interval": "95 % interval",
-            "twins": "twins",
-            "needs": "more motion of this decides",
-        }
-        rows = [
-            (format_explanation(alternative), *_details(alternative), alternative.needs or "none")
-            for alternative in diagnosis.undecided
-        ]
+        heads = {**EXPLAINED, "needs": "more motion of this decides"}
+        rows = [(*_explained(one), one.needs or "none") for one in diagnosis.undecided]
         table = table_of("Undecided between", heads, rows, brief=True)
         yield replace(table, columns=(*table.columns[:-1], replace(table.columns[-1], brief=False)))
     if diagnosis.refused:
         heads = {
-            "explanation": "Explanation",
-            "interval": "95 % interval",
-            "twins": "twins",
-            "rms_after": "rms after",
-            "reason": "reason",
+            **EXPLAINED, "rms_after": "rms after", "reason": "reason",
             "needs": "more motion of this determines it",
-        }
-        refused_rows = [
+        }  # fmt: skip
+        refused = [
             (
-                format_explanation(refused), *_details(refused),
-                format_amount(refused.causes[-1].rms_after, diagnosis.unit) if refused.causes else "",
-                refused.reason, refused.needs or "none",
+                *_explained(one), format_amount(one.causes[-1].rms_after, diagnosis.unit),
+                one.reason, one.needs or "none",
             )
-            for refused in diagnosis.refused
+            for one in diagnosis.refused
         ]  # fmt: skip
-        yield table_of("Not determined by this motion", heads, refused_rows)
+        yield table_of("Not determined by this motion", heads, refused)
 
 
-def _details(explanation: Alternative | Refused) -> tuple[str, str]:
-    """Return the intervals and the twins of the causes of an explanation."""
+def _explained(explanation: Alternative | Refused) -> tuple[str, str, str]:
+    """Return the causes of an explanation, their intervals, and their twins."""
     intervals = "; ".join(filter(None, map(format_interval, explanation.causes)))
-    return intervals, ", ".join(twin for cause in explanation.causes for twin in cause.twins)
+    twins = ", ".join(twin for cause in explanation.causes for twin in cause.twins)
+    return format_explanation(explanation), intervals, twins
 
 
 def _heads(unit: str) -> Heads[Cause]:

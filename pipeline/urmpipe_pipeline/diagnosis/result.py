@@ -30,6 +30,9 @@ Kind = Literal[
 ]  # fmt: skip
 """What may make two sides deviate."""
 
+CLOCKS = ("time_lag", "clock_drift")
+STRUCTURE = ("link_length", "link_shift", "tilt")
+
 
 @dataclass(frozen=True, slots=True)
 class Cause:
@@ -47,8 +50,8 @@ class Cause:
         value: One number, three of base and tool, none of signs and exchanges, in `unit`. Of a backlash the
             whole play, of a sag 1 / stiffness, of a coupling -1 if the first joint includes the second, of
             outliers their largest distance.
-        unit: m, rad, s, s2 (of q'' in q), s/s, turns, rad/(N m), rad/kg (of a sag without masses: of each kg
-            at the tool centre point), or empty of a factor.
+        unit: m, rad, s, s2 (of q'' in q), s/s, turns, rad/(N m), m/N, rad/kg, m/kg (of a sag without masses:
+            of each kg at the tool centre point), or empty of a factor.
         low: Lower end of the 95 % interval of each number; none where nothing was fitted.
         high: Upper end.
         from_sample: Row of the log, from 0, from which on it holds; None for all of them.

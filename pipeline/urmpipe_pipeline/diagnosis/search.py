@@ -311,7 +311,7 @@ class Search:
 
     @cached_property
     def _prior(self) -> FloatArray:
-        """What each group adds to a score by its kind; a twin that stands for another goes first."""
+        """What each group adds to a score by its kind."""
         return np.array([ORDER.get(group.kind, 0.0) for group in self.model.groups])
 
     def _columns(self, groups: Sequence[int]) -> list[int]:

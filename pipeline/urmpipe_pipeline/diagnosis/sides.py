@@ -22,7 +22,6 @@ from urmpipe_pipeline.diagnosis.arm_groups import (
     time_groups,
     tool_groups,
 )
-from urmpipe_pipeline.diagnosis.gate import STRUCTURE
 from urmpipe_pipeline.diagnosis.hypotheses import Group, numbered
 from urmpipe_pipeline.diagnosis.interpolation import (
     Cubics,
@@ -34,7 +33,7 @@ from urmpipe_pipeline.diagnosis.interpolation import (
 from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion, motion_of
 from urmpipe_pipeline.diagnosis.place import TOOL, PlaceModel
-from urmpipe_pipeline.diagnosis.result import NotLookedFor
+from urmpipe_pipeline.diagnosis.result import STRUCTURE, NotLookedFor
 from urmpipe_pipeline.log_edits import (
     Edits,
     axis_edits,

@@ -13,6 +13,8 @@ import urmpipe
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.transform import Transform
+from urmpipe_pipeline.comparison.facts import remedy_hints
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 
 UR5E = load_robot("ur5e")
@@ -160,3 +162,58 @@ def test_a_joint_that_turns_about_the_tool_centre_point_is_named_apart(write: Wr
     assert apart == " reads 1 deg too high (this does not move the TCP)"
     assert ("elbow_joint reads 0.5 deg too high: rms" in chain) is (elbow > 0.0)
     assert found.verdict == "fail"
+
+
+def test_joints_that_agree_do_not_where_the_robots_differ() -> None:
+    """A tool of 100 mm is known to one side only."""
+    longer = UR5E.placed(tool=Transform(translation=(0.0, 0.0, 0.1)))
+    asked, done = (urmpipe.ingest(name="side", t=T, q=Q, unit="rad", robot=robot) for robot in (longer, UR5E))
+    found = urmpipe.diagnose(asked, done)
+    reason = "no change of joints or clock makes the tool centre points agree"
+    assert found.sentence == f"no cause found: rms 100 mm remains ({reason})"
+
+
+@pytest.mark.parametrize(
+    ("allowed", "breaks"), [("x=10mm,y=1mm,z=10mm", False), ("x=4mm,y=10mm,z=10mm", True)]
+)
+def test_a_cause_breaks_the_tolerance_of_its_own_axis(write: Write, allowed: str, breaks: bool) -> None:
+    found = diagnosed(
+        write("path", T, tcp=place(Q) + np.array([0.005, 0.0, 0.0])), write("log", T, Q), allowed
+    )
+    ((kind, broken),) = [(cause.kind, cause.breaks) for cause in found.causes]
+    assert (kind, broken, found.verdict) == ("base_shift", breaks, "fail" if breaks else "pass")
+
+
+def test_rows_without_all_joints_are_no_samples(write: Write) -> None:
+    few = Q.copy()
+    few[np.arange(len(T)) % (len(T) // 5) != 0, 5] = np.nan
+    found = diagnosed(write("path", T, tcp=place(Q) + np.array([0.0, 0.0, 0.005])), write("log", T, few))
+    assert found.causes == ()
+    assert found.remainder.words.endswith(" samples with all values: fewer than 10")
+
+
+def test_it_is_the_reference_that_rests(write: Write) -> None:
+    found = diagnosed(write("still", T, np.tile(Q[0], (len(T), 1))), write("path", T, tcp=place(Q)))
+    assert found.remainder.words == "the reference is at rest: one pose"
+
+
+@pytest.mark.parametrize("turn", [-np.pi, np.pi])
+def test_of_joints_on_both_sides_half_a_turn_has_a_sense(write: Write, turn: float) -> None:
+    log = Q.copy()
+    log[300:, 1] -= turn
+    (cause,) = diagnosed(write("one", T, Q), write("two", T, log)).causes
+    assert (cause.kind, cause.from_sample, cause.value) == ("half_turn", 300, (turn,))
+
+
+def test_a_path_in_mm_is_read_so_and_has_no_exponent(write: Write) -> None:
+    found = diagnosed(write("path", T, tcp=1000.0 * place(Q)), write("log", T, Q))
+    assert "in mm, read as m: rms " in found.sentence
+    assert "e+" not in found.sentence
+
+
+def test_all_joints_in_degrees_are_corrected_at_once(write: Write) -> None:
+    files = write("one", T, Q), write("two", T, np.degrees(Q))
+    asked, done = (urmpipe.ingest(file, "ur5e", unit="rad") for file in files)
+    (run,) = urmpipe.compare(asked, done, diagnose=True).runs
+    (hint,) = remedy_hints(run)
+    assert hint.value == dict.fromkeys(run.run.log.joints, "deg")

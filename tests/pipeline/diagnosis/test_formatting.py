@@ -74,7 +74,7 @@ TEXTS: Sequence[tuple[Cause, str, str, str]] = [
     (of_joint("sag", "q2", 0.01 * DEG, unit="rad/kg"), "joint q2 sags by 0.01 deg/kg, like gravity", "joint q2 were corrected for a sag of 0.01 deg/kg", "sag of q2"),
     (LENGTH, "r_4 needs +1.2 mm from row 4 on", "r_4 were changed by +1.2 mm from row 4 on", "r_4"),
     (number("tilt", "theta_4", -0.1 * DEG, unit="rad"), "theta_4 needs -0.1 deg", "theta_4 were changed by -0.1 deg", "theta_4"),
-    (number("link_shift", "p4", 0.003, segment="p4", axis=Y), "segment 4 needs +3 mm sideways (y)", "segment 4 were moved by +3 mm sideways (y)", "segment 4 sideways y"),
+    (number("link_shift", "segment 4 sideways y", 0.003, segment="p4", axis=Y), "segment 4 needs +3 mm sideways (y)", "segment 4 were moved by +3 mm sideways (y)", "segment 4 sideways y"),
     (Cause("own_geometry", "arm"), "the arm's own geometry, as a calibration finds it", "the arm were calibrated", "own geometry"),
     (number("base_shift", "base", *THREE), "the base needs (+1, -2, +0.1) mm", "the base were moved by (+1, -2, +0.1) mm", "base shift"),
     (BASE, "the base needs a turn of (0, 0, +0.1146) deg", "the base were turned by (0, 0, +0.1146) deg", "base rotation"),

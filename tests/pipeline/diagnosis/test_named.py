@@ -61,7 +61,7 @@ def said(numbers: Numbers, edits: Edits = (), **how: object) -> tuple[Named, fro
 
 def causes_of(search: Search, result: SearchResult) -> tuple[tuple[Cause, ...], tuple[Alternative, ...]]:
     """Return the causes of a search in the words of the result; none of them is out of tolerance."""
-    names, rows = tuple(URM6.coordinates), np.arange(search.model.rows)
+    names = tuple(URM6.coordinates)
     return ExplanationBuilder(search, result, names, names, lambda *_: False).causes()
 
 
