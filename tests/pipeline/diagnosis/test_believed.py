@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -55,33 +54,34 @@ def is_too_large(cause: Cause) -> bool:
     return size > limits.get(cause.kind, np.inf) or (cause.kind == "joint_scale" and abs(size - 1.0) > 0.02)
 
 
-def cancels(cause: Cause, rms: float) -> bool:
-    """Return whether a base or tool alone makes the rms more than three times as large."""
-    return cause.kind in ("tool_shift", "base_shift") and math.hypot(*cause.value) > 4.0 * rms
+@pytest.mark.slow
+def test_what_is_not_known_is_not_explained_by_what_no_arm_has(arm: Chain) -> None:
+    q = joints(600, 0.1)
+    meant = q.copy()
+    meant[:, 1] += q[:, 1] ** 2
+    found = diagnosed(arm, poses_over_log(arm, meant)[0] + white(0, 600, 5e-5), q)
+    (refused,) = [one for one in found.refused if one.reason == "more than any arm differs by"]
+    assert any(is_too_large(cause) for cause in refused.causes)
+    assert not any(is_too_large(cause) for cause in found.causes)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("fault", "wide", "reason"),
-    [
-        ("waves", 0.3, "they cancel each other"),
-        ("square", 0.1, "more than any arm differs by"),
-    ],
-)
-def test_what_is_not_known_is_not_explained_by_what_no_arm_has(
-    arm: Chain, fault: str, wide: float, reason: str
-) -> None:
-    q = joints(600, wide)
-    meant, swing = q.copy(), q[:, 1]
-    meant[:, 1] += 0.01 * np.sin(7.0 * swing / wide) if fault == "waves" else swing**2
-    found = diagnosed(arm, poses_over_log(arm, meant)[0] + white(0, 600, 5e-5), q)
-    refused = [cause for one in found.refused if one.reason == reason for cause in one.causes]
-    if fault == "waves":  # what cancels is not named, whether or not the criterion prefers it
-        assert not any(cancels(cause, found.rms) for cause in found.causes)
-        assert (found.causes, found.undecided) == ((), ())
-    else:
-        assert any(is_too_large(cause) for cause in refused)
-        assert not any(is_too_large(cause) for cause in found.causes)
+def test_causes_that_each_make_the_rms_more_than_three_times_as_large_are_refused(arm: Chain) -> None:
+    """A sag is mostly constant where a joint swings little: a zero takes its mean away."""
+    q, step = joints(600, 0.2), np.array([0.0, 1e-6, 0.0])
+    climb = (poses_over_log(arm, q + step)[0] - poses_over_log(arm, q - step)[0])[:, 2] / 2e-6
+    torque = 9.80665 * climb  # of 1 kg at the tool centre point
+    meant = q.copy()
+    meant[:, 1] += 0.004 * (torque - torque.mean())
+    path = poses_over_log(arm, meant)[0] + white(0, 600, 5e-5)
+    found = diagnosed(arm, path, q)
+    (refused,) = [one for one in found.refused if one.reason == "they cancel each other"]
+    (zero,) = [cause for cause in refused.causes if cause.kind == "joint_offset"]
+    alone = q.copy()
+    alone[:, int(zero.name[1:]) - 1] += zero.value[0]
+    apart = np.linalg.norm(path - poses_over_log(arm, alone)[0], axis=1)
+    assert np.sqrt((apart**2).mean()) > 3.0 * found.rms > 3.0 * zero.rms_after
+    assert "joint_offset" not in {cause.kind for cause in found.causes}
 
 
 @pytest.mark.slow
@@ -99,7 +99,8 @@ def test_what_changes_during_the_log_is_no_constant_cause(arm: Chain, fault: str
     assert (found.causes, found.undecided) == ((), ())
     if fault == "drifting base":
         changing = [one for one in found.refused if one.reason == "what would fit changes during the log"]
-        assert "base_shift" in {cause.kind for one in changing for cause in one.causes}
+        (shift,) = [cause for one in changing for cause in one.causes if cause.kind == "base_shift"]
+        assert 1e-4 < shift.rms_after < shift.rms_before == found.rms
 
 
 @pytest.mark.slow
@@ -125,7 +126,7 @@ def test_a_joint_whose_rows_do_not_show_its_acceleration_is_not_asked_for_compli
 
 
 @pytest.mark.slow
-def test_a_step_beyond_the_bounds_of_an_arm_is_halved(arm: Chain) -> None:
+def test_a_step_beyond_the_bounds_of_an_arm_is_shortened(arm: Chain) -> None:
     q, far = joints(600), FARTHEST - 0.004
     path = poses_over_log(arm, q)[0] + [far + 0.005, 0.0, 0.0] + white(1, 600, 1e-4)
     found = diagnosed(arm, path, q, base=(far, 0.0, 0.0))
