@@ -42,7 +42,8 @@ SOME = 2_000  # rows, spread evenly, that select before more of them settle it
 MANY = 20_000  # rows, spread evenly, that settle an explanation; standard errors fall with the root of them
 MAJOR = 0.35  # share of the square that stays, where more than noise does, with a cause and not without it
 PROMISED = 0.5  # share of the square that what is left of an explanation leaves at most
-HOPELESS = 2.0  # a start is given up if it leaves e times the rms of the best so far
+HOPELESS = 1.0  # a start is given up if it leaves 1.6 (root of e) times the rms of the best so far
+SAME = 1e-3  # share of the square by which two fits of the same causes differ and are the same
 CLEAR = 100.0  # times the noise that a deviation is which one cause that explains it leaves without a rival
 STEPS = 6  # of a fit from a start; those of an explanation that is settled are more
 ROUNDS = 6  # selections after each other: from a good start three are enough
@@ -217,14 +218,14 @@ class Search:
 
     def _explored(self, ranked: Sequence[Edits], coarse: Rows, medium: Rows, tau: float) -> list[Explanation]:
         """Return what is found from each start, the best first, each once."""
-        every: list[Explanation] = []
+        every, passed = list[Explanation](), dict[tuple[Edits, Subset], float]()
         for start in self._starts(ranked, coarse):
             best = min(every, key=_score, default=None)
             if best is not None and self._is_needless(start, best, coarse):
                 continue
             margin = HOPELESS * len(medium.at) * len(medium.weight) / tau
             most = np.inf if best is None else best.score + margin
-            every.append(self._explained(medium, start, tau, most))
+            every.append(self._explained(medium, start, tau, most, passed))
         distinct: dict[object, Explanation] = {}
         for candidate in sorted(every, key=_score):
             distinct.setdefault(candidate.key, candidate)
@@ -350,10 +351,18 @@ class Search:
             prior=self._prior, more=more,
         )  # fmt: skip
 
-    def _explained(self, rows: Rows, state: State, tau: float, most: float = np.inf) -> Explanation:
+    def _explained(
+        self,
+        rows: Rows,
+        state: State,
+        tau: float,
+        most: float = np.inf,
+        passed: dict[tuple[Edits, Subset], float] | None = None,
+    ) -> Explanation:
         """Return the best explanation with some edits, selected anew where the last fit led until it stays.
 
-        It is given up if its score stays above `most`.
+        It is given up if its score stays above `most`, or if another start led to the same fit: `passed` has
+        what each leaves.
         """
         best: Explanation | None = None
         taken: Subset | None = None
@@ -374,8 +383,12 @@ class Search:
                 break
             seen.add(chosen)
             state, more = self._within(state, chosen, some, selection, STEPS)
-            if selection.score(cost(self.model, state, some), chosen - more) > most:
+            left, key = cost(self.model, state, some), (state.edits, chosen - more)
+            met = passed is not None and np.isclose(passed.get(key, np.inf), left, rtol=SAME)
+            if met or selection.score(left, chosen - more) > most:
                 break
+            if passed is not None:
+                passed[key] = left
             taken, beyond = chosen - more, beyond | more
         return best or Explanation(state, taken or frozenset(), np.inf)
 
@@ -430,7 +443,8 @@ class Search:
         some = replace(rows, at=self.spread(SOME))
         fit = self._stable(some, best.state, None)
         near = sorted((candidate for candidate in others if candidate.score < best.score + FAR), key=_score)
-        near = [self._explained(fit.rows, candidate.state, fit.tau) for candidate in near[:SHOWN]]
+        most = fit.score(fit.tau) + HOPELESS * fit.selection.normal.count / fit.tau
+        near = [self._explained(fit.rows, candidate.state, fit.tau, most) for candidate in near[:SHOWN]]
         for candidate in near:
             if candidate.score < fit.score(fit.tau):
                 again = self._stable(some, candidate.state, None)
