@@ -27,12 +27,22 @@ from urmpipe_pipeline.runs.parts import log_facts
 MEANING = {"coverage": "of the reference, shown by the log", "judged": "of the log's motion, judged"}
 """What a share is of."""
 
+LEADING = 3
+"""Causes of so many logs stand at the top of a page; tables and sections have the others."""
+
+
+def cause_facts(result: Comparison) -> Iterator[Fact]:
+    """Yield why the logs deviate that are furthest out, where that is known."""
+    for one in _leading(result) or [result.worst]:
+        if one.diagnosis is not None and one.decisive is one.furthest:
+            cause = diagnosis_facts(one.diagnosis)[0]
+            name = f"{cause.name} of {one.name}" if len(result.runs) > 1 else cause.name
+            yield replace(cause, name=name, page=one.verdict == "fail")
+
 
 def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
-    """Yield why a log deviates, if that is known, and what decided the verdict: how much, when and where."""
+    """Yield what decided the verdict: how much, when and where."""
     held, furthest = one.decisive, one.furthest
-    cause = diagnosis_facts(one.diagnosis)[:1] if one.diagnosis and held is furthest else ()
-    yield from (replace(fact, page=_leads_page(one)) for fact in cause)
     yield Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", Ref(one.name, colour))
     yield Fact("Decided by", decided_words(held), page=False)
     yield Fact("Decided by", ", ".join(filter(None, (size_of(held), used_words(held)))), brief=False)
@@ -44,9 +54,10 @@ def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
     yield from (replace(fact, page=False) for fact in _undiagnosed(one))
 
 
-def _leads_page(one: Deviation) -> bool:
-    """Return whether the cause of the worst log is at the top of a page: not if it passes."""
-    return one.verdict == "fail" and one.decisive is one.furthest
+def _leading(result: Comparison) -> list[Deviation]:
+    """Return the logs whose causes are at the top of a page: those that fail, the worst first."""
+    known = (one for one in reversed(result.ranking) if one.diagnosis is not None)
+    return [one for one in known if one.verdict == "fail" and one.decisive is one.furthest][:LEADING]
 
 
 def place_of(one: Deviation, held: Statistics) -> Place | None:
@@ -108,10 +119,9 @@ def _why(one: Deviation, result: Comparison) -> Iterator[Fact]:
     """Yield why a log deviates, or what says so."""
     if one.diagnosis is not None:
         several = len(result.runs) > 1  # else the answer stands with the verdict
-        above = one is result.worst and _leads_page(one)
-        for fact in diagnosis_facts(one.diagnosis, remedy_hints(one)):
-            page = fact.page and not (above and fact.name == "Cause")
-            yield replace(fact, brief=fact.brief and several, page=page)
+        answer, *others = diagnosis_facts(one.diagnosis, remedy_hints(one))
+        for fact in (replace(answer, page=one not in _leading(result)), *others):
+            yield replace(fact, brief=fact.brief and several)
     yield from (replace(fact, brief=False) for fact in _undiagnosed(one))
 
 

@@ -13,6 +13,7 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share
 from urmpipe_pipeline.comparison.facts import (
     alignment_words,
+    cause_facts,
     decisive_facts,
     deviation_facts,
     remedy_hints,
@@ -66,7 +67,7 @@ def present(result: Comparison) -> Presentation:
         name=result.name,
         headline=verdict_words(result),
         verdict=result.verdict,
-        facts=(*decisive_facts(worst, colour), *_against(result)),
+        facts=(*cause_facts(result), *decisive_facts(worst, colour), *_against(result)),
         body=_body(result),
         opens_at_ns=int(worst.t_ns[worst.furthest_at]) if worst.run.timed else 0,
         opens_at_row=None if worst.run.timed else worst.furthest.sample_max,

@@ -20,7 +20,7 @@ from urmpipe_models.row_blocks import row_blocks, side_by_side
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.deciding import deciding_joint
 from urmpipe_pipeline.diagnosis.fit import BLOCK, Model, cost, deviation, inliers
-from urmpipe_pipeline.diagnosis.formatting import short_name
+from urmpipe_pipeline.diagnosis.formatting import NOT_CONSTANT, short_name
 from urmpipe_pipeline.diagnosis.gate import LARGEST
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.diagnosis.intervals import batch_covariance, student_quantile
@@ -38,6 +38,7 @@ SEVERAL = 1.2  # outliers are a cause if all rows have so many times the rms of 
 RATES = (*CLOCKS, "servo_lag", "joint_lag", "compliance", "backlash")
 APART = 2.0  # times the largest other deviation that the median of outliers is
 ALONG = 0.9  # share of the square of outliers that points along what such a cause changes: it is no outlier
+ABOUT = 0.9  # of the largest outlier: if all are at least so large, one number is that of all
 UNLIKE = 3.0  # outliers are so many times larger than what causes do that change with the rates of joints
 
 
@@ -165,7 +166,9 @@ class ExplanationBuilder:
             parts = [*map(Part, edits), *(Part(group=g) for g in sorted(subset))]
             causes = (self._of_part(part, explanation, 0.0, ()) for part in parts)
             changed = tuple(replace(cause, rms_before=before, rms_after=after) for cause in causes)
-            refusals.append(Refused(changed, reason, self._needs([explanation, self.result.best])))
+            changes = reason == NOT_CONSTANT  # no other motion makes it constant
+            needs = "" if changes else self._needs([explanation, self.result.best])
+            refusals.append(Refused(changed, reason, needs))
         return tuple(refusals)
 
     def after(self) -> FloatArray:
@@ -248,9 +251,7 @@ class ExplanationBuilder:
         for k, part in enumerate(order):
             mended = self._only(explanation.state, (part,))
             made = nothing[:, list(part.rows)] if part.rows else nothing - self._deviation(mended)
-            by_joint = self.model.of_joints
-            size = np.abs(made).max(axis=0) if by_joint else np.sqrt((made**2).sum(axis=0))
-            effect = float(np.nanmax(size, initial=0.0))
+            effect = float(np.nanmax(self._sizes(made), initial=0.0))
             causes.append(
                 replace(
                     self._of_part(part, explanation, effect, twins.get(part, ())),
@@ -261,11 +262,20 @@ class ExplanationBuilder:
             )  # fmt: skip
         return tuple(causes)
 
+    def _sizes(self, made: FloatArray) -> FloatArray:
+        """Return how large deviations of rows are: a distance, or that of the joint furthest off."""
+        if self.model.of_joints:
+            return np.asarray(np.abs(made).max(axis=0))
+        return np.asarray(np.sqrt((made**2).sum(axis=0)))
+
     def _of_part(self, part: Part, explanation: Explanation, effect: float, twins: Sequence[str]) -> Cause:
         """Return a cause without what it changes."""
         if part.rows:
             rows = tuple(self.model.sample[list(part.rows)].tolist())
-            return Cause("outliers", "rows", rows=rows, value=(effect,), unit=self.model.unit)
+            sizes = self._sizes(self.before[:, list(part.rows)])
+            least = float(np.nanmin(sizes, initial=effect))
+            value = (effect,) if least > ABOUT * effect else (least, effect)
+            return Cause("outliers", "rows", rows=rows, value=value, unit=self.model.unit)
         if part.usual:
             return Cause("own_geometry", "arm")
         cause = self._of_edit(part.edit) if part.edit else self._of_group(part.group, explanation)

@@ -31,11 +31,14 @@ MAX_CAUSES = 3  # in a summary, with all that break the tolerance; a table has t
 MAX_LISTED = 2  # undecided explanations in a summary, or one if two have too many causes; a table has all
 MAX_UNDECIDED = 4  # causes of two such explanations together
 MIN_EXPLAINED = 1.0 / 3.0  # fraction of the rms; with less, the summary says that it explains little
-NOTHING = 0.01  # fraction of the rms of a passed log; less would go unnoticed
+NOTHING = 0.01  # fraction of an rms; less would go unnoticed
 UNMOVED = 1e-6  # m; a cause that moves no position by more is not one of the rms
 ROUNDING = 1e-9  # mm or deg: less is the rounding of the numbers that were subtracted
 CLOCKS = ("time_lag", "clock_drift")
 PASSES = "passes; "
+TOO_LARGE = "more than any arm differs by"  # reasons of refusals
+CANCELLING = "they cancel each other"
+NOT_CONSTANT = "what would fit changes during the log"
 
 
 def format_summary(diagnosis: Diagnosis) -> str:
@@ -95,7 +98,7 @@ def _is_joinable(step: Sequence[Cause], *causes: Cause) -> bool:
 
 
 def _lowers(step: Sequence[Cause]) -> bool:
-    return step[-1].rms_after < step[0].rms_before
+    return step[-1].rms_after < (1.0 - NOTHING) * step[0].rms_before
 
 
 def _format_avoidable(diagnosis: Diagnosis) -> str:
@@ -201,6 +204,8 @@ def format_explanation(explanation: Alternative | Refused) -> str:
 
 def format_refusal(refused: Refused) -> str:
     """Return why causes are not believed, and which motion would determine them."""
+    if len(refused.causes) > 1 and refused.reason == NOT_CONSTANT:
+        return f"not determined by this motion: {refused.reason}"
     if len(refused.causes) > MAX_LISTED:  # no motion of one joint determines so many
         return f"not determined by this motion: {len(refused.causes)} causes ({refused.reason})"
     needs = f"; more motion of {refused.needs} would determine it" if refused.needs else ""
@@ -306,6 +311,8 @@ def _displayed_unit(cause: Cause) -> tuple[str, float]:
 
 def _format_numbers(cause: Cause, numbers: Sequence[float]) -> str:
     """Return numbers in the displayed unit of a cause, without it."""
+    if cause.kind == "outliers":
+        return " to ".join(_format_number(number * _displayed_unit(cause)[1]) for number in numbers)
     if len(numbers) > 1:
         negligible = 1e-4 * max(map(abs, numbers))  # below the digits of the largest
         shown = [number if abs(number) > negligible else 0.0 for number in numbers]

@@ -20,6 +20,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, cost
+from urmpipe_pipeline.diagnosis.formatting import CANCELLING, TOO_LARGE
 from urmpipe_pipeline.diagnosis.hypotheses import State
 from urmpipe_pipeline.diagnosis.intervals import autocorrelation_time
 from urmpipe_pipeline.diagnosis.result import CLOCKS, STRUCTURE
@@ -50,10 +51,6 @@ UNEVEN = 0.1  # the same of a clock, which nothing of an arm resembles
 SIGNIFICANT = 5.0  # standard deviations of F, sqrt(2 / numbers more) each, by which it lies above 1
 FEW = 300  # rows, spread evenly, on which causes are applied alone
 SOME = 2_000  # rows, spread evenly, on which numbers may change
-
-TOO_LARGE = "more than any arm differs by"
-CANCELLING = "they cancel each other"
-NOT_CONSTANT = "what would fit changes during the log"
 
 
 class Fitter(Protocol):

@@ -67,7 +67,7 @@ def diagnosis_facts(diagnosis: Diagnosis, hints: Sequence[Hint] = ()) -> tuple[F
     single = diagnosis.causes[0] if len(diagnosis.causes) == 1 else None
     own_tcp = "; ".join(map(format_own_tcp, diagnosis.own_tcp))
     return (
-        Fact("Cause", diagnosis.sentence, leads=True),
+        Fact("Diagnosis" if diagnosis.verdict == "pass" else "Cause", diagnosis.sentence, leads=True),
         Fact("Meaning", _meaning(diagnosis, hints), brief=False, leads=True),
         Fact("95 % interval", format_interval(single) if single else "", brief=False, page=False),
         Fact("Undecided", undecided, brief=False, page=False),  # the cause and a table say it
@@ -83,13 +83,15 @@ def _meaning(diagnosis: Diagnosis, hints: Sequence[Hint]) -> Advice | None:
     if not diagnosis.causes or diagnosis.remainder.different:
         return None
     if diagnosis.verdict == "pass":
-        return Advice(hints=tuple(hints)) if hints else None
+        return Advice("to try it", tuple(hints)) if hints else None
     remedies = [build_remedy(cause) for cause in select_causes(diagnosis.causes)]
     last = {remedy.place: k for k, remedy in enumerate(remedies)}  # a place is named once, after the last
     steps = [
         remedy.imperative() if last[remedy.place] == k else remedy._replace(place="").imperative()
         for k, remedy in enumerate(remedies)
     ]
+    if diagnosis.undecided:
+        steps.append(f"{format_amount(diagnosis.causes[-1].rms_after, diagnosis.unit)} rms then remains")
     return Advice("; ".join(steps), tuple(hints))
 
 

@@ -49,7 +49,7 @@ class Cause:
             other causes, and of a base or tool with three numbers.
         value: One number, three of base and tool, none of signs and exchanges, in `unit`. Of a backlash the
             whole play, of a sag 1 / stiffness, of a coupling -1 if the first joint includes the second, of
-            outliers their largest distance.
+            outliers their least and their largest distance, or one of about both.
         unit: m, rad, s, s2 (of q'' in q), s/s, turns, rad/(N m), m/N, rad/kg, m/kg (of a sag without masses:
             of each kg at the tool centre point), or empty of a factor.
         low: Lower end of the 95 % interval of each number; none where nothing was fitted.

@@ -30,7 +30,8 @@ from urmpipe_pipeline.diagnosis.candidates import (
     residual_after_fit,
 )
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, cost, fitted, inliers, normal_equations, residual
-from urmpipe_pipeline.diagnosis.gate import CANCELLING, NOISE, NOT_CONSTANT, find_changing, find_unbelievable
+from urmpipe_pipeline.diagnosis.formatting import CANCELLING, NOT_CONSTANT
+from urmpipe_pipeline.diagnosis.gate import NOISE, find_changing, find_unbelievable
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
 from urmpipe_pipeline.diagnosis.intervals import LONGEST, autocorrelation_time
 from urmpipe_pipeline.diagnosis.selection import Normal, Selection, Subset, without_twins
