@@ -126,8 +126,13 @@ def environment() -> Environment:
 
 
 def _inert(value: Any) -> Any:
-    """Return a text of the page on one line, with escapes for what reorders letters or acts on a terminal."""
-    return value if isinstance(value, Markup) or not isinstance(value, str) else inert(value)
+    """Return a text of the page on one line, with escapes for what reorders letters or acts on a terminal.
+
+    An arrow is one letter there: a line may not break within "->".
+    """
+    if isinstance(value, Markup) or not isinstance(value, str):
+        return value
+    return inert(value).replace(" -> ", " → ")
 
 
 def text_lines(text: str) -> Markup:
