@@ -127,9 +127,10 @@ def swap_edits(joints: int) -> Iterator[Edits]:
 
 
 def joint_unit_edits(turning: Sequence[bool]) -> Iterator[Edits]:
-    """Yield that a joint that turns, or all of them, are in deg and were read as rad, or in rad, as deg."""
+    """Yield that a joint that turns, all but one or all are in deg, read as rad, or in rad, read as deg."""
     joints = np.flatnonzero(turning).tolist()
-    for some in [*((j,) for j in joints), *([tuple(joints)] if len(joints) > 1 else [])]:
+    others = [tuple(j for j in joints if j != one) for one in joints] if len(joints) > 2 else []
+    for some in [*((j,) for j in joints), *others, *([tuple(joints)] if len(joints) > 1 else [])]:
         yield from ((Edit("joint_unit", some, factor),) for factor in (math.pi / 180.0, 180.0 / math.pi))
 
 

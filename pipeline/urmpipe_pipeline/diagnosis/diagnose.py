@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.row_blocks import spread_rows
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
+from urmpipe_pipeline import text
 from urmpipe_pipeline.diagnosis.edits import later_edits, turn_edits
 from urmpipe_pipeline.diagnosis.explain import ExplanationBuilder
 from urmpipe_pipeline.diagnosis.fit import Model, residual
@@ -107,9 +108,11 @@ def _diagnosed(deviation: Deviation, question: Question, lag: float | None) -> D
     search, result = _found(
         Search(model, edits, _floor(deviation, question), question.forced, starts, timed=timed)
     )
-    built = ExplanationBuilder(
-        search, result, question.names, question.own_names, partial(_breaks, deviation)
-    )
+    given = question.names, question.own_names, partial(_breaks, deviation)
+    built = ExplanationBuilder(search, result, *given)
+    while weak := built.insignificant():
+        result = search.without(result, weak)
+        built = ExplanationBuilder(search, result, *given)
     causes, undecided = built.causes()
     state, after = built.state, built.after()
     before, left = rms(built.before.T), rms(after.T)
@@ -251,7 +254,8 @@ def _tells_nothing(question: Question) -> str:
     some = spread_rows(model.rows, SOME)
     known = int(np.isfinite(model.residual(zero(model.groups), some)).all(axis=0).sum())
     if known < LEAST_SAMPLES:
-        return f"{known} samples{' with all values' * (known < model.rows)}: fewer than {LEAST_SAMPLES}"
+        samples = text.counted(known, "sample")
+        return f"{samples}{' with all values' * (known < model.rows)}: fewer than {LEAST_SAMPLES}"
     moved = np.fmax.reduce(model.motion.value, axis=1) - np.fmin.reduce(model.motion.value, axis=1)
     side = "log" if question.sign > 0.0 else "reference"
     return f"the {side} is at rest: one pose" if np.nanmax(moved, initial=0.0) < AT_REST else ""

@@ -129,12 +129,30 @@ class ExplanationBuilder:
         every = [best, *(explanation for explanation in self.result.others if self._relevant(explanation))]
         rivals, twins = self._without_twins(every)
         common = set.intersection(*(set(self._parts(explanation)) for explanation in rivals))
+        common = {part for part in common if all(self._is_same_number(part, other) for other in rivals)}
         named = self._causes(best, common, twins)[: len(common)]
         if len(rivals) == 1:
             return named, ()
         needs = self._needs(rivals)
         alternatives = (self._causes(explanation, common, {})[len(common) :] for explanation in rivals)
         return named, tuple(Alternative(causes, needs) for causes in alternatives)
+
+    def _is_same_number(self, part: Part, other: Explanation) -> bool:
+        """Tell whether a cause has the same numbers in the best explanation and in another, if it has any."""
+        if part.group < 0:
+            return True
+        best, group = self.result.best, self.model.groups[part.group]
+        reach = self._half_width(best, part.group) + self._half_width(other, part.group)
+        return bool((np.abs(best.state.of(group) - other.state.of(group)) <= reach).all())
+
+    def insignificant(self) -> set[int]:
+        """Return the groups of the best explanation with intervals that all contain 0."""
+        best = self.result.best
+        return {g for g in best.subset if not self._is_significant(best, g)}
+
+    def _is_significant(self, explanation: Explanation, g: int) -> bool:
+        numbers = np.abs(explanation.state.of(self.model.groups[g]))
+        return bool((numbers > self._half_width(explanation, g)).any())
 
     def explains(self, share: float) -> bool:
         """Tell whether causes take a share of the rms of all that was fitted away, or break a tolerance."""
@@ -212,10 +230,7 @@ class ExplanationBuilder:
 
     def _relevant(self, explanation: Explanation) -> bool:
         """Tell whether each cause of an explanation has a number whose interval lies beside 0."""
-        return all(
-            (np.abs(explanation.state.of(self.model.groups[g])) > self._half_width(explanation, g)).any()
-            for g in explanation.subset
-        )
+        return all(self._is_significant(explanation, g) for g in explanation.subset)
 
     def _parts(self, explanation: Explanation) -> list[Part]:
         """Return the causes of an explanation: rows, what is usual, edits, then groups."""

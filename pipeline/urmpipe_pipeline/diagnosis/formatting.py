@@ -49,15 +49,18 @@ def format_summary(diagnosis: Diagnosis) -> str:
         fitted = f"the causes found leave {after} of it" if causes or alternatives else "no cause found"
         return f"probably different motions: rms {before}, {fitted}"
     if not causes and not alternatives:
-        if diagnosis.refused and diagnosis.verdict != "pass":
-            return f"{format_refusal(diagnosis.refused[0])}; rms {after} remains"
+        if diagnosis.refused:
+            passes = PASSES if diagnosis.verdict == "pass" else ""
+            return f"{passes}{format_refusal(diagnosis.refused[0])}; rms {after} remains"
         return f"no cause found: rms {before} remains{f' ({residual.words})' if residual.words else ''}"
     unseen = [cause for cause in causes if _moves_nothing(cause, diagnosis.unit)]
     if unseen:
         seen = tuple(cause for cause in causes if cause not in unseen)
         rest = format_summary(replace(diagnosis, causes=seen)) if seen or alternatives else ""
         start = f"{rest}; " if rest else PASSES if diagnosis.verdict == "pass" else ""
-        return f"{start}{text.enumerated(list(map(format_cause, unseen)))} (this does not move the TCP)"
+        only_turns = all(cause.kind == "turns" for cause in unseen)
+        effect = "does not move the TCP" if only_turns else "turns the TCP, but does not move it"
+        return f"{start}{text.enumerated(list(map(format_cause, unseen)))} (this {effect})"
     if diagnosis.verdict == "pass":
         return f"{PASSES}{_format_avoidable(diagnosis)}"
     little = diagnosis.rms - residual.rms < MIN_EXPLAINED * diagnosis.rms
@@ -67,7 +70,7 @@ def format_summary(diagnosis: Diagnosis) -> str:
 def _moves_nothing(cause: Cause, unit: str) -> bool:
     """Tell whether a cause leaves all positions: a turn about the tool centre point, whole turns."""
     still = cause.effect < UNMOVED and abs(cause.rms_after - cause.rms_before) < UNMOVED
-    return unit == "m" and still and cause.kind not in ("tool_rotation", "outliers", "own_geometry")
+    return unit == "m" and still and cause.kind not in ("outliers", "own_geometry")
 
 
 def select_causes(causes: Sequence[Cause]) -> list[Cause]:
@@ -171,10 +174,11 @@ def _format_more(diagnosis: Diagnosis, listed: Sequence[Cause]) -> str:
 def _format_origin(diagnosis: Diagnosis) -> str:
     """Return which side has the causes, as the other side's own tool centre point shows."""
     names = [side for side in diagnosis.own_tcp if side.agrees and side.name != diagnosis.origin]
-    if not diagnosis.origin or not names:
+    if not diagnosis.origin:
         return ""
     causes = "that is" if len(diagnosis.causes) < 2 else "these are"
-    return f"; {format_own_tcp(names[0])}, so {causes} in {diagnosis.origin}"
+    follows = f"the TCP that {diagnosis.origin} recorded follows the other side"
+    return f"; {format_own_tcp(names[0]) if names else follows}, so {causes} in {diagnosis.origin}"
 
 
 def format_own_tcp(side: OwnTcp) -> str:

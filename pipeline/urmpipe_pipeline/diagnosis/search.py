@@ -13,9 +13,10 @@ Every subset passes the gate (gate.py); what it refuses is kept, with the reason
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +52,8 @@ ROUNDS = 6  # selections after each other: from a good start three are enough
 NEAR = 6.0  # explanations whose scores differ by less are rivals: odds of twenty to one
 FAR = 100.0  # an explanation whose score on some rows is so much above the best is no rival on more
 SHOWN = 5  # so many rivals are kept
+LESS = 0.95  # share of the square of the best that a rival with more causes leaves at most
+NEARLY = 0.01  # share by which the scale of a joint differs from a factor between units
 
 ORDER: Mapping[str, float] = {
     "tool_shift": 0.0, "tool_rotation": 0.0, "base_shift": 0.3, "base_rotation": 0.3, "base_mirrored": 0.3,
@@ -213,6 +216,9 @@ class Search:
             zeros, candidate = self._with_zeros(medium, tau)
             if candidate.score < best.score:
                 search, best, others = zeros, candidate, [best, *others]
+            for candidate in self._on_turned_bases(coarse, medium, tau):
+                if candidate.score < best.score:
+                    search, best, others = self, candidate, [best, *others]
         weight = self._weight(weight, best.state, self.model.groups)
         rows = Rows(self.spread(MANY), weight, self._least(weight))
         return search._settled(rows, best, others)
@@ -250,6 +256,19 @@ class Search:
         zeros = tuple(g for g, group in enumerate(self.model.groups) if group.kind == "joint_offset")
         search = replace(self, first=zeros)
         return search, search._explained(rows, self.fitted(self.zero, frozenset(zeros), rows), tau)
+
+    def _on_turned_bases(self, coarse: Rows, medium: Rows, tau: float) -> Iterator[Explanation]:
+        """Yield what other robots explain whose bases are turned or mirrored, too, where much deviates."""
+        if cost(self.model, self.zero, coarse) <= CLEAR * NOISE:
+            return
+        robots, bases = (
+            [edit for edit, *more in self.edits if edit.kind in kinds and not more]
+            for kinds in (("other_robot",), ("base_rotation", "base_mirrored"))
+        )
+        pairs = [*product(robots, bases)]
+        for edits in rank_discrete_causes(self.model, pairs, self.zero, coarse, self.floor) if pairs else ():
+            if edits:
+                yield self._explained(medium, replace(self.zero, edits=edits), tau)
 
     def _first_tau(self, state: State, rows: Rows) -> float:
         """Return the autocorrelation time in rows of what all numbers leave: at least that of noise."""
@@ -467,11 +486,12 @@ class Search:
         """Return an explanation with one cause at full size for several numbers, and what finds it.
 
         The zero of the last joint is a shift of the tool that takes up to three numbers; a base turned by
-        half a turn and back by a number is turned by one.
+        half a turn and back by a number is turned by one; a scale of 57.3 is a unit.
         """
         search = self
-        for state, subset in [*self._single_causes(fit), *self._turned_at_once(fit)]:
+        for state, subset in [*self._single_causes(fit), *self._turned_at_once(fit), *self._units(fit)]:
             now, start = self._fitted_score(fit, fit), self.fitted(state, subset, fit.rows)
+            now += NEAR * (len(state.edits) > len(fit.state.edits))  # what is no number goes first
             if fit.selection.score(cost(self.model, start, fit.rows), subset) > now + FAR:
                 continue
             again = replace(self, first=(*(subset & self._distinct[1].keys()), *self.first))
@@ -511,6 +531,21 @@ class Search:
                     values[list(group.columns)] += angle * np.dot(axis, group.axis)
                     yield State(values, _but(fit.state.edits, edit)), fit.subset
 
+    def _units(self, fit: SelfConsistentFit) -> Iterator[tuple[State, Subset]]:
+        """Yield explanations with another unit of a joint in place of its scale."""
+        for g in fit.subset:
+            if (edit := self._unit_like(fit.state, g)) is not None:
+                rest = self._bare(fit.state, fit.subset - {g})
+                yield replace(rest, edits=(*rest.edits, edit)), fit.subset - {g}
+
+    def _unit_like(self, state: State, g: int) -> Edit | None:
+        """Return the unit of a joint that its scale is nearly the factor of; None of others."""
+        group = self.model.groups[g]
+        units = (edit for edit, *more in self.edits if edit.kind == "joint_unit" and not more)
+        own = (edit for edit in units if group.kind == "joint_scale" and edit.joints == (group.joint,))
+        scale = 1.0 + state.of(group)[0]
+        return next((edit for edit in own if abs(scale / edit.value - 1.0) < NEARLY), None)
+
     def _without_minor(self, fit: SelfConsistentFit) -> SelfConsistentFit:
         """Return an explanation without what explains little, where more than noise is left.
 
@@ -528,29 +563,40 @@ class Search:
                 for start, kept in less
             ]
             costs = [cost(self.model, candidate, fit.rows) for candidate, _ in fits]
-            if not costs or now <= MAJOR * min(costs):
+            together = len(fits) > 1 and self._only_together(state, subset, fit.rows)
+            if not costs or (now <= MAJOR * min(costs) and not together):
                 break
             there, kept = fits[int(np.argmin(costs))]
             fit = fit._replace(state=there, subset=kept, selection=self._selection(there, fit.rows, fit.tau))
         return fit
 
+    def _only_together(self, state: State, subset: Subset, rows: Rows) -> bool:
+        """Tell whether none of several causes takes anything away alone."""
+        alone = [self._bare(replace(state, edits=()), frozenset((g,))) for g in subset]
+        alone += [replace(self.zero, edits=(edit,)) for edit in state.edits]
+        nothing = cost(self.model, self.placed(self.zero, rows), rows)
+        return all(cost(self.model, self.placed(one, rows), rows) >= nothing for one in alone)
+
     def _without_changing(self, result: SearchResult) -> SearchResult:
         """Return what was found without the causes that change during the log, what is left fitted again."""
-        state, subset, _ = result.best
-        changing, edits = find_changing(self, state, subset, result.rows)
+        changing, edits = find_changing(self, result.best.state, result.best.subset, result.rows)
         if not changing and not edits:
             return result
-        kept = subset - changing
-        start = replace(state, edits=tuple(edit for edit in state.edits if edit not in edits))
+        refused = (*result.refused, Refusal(result.best, NOT_CONSTANT, frozenset(changing), edits))
+        rest = self.without(result, changing, edits)
+        if cost(self.model, rest.best.state, rest.rows) > PROMISED * cost(self.model, self.zero, rest.rows):
+            rest = self.without(result, result.best.subset, result.best.state.edits)
+        return self._without_changing(replace(rest, others=(), refused=refused))
+
+    def without(self, result: SearchResult, groups: Set[int], edits: Edits = ()) -> SearchResult:
+        """Return what was found without some causes, what is left fitted again."""
+        kept = result.best.subset - groups
+        left = tuple(edit for edit in result.best.state.edits if edit not in edits)
+        start = replace(result.best.state, edits=left)
         there = self.beside_usual(self.fitted(start, kept, result.rows), kept, result.rows)
-        if cost(self.model, there, result.rows) > PROMISED * cost(self.model, self.zero, result.rows):
-            there, kept = self.placed(self.zero, result.rows), frozenset()
         selection = self._selection(there, result.rows, result.tau)
         best = Explanation(there, kept, float(selection.scores([kept])[0]))
-        refused = (*result.refused, Refusal(result.best, NOT_CONSTANT, frozenset(changing), edits))
-        return self._without_changing(
-            replace(result, best=best, others=(), normal=selection.normal, refused=refused)
-        )
+        return replace(result, best=best, normal=selection.normal)
 
     def _does_nothing(self, fit: SelfConsistentFit, edit: Edit) -> bool:
         """Tell whether a discrete cause leaves no less than the floor on the rows that count."""
@@ -625,8 +671,9 @@ class Search:
         simple, least = final.size, cost(self.model, state, rows)
         near = [
             candidate for candidate in near
-            if (candidate.size <= simple or cost(self.model, candidate.state, rows) < least)
+            if (candidate.size <= simple or cost(self.model, candidate.state, rows) < LESS * least)
             and (candidate.state.edits != state.edits or moving(candidate.subset) == candidate.subset)
+            and not any(self._unit_like(candidate.state, g) in state.edits for g in candidate.subset)
         ]  # fmt: skip
         near = list({candidate.key: candidate for candidate in near}.values())
         shown = tuple(sorted(near, key=_score)[:SHOWN])

@@ -159,7 +159,7 @@ def test_a_joint_that_turns_about_the_tool_centre_point_is_named_apart(write: Wr
     found = diagnosed(write("one", T, Q), write("two", T, Q + off), "axis=3.5mm,joint=0.6deg")
     assert {cause.name for cause in found.causes} == {*["elbow_joint"] * (elbow > 0.0), "wrist_3_joint"}
     chain, _, apart = found.sentence.rpartition("wrist_3_joint")
-    assert apart == " reads 1 deg too high (this does not move the TCP)"
+    assert apart == " reads 1 deg too high (this turns the TCP, but does not move it)"
     assert ("elbow_joint reads 0.5 deg too high: rms" in chain) is (elbow > 0.0)
     assert found.verdict == "fail"
 

@@ -210,7 +210,7 @@ def test_a_joint_in_another_unit_or_that_includes_another_is_read_right() -> Non
     chain = rail_arm()
     turning = [joint.kind == "revolute" for joint in chain.moving]
     every = [*joint_unit_edits(turning), *coupling_edits(turning)]
-    assert len(set(every)) == 6 * 2 + 5 * 4 * 2  # each of five joints, or all
+    assert len(set(every)) == 11 * 2 + 5 * 4 * 2  # each of five joints, all others, or all
     model, q = nominal(chain, rich_motion(chain), T), rich_motion(chain)(T)
     for edits in every:
         assert 0 not in edits[0].joints  # a rail

@@ -137,14 +137,14 @@ def test_the_remainder_is_what_the_mended_log_leaves() -> None:
     assert found.causes[-1].rms_after == pytest.approx(found.remainder.rms)
 
 
-@pytest.mark.parametrize("samples", [1, 9])
-def test_of_fewer_than_ten_samples_nothing_is_named(samples: int) -> None:
+@pytest.mark.parametrize(("samples", "words"), [(1, "1 sample"), (9, "9 samples")])
+def test_of_fewer_than_ten_samples_nothing_is_named(samples: int, words: str) -> None:
     q = joints()[:samples]
     position = poses(URM6, q, oriented=False)[0].T
     found = diagnosed(path_run(position + 0.1, tsp=PERIOD), run_of(q, URM6, tsp=PERIOD))
     assert not found.causes
     assert not found.undecided
-    assert found.not_looked_for[0].reason == f"{samples} samples: fewer than 10"
+    assert found.not_looked_for[0].reason == f"{words}: fewer than 10"
     assert found.rms == pytest.approx(0.1 * np.sqrt(3.0))
     assert found.remainder.share == 1.0
 
