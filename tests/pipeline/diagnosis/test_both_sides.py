@@ -148,6 +148,7 @@ def test_the_side_that_disagrees_with_its_tool_centre_point_has_the_causes(
         assert one.rms == pytest.approx(np.sqrt((apart[one.name] ** 2).mean()), rel=1e-9)
         assert one.largest == pytest.approx(apart[one.name].max(), rel=1e-9)
     assert found.origin == origin
+    assert found.sentence.endswith(f"that is in {origin}") is bool(origin)
     reasons = [one.reason for one in found.not_looked_for if "link_length" in one.kinds]
     assert [reason in one for one in reasons] == ([True] if reason else [])
 
@@ -217,3 +218,28 @@ def test_all_joints_in_degrees_are_corrected_at_once(write: Write) -> None:
     (run,) = urmpipe.compare(asked, done, diagnose=True).runs
     (hint,) = remedy_hints(run)
     assert hint.value == dict.fromkeys(run.run.log.joints, "deg")
+
+
+@pytest.mark.parametrize("robot", ["ur10e", "ur3"])
+def test_another_robot_on_a_turned_base_is_found_with_it(write: Write, robot: str) -> None:
+    base = Transform(((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)))
+    path = poses_over_log(load_robot(robot).placed(base), Q)[0]
+    noise = np.random.default_rng(4).normal(0.0, 1e-4, path.shape)
+    found = diagnosed(write("path", T, tcp=path + noise), write("log", T, Q))
+    named = {cause.kind: cause for cause in found.causes}
+    assert {*named} == {"base_rotation", "other_robot"}
+    assert (named["other_robot"].name, named["base_rotation"].value) == (robot, (pytest.approx(np.pi),))
+
+
+@pytest.mark.parametrize("read", [np.pi / 180.0, 180.0 / np.pi])
+@pytest.mark.parametrize("others", [False, True])
+def test_a_joint_or_all_others_in_another_unit(write: Write, read: float, others: bool) -> None:
+    wrong = np.full(6, others)
+    wrong[3] = not others
+    log = np.where(wrong, Q / read, Q)
+    noise = np.random.default_rng(5).normal(0.0, 1e-4, (len(T), 3))
+    asked = urmpipe.ingest(write("path", T, tcp=place(Q) + noise))
+    done = urmpipe.ingest(name="log", t=T, q=log, unit="rad", robot=UR5E, names=UR5E.coordinates)
+    (cause,) = urmpipe.diagnose(asked, done).causes
+    assert (cause.kind, cause.value) == ("joint_unit", (pytest.approx(read),))
+    assert {*cause.joints} == {name for name, one in zip(UR5E.coordinates, wrong, strict=True) if one}
