@@ -38,7 +38,7 @@ SEVERAL = 1.2  # outliers are a cause if all rows have so many times the rms of 
 RATES = (*CLOCKS, "servo_lag", "joint_lag", "compliance", "backlash")
 APART = 2.0  # times the largest other deviation that the median of outliers is
 ALONG = 0.9  # share of the square of outliers that points along what such a cause changes: it is no outlier
-ABOUT = 0.9  # of the largest outlier: if all are at least so large, one number is that of all
+ABOUT = 0.9  # share of a number that another one has at least, if one of them is shown for both
 UNLIKE = 3.0  # outliers are so many times larger than what causes do that change with the rates of joints
 
 
@@ -142,8 +142,9 @@ class ExplanationBuilder:
         if part.group < 0:
             return True
         best, group = self.result.best, self.model.groups[part.group]
+        mine, theirs = best.state.of(group), other.state.of(group)
         reach = self._half_width(best, part.group) + self._half_width(other, part.group)
-        return bool((np.abs(best.state.of(group) - other.state.of(group)) <= reach).all())
+        return bool((np.abs(mine - theirs) <= np.maximum(reach, (1.0 - ABOUT) * np.abs(mine))).all())
 
     def insignificant(self) -> set[int]:
         """Return the groups of the best explanation with intervals that all contain 0."""

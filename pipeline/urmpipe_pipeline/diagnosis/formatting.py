@@ -49,7 +49,8 @@ def format_summary(diagnosis: Diagnosis) -> str:
         fitted = f"the causes found leave {after} of it" if causes or alternatives else "no cause found"
         return f"probably different motions: rms {before}, {fitted}"
     if not causes and not alternatives:
-        if diagnosis.refused:
+        few = bool(diagnosis.refused) and len(diagnosis.refused[0].causes) <= MAX_LISTED
+        if diagnosis.refused and (few or diagnosis.verdict != "pass"):
             passes = PASSES if diagnosis.verdict == "pass" else ""
             return f"{passes}{format_refusal(diagnosis.refused[0])}; rms {after} remains"
         return f"no cause found: rms {before} remains{f' ({residual.words})' if residual.words else ''}"

@@ -48,7 +48,6 @@ SEGMENTS = 6  # of a log, in which a number may differ
 CLOCK_SEGMENTS = 40  # the same of a clock: rows that are missing make it jump
 CHANGING = 0.3  # share of a number by which it changes, rms over the segments
 UNEVEN = 0.1  # the same of a clock, which nothing of an arm resembles
-CLEARLY = 6.0  # twice the log of odds of 20 to 1
 SIGNIFICANT = 5.0  # standard deviations of F, sqrt(2 / numbers more) each, by which it lies above 1
 FEW = 300  # rows, spread evenly, on which causes are applied alone
 SOME = 2_000  # rows, spread evenly, on which numbers may change
@@ -96,13 +95,21 @@ def find_unbelievable(search: Fitter, state: State, subset: Subset, rows: Rows) 
     if len(subset) + len(state.edits) < 2:
         signs = {g for g in beyond if groups[g].kind == "joint_scale" and state.of(groups[g])[0] <= -1.0}
         signs |= {g for g in beyond if groups[g].kind == "backlash"}
-        return (beyond if cost(search.model, state, rows) > NOISE else signs), ""
+        return (signs if leaves_noise(search, state, rows) else beyond), ""
     if beyond:
         return beyond, ""
     reach = getattr(search.model, "reach", np.inf)
     limit = {g: BESIDE.get(groups[g].kind, REACHED.get(groups[g].kind, np.inf) * reach) for g in subset}
     beyond = {g for g in subset if largest[g] > limit[g]}
     return (beyond, TOO_LARGE) if beyond else (_find_cancelling(search, state, subset, rows), CANCELLING)
+
+
+def leaves_noise(search: Fitter, state: State, rows: Rows) -> bool:
+    """Tell whether an explanation leaves noise, and less than half the square of a deviation that is more."""
+    left = cost(search.model, state, rows)
+    if left > NOISE:
+        return False
+    return cost(search.model, search.placed(search.zero, rows), rows) > max(NOISE, 2.0 * left)
 
 
 def _find_cancelling(search: Fitter, state: State, subset: Subset, rows: Rows) -> set[int]:
@@ -149,8 +156,6 @@ def find_changing(search: Fitter, state: State, subset: Subset, rows: Rows) -> t
     floor = float(np.mean((search.floor * rows.weight) ** 2))
     clocks = [g >= 0 and model.groups[g].kind in CLOCKS for g in owners]
     changing = set[int]()
-    if owners and not without and _is_growing(left, values, columns, fitted, search.timed, floor):
-        changing |= set(owners)
     for segments in ([2] * len(owners), [CLOCK_SEGMENTS if clock else SEGMENTS for clock in clocks]):
         if not owners or left.shape[1] < 4 * sum(segments):
             continue
@@ -167,29 +172,6 @@ def find_changing(search: Fitter, state: State, subset: Subset, rows: Rows) -> t
                 changing.add(g)
     changing -= {g for g in subset if model.groups[g].kind == "backlash"}  # its sense is a guess at rest
     return {g for g in changing if g >= 0}, tuple(state.edits[-1 - g] for g in changing if g < 0)
-
-
-def _is_growing(
-    left: FloatArray,
-    values: FloatArray,
-    columns: Sequence[FloatArray],
-    fitted: FloatArray | None,
-    timed: bool,
-    floor: float,
-) -> bool:
-    """Tell whether numbers that grow from 0, or fade to 0, leave clearly less than as many constant ones."""
-    most = left + np.tensordot(values, columns, 1)
-
-    def squares(parts: Sequence[FloatArray]) -> float:
-        every = np.array([part.ravel() for part in parts])
-        every = every if fitted is None else np.concatenate([every, fitted])
-        every = every / np.sqrt(np.maximum((every**2).sum(axis=1), np.finfo(float).tiny))[:, np.newaxis]
-        solved = np.linalg.lstsq(every @ every.T, every @ most.ravel(), rcond=1e-9)[0]
-        return max(float(((most.ravel() - solved @ every) ** 2).sum()), floor * left.size)
-
-    independent = left.size / (autocorrelation_time(left.T) if timed else 1.0)
-    least = min(squares([column * hat for column in columns]) for hat in _hats(2, left.shape[1]))
-    return bool(independent * np.log(squares(columns) / least) > CLEARLY)
 
 
 def _hats(segments: int, rows: int) -> FloatArray:

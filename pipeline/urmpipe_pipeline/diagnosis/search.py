@@ -32,7 +32,7 @@ from urmpipe_pipeline.diagnosis.candidates import (
 )
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, cost, fitted, inliers, normal_equations, residual
 from urmpipe_pipeline.diagnosis.formatting import CANCELLING, NOT_CONSTANT
-from urmpipe_pipeline.diagnosis.gate import NOISE, find_changing, find_unbelievable
+from urmpipe_pipeline.diagnosis.gate import NOISE, find_changing, find_unbelievable, leaves_noise
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
 from urmpipe_pipeline.diagnosis.intervals import LONGEST, autocorrelation_time
 from urmpipe_pipeline.diagnosis.selection import Normal, Selection, Subset, without_twins
@@ -44,7 +44,7 @@ SOME = 2_000  # rows, spread evenly, that select before more of them settle it
 MANY = 20_000  # rows, spread evenly, that settle an explanation; standard errors fall with the root of them
 MAJOR = 0.35  # share of the square that stays, where more than noise does, with a cause and not without it
 PROMISED = 0.5  # share of the square that what is left of an explanation leaves at most
-HOPELESS = 1.0  # a start is given up if it leaves 1.6 (root of e) times the rms of the best so far
+HOPELESS = 2.0  # a start is given up if it leaves e times the rms of the best so far
 SAME = 1e-3  # share of the square by which two fits of the same causes differ and are the same
 CLEAR = 100.0  # times the noise that a deviation is which one cause that explains it leaves without a rival
 STEPS = 6  # of a fit from a start; those of an explanation that is settled are more
@@ -451,7 +451,7 @@ class Search:
             reason != CANCELLING and len(subset) > 1 and not state.edits
         ):  # one of them that alone leaves noise is believed
             for g in sorted(beyond):
-                if cost(self.model, self.fitted(state, frozenset((g,)), rows), rows) <= NOISE:
+                if leaves_noise(self, self.fitted(state, frozenset((g,)), rows), rows):
                     return set(subset) - {g}
         if beyond and reason:
             refused = Explanation(state, subset, np.inf)
