@@ -11,7 +11,8 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.wording import SYMBOLS
-from urmpipe_pipeline.diagnosis.formatting import format_cause, format_residual, joint_names
+from urmpipe_pipeline.diagnosis.cause_texts import format_cause, joint_names
+from urmpipe_pipeline.diagnosis.formatting import format_residual
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.palette import (
     AXIS_COLOURS,

@@ -20,10 +20,10 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, cost
-from urmpipe_pipeline.diagnosis.formatting import CANCELLING, TOO_LARGE
+from urmpipe_pipeline.diagnosis.formatting import CANCELLING, CLOCKS, TOO_LARGE
 from urmpipe_pipeline.diagnosis.hypotheses import State
 from urmpipe_pipeline.diagnosis.intervals import autocorrelation_time
-from urmpipe_pipeline.diagnosis.result import CLOCKS, STRUCTURE
+from urmpipe_pipeline.diagnosis.result import STRUCTURE
 from urmpipe_pipeline.diagnosis.selection import Subset
 from urmpipe_pipeline.log_edits import Edits
 

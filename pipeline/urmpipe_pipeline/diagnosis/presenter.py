@@ -7,20 +7,22 @@ from dataclasses import replace
 
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
-from urmpipe_pipeline.diagnosis.formatting import (
+from urmpipe_pipeline.diagnosis.cause_texts import (
     KIND_TEXTS,
-    PASSES,
     build_remedy,
     format_amount,
     format_cause,
-    format_explanation,
     format_interval,
+    format_value,
+    short_name,
+)
+from urmpipe_pipeline.diagnosis.formatting import (
+    PASSES,
+    format_explanation,
     format_own_tcp,
     format_residual,
     format_undecided,
-    format_value,
     select_causes,
-    short_name,
 )
 from urmpipe_pipeline.diagnosis.result import Alternative, Cause, Diagnosis, Refused
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, table_of

@@ -30,7 +30,6 @@ Kind = Literal[
 ]  # fmt: skip
 """What may make two sides deviate."""
 
-CLOCKS = ("time_lag", "clock_drift")
 STRUCTURE = ("link_length", "link_shift", "tilt")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from diagnoses import BASE, LENGTH, OFFSET, SIGN
-from urmpipe_pipeline.diagnosis.formatting import (
+from urmpipe_pipeline.diagnosis.cause_texts import (
     KIND_TEXTS,
     build_remedy,
     format_amount,
