@@ -20,10 +20,11 @@ from urmpipe_models.repolarizer import repolarize
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.arm_groups import cause_groups
 from urmpipe_pipeline.diagnosis.edits import later_edits
+from urmpipe_pipeline.diagnosis.explanations import Explanation
+from urmpipe_pipeline.diagnosis.explanations import SearchResult as Found
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, numbered
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
-from urmpipe_pipeline.diagnosis.search import Explanation, Search
-from urmpipe_pipeline.diagnosis.search import SearchResult as Found
+from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.log_edits import Edit, Edits, robot_edits, sign_edits, swap_edits, unit_edits
 
 DURATION = 36.91

@@ -16,13 +16,14 @@ from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline import text
 from urmpipe_pipeline.diagnosis.edits import later_edits, turn_edits
 from urmpipe_pipeline.diagnosis.explain import ExplanationBuilder
+from urmpipe_pipeline.diagnosis.explanations import SearchResult
 from urmpipe_pipeline.diagnosis.fit import Model, residual
 from urmpipe_pipeline.diagnosis.hypotheses import State, zero
 from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.one_pose import tool_hypotheses
 from urmpipe_pipeline.diagnosis.own_tcp import ask_both_sides
 from urmpipe_pipeline.diagnosis.result import STRUCTURE, Diagnosis, NotLookedFor, Remainder, rms
-from urmpipe_pipeline.diagnosis.search import Search, SearchResult
+from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.diagnosis.sides import AT_REST, Question, Side, build_question
 from urmpipe_pipeline.log_edits import Edits
 

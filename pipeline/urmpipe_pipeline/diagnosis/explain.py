@@ -20,6 +20,7 @@ from urmpipe_models.row_blocks import row_blocks, side_by_side
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.cause_texts import short_name
 from urmpipe_pipeline.diagnosis.deciding import deciding_joint
+from urmpipe_pipeline.diagnosis.explanations import COARSE, Explanation, SearchResult
 from urmpipe_pipeline.diagnosis.fit import BLOCK, Model, cost, deviation, inliers
 from urmpipe_pipeline.diagnosis.formatting import CLOCKS, NOT_CONSTANT
 from urmpipe_pipeline.diagnosis.gate import LARGEST
@@ -27,7 +28,7 @@ from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.diagnosis.intervals import batch_covariance, student_quantile
 from urmpipe_pipeline.diagnosis.joints import JointsModel
 from urmpipe_pipeline.diagnosis.result import Alternative, Cause, Refused, rms
-from urmpipe_pipeline.diagnosis.search import COARSE, Explanation, Search, SearchResult
+from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.diagnosis.selection import TWIN
 from urmpipe_pipeline.log_edits import Edit, Edits
 

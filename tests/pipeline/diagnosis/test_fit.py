@@ -1,4 +1,4 @@
-"""Fits and normal equations, against SciPy's least squares and plain NumPy."""
+"""Explanations and normal equations, against SciPy's least squares and plain NumPy."""
 
 from __future__ import annotations
 

@@ -31,8 +31,9 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.diagnosis.explain import ExplanationBuilder
+from urmpipe_pipeline.diagnosis.explanations import SearchResult
 from urmpipe_pipeline.diagnosis.result import Alternative, Cause, rms
-from urmpipe_pipeline.diagnosis.search import Search, SearchResult
+from urmpipe_pipeline.diagnosis.search import Search
 from urmpipe_pipeline.log_edits import Edit, Edits
 
 URM6 = load_robot("urm6")
