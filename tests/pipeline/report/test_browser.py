@@ -412,6 +412,7 @@ def test_paper_is_light_shows_what_passed_and_cuts_nothing_and_the_screen_is_as_
     desk.emulate_media(color_scheme="dark")
     desk.set_viewport_size({**DESK, "width": 688})  # what an A4 page holds between margins of 14 mm
     scroll_through(desk)
+    until(desk, f"{GROUNDS}.every(ground => {sorted(DARK)}.includes(ground))")  # each figure in its own frame
     assert set(desk.evaluate(GROUNDS)) == DARK
     folded = desk.locator("details:not([open])").count()
     passed = desk.locator("details.passed").count()
