@@ -31,7 +31,10 @@ def interrupted(forks: Forks, job: Job, folder: Path, number: int, moments: int)
         _check_end(job, ended, killed=number == signal.SIGKILL)
         if number != signal.SIGKILL:  # which nobody can clean up after
             assert not list(folder.glob("*.part")), job.name
-        found[_outputs(job, folder, before)] += 1
+        state = _outputs(job, folder, before)
+        if state == "new":  # a machine that was busy at first is measured anew by runs that came to their end
+            forks.seconds[job.name] = min(forks.seconds[job.name], ended.seconds)
+        found[state] += 1
         _remove_parts(folder)
     return found
 

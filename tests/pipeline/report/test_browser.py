@@ -404,7 +404,7 @@ def test_what_failed_is_open_and_first_and_what_passed_opens_by_its_link(
     assert desk.locator("#r1-2 .plot").first.is_visible()
     assert desk.locator("#r1-1 .plot").first.is_hidden()
     desk.locator(".summary th a", has_text=best).click()
-    assert desk.locator("#r1-1 .plot").first.is_visible()
+    desk.locator("#r1-1 .plot").first.wait_for(state="visible")
     assert 0 <= there(desk.locator("#r1-1").bounding_box())["y"] < 200
 
 
