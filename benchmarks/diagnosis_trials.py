@@ -170,7 +170,7 @@ def graded(named: Sequence[Cause], trial: Trial) -> str:
         return "more"
     twins = [fault for fault in rest if any(is_among(cause.twins, fault, trial) for cause in open_causes)]
     if len(open_causes) <= len(twins):
-        return "told twin" if len(twins) == len(rest) else "partial"
+        return "twin" if len(twins) == len(rest) else "partial"
     return "same effect" if len(named) <= len(trial.truth) and does_the_same(named, trial) else "wrong"
 
 
@@ -182,8 +182,8 @@ def outcome(diagnosis: Diagnosis, trial: Trial) -> str:
     if not diagnosis.undecided:
         return graded(sure, trial) if sure else "refused" if diagnosis.refused else "nothing"
     grades = {graded([*sure, *cause.causes], trial) for cause in diagnosis.undecided if sure or cause.causes}
-    if grades & {"right", "told twin", "same effect"}:
-        return "told twin"
+    if grades & {"right", "twin", "same effect"}:
+        return "twin"
     if sure and graded(sure, trial) not in ("partial", "right"):
         return "wrong"
     return "partial" if sure else "undecided"
@@ -252,7 +252,7 @@ def code() -> str:
     ).hexdigest()[:12]
 
 
-GOOD = ("right", "told twin", "same effect")
+GOOD = ("right", "twin", "same effect")
 ANSWERS = (*GOOD, "partial", "undecided", "refused", "nothing", "more", "wrong", "error")
 WRONG = ("more", "wrong")
 
@@ -286,12 +286,14 @@ def judged(results: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[Bound]
     counted = [result for result in singles if result["counts"]]
     lines = [
         *table(f"single causes of {1e3 * MOVED:g} mm rms or more", by(_kind, counted) | {"all": counted}),
-        *table("singles, mm rms", by(lambda result: f"{1e3 * result['size']:04.1f}", singles)),
-        *table("singles, noise", by(lambda result: result["noise"], counted)),
+        *table(
+            "single causes by their rms in mm", by(lambda result: f"{1e3 * result['size']:04.1f}", singles)
+        ),
+        *table("single causes by noise", by(lambda result: result["noise"], counted)),
         *table("others", {"pairs": of.get("pair", [])} | by(_kind, outside) | {"undisturbed": quiet}),
     ]
     bounds = [
-        Bound("singles: right, a told twin, or a cause that does the same", share(counted, *GOOD), least=0.9),
+        Bound("singles: right, a twin, or a cause of the same effect", share(counted, *GOOD), least=0.9),
         Bound("singles: wrong", share(counted, *WRONG), under=0.005),
         Bound("errors", sum(result["answer"] == "error" for result in results), most=0),
         Bound("outside the catalogue: named as something else", share(outside, "wrong"), under=0.05),
@@ -390,10 +392,11 @@ def main() -> None:
     if len(results) < COUNT:
         print("\n".join([*lines, "", *map(str, bounds)]))
         return
-    title = [f"# Diagnosis: {COUNT} seeded trials on motions of real logs", "", *machine("scipy")]
-    took = f"{sum(result['seconds'] for result in results):.0f} s of one core."
-    same = "Same effect: what is named does what the truth does, without having it as a twin."
-    write_results("diagnosis_trials", [*title, f"{took} {same}", *lines], bounds)
+    title = [f"# Diagnosis: {COUNT} seeded trials on motions of real logs", "", *machine("scipy"), ""]
+    title.append(f"All trials took {sum(result['seconds'] for result in results):.0f} s of one core.")
+    title.append("Twin: the true cause is a twin of the one that is named.")
+    title.append("Same effect: another cause is named that moves the arm alike.")
+    write_results("diagnosis_trials", [*title, *lines], bounds)
 
 
 if __name__ == "__main__":

@@ -21,11 +21,11 @@ AXES = np.eye(3)
 
 @dataclass(frozen=True, eq=False)
 class Fault:
-    """One cause, as the arm of a trial has it: what is added to the arm, or to the reading of its log.
+    """One cause of a deviation: a change of the arm, or of how its log is read.
 
     Attributes:
         kind: As `Cause.kind`.
-        value: As `Cause.value`; of a scale what is added to 1.
+        value: As `Cause.value`; for a scale, the difference from 1.
         joints: Indices of its joints.
         name: What the diagnosis should call it; empty where its joints or its frame say it.
         axis: Unit vector along or about which a frame changes [-]; None: `value` has three numbers.

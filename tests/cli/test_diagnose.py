@@ -272,7 +272,7 @@ def test_the_unit_of_a_joint_is_an_option(folder: Path) -> None:
     table.assign(q3=np.degrees(table.q3)).to_csv("mixed.csv", index=False)
     (run,) = urmpipe.compare(PATH, "mixed.csv", "urm6", unit="rad", diagnose=True).runs
     cause = Cause("joint_unit", "phi3", ("q3",), value=(np.pi / 180.0,))
-    diagnosis = replace(there(run.diagnosis), causes=(cause,), remainder=Remainder(0.0, 0.0))
+    diagnosis = replace(there(run.diagnosis), causes=(cause,), remainder=Remainder(0.0))
     (hint,) = remedy_hints(replace(run, diagnosis=diagnosis))
     assert hint.spelled("command line") == "--unit q3=deg"
     assert isinstance(hint.value, dict)

@@ -44,7 +44,7 @@ def diagnosis_of(one: Deviation) -> Diagnosis:
         one.name, one.verdict, len(one.sample), "m", before, (SIGN, LENGTH),
         (Alternative((BASE,), "phi5"), Alternative((OFFSET,), "phi5")),
         (NotLookedFor(("tool_rotation",), "the reference has no orientation"),),
-        Remainder(rms(mended), 1e-4, "the digits of the log"), one.sample[::2], mended,
+        Remainder(rms(mended), "the digits of the log"), one.sample[::2], mended,
         (LogWarning("short", "the motion is short"),), refused=(Refused((TWIN,), "it cancels r_4", "phi5"),),
         own_tcp=(OwnTcp("log", 5e-5, 1e-4, agrees=True), OwnTcp("sim", 0.01, 0.02, agrees=False)),
         origin="sim",

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from urmpipe_models.kinematics.identification import Twist, changed, sensitiviti
 from urmpipe_models.row_blocks import spread_rows
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline.diagnosis.arm_groups import cause_groups
+from urmpipe_pipeline.diagnosis.fit import Positions
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
 from urmpipe_pipeline.diagnosis.motion import Clock, Joints, Motion
 from urmpipe_pipeline.log_edits import IDENTITY, Edits, Matrix
@@ -27,7 +27,7 @@ FITTED = 100
 
 
 @dataclass(frozen=True, eq=False)
-class ArmModel:
+class ArmModel(Positions):
     """A side with joints and an arm, beside a side that tells where the tool centre point was.
 
     Residuals are in the unit that the data were read in: a factor of the path divides the model, so that it
@@ -56,26 +56,6 @@ class ArmModel:
     judged: FloatArray | None = None
     _placed: dict[Edits, Chain] = field(default_factory=dict)
     _twists: dict[str, list[tuple[Twist, int]]] = field(default_factory=dict, init=False)
-
-    @property
-    def unit(self) -> Literal["m", "rad"]:
-        """Of what is judged."""
-        return "m"
-
-    @property
-    def of_joints(self) -> bool:
-        """Whether the joints themselves are judged, not positions."""
-        return False
-
-    @property
-    def rows(self) -> int:
-        """How many rows are held against each other."""
-        return len(self.sample)
-
-    @property
-    def blocks(self) -> IntArray:
-        """Which components share a noise: positions 0, orientations 1, shape (c,)."""
-        return np.repeat([0, 1], 3)[: 3 if self.rotation is None else 6]
 
     def arm(self, state: State, wanted: Collection[int] = ()) -> tuple[Chain, list[tuple[Twist, int]]]:
         """Return the arm as an explanation has it, and its twists there with the places of their numbers.
@@ -195,10 +175,6 @@ class ArmModel:
         if self.judged is not None:
             left = left + (self.judged - self.position)[:, rows]
         return unit_of(state.edits) * left
-
-    def wanted(self, rows: IntArray) -> FloatArray:
-        """Return where the tool centre point should be as it is judged in [m], shape (3, n)."""
-        return (self.position if self.judged is None else self.judged)[:, rows]
 
     def _left(self, pose: Transform, edits: Edits, rows: IntArray, inside: BoolArray) -> FloatArray:
         rotation = None if self.rotation is None else self.rotation[:, :, rows]

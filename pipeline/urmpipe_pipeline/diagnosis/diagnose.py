@@ -139,13 +139,13 @@ def _diagnosed(deviation: Deviation, question: Question, lag: float | None) -> D
         undecided=undecided,
         refused=built.refused(),
         not_looked_for=question.not_looked_for,
-        remainder=_remainder(deviation, model, before, left, OWN if unnamed else ""),
+        remainder=_remainder(deviation, model, left, OWN if unnamed else ""),
         sample=model.sample,
         mended=question.sign * after.T,
     )
 
 
-def _remainder(deviation: Deviation, model: Model, before: float, left: float, words: str) -> Remainder:
+def _remainder(deviation: Deviation, model: Model, left: float, words: str) -> Remainder:
     """Return what stays of a whole deviation, root mean squares in [m] or [rad].
 
     Where it is out of tolerance, and more than half of how far the reference moves about its mean, no cause
@@ -156,8 +156,7 @@ def _remainder(deviation: Deviation, model: Model, before: float, left: float, w
     kinds = ("joint",) if model.of_joints else LENGTHS
     tolerance = _tolerance(deviation, kinds, DEFAULT_TOLERANCE)
     different = left > max(tolerance, UNLIKE * moves)
-    share = (left / before) ** 2 if before else 0.0
-    return Remainder(left, share, UNRELATED if different else words, different)
+    return Remainder(left, UNRELATED if different else words, different)
 
 
 def _later(question: Question, *, timed: bool) -> Iterator[Edits]:
@@ -292,7 +291,7 @@ def _nothing(
         causes=(),
         undecided=undecided,
         not_looked_for=(*(() if tested else (NotLookedFor(kinds, reason),)), *question.not_looked_for),
-        remainder=Remainder(rms(mended.T), (rms(mended.T) / before) ** 2 if before else 0.0, reason),
+        remainder=Remainder(rms(mended.T), reason),
         sample=model.sample,
         mended=question.sign * mended.T,
     )

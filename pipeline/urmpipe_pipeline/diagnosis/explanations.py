@@ -172,7 +172,7 @@ class Explanations:
         return autocorrelation_time(left.T, float((self.floor**2).sum()))
 
     def fitted(self, state: State, subset: Subset, rows: Rows, steps: int = 2 * STEPS) -> State:
-        """Return an explanation with the best numbers of a subset, and of what is always fitted."""
+        """Fit the numbers of a subset, and of the groups that are always fitted."""
         taken = [self.model.groups[g] for g in sorted(subset | set(self.forced))]
         return fitted(self.model, state, taken, rows, steps=steps)
 
@@ -298,7 +298,7 @@ class Explanations:
     def _within(
         self, state: State, subset: Subset, rows: Rows, selection: Selection, steps: int = 2 * STEPS
     ) -> tuple[State, set[int]]:
-        """Return the best numbers of what is believed of a subset, and the groups it lacks."""
+        """Fit a subset without the groups that the gate refuses; return the fit and these groups."""
         gone: set[int] = set()
         guess = self._guess(state, subset, selection)
         while True:

@@ -82,6 +82,46 @@ class Model(Protocol):
         """Return what is judged of where the model should be, in [m] or [rad], shape (k, n)."""
 
 
+class Positions:
+    """What models have in common whose tool centre point is judged.
+
+    Attributes:
+        sample: Rows of the log, shape (n,).
+        position: Where the tool centre point should be in [m], shape (3, n).
+        rotation: Its orientation as matrices [-], shape (3, 3, n); None without any.
+        judged: Where it should be as a comparison has it in [m], shape (3, n); None if that is `position`.
+    """
+
+    sample: IntArray
+    position: FloatArray
+    rotation: FloatArray | None
+    judged: FloatArray | None
+
+    @property
+    def unit(self) -> Literal["m", "rad"]:
+        """Of what is judged."""
+        return "m"
+
+    @property
+    def of_joints(self) -> bool:
+        """Whether the joints themselves are judged, not positions."""
+        return False
+
+    @property
+    def rows(self) -> int:
+        """How many rows are compared."""
+        return len(self.sample)
+
+    @property
+    def blocks(self) -> IntArray:
+        """Which components share a noise: positions 0, orientations 1, shape (c,)."""
+        return np.repeat([0, 1], 3)[: 3 if self.rotation is None else 6]
+
+    def wanted(self, rows: IntArray) -> FloatArray:
+        """Return where the tool centre point should be as it is judged in [m], shape (3, n)."""
+        return (self.position if self.judged is None else self.judged)[:, rows]
+
+
 @dataclass(frozen=True, eq=False)
 class Rows:
     """Rows that an explanation is held against.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
@@ -22,6 +21,7 @@ from urmpipe_pipeline.diagnosis.arm import (
     turn_between,
     unit_of,
 )
+from urmpipe_pipeline.diagnosis.fit import Positions
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero
 from urmpipe_pipeline.diagnosis.motion import Clock, Motion
 from urmpipe_pipeline.log_edits import IDENTITY, Edits
@@ -31,7 +31,7 @@ TOOL = 1
 
 
 @dataclass(frozen=True, eq=False)
-class PlaceModel:
+class PlaceModel(Positions):
     """Where a log recorded its tool centre point, beside where the reference has it: base @ pose @ tool.
 
     Residuals are in the unit that the reference was read in, whatever the unit of either side is.
@@ -55,26 +55,6 @@ class PlaceModel:
     position: FloatArray
     rotation: FloatArray | None
     judged: FloatArray | None = None
-
-    @property
-    def unit(self) -> Literal["m", "rad"]:
-        """Of what is judged."""
-        return "m"
-
-    @property
-    def of_joints(self) -> bool:
-        """Whether the joints themselves are judged, not positions."""
-        return False
-
-    @property
-    def rows(self) -> int:
-        """How many rows are held against each other."""
-        return len(self.sample)
-
-    @property
-    def blocks(self) -> IntArray:
-        """Which components share a noise: positions 0, orientations 1, shape (c,)."""
-        return np.repeat([0, 1], 3)[: 3 if self.rotation is None else 6]
 
     @cached_property
     def _spin(self) -> FloatArray:
@@ -101,10 +81,6 @@ class PlaceModel:
         if self.judged is not None:
             left = left + (self.judged - self.position)[:, rows]
         return unit_of(state.edits, "reference") * left
-
-    def wanted(self, rows: IntArray) -> FloatArray:
-        """Return where the tool centre point should be as it is judged in [m], shape (3, n)."""
-        return (self.position if self.judged is None else self.judged)[:, rows]
 
     def linear(
         self, state: State, rows: IntArray, groups: Sequence[Group] | None = None

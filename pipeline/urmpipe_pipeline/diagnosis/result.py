@@ -183,13 +183,11 @@ class Remainder:
 
     Attributes:
         rms: Root mean square of what stays, in the unit of the diagnosis.
-        share: Its share of the mean square, 0..1.
         words: What it is taken for, where that is known; else empty.
         different: Whether it is so large that the two sides are probably different motions.
     """
 
     rms: float
-    share: float
     words: str = ""
     different: bool = False
 

@@ -133,7 +133,6 @@ def test_the_remainder_is_what_the_mended_log_leaves() -> None:
     found = against_path(q)
     known = np.isfinite(found.mended).all(axis=1)
     assert found.remainder.rms == pytest.approx(float(np.sqrt((found.mended[known] ** 2).sum(axis=1).mean())))
-    assert found.remainder.share == pytest.approx((found.remainder.rms / found.rms) ** 2)
     assert found.causes[-1].rms_after == pytest.approx(found.remainder.rms)
 
 
@@ -146,7 +145,7 @@ def test_of_fewer_than_ten_samples_nothing_is_named(samples: int, words: str) ->
     assert not found.undecided
     assert found.not_looked_for[0].reason == f"{words}: fewer than 10"
     assert found.rms == pytest.approx(0.1 * np.sqrt(3.0))
-    assert found.remainder.share == 1.0
+    assert found.remainder.rms == found.rms
 
 
 def test_of_a_log_at_rest_nothing_is_named() -> None:

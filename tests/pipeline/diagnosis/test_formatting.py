@@ -156,7 +156,7 @@ def chain(*causes: Cause, last: float = 0.0002, **fields: Any) -> Diagnosis:
         replace(cause, rms_before=before, rms_after=after)
         for cause, before, after in zip(causes, left, left[1:], strict=False)
     )
-    stays = fields.pop("remainder", Remainder(last, 0.0))
+    stays = fields.pop("remainder", Remainder(last))
     verdict = fields.pop("verdict", "fail")
     undecided = fields.pop("undecided", ())
     return Diagnosis(
@@ -186,7 +186,7 @@ LATE = number("time_lag", "clock", -1.35, unit="s", breaks=True)
 DRIFT = number("clock_drift", "clock", 1e-4, unit="s/s")
 WRONG_ROWS = number("outliers", "rows", 0.245, rows=(1, 2))
 UNDECIDED = tuple(Alternative((cause,), "phi5") for cause in (BASE, OFFSET, LENGTH))
-DIFFERENT = Remainder(0.19238, 0.4, "more than half", different=True)
+DIFFERENT = Remainder(0.19238, "more than half", different=True)
 HIGH = [of_joint("joint_offset", f"q{k}", -k * DEG, unit="rad") for k in range(1, 7)]
 BREAKING = [replace(cause, breaks=k in (0, 3, 4, 5)) for k, cause in enumerate(HIGH)]
 BOTH_TCP = (OwnTcp("robot", 5e-5, 1e-4, agrees=True), OwnTcp("sim", 0.01, 0.02, agrees=False))
@@ -217,7 +217,7 @@ SENTENCES: Sequence[tuple[Callable[[], Diagnosis], str]] = [
     (lambda: off_by(0.3, 0.15, 0.16, undecided=UNDECIDED[:2]), "joint q1 reads 1 deg too high and joint q2 reads 2 deg too high: rms 300 -> 160 mm; then either the base needs a turn of (0, 0, +0.1146) deg or module 1 (phi1) reads 0.1146 deg too low (more motion of phi5 would decide); rms 160 mm remains"),
     (lambda: chain(undecided=(Alternative(tuple(HIGH[:3])), Alternative(tuple(HIGH[2:5]))), last=0.1), "either joint q1 reads 1 deg too high, joint q2 reads 2 deg too high and joint q3 reads 3 deg too high or another (this log cannot decide): rms 300 mm -> 100 mm"),
     (lambda: chain(verdict="pass", last=0.3), "no cause found: rms 300 mm remains"),
-    (lambda: chain(last=0.3, remainder=Remainder(0.3, 1.0, "the log is at rest")), "no cause found: rms 300 mm remains (the log is at rest)"),
+    (lambda: chain(last=0.3, remainder=Remainder(0.3, "the log is at rest")), "no cause found: rms 300 mm remains (the log is at rest)"),
     (lambda: chain(last=0.3, refused=(Refused((LENGTH,), "it changes", "phi5"),)), "not determined by this motion: r_4 needs +1.2 mm from row 4 on (it changes); more motion of phi5 would determine it; rms 300 mm remains"),
     (lambda: chain(last=0.3, refused=(Refused((LENGTH,), "it changes"),)), "not determined by this motion: r_4 needs +1.2 mm from row 4 on (it changes); rms 300 mm remains"),
     (lambda: chain(undecided=UNDECIDED, last=0.1), "either the base needs a turn of (0, 0, +0.1146) deg or module 1 (phi1) reads 0.1146 deg too low or another (more motion of phi5 would decide): rms 300 mm -> 100 mm"),
