@@ -12,6 +12,7 @@ from urmpipe_models.elementwise import Element, add, cross
 from urmpipe_models.networks.element_measures import MEASURES, measure
 from urmpipe_models.networks.joint_motion import Screws, forbidden, joint_frame, joint_screws
 from urmpipe_models.networks.mechanism import Given, Mechanism, Pose, Posed, of_controls
+from urmpipe_models.networks.parts import ConstraintElement, Joint
 from urmpipe_models.networks.rotations import turning_of, untwisted
 from urmpipe_models.orientation import quaternions, rotation_vectors
 from urmpipe_models.transform import Transform
@@ -226,3 +227,41 @@ def _stacked(elements: Sequence[Element], n: int) -> FloatArray:
     for k, one in enumerate(elements):
         rows[k] = one
     return rows
+
+
+def body_twists(mechanism: Mechanism, x: FloatArray) -> dict[str, FloatArray]:
+    """Return the twist of each body in the ground per unit of each variable, shape (6, variables, n).
+
+    Angular velocity in [rad], then the velocity in [m] of the point at the origin of the ground.
+
+    Args:
+        mechanism: The network.
+        x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
+    """
+    posed, controls = mechanism.posed(x), mechanism.control_slopes(x)
+    screws = _screws(mechanism, x, posed, controls)
+    twists = {}
+    for name, pose in posed.bodies.items():
+        twists[name] = np.zeros((6, len(mechanism.variables), x.shape[1]))
+        for mover, sign in pose.movers.items():
+            places, own = screws[mover]
+            twists[name][:, places] += sign * own
+    return twists
+
+
+def wrench_carriers(
+    mechanism: Mechanism, x: FloatArray
+) -> Iterator[tuple[Joint | ConstraintElement, slice, FloatArray]]:
+    """Yield of each cut joint and element its rows, and what turns twists in the ground into rates of the rows.
+
+    The transpose turns multipliers of the rows, in [N] and [N.m], into the moment and force, about the origin of
+    the ground, on the second body. Shape (rows, 6, n).
+
+    Args:
+        mechanism: The network.
+        x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
+    """
+    ties = (*(mechanism.network.joints[cut] for cut in mechanism.graph.cuts), *mechanism.network.elements)
+    equations = _equations(mechanism, x, mechanism.posed(x), mechanism.control_slopes(x))
+    for tie, equation in zip(ties, equations, strict=True):
+        yield tie, equation.rows, equation.carrier

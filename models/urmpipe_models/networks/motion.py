@@ -350,7 +350,9 @@ class _Tracer:
         shares = np.polyfit(steps - middle, [share(node) for node in around], 3)
         roots = np.roots(shares)
         root = float(roots[np.argmin(np.abs(roots))].real)
-        z = np.array([np.polyval(part, root) for part in np.polyfit(steps - middle, [node.z for node in around], 3).T])
+        z = np.array(
+            [np.polyval(part, root) for part in np.polyfit(steps - middle, [node.z for node in around], 3).T]
+        )
         return self.drive.node(z, here.tangent)
 
     def _turn_back(self, there: Node) -> None:
@@ -402,7 +404,9 @@ class _Tracer:
             if best.distance < SINGULAR or best.distance > 4.0 * falls:
                 break  # at 0, or in a valley above it
         known = [node for _, node in self.trace.singular]
-        if best.distance < 10.0 * SINGULAR and not any(np.allclose(best.z, node.z, atol=1e-4) for node in known):
+        if best.distance < 10.0 * SINGULAR and not any(
+            np.allclose(best.z, node.z, atol=1e-4) for node in known
+        ):
             passage: Passage = "branches" if self._branches(best, here.tangent) else "goes through"
             self._record(passage, best, here.tangent)
 
@@ -440,7 +444,9 @@ class _Tracer:
         self._append(node)
         if coordinate >= 0:
             place = float(node.z[-1]) / drive.length
-            self.trace.stop = LimitStop(int(drive.free[coordinate]), value * float(drive.scales[coordinate]), place)
+            self.trace.stop = LimitStop(
+                int(drive.free[coordinate]), value * float(drive.scales[coordinate]), place
+            )
             return False
         if self.trace.complete or node.distance > OVERRUN:
             self.trace.complete = True
@@ -541,7 +547,9 @@ def _interpolate(drive: Drive, pose: SingularPose, node: Node, at: FloatArray, x
     eight configurations around it. Where s has its extreme, only the way there is of the motion.
     """
     places = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
-    around = [drive.correct(node.z + STENCIL * place * node.tangent, node.tangent) for place in places.tolist()]
+    around = [
+        drive.correct(node.z + STENCIL * place * node.tangent, node.tangent) for place in places.tolist()
+    ]
     if any(z is None for z in around):
         return
     terms = [np.polynomial.Polynomial.fit(places, values, 7) for values in np.array(around).T]

@@ -183,9 +183,7 @@ def wrap_rotation_vector(vector: Vector) -> Vector:
     return scale(np.where(turns > 0.0, 1.0 - 2.0 * np.pi * turns / np.maximum(angle, 1.0), 1.0), vector)
 
 
-def _residual(
-    mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls: dict[str, Given]
-) -> Column:
+def _residual(mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls: dict[str, Given]) -> Column:
     per_length = 1.0 / mechanism.length
     rows: Column = []
     for first, second in cut_frames(mechanism, x, posed, controls):

@@ -34,7 +34,9 @@ from urmpipe_models.networks.motion import (
 )
 
 COARSE = 0.05  # scaled length of the drives between rows that are solved first
-MAX_DISAGREEMENT = 0.1  # share of a difference by which the tangents may miss it; usual is the square of COARSE
+MAX_DISAGREEMENT = (
+    0.1  # share of a difference by which the tangents may miss it; usual is the square of COARSE
+)
 SAME = 1e-7  # scaled difference below which two solutions are the same
 
 
@@ -151,7 +153,9 @@ class _Follower:
         end[self.driven] = self.rows[row][:, np.newaxis]
         change = end - x[:, np.newaxis]
         end[self.free] += self._tangents(x[:, np.newaxis], change)[self.free]
-        end = unspun(self.mechanism, self.spins, settle(self.mechanism, end, self.free, wrap=True)[0], self.start)
+        end = unspun(
+            self.mechanism, self.spins, settle(self.mechanism, end, self.free, wrap=True)[0], self.start
+        )
         return end[:, 0] if self._is_continuous(x[:, np.newaxis], end)[0] else None
 
     def _trace_rows(self, first: int, second: int) -> tuple[int, FloatArray]:
@@ -258,4 +262,3 @@ class _Follower:
             limit = float(self.limits[variable, int(value > self.limits[variable, 1])])
             self.motion.stop = LimitStop(variable, limit, float(row))
             self.motion.x = self.motion.x[:, :row]
-
