@@ -126,7 +126,7 @@ def _equations(
         moved = joint_frame(joint, [one.value for one in mechanism.values(joint, x, controls)])
         here = posed.joints[joint.name] @ moved
         gap = gap_of(here.inverse() @ posed.bodies[joint.bodies[1]].frame @ joint.frames[1], n)
-        movers = _between(posed.bodies, joint.bodies, joint.name)
+        movers = relative_movers(posed.bodies, joint.bodies, joint.name)
         yield _Equation(slice(6 * k, 6 * k + 6), gap, _carrier(here, gap), movers, {})
     first = 6 * len(mechanism.graph.cuts)
     for row, element in enumerate(mechanism.network.elements, first):
@@ -134,7 +134,7 @@ def _equations(
         measured = measure(element, *(posed.bodies[name].frame for name in element.bodies))
         wrench = _stacked((*measured.moment, *measured.force), n)[np.newaxis]
         excess = _stacked((measured.distance - length.value,), n)
-        movers = _between(posed.bodies, element.bodies)
+        movers = relative_movers(posed.bodies, element.bodies)
         yield _Equation(slice(row, row + 1), excess, wrench, movers, length.slopes)
 
 
@@ -158,11 +158,11 @@ def _screws(
         vector = (x[first + 3], x[first + 4], x[first + 5])
         p = posed.bodies[name].frame.translation
         turning = [(axis, cross(p, axis)) for axis in turning_of(vector)]
-        found[name] = _combined([*_SLIDING, *turning], values, n)
+        found[name] = _combined([*SLIDING_SCREWS, *turning], values, n)
     return found
 
 
-_SLIDING: Screws = [
+SLIDING_SCREWS: Screws = [
     ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
     ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
@@ -200,7 +200,7 @@ def _carrier(here: Transform, gap: FloatArray) -> FloatArray:
     return carried
 
 
-def _between(posed: dict[str, Pose], bodies: tuple[str, str], cut: str = "") -> dict[str, int]:
+def relative_movers(posed: dict[str, Pose], bodies: tuple[str, str], cut: str = "") -> dict[str, int]:
     """Return the sign with which each mover moves the second body against the first; -1 of the cut joint."""
     first, second = (posed[name].movers for name in bodies)
     signs = {name: second.get(name, 0) - first.get(name, 0) for name in {**first, **second}}
