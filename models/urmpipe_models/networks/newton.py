@@ -44,7 +44,7 @@ def close_network(mechanism: Mechanism, x: Sequence[Element], steps: int) -> lis
     """Return the variables after Newton steps with the controls held.
 
     From a distance h to the closed configuration, in rad or lengths of the mechanism, a step leads to one of
-    the order of h^2. Where nothing closes nearby, the result is where the steps ended: see `largest_residual`.
+    the order of h^2. Where nothing closes nearby, it is where the steps ended: see `largest_residual`.
 
     Args:
         mechanism: The network.
