@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -61,8 +61,19 @@ def space_figure(result: NetworkResult) -> Iterator[SpaceFigure]:
     caption += " Crimson: a joint whose bodies do not meet." if result.gaps else ""
     caption += " Faint: further assemblies, which the legend switches." if others > 0 else ""
     alt = f"{result.name} in three dimensions, {len(result.network.body_names)} bodies."
-    found = (replace(one, label="" if one.group == "ghosts" else one.label) for one in solids(result))
-    yield SpaceFigure("In space", caption, alt, solids=tuple(found), plane=motion_plane(result))
+    found = [replace(one, label="" if one.group == "ghosts" else one.label) for one in solids(result)]
+    yield SpaceFigure("In space", caption, alt, solids=joined_labels(found), plane=motion_plane(result))
+
+
+def joined_labels(found: Sequence[Solid]) -> tuple[Solid, ...]:
+    """Return solids, the labels of those at the same place as one label of the first: "slider, B, s"."""
+    places = [tuple(np.round(one.at, 6).tolist()) for one in found]
+    labels: dict[tuple[float, ...], list[str]] = {}
+    for one, place in zip(found, places, strict=True):
+        labels.setdefault(place, []).extend([one.label] if one.label else [])
+    return tuple(
+        replace(one, label=", ".join(labels.pop(place, ()))) for one, place in zip(found, places, strict=True)
+    )
 
 
 def motion_plane(result: NetworkResult) -> PlaneView | None:

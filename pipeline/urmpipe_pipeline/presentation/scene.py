@@ -38,8 +38,9 @@ class PlaneView(NamedTuple):
     @property
     def axis_names(self) -> tuple[str, str, str]:
         """What these directions are called: x, y, z with their sign, others by their components."""
-        right, up, normal = map(_direction_name, self.axes.T)
-        return right, up, normal
+        right, up, normal = self.axes.T
+        normal = normal * np.sign(normal[np.argmax(np.abs(normal))])  # a view has no direction by its name
+        return _direction_name(right), _direction_name(up), _direction_name(normal)
 
 
 def _direction_name(direction: FloatArray) -> str:

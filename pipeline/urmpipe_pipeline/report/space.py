@@ -45,9 +45,9 @@ BACK_PX, FRONT_PX, VALUES_PX = 2, 5, 6
 """Width of a path: of those in the back, of the one in front, and of one that its values colour."""
 
 
-PLANE_SIZE, PLANE_DISTANCE, PLANE_CENTRE, PLANE_TILT = 1.9, 1.9, -0.1, 0.25
-"""Of a planar mechanism: its longest axis, how far away the eye is, and what it looks at upwards of the middle,
-in lengths of the scene; the angle between the eye and the normal in [rad]."""
+PLANE_SIZE, PLANE_DISTANCE, PLANE_CENTRE, PLANE_TILT = 1.75, 1.9, -0.1, 0.25
+"""Of a planar mechanism: its longest axis, how far away the eye is, and what it looks at above the middle, in
+lengths of the scene; the angle between the eye and the normal in [rad]."""
 
 
 def drawn_space(figure: SpaceFigure) -> Figure:

@@ -28,7 +28,7 @@ Labelled: TypeAlias = Solid | MovingLines
 LABEL_COLOUR = "#ffffff"
 """Labels: they stand on surfaces of any colour."""
 
-LETTER, LINE = 0.03, 0.09
+LETTER, LINE = 0.024, 0.08
 """Width of a letter and height of a label, as shares of the radius of the scene."""
 
 
@@ -63,7 +63,7 @@ def draw_solids(stream: RecordingStream, scene: Scene, size: float, thread: floa
 
 
 def _label_lifts(labelled: Sequence[Labelled], size: float, plane: PlaneView | None) -> FloatArray:
-    """Return how far labels are moved upwards in the view at first, so that they do not cover each other.
+    """Return how far labels are moved up or down in the view at first, so that they do not cover each other.
 
     Args:
         labelled: What has labels; what is hidden is passed over.
@@ -74,17 +74,20 @@ def _label_lifts(labelled: Sequence[Labelled], size: float, plane: PlaneView | N
         In [m], shape (n, 3).
     """
     axes, lifts = eye_axes(plane), np.zeros(len(labelled))
+    line = LINE * size
     taken: list[tuple[FloatArray, float]] = []  # middle to the right and up, half of the width
     for k, one in enumerate(labelled):
         if not one.label or (isinstance(one, Solid) and one.hidden):
             continue
         place, half = _first_place(one) @ axes[:, :2], 0.5 * LETTER * size * (len(one.label) + 1)
-        while any(
-            abs(place[1] - at[1]) < 0.999 * LINE * size and abs(place[0] - at[0]) < half + other
-            for at, other in taken
-        ):
-            place, lifts[k] = np.add(place, (0.0, LINE * size)), lifts[k] + LINE * size
-        taken.append((place, half))
+        near = [at for at, other in taken if abs(place[0] - at[0]) < half + other]
+        lifts[k] = next(
+            lift
+            for lift in line
+            * np.array([0, *(sign * n for n in range(1, len(taken) + 2) for sign in (1, -1))])
+            if all(abs(place[1] + lift - at[1]) > 0.999 * line for at in near)
+        )
+        taken.append((place + np.array([0.0, lifts[k]]), half))
     return np.asarray(np.outer(lifts, axes[:, 1]))
 
 
