@@ -26,13 +26,14 @@ from urmpipe_models.orientation import quaternions
 from urmpipe_models.spelling import Voice
 from urmpipe_models.taylor import Taylor
 from urmpipe_pipeline import text
-from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, seconds
+from urmpipe_pipeline.joint_log import NETWORK, JointLog, LogColumn, LogWarning, seconds
 from urmpipe_pipeline.networks.motion_drawing import moving_scene, motion_space_figure, motion_svg
 from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.figure import Drawing, Figure, Line, Panel, View
 from urmpipe_pipeline.presentation.parts import (
     Heads,
+    columns_of,
     inputs_table,
     provenance_table,
     recording_fact,
@@ -51,7 +52,6 @@ from urmpipe_pipeline.presentation.section import (
     Section,
     Table,
     Value,
-    columns_of,
 )
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs import exports as run_exports
@@ -61,7 +61,6 @@ from urmpipe_pipeline.runs.results import SCHEMA, Run
 if TYPE_CHECKING:
     import pandas as pd
 
-SOURCE = "network"  # source of a log that is the motion of a network
 MAX_SHOWN = 4000  # instants of the viewer's scene; a network of ten bodies then takes about 10 MB
 SHOWN_NS = 20_000_000  # ns between instants of the scene at least: 50 Hz, as of arms
 DRAWN = 400  # instants of a curve in a drawing
@@ -387,7 +386,7 @@ def motion_run(motion: NetworkMotion) -> Run:
     for k, component in enumerate(("qx", "qy", "qz", "qw") if position is not None else ()):
         columns.append(LogColumn(component, component, "rotation", k, "", number=len(names) + 5 + k))
     log = JointLog(
-        name=motion.name, source=SOURCE, files=motion.provenance.inputs, t_ns=motion.t_ns, joints=names, q=q,
+        name=motion.name, source=NETWORK, files=motion.provenance.inputs, t_ns=motion.t_ns, joints=names, q=q,
         tcp_position=position, tcp_rotation=motion.quat_xyzw,
         rotation_form=None if position is None else "quat_xyzw", columns=tuple(columns), warnings=motion.warnings,
     )  # fmt: skip
