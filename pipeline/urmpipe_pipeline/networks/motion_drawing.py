@@ -151,13 +151,13 @@ def motion_svg(
     """
     motion = _NetworkPoses(network, np.asarray(poses), np.asarray(lengths))
     first = motion.at(0)
-    found = parts(first)
+    first_parts = parts(first)
     pieces = [piece for row in _further_rows(motion.poses) for piece in _ghost(motion.at(row))]
-    pieces += mechanism_pieces(network, found)
+    pieces += mechanism_pieces(network, first_parts)
     pieces += [Piece(position, colour, 2.0, front=True) for (_, position), colour in _coloured(curves)]
     ends = [spot for curve, colour in _coloured(curves) for spot in _curve_ends(*curve, colour)]
-    marks = [replace(one, words="") for one in ends]
-    sketch = Sketch(pieces=pieces, spots=marks, names=[*ends, *part_names(network, found)])
+    marks = [replace(end, words="") for end in ends]
+    sketch = Sketch(pieces=pieces, spots=marks, names=[*ends, *part_names(network, first_parts)])
     return sketch_svg(sketch, find_plane(first), title)
 
 

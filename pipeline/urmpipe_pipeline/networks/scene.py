@@ -61,19 +61,22 @@ def space_figure(result: NetworkResult) -> Iterator[SpaceFigure]:
     caption += " Crimson: a joint whose bodies do not meet." if result.gaps else ""
     caption += " Faint: further assemblies, which the legend switches." if others > 0 else ""
     alt = f"{result.name} in three dimensions, {len(result.network.body_names)} bodies."
-    found = [replace(one, label="" if one.group == "ghosts" else one.label) for one in solids(result)]
-    yield SpaceFigure("In space", caption, alt, solids=joined_labels(found), plane=motion_plane(result))
-
-
-def joined_labels(found: Sequence[Solid]) -> tuple[Solid, ...]:
-    """Return solids, the labels of those at the same place as one label of the first: "slider, B, s"."""
-    places = [tuple(np.round(one.at, 6).tolist()) for one in found]
-    labels: dict[tuple[float, ...], list[str]] = {}
-    for one, place in zip(found, places, strict=True):
-        labels.setdefault(place, []).extend([one.label] if one.label else [])
-    return tuple(
-        replace(one, label=", ".join(labels.pop(place, ()))) for one, place in zip(found, places, strict=True)
+    shown_solids = [
+        replace(solid, label="" if solid.group == "ghosts" else solid.label) for solid in solids(result)
+    ]
+    yield SpaceFigure(
+        "In space", caption, alt, solids=joined_labels(shown_solids), plane=motion_plane(result)
     )
+
+
+def joined_labels(labelled: Sequence[Solid]) -> tuple[Solid, ...]:
+    """Return solids, the labels of those at the same place as one label of the first: "slider, B, s"."""
+    places = [tuple(np.round(solid.at, 6).tolist()) for solid in labelled]
+    labels: dict[tuple[float, ...], list[str]] = {}
+    for solid, place in zip(labelled, places, strict=True):
+        labels.setdefault(place, []).extend([solid.label] if solid.label else [])
+    joined = [", ".join(labels.pop(place, ())) for place in places]
+    return tuple(replace(solid, label=words) for solid, words in zip(labelled, joined, strict=True))
 
 
 def motion_plane(result: NetworkResult) -> PlaneView | None:

@@ -1,8 +1,8 @@
 """Solids and moving lines in the 3D view: meshes, lines and labels, an entity each.
 
-A solid that moves is sent once; its frame moves by one transform per row, at 50 Hz or less. Lines whose
-points move are sent anew at each of these rows. The label of what moves is an entity by itself: it does not
-turn with it.
+A solid that moves is sent once; its frame moves by item transform per row, at 50 Hz or less. Lines whose
+points move are sent at each of these rows. The label of a moving solid has its own entity, so it does not turn
+with the solid.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 Labelled: TypeAlias = Solid | MovingLines
 
 LABEL_COLOUR = "#ffffff"
-"""Labels: they stand on surfaces of any colour."""
+"""Labels: readable on surfaces of any colour."""
 
 LETTER, LINE = 0.024, 0.08
 """Width of a letter and height of a label, as shares of the radius of the scene."""
@@ -43,22 +43,22 @@ def draw_solids(stream: RecordingStream, scene: Scene, size: float, thread: floa
     """
     every: tuple[Labelled, ...] = (*scene.solids, *scene.moving_lines)
     hidden = []
-    for one, key, lift in zip(every, _keys(every), _label_lifts(every, size, scene.plane), strict=True):
+    for item, key, lift in zip(every, _keys(every), _label_lifts(every, size, scene.plane), strict=True):
         entity = shown_path("scene", *key)
-        if isinstance(one, MovingLines):
-            _draw_moving_lines(stream, one, entity, thread)
-            places = one.lines[0].mean(axis=1) + lift
-            _draw_moving_label(stream, f"{entity}/label", one.label, places, one.t_ns)
+        if isinstance(item, MovingLines):
+            _draw_moving_lines(stream, item, entity, thread)
+            places = item.lines[0].mean(axis=1) + lift
+            _draw_moving_label(stream, f"{entity}/label", item.label, places, item.t_ns)
             continue
-        _draw(stream, one, entity, thread)
-        hidden += [entity] if one.hidden else []
-        if one.motion is not None:
-            _move(stream, entity, one.motion)
-            places = one.motion.points(np.array([one.at]))[:, 0] + lift
+        _draw(stream, item, entity, thread)
+        hidden += [entity] if item.hidden else []
+        if item.motion is not None:
+            _move(stream, entity, item.motion)
+            places = item.motion.points(np.array([item.at]))[:, 0] + lift
             words = shown_path("scene", "labels", *key)
-            _draw_moving_label(stream, words, one.label, places, one.motion.t_ns)
-        elif one.label:
-            stream.log(f"{entity}/label", _label(one.label, [np.add(one.at, lift)]), static=True)
+            _draw_moving_label(stream, words, item.label, places, item.motion.t_ns)
+        elif item.label:
+            stream.log(f"{entity}/label", _label(item.label, [np.add(item.at, lift)]), static=True)
     return hidden
 
 
@@ -66,7 +66,7 @@ def _label_lifts(labelled: Sequence[Labelled], size: float, plane: PlaneView | N
     """Return how far labels are moved up or down in the view at first, so that they do not cover each other.
 
     Args:
-        labelled: What has labels; what is hidden is passed over.
+        labelled: Solids and lines; hidden ones are skipped.
         size: Radius of the scene in [m].
         plane: From where it is seen.
 
@@ -76,10 +76,10 @@ def _label_lifts(labelled: Sequence[Labelled], size: float, plane: PlaneView | N
     axes, lifts = eye_axes(plane), np.zeros(len(labelled))
     line = LINE * size
     taken: list[tuple[FloatArray, float]] = []  # middle to the right and up, half of the width
-    for k, one in enumerate(labelled):
-        if not one.label or (isinstance(one, Solid) and one.hidden):
+    for k, item in enumerate(labelled):
+        if not item.label or (isinstance(item, Solid) and item.hidden):
             continue
-        place, half = _first_place(one) @ axes[:, :2], 0.5 * LETTER * size * (len(one.label) + 1)
+        place, half = _first_place(item) @ axes[:, :2], 0.5 * LETTER * size * (len(item.label) + 1)
         near = [at for at, other in taken if abs(place[0] - at[0]) < half + other]
         lifts[k] = next(
             lift
@@ -91,16 +91,16 @@ def _label_lifts(labelled: Sequence[Labelled], size: float, plane: PlaneView | N
     return np.asarray(np.outer(lifts, axes[:, 1]))
 
 
-def _first_place(one: Labelled) -> FloatArray:
+def _first_place(item: Labelled) -> FloatArray:
     """Return where the label of something is first in [m], shape (3,)."""
-    if isinstance(one, MovingLines):
-        return np.asarray(one.lines[0][0].mean(axis=0))
-    return np.array(one.at) if one.motion is None else one.motion.points(np.array([one.at]))[0, 0]
+    if isinstance(item, MovingLines):
+        return np.asarray(item.lines[0][0].mean(axis=0))
+    return np.array(item.at) if item.motion is None else item.motion.points(np.array([item.at]))[0, 0]
 
 
 def _keys(labelled: Sequence[Labelled]) -> list[tuple[str, str]]:
     """Return the group and the name of each as parts of an entity path, all different."""
-    parted = (key.partition("/") for key in keys([f"{one.group}/{one.name}" for one in labelled]))
+    parted = (key.partition("/") for key in keys([f"{item.group}/{item.name}" for item in labelled]))
     return [(group, name) for group, _, name in parted]
 
 
@@ -127,7 +127,7 @@ def _draw(stream: RecordingStream, solid: Solid, entity: str, thread: float) -> 
 
 
 def _draw_moving_lines(stream: RecordingStream, moving: MovingLines, entity: str, thread: float) -> None:
-    """Send lines anew at each of the rows that are drawn."""
+    """Send lines at each of the rows that are drawn."""
     import rerun as rr
 
     style = rr.LineStrips3D.from_fields(colors=[rgb(moving.colour)], radii=[moving.radius or thread])
@@ -139,7 +139,7 @@ def _draw_moving_lines(stream: RecordingStream, moving: MovingLines, entity: str
 
 
 def _move(stream: RecordingStream, entity: str, motion: Motion) -> None:
-    """Send the poses of a frame. Rerun takes a row as the whole transform: both parts stand in each."""
+    """Send the poses of a frame. Rerun takes a row as the whole transform, so each has both parts."""
     import rerun as rr
 
     rows = _rows(np.column_stack((motion.position, motion.quat_xyzw)), motion.t_ns)
@@ -162,7 +162,7 @@ def _label(words: str, places: Sequence[FloatArray] | None = None) -> Points3D:
 def _draw_moving_label(
     stream: RecordingStream, entity: str, words: str, places: FloatArray, t_ns: IntArray
 ) -> None:
-    """Draw a label, if there is one, at places in [m], shape (n, 3), at times in [ns], shape (n,)."""
+    """Draw a label, if there is item, at places in [m], shape (n, 3), at times in [ns], shape (n,)."""
     import rerun as rr
 
     if not words:
@@ -175,6 +175,6 @@ def _draw_moving_label(
 
 def normals(triangles: FloatArray) -> FloatArray:
     """Return the unit normals of triangles in [m], shape (n, 3, 3), [-], shape (n, 3); of none upwards."""
-    found = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    size = np.linalg.norm(found, axis=1, keepdims=True)
-    return np.where(size > 0.0, found / np.where(size > 0.0, size, 1.0), (0.0, 0.0, 1.0))
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    size = np.linalg.norm(cross, axis=1, keepdims=True)
+    return np.where(size > 0.0, cross / np.where(size > 0.0, size, 1.0), (0.0, 0.0, 1.0))
