@@ -36,6 +36,7 @@ from urmpipe_models.transform import Transform
 Column: TypeAlias = list[Element]
 """One element per row."""
 
+MAX_STEP = 0.5  # rad or lengths that a Newton step changes a variable by: beyond, the tangent leads astray
 MAX_RATIO = 2.0  # steps ahead in steps of the past: farther on, a line is no better than Newton's tangent
 MIN_SQUARE = 1e-24  # of a past step in rad or lengths: a shorter one is rounding and has no direction
 
@@ -54,13 +55,15 @@ def close_network(mechanism: Mechanism, x: Sequence[Element], steps: int) -> lis
     """
     closed = list(x)
     scales = mechanism.column_scales
-    for _ in range(steps):
+    for _ in range(steps if len(mechanism.free) else 0):
         posed, controls = mechanism.posed(closed), mechanism.control_slopes(closed)
         residual = _residual(mechanism, closed, posed, controls)
         columns = _jacobian(mechanism, closed, posed, controls)
         step = damped_normal_step(columns, residual)
+        longest = reduce(np.maximum, (np.abs(change) for change in step))
+        part_taken = MAX_STEP / np.maximum(longest, MAX_STEP)
         for k, change in zip(mechanism.free, step, strict=True):
-            closed[k] = plus(closed[k], times(float(scales[k]), change))
+            closed[k] = plus(closed[k], times(float(scales[k]), times(part_taken, change)))
         for part in mechanism.rotations:
             closed[part] = wrap_rotation_vector(_vector(closed, part))
     return closed
