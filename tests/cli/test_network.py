@@ -98,7 +98,7 @@ def test_solve_finds_both_assemblies_of_a_four_bar(urmpipe: Run) -> None:
     angles = [one["variables"]["theta4"] for one in told["assemblies"]]
     assert angles == pytest.approx(FOUR_BAR, abs=1e-9)
     assert told["reason"] == "at least 2: 100 random starts in a row found nothing new"
-    assert all(set(one) == {"variables", "residual", "mobility"} for one in told["assemblies"])
+    assert all(set(one) == {"variables", "poses", "residual", "mobility"} for one in told["assemblies"])
     assert told["restarts"] > 100
     near = json.loads(urmpipe("network", "solve", "four-bar", "--json").out)
     assert len(near["assemblies"]) == 1

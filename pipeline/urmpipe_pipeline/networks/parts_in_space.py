@@ -62,6 +62,8 @@ SAME = 1e-9
 OPEN = 1e-6
 """A joint whose points are further apart, as a share of the mechanism's extent, has a line between them."""
 
+PARALLEL = 1e-6  # sine of the angle between the axes of two wheels below which they have pitch circles
+
 Kind: TypeAlias = Literal["body", "joint", "element"]
 
 
@@ -96,7 +98,7 @@ class Placed:
         network: The network.
         poses: Where each body is, as a matrix [-] and [m], shape (4, 4), by its name.
         points: Where joints and elements tie each body, in its own frame in [m], by its name.
-        lengths: The length of each element in [m].
+        lengths: The length of each element in [m], of a pair its offset in [m] or [rad].
         extent: The diagonal of the box around all points of its bodies in [m].
         sides: Of what is round.
     """
@@ -243,9 +245,11 @@ def _rail(first: FloatArray, second: FloatArray, n: FloatArray, beyond: float) -
 
 
 def _element(at: Placed, element: ConstraintElement, length: float) -> Part:
-    """Return an element: a rod, a plane, two lines, or a tube about a line."""
+    """Return an element: a rod, a plane, two lines, a tube about a line, or a pair."""
     p, q = (at.point(body, point) for body, point in zip(element.bodies, element.points, strict=True))
     colour, e = CONTROL_COLOUR if is_driven(element) else ELEMENT_COLOUR, at.extent
+    if element.is_pair:
+        return _pair(at, element, colour)
     n = at.direction(element.bodies[0], element.normals[0])
     dots = (ball(p, DOT * e, at.sides), ball(q, DOT * e, at.sides))
 
@@ -275,6 +279,29 @@ def _element(at: Placed, element: ConstraintElement, length: float) -> Part:
     feet = _nearest(p, n, q, other)
     lines = [_around(p, foot, axis, e) for p, foot, axis in ((p, feet[0], n), (q, feet[1], other))]
     return made(feet.mean(axis=0), bar(feet[0], feet[1], ROD * e, at.sides), lines=iter((*lines, feet)))
+
+
+def _pair(at: Placed, pair: ConstraintElement, colour: str) -> Part:
+    """Return a pair: a line between its joints, and the pitch circles of a gear or a pinion about them."""
+    first, second = (joint for joint, _ in at.network.coupled(pair))
+    p, q = at.point(first.bodies[0], first.frames[0].translation), _joint(at, second).at
+    axes = [at.axes(one.bodies[0], one.frames[0])[:, 1] for one in (first, second)]
+    lines = [np.array([p, q])]
+    if pair.kind == "rack":
+        lines.append(_ring(p, axes[0], abs(pair.radius), at.sides))
+    elif pair.kind == "gear" and float(np.linalg.norm(np.cross(axes[0], axes[1]))) < PARALLEL:
+        across = q - p - float((q - p) @ axes[0]) * axes[0]
+        module = float(np.linalg.norm(across)) / (abs(sum(pair.teeth)) or 1.0)
+        for centre, teeth in ((p, pair.teeth[0]), (p + across, pair.teeth[1])):
+            lines.append(_ring(centre, axes[0], module * abs(teeth), at.sides))
+    dots = tuple(ball(one, DOT * at.extent, at.sides) for one in (p, q))
+    return Part(pair.name, "element", colour, 0.5 * (p + q), dots, tuple(lines))
+
+
+def _ring(centre: FloatArray, n: FloatArray, radius: float, sides: int) -> FloatArray:
+    """Return a closed circle in [m] about a centre across a unit vector, shape (k, 3)."""
+    corners = circle(centre, n, radius, 2 * sides)
+    return np.vstack((corners, corners[:1]))
 
 
 def _nearest(p: FloatArray, n: FloatArray, q: FloatArray, other: FloatArray) -> FloatArray:
