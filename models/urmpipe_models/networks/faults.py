@@ -151,9 +151,7 @@ def _limit_faults(where: str, joint: Joint) -> Iterator[Finding]:
         return
     count = 0 if joint.kind in ("global", "user") else len(joint.units)
     if len(joint.limits) != count:
-        reason = (
-            f"{count}, a lower and an upper one per variable" if count else f"none of a {joint.kind} joint"
-        )
+        reason = f"{count}, one pair per variable" if count else f"none of a {joint.kind} joint"
         yield Finding(f"found {len(joint.limits)} limits, allowed: {reason}", about=f"{where}.lower")
         return
     for unit, (lower, upper) in zip(joint.units, joint.limits, strict=True):

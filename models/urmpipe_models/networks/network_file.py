@@ -250,6 +250,8 @@ class _Reader:
         """Note a start of a free variable beyond its limits."""
         starts = zip(joint.start or (0.0,) * len(joint.units), joint.drives, strict=False)
         free = [start if drive is None else math.nan for start, drive in starts]  # NaN is beyond no limit
+        if any(lower > upper for lower, upper in joint.limits):
+            return
         for unit, value, end, limit in exceeded_limits(joint, free, is_coupled=True):
             size = in_si(1.0, unit, self.units)
             allowed = "at least lower" if end == "lower" else "at most upper"

@@ -311,8 +311,8 @@ def exceeded_limits(
 ) -> Iterator[tuple[str, float, str, float]]:
     """Yield each variable beyond its limits: its unit, its value, `lower` or `upper`, and that limit.
 
-    The angle of a revolute or cylindrical joint with two finite limits is taken at the full turn that is
-    nearest to the middle of these, unless the joint is in a pair, where full turns count.
+    The angle of a revolute or cylindrical joint with two finite limits is within them if it is so after any
+    number of full turns, unless the joint is in a pair, where full turns count.
 
     Args:
         joint: The joint.
@@ -321,10 +321,9 @@ def exceeded_limits(
     """
     is_periodic = joint.kind in ("revolute", "cylindrical") and not is_coupled
     for unit, value, (lower, upper) in zip(joint.units, values, joint.limits, strict=False):
-        at = value
+        nearest = value
         if is_periodic and unit == "rad" and math.isfinite(upper - lower):
-            at -= 2.0 * math.pi * round((value - 0.5 * (lower + upper)) / (2.0 * math.pi))
-        if at < lower - LIMIT_TOLERANCE:
-            yield unit, at, "lower", lower
-        elif at > upper + LIMIT_TOLERANCE:
-            yield unit, at, "upper", upper
+            nearest -= 2.0 * math.pi * round((value - 0.5 * (lower + upper)) / (2.0 * math.pi))
+        if nearest < lower - LIMIT_TOLERANCE or nearest > upper + LIMIT_TOLERANCE:
+            end, limit = ("lower", lower) if value < lower else ("upper", upper)
+            yield unit, value, end, limit
