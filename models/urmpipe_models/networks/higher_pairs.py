@@ -1,6 +1,6 @@
 """Higher pairs: gears, racks and cams, as equations between the variables of two joints.
 
-With the angle q_1 of the first joint, the variable q_2 of the second one, and an offset,
+With the angle q_1 of the first joint, the variable q_2 of the second joint, and an offset,
 
     q_2 = offset + f(q_1)
 
@@ -12,7 +12,7 @@ The variables are not reduced by full turns: a gear keeps the count of its turns
 
 1. `transmitted`: f and its derivative, elementwise.
 2. `read_pair`: a pair from its table of a file, with the profile of a cam from a CSV file.
-3. `pair_faults`: what is wrong with a pair.
+3. `pair_faults`: the errors of a pair.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def transmitted(element: ConstraintElement, angle: Element) -> tuple[Element, El
 def _spline_value(profile: Profile, angle: Element) -> tuple[Element, Element]:
     """Return the periodic cubic spline through the points of a profile, and its derivative.
 
-    Each segment is evaluated and one of them selected: symbols pass, too.
+    Every segment is evaluated, then the right value selected: so symbols pass, too.
     """
     coefficients, first = _segments(profile), profile[0][0]
     turned = angle - first
@@ -99,9 +99,9 @@ def _segments(profile: Profile) -> FloatArray:
     h = np.diff(x, append=x[0] + TURN)
     chords = (np.roll(y, -1) - y) / h
     before = np.roll(h, 1)
-    one = np.eye(len(x))
+    eye = np.eye(len(x))
     matrix = 2.0 * np.diag(before + h)
-    matrix += before[:, np.newaxis] * np.roll(one, -1, axis=1) + h[:, np.newaxis] * np.roll(one, 1, axis=1)
+    matrix += before[:, np.newaxis] * np.roll(eye, -1, axis=1) + h[:, np.newaxis] * np.roll(eye, 1, axis=1)
     M = np.linalg.solve(matrix, 6.0 * (chords - np.roll(chords, 1)))
     after = np.roll(M, -1)
     return np.stack(
@@ -115,7 +115,7 @@ def _segments(profile: Profile) -> FloatArray:
 def read_pair(
     name: str, kind: ElementKind, table: Table, joints: Mapping[str, Joint], units: Units, folder: Path
 ) -> ConstraintElement:
-    """Return a gear, rack or cam from its table; what is wrong is noted.
+    """Return a gear, rack or cam from its table; errors are noted there.
 
     Args:
         name: Its name.
@@ -151,15 +151,15 @@ def _read_profile(table: Table, unit: str, units: Units, folder: Path) -> Profil
         rows = _read_csv(table, value, folder)
     else:
         rows = value if isinstance(value, (list, tuple)) else []
-        wrong = [k for k, row in enumerate(rows) if not are_numbers(row, 2)]
-        for k in wrong:
+        unreadable = [k for k, row in enumerate(rows) if not are_numbers(row, 2)]
+        for k in unreadable:
             table.fault(
                 f"profile[{k}]", f"found {shown(rows[k])}, allowed: [angle, lift], two finite numbers"
             )
         if rows is not value:
-            found = "nothing" if value is None else shown(value)
-            table.fault("profile", f"found {found}, allowed: a list of [angle, lift], or a .csv file")
-        rows = [] if wrong else rows
+            text = "nothing" if value is None else shown(value)
+            table.fault("profile", f"found {text}, allowed: a list of [angle, lift], or a .csv file")
+        rows = [] if unreadable else rows
     return tuple((in_si(float(a), "rad", units), in_si(float(b), unit, units)) for a, b in rows)
 
 
@@ -172,18 +172,18 @@ def _read_csv(table: Table, file: str, folder: Path) -> list[tuple[float, float]
         reason = error.strerror if isinstance(error, OSError) else "it is no text"
         table.fault("profile", f"{shown(file)} cannot be read: {reason}; allowed: a .csv file of two columns")
         return []
-    found, wrong = [], []
+    points, faults = [], []
     for number, row in enumerate(cells, 1):
         pair = [_number(cell) for cell in row]
         if len(pair) == 2 and all(map(is_number, pair)):
-            found.append((pair[0], pair[1]))
+            points.append((pair[0], pair[1]))
         elif row != [""] and not (number == 1 and all(map(math.isnan, pair))):
-            wrong.append(f"{file}, line {number}: found {shown(','.join(row))}")
-    for message in wrong[:MAX_LISTED]:
+            faults.append(f"{file}, line {number}: found {shown(','.join(row))}")
+    for message in faults[:MAX_LISTED]:
         table.fault("profile", f"{message}, allowed: angle,lift, two finite numbers")
-    if len(wrong) > MAX_LISTED:
-        table.fault("profile", f"{file}: {len(wrong) - MAX_LISTED} more such lines")
-    return [] if wrong else found
+    if len(faults) > MAX_LISTED:
+        table.fault("profile", f"{file}: {len(faults) - MAX_LISTED} more such lines")
+    return [] if faults else points
 
 
 def _number(cell: str) -> float:
@@ -197,9 +197,7 @@ def _number(cell: str) -> float:
 
 
 def pair_faults(where: str, element: ConstraintElement, parts: Parts) -> Iterator[Finding]:
-    """Yield what is wrong with a pair.
-
-    What may follow from a joint that could not be read has the kind "coupled".
+    """Yield the errors of a pair; those that may follow from an unreadable joint have the kind "coupled".
 
     Args:
         where: Its place in a file, such as elements.mesh.
@@ -217,8 +215,8 @@ def pair_faults(where: str, element: ConstraintElement, parts: Parts) -> Iterato
 
 
 def _joints_faults(where: str, element: ConstraintElement, parts: Parts) -> Iterator[Finding]:
-    """Yield unknown joints, joints of the wrong kind, and one joint twice."""
-    place, joints = f"{where}.joints", {one.name: one for one in parts.joints}
+    """Yield unknown joints, joints of the wrong kind, and a joint that is named twice."""
+    place, joints = f"{where}.joints", {joint.name: joint for joint in parts.joints}
     if len(element.joints) != 2:
         yield Finding(f"found {len(element.joints)}, allowed: the names of two joints", about=place)
         return
@@ -240,8 +238,8 @@ def _joints_faults(where: str, element: ConstraintElement, parts: Parts) -> Iter
 def _teeth_faults(where: str, teeth: tuple[float, ...]) -> Iterator[Finding]:
     """Yield teeth that are 0, and two internal wheels."""
     allowed = "two numbers other than 0, at most one of them negative: that of an internal wheel"
-    if len(teeth) != 2 or not all(0.0 < abs(one) <= MAX_VALUE for one in teeth) or max(teeth) < 0.0:
-        yield Finding(f"found {', '.join(f'{one:g}' for one in teeth)}, allowed: {allowed}", about=where)
+    if len(teeth) != 2 or not all(0.0 < abs(count) <= MAX_VALUE for count in teeth) or max(teeth) < 0.0:
+        yield Finding(f"found {', '.join(f'{count:g}' for count in teeth)}, allowed: {allowed}", about=where)
 
 
 def _profile_faults(where: str, profile: Profile) -> Iterator[Finding]:
@@ -249,14 +247,14 @@ def _profile_faults(where: str, profile: Profile) -> Iterator[Finding]:
     if not MIN_POINTS <= len(profile) <= MAX_POINTS:
         yield Finding(f"found {len(profile)} points, allowed: {MIN_POINTS} to {MAX_POINTS}", about=where)
     for k, row in enumerate(profile):
-        if not all(abs(one) <= MAX_VALUE for one in row):  # NaN is not, either
-            found = ", ".join(f"{one:g}" for one in row)
-            yield Finding(f"found {found}, allowed: finite numbers of a mechanism", about=f"{where}[{k}]")
+        if not all(abs(number) <= MAX_VALUE for number in row):  # NaN is not, either
+            text = ", ".join(f"{number:g}" for number in row)
+            yield Finding(f"found {text}, allowed: finite numbers of a mechanism", about=f"{where}[{k}]")
     for k, ((before, _), (angle, _)) in enumerate(pairwise(profile), 1):
         if angle <= before:
-            found = f"found the angle {angle:g} rad after {before:g} rad"
-            yield Finding(f"{found}, allowed: angles that increase", about=f"{where}[{k}]")
+            message = f"found the angle {angle:g} rad after {before:g} rad"
+            yield Finding(f"{message}, allowed: angles that increase", about=f"{where}[{k}]")
     if profile and profile[-1][0] - profile[0][0] >= TURN - 1e-9:
         span = f"found angles over {profile[-1][0] - profile[0][0]:.6g} rad"
-        reason = "after a full turn the profile repeats its first point by itself"
+        reason = "the first point repeats after it"
         yield Finding(f"{span}, allowed: less than a full turn: {reason}", about=where)

@@ -232,11 +232,11 @@ class Parts:
 
     def coupled(self, element: ConstraintElement) -> tuple[tuple[Joint, int], ...]:
         """Return the joints of a pair that there are, each with the number of its variable."""
-        joints = {one.name: one for one in self.joints}
-        found = [joints[name] for name in element.joints if name in joints]
+        joints = {joint.name: joint for joint in self.joints}
+        known = [joints[name] for name in element.joints if name in joints]
         return tuple(
-            (one, len(one.units) - 1 if k == 1 and element.kind == "rack" else 0)
-            for k, one in enumerate(found)
+            (joint, len(joint.units) - 1 if k == 1 and element.kind == "rack" else 0)
+            for k, joint in enumerate(known)
         )
 
     @cached_property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -137,6 +138,22 @@ def test_numbers_columns_and_symbols_pass_through_the_same_lines() -> None:
             assert float(symbolic) == pytest.approx(number, abs=1e-15)  # sums in another order
 
 
+def test_joints_of_denavit_hartenberg_elements_and_of_arms_are_coupled() -> None:
+    tables = {
+        "angle_unit": "deg",
+        "dh": {"elements": {"J": {"kind": "R"}, "K": {"kind": "P"}}},
+        "chains": {"arm": {"robot": "ur5e"}},
+        "elements": {
+            "belt": {"kind": "rack", "joints": ["J", "K"], "radius": 0.05, "offset": 0.1},
+            "wrist": {"kind": "gear", "joints": ["arm.wrist_1_joint", "arm.wrist_2_joint"], "teeth": [1, -2]},
+        },
+    }
+    values = network_check(tables).assemblies[0].values
+    assert values["K"][0] == pytest.approx(0.1 + 0.05 * values["J"][0], abs=ROUNDING)
+    wrists = [values[f"arm.wrist_{k}_joint"][0] for k in (1, 2)]
+    assert wrists[1] == pytest.approx(0.5 * wrists[0], abs=ROUNDING)
+
+
 # --- derivatives, mobility and redundancy
 
 MANY: dict[str, Any] = {
@@ -247,7 +264,7 @@ def test_everything_wrong_with_pairs_is_reported_at_once() -> None:
         "elements.p4.profile[2]: found the angle 0.349066 rad after 0.349066 rad,"
         " allowed: angles that increase",
         "elements.p5.profile: found angles over 6.28319 rad, allowed: less than a full turn:"
-        " after a full turn the profile repeats its first point by itself",
+        " the first point repeats after it",
         "elements.p6.offset: control found 'speed', allowed: turn",
     ]
 
@@ -257,6 +274,17 @@ def test_joints_that_could_not_be_read_are_no_faults_of_their_pairs() -> None:
     text = refusal(NetworkError, lambda: load_network(wrong))
     assert text.startswith("joints.B.kind: found 'round'")
     assert "\n" not in text
+
+    chain = {**wrong, "chains": {"arm": {"robot": "ur50"}}}
+    chain["elements"] = {"pair": {**GEARED["elements"]["pair"], "joints": ["A", "arm.elbow"]}}
+    assert "elements" not in refusal(NetworkError, lambda: load_network(chain))
+
+
+def test_the_bodies_of_a_pair_in_python_are_those_of_its_joints() -> None:
+    network = load_network(GEARED)
+    pair = replace(network.elements[0], bodies=("ground", "b"))
+    text = refusal(NetworkError, lambda: replace(network, elements=(pair,)))
+    assert text == "elements.pair.bodies: found ground, b, allowed: those of its joints, a, b"
 
 
 def test_a_profile_is_read_from_a_file_beside_the_network(tmp_path: Path) -> None:
