@@ -10,6 +10,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import pytest
+from scipy.spatial.transform import Rotation
 
 import urmpipe as api
 from urmpipe_datasets import NETWORKS
@@ -65,9 +66,9 @@ def test_list_names_every_network_with_its_source(urmpipe: Run) -> None:
     assert [one["name"] for one in listed["networks"]] == list(network_names())
     assert all(one["source"] and one["description"] for one in listed["networks"])
     assert set(network_names()) == {
-        "bennett", "bricard", "cluster-crc", "cluster-eg", "cluster-gc", "cluster-gg", "four-bar",
-        "nine-revolute", "nine-revolute-controlled", "rccc", "rssr", "sarrus", "screw-jack", "slider-crank",
-        "stewart-gough",
+        "bennett", "bricard", "cam-follower", "cluster-crc", "cluster-eg", "cluster-gc", "cluster-gg",
+        "four-bar", "geared-five-bar", "nine-revolute", "nine-revolute-controlled", "rack-and-pinion", "rccc",
+        "rssr", "sarrus", "screw-jack", "slider-crank", "stewart-gough", "stewart-gough-driven",
     }  # fmt: skip
 
 
@@ -86,7 +87,7 @@ def test_check_tells_mobility_and_why_kutzbach_differs(urmpipe: Run) -> None:
     assert told["residual"] < 1e-12
     assert set(told) == {
         "schema", "name", "kind", "structure", "bodies", "variables", "mobility", "kutzbach", "loops",
-        "clusters", "redundant", "idle", "special", "residual", "gaps", "warnings", "output",
+        "clusters", "redundant", "idle", "special", "residual", "assemblies", "gaps", "warnings", "output",
     }  # fmt: skip
 
 
@@ -98,7 +99,7 @@ def test_solve_finds_both_assemblies_of_a_four_bar(urmpipe: Run) -> None:
     angles = [one["variables"]["theta4"] for one in told["assemblies"]]
     assert angles == pytest.approx(FOUR_BAR, abs=1e-9)
     assert told["reason"] == "at least 2: 100 random starts in a row found nothing new"
-    assert all(set(one) == {"variables", "residual", "mobility"} for one in told["assemblies"])
+    assert all(set(one) == {"variables", "poses", "residual", "mobility"} for one in told["assemblies"])
     assert told["restarts"] > 100
     near = json.loads(urmpipe("network", "solve", "four-bar", "--json").out)
     assert len(near["assemblies"]) == 1
@@ -236,6 +237,34 @@ def test_a_recording_and_a_drawing_are_written_and_replaced(urmpipe: Run, tmp_pa
     assert any("coupler" in text for text in texts)
     assert urmpipe("report", "rssr.rrd").code == 0
     assert "coupler" in (tmp_path / "rssr.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["cam-follower", "geared-five-bar", "rack-and-pinion"])
+def test_pairs_are_drawn_recorded_and_reported(urmpipe: Run, tmp_path: Path, name: str) -> None:
+    run, drawing = tmp_path / "run.rrd", tmp_path / "run.svg"
+    ran = urmpipe("network", "check", name, "-o", run, "--draw", drawing)
+    assert (ran.code, ran.err) == (0, "")
+    network = api.load_network(name)
+    words = "".join(ElementTree.parse(drawing).getroot().itertext())
+    for one in network.elements:
+        assert f"{one.name} {one.kind}" in words
+    read = api.read_recording(run)
+    assert read.network.elements == network.elements
+    assert [one.limits for one in read.network.joints] == [one.limits for one in network.joints]
+    assert urmpipe("report", run, "-o", tmp_path / "run.html").code == 0
+
+
+@pytest.mark.parametrize("command", ["check", "solve"])
+def test_json_has_the_poses_of_bodies(urmpipe: Run, command: str) -> None:
+    told = json.loads(urmpipe("network", command, "rssr", "--set", "crank=2", "--json").out)
+    expected = api.network_solve("rssr", controls={"crank": 2}).assemblies[0].poses
+    poses = told["assemblies"][0]["poses"]
+    assert list(poses) == list(api.load_network("rssr").body_names)
+    for pose, matrix in zip(poses.values(), expected, strict=True):
+        assert pose["position"] == matrix[:3, 3].tolist()
+        rotation = Rotation.from_quat(pose["quat_xyzw"]).as_matrix()
+        assert rotation == pytest.approx(matrix[:3, :3], abs=1e-14)  # rounding of a conversion
+        assert pose["quat_xyzw"][3] >= 0.0
 
 
 def test_an_input_and_a_foreign_file_are_not_replaced(urmpipe: Run, tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-
 NAMED = set(re.findall(r"`(\w+)`", PAGE))
 FREE = {
     "steps", "units", "tolerance", "noise", "before", "now", "delta", "start", "joints", "joint_turns",
-    "arguments", "points", "value", "variables",
+    "arguments", "points", "value", "variables", "poses",
 }  # fmt: skip
 """Objects whose keys are names of columns, axes, joints, kinds or options."""
 

@@ -81,7 +81,7 @@ def test_every_kind_is_on_the_page() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "count"), [("boom", 2), ("five-bar", 2), ("door", 8)])
+@pytest.mark.parametrize(("name", "count"), [("boom", 2), ("five-bar", 2), ("door", 8), ("timing", 1)])
 def test_an_example_moves_by_its_control(name: str, count: int) -> None:
     found = urmpipe.network_solve(f"{name}.toml", every=True)
     assert (len(found.assemblies), there(found.mobility).mobility) == (count, 1)

@@ -106,7 +106,7 @@ def lay(folder: Path, files: dict[str, str]) -> None:
 def files_of_pages() -> dict[str, str]:
     """Return the files that pages name, other than those of repeated motion, by their names."""
     named = {"coppelia": "coppeliasim", "path": "path", **dict.fromkeys(("log", "a", "b", "other"), "matlab")}
-    networks = zip(("boom", "five-bar", "door"), snippets("docs/networks.md", "toml"), strict=True)
+    networks = zip(("boom", "timing", "five-bar", "door"), snippets("docs/networks.md", "toml"), strict=True)
     systems = snippets("docs/simulate.md", "toml")
     return {
         **{f"{name}.csv": thinned(LOGS / f"{source}.csv") for name, source in named.items()},

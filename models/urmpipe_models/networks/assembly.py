@@ -366,8 +366,10 @@ def gaps_at(mechanism: Mechanism, x: FloatArray) -> tuple[Gap, ...]:
                 name, mechanism.graph.loops[k], float(np.linalg.norm(gap[:3])), float(np.linalg.norm(gap[3:]))
             )
         )
-    elements = zip(mechanism.network.elements, residual[6 * len(mechanism.graph.cuts) :], strict=True)
-    gaps += [Gap(one.name, (one.name,), abs(float(gap)), 0.0) for one, gap in elements]
+    errors = np.abs(residual[6 * len(mechanism.graph.cuts) :]).tolist()
+    network = mechanism.network
+    for element, unit, error in zip(network.elements, network.element_units, errors, strict=True):
+        gaps.append(Gap(element.name, (element.name,), *((error, 0.0) if unit == "m" else (0.0, error))))
     sizes = [max(one.metres / mechanism.length, one.radians) for one in gaps]
     worst_first = sorted(zip(sizes, gaps, strict=True), key=lambda pair: -pair[0])
     return tuple(gap for size, gap in worst_first if size > CLOSED)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -46,7 +47,7 @@ def chain_parts(
 
     Args:
         name: Its name in the network.
-        chain: The chain, of which limits are not used.
+        chain: The chain.
         carrier: The body that its base stands on.
         start: Where its coordinates start, in [rad] and [m].
         values: What drives coordinates, in [rad] and [m]; the others are free.
@@ -99,6 +100,7 @@ def _joint(
         (origin @ turned, turned),
         start=(float(start),),
         values=() if drive is None else (drive,),
+        limits=((one.lower, one.upper),) if math.isfinite(one.lower) or math.isfinite(one.upper) else (),
     )
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IndexArray
 from urmpipe_models.elementwise import Element, add, cross
 from urmpipe_models.networks.element_measures import MEASURES, measure
+from urmpipe_models.networks.higher_pairs import transmitted
 from urmpipe_models.networks.joint_motion import Screws, forbidden, joint_frame, joint_screws
 from urmpipe_models.networks.mechanism import Given, Mechanism, Pose, Posed, of_controls
 from urmpipe_models.networks.parts import ConstraintElement, Joint
@@ -23,7 +24,8 @@ class Closure:
     """What does not close at n configurations, and how that changes.
 
     Rows: of each cut joint the gap x, y, z in [m] and its rotation vector in [rad], both seen from where the
-    joint should be; then of each element what it is too long by in [m].
+    joint should be; then of each element what it is too long by in [m], of a pair what its second variable is
+    off by in [m] or [rad].
 
     Attributes:
         residual: In [m] and [rad], shape (rows, n).
@@ -44,6 +46,7 @@ class _Equation:
         carrier: What turns a twist in the ground into the rates of that, shape (k, 6, n).
         movers: The sign with which each mover's twist counts.
         slopes: What the rows fall by a unit of variables.
+        values: What the rows rise by a unit of values of joints: by the joint and the value's number.
     """
 
     rows: slice
@@ -51,6 +54,7 @@ class _Equation:
     carrier: FloatArray
     movers: dict[str, int]
     slopes: dict[int, Element]
+    values: dict[tuple[str, int], Element] = field(default_factory=dict)
 
 
 def closure_of(mechanism: Mechanism, x: FloatArray) -> Closure:
@@ -59,7 +63,7 @@ def closure_of(mechanism: Mechanism, x: FloatArray) -> Closure:
     The gap of a cut joint is p and the rotation vector of E = (G_1 A_1 T)^-1 G_2 A_2, which is the
     identity where its loop closes. A change of the variables moves E by the twist of the second body
     against the first, minus the joint's own. An element's length changes by the scalar product of that
-    twist and the element's wrench.
+    twist and the element's wrench; a pair has slopes alone.
 
     Args:
         mechanism: The network.
@@ -107,11 +111,16 @@ def released(mechanism: Mechanism, x: FloatArray) -> Iterator[tuple[str, str, Fl
     for joint in mechanism.network.joints:
         values = [one.value for one in mechanism.values(joint, at, controls)]
         frame = posed.joints[joint.name]
+        driven = iter([k for k, drive in enumerate(joint.drives) if drive is not None])
         for constraint, unit, (w, v) in forbidden(joint, values, frame):
-            twist = _stacked((*w, *v), 1)[:, 0] * (mechanism.length if unit == "m" else 1.0)
-            column = np.zeros(mechanism.rows)
+            size = mechanism.length if unit == "m" else 1.0
+            twist = _stacked((*w, *v), 1)[:, 0] * size
+            column, value = np.zeros(mechanism.rows), -1
+            if constraint == "drive":
+                value = next(driven)
             for one in equations:
                 column[one.rows] += one.movers.get(joint.name, 0) * (one.carrier[:, :, 0] @ twist)
+                column[one.rows] += one.values.get((joint.name, value), 0.0) * size
             yield joint.name, constraint, column * mechanism.row_scales
     for row, element in enumerate(mechanism.network.elements, 6 * len(mechanism.graph.cuts)):
         yield element.name, MEASURES[element.kind], np.eye(mechanism.rows)[row]
@@ -132,11 +141,36 @@ def _equations(
     first = 6 * len(mechanism.graph.cuts)
     for row, element in enumerate(mechanism.network.elements, first):
         length = of_controls(element.length, controls)
+        if element.is_pair:
+            yield _pair_equation(mechanism, element, row, x, length, controls)
+            continue
         measured = measure(element, *(posed.bodies[name].frame for name in element.bodies))
         wrench = _stacked((*measured.moment, *measured.force), n)[np.newaxis]
         excess = _stacked((measured.distance - length.value,), n)
         movers = relative_movers(posed.bodies, element.bodies)
         yield _Equation(slice(row, row + 1), excess, wrench, movers, length.slopes)
+
+
+def _pair_equation(
+    mechanism: Mechanism,
+    element: ConstraintElement,
+    row: int,
+    x: FloatArray,
+    offset: Given,
+    controls: dict[str, Given],
+) -> _Equation:
+    """Return q_2 - f(q_1) - offset = 0 of a pair, see `higher_pairs`."""
+    (first, j), (second, k) = mechanism.network.coupled(element)
+    angle, follower = mechanism.values(first, x, controls)[j], mechanism.values(second, x, controls)[k]
+    value, slope = transmitted(element, angle.value)
+    slopes = dict(offset.slopes)
+    for place, inner in angle.slopes.items():
+        slopes[place] = slopes.get(place, 0.0) + slope * inner
+    for place, inner in follower.slopes.items():
+        slopes[place] = slopes.get(place, 0.0) - inner
+    error = _stacked((follower.value - value - offset.value,), x.shape[1])
+    rates = {(first.name, j): -slope, (second.name, k): 1.0}
+    return _Equation(slice(row, row + 1), error, np.zeros((1, 6, x.shape[1])), {}, slopes, rates)
 
 
 def _screws(

@@ -166,7 +166,7 @@ def variable_limits(mechanism: Mechanism) -> FloatArray:
     for k, variable in enumerate(mechanism.variables):
         if variable.kind == "control":
             limits[k] = controls[variable.owner].lower, controls[variable.owner].upper
-        elif variable.kind == "joint" and getattr(joints[variable.owner], "limits", ()):
+        elif variable.kind == "joint" and joints[variable.owner].limits:
             limits[k] = joints[variable.owner].limits[variable.index]
     return limits
 

@@ -10,7 +10,15 @@ from urmpipe_models.elementwise import Element, Vector, add, cross, dot, scale, 
 from urmpipe_models.networks.parts import ConstraintElement
 from urmpipe_models.transform import Transform
 
-MEASURES = {"gg": "length", "eg": "height", "crc": "distance", "gc": "radius"}
+MEASURES = {
+    "gg": "length",
+    "eg": "height",
+    "crc": "distance",
+    "gc": "radius",
+    "gear": "mesh",
+    "rack": "mesh",
+    "cam": "contact",
+}
 """What an element of a kind holds."""
 
 
@@ -40,7 +48,7 @@ def measure(element: ConstraintElement, first: Transform, second: Transform) -> 
     length of what p_2 - p_1 has across n_1. Of crc whose length is the constant 0 the sign stays.
 
     Args:
-        element: The element.
+        element: The element, no pair.
         first: Its first body in the ground.
         second: Its second.
 

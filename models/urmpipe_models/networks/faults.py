@@ -11,14 +11,17 @@ from urmpipe_models.errors import Finding, shown
 from urmpipe_models.names import nearest, not_among
 from urmpipe_models.networks.control_faults import control_faults
 from urmpipe_models.networks.graph import graph_of
-from urmpipe_models.networks.parts import FREEDOMS, POSE_UNITS, ConstraintElement, ElementKind, Joint, Parts
-from urmpipe_models.networks.value_faults import (
-    LARGEST,
+from urmpipe_models.networks.higher_pairs import pair_faults
+from urmpipe_models.networks.parts import (
+    FREEDOMS,
     ORTHONORMAL,
-    lines_faults,
-    not_orthonormal,
-    value_faults,
+    POSE_UNITS,
+    ConstraintElement,
+    ElementKind,
+    Joint,
+    Parts,
 )
+from urmpipe_models.networks.value_faults import LARGEST, lines_faults, not_orthonormal, value_faults
 
 if TYPE_CHECKING:
     from urmpipe_models.transform import Transform
@@ -31,7 +34,7 @@ def faults_of(parts: Parts) -> Iterator[Finding]:
     """Yield what is wrong with the parts of a network.
 
     What may follow from something that could not be read has a kind: "untied", a body that nothing ties,
-    "idle", a control that drives nothing, and "parallel", two lines.
+    "idle", a control that drives nothing, "parallel", two lines, and "coupled", a joint of a pair.
     """
     found = [*_structure_faults(parts), *value_faults(parts)]
     yield from found or lines_faults(parts)
@@ -48,11 +51,16 @@ def _structure_faults(parts: Parts) -> Iterator[Finding]:
     yield from _name_faults(parts)
     yield from _body_faults(parts)
     for where, tie in parts.ties:
-        yield from _tie_faults(where, tie, parts.body_names)
+        if isinstance(tie, Joint) or not tie.is_pair:
+            yield from _tie_faults(where, tie, parts.body_names)
     for joint in parts.joints:
         yield from _joint_faults(f"joints.{joint.name}", joint)
+        yield from _limit_faults(f"joints.{joint.name}", joint)
     for element in parts.elements:
-        yield from _element_faults(f"elements.{element.name}", element)
+        if element.is_pair:
+            yield from pair_faults(f"elements.{element.name}", element, parts)
+        else:
+            yield from _element_faults(f"elements.{element.name}", element)
     yield from control_faults(parts)
 
 
@@ -137,6 +145,21 @@ def _joint_faults(where: str, joint: Joint) -> Iterator[Finding]:
     yield from _frame_faults(where, joint.frames)
 
 
+def _limit_faults(where: str, joint: Joint) -> Iterator[Finding]:
+    """Yield limits that a joint cannot have."""
+    if not joint.limits:
+        return
+    count = 0 if joint.kind in ("global", "user") else len(joint.units)
+    if len(joint.limits) != count:
+        reason = f"{count}, one pair per variable" if count else f"none of a {joint.kind} joint"
+        yield Finding(f"found {len(joint.limits)} limits, allowed: {reason}", about=f"{where}.lower")
+        return
+    for unit, (lower, upper) in zip(joint.units, joint.limits, strict=True):
+        if not lower <= upper:
+            message = f"found {lower:g} {unit}, above upper, {upper:g} {unit}; allowed: at most upper"
+            yield Finding(message, about=f"{where}.lower")
+
+
 def _user_faults(where: str, joint: Joint) -> Iterator[Finding]:
     """Yield what a user joint has and may not have, or the other way round."""
     for key, given in (("start", joint.start), ("value", joint.values)):
@@ -156,7 +179,11 @@ def _frame_faults(where: str, frames: tuple[Transform, Transform]) -> Iterator[F
         m, n, k = frame.columns
         off = math.sqrt(dot(m, m)) - 1.0, math.sqrt(dot(n, n)) - 1.0, dot(m, n)
         of = f" in the {body} body" if frames[0] != frames[1] else ""
-        if not all(abs(one) <= ORTHONORMAL for one in off):
+        if all(abs(one) <= ORTHONORMAL for one in off[:2]) and abs(off[2]) > ORTHONORMAL:
+            allowed = f"{ORTHONORMAL:g} at most, or no m: then one perpendicular to n is taken"
+            message = f"m is not perpendicular to n{of}: m . n = {off[2]:.3g}; allowed: {allowed}"
+            yield Finding(message, about=f"{where}.m")
+        elif not all(abs(one) <= ORTHONORMAL for one in off):
             key = "m" if all(abs(one) <= ORTHONORMAL for one in off[1:]) else "n"
             yield Finding(not_orthonormal(off, of), about=f"{where}.{key}")
         elif not all(abs(one) <= ORTHONORMAL for one in subtract(cross(m, n), k)):

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, Literal, TypeAlias
 
-from urmpipe_models.elementwise import ZERO, Vector
+from urmpipe_models.elementwise import ZERO, Vector, dot, scale, subtract
 from urmpipe_models.errors import shown
 from urmpipe_models.files.tables import Table, are_numbers, is_number
 from urmpipe_models.networks.control_faults import is_name
 from urmpipe_models.networks.expressions import Expression
-from urmpipe_models.networks.parts import frame_of
+from urmpipe_models.networks.parts import ORTHONORMAL, frame_of
 from urmpipe_models.robots.robot_frames import Units
 from urmpipe_models.transform import Transform
 
@@ -27,6 +28,8 @@ FORMS: dict[Form, str] = {
 M: Vector = (1.0, 0.0, 0.0)
 N: Vector = (0.0, 1.0, 0.0)
 """m and n of a body in a joint where its table has none."""
+
+ALONG_X = 1.0 - 1e-6  # |n . x| of an n that lies along x: within 1.4e-3 rad its projection loses digits
 
 STILL = tuple(map(Expression, ("1.0", "0.0", "0.0", "0.0", "1.0", "0.0", "0.0", "0.0", "0.0")))
 """The motion of a user joint that stands in for one whose kind is none."""
@@ -67,8 +70,23 @@ def read_frames(table: Table, units: Units) -> tuple[Transform, Transform]:
     m, n = read_vectors(table, "m", default=M), read_vectors(table, "n", default=N)
     if len(table.faults) > many:
         m, n = (M, M), (N, N)
+    elif not table.has("m"):
+        m = perpendicular(n[0]), perpendicular(n[1])
     first, second = read_points(table, units)
     return frame_of(m[0], n[0], first), frame_of(m[1], n[1], second)
+
+
+def perpendicular(n: Vector) -> Vector:
+    """Return m of a joint without one: the unit vector of x without its part along n; of y if n is along x.
+
+    Args:
+        n: The axis of the joint, a unit vector [-].
+    """
+    if not abs(n[0]) > ORTHONORMAL:
+        return M
+    axis = M if abs(n[0]) < ALONG_X else N
+    across = subtract(axis, scale(dot(axis, n), n))
+    return scale(1.0 / max(math.sqrt(dot(across, across)), 1e-300), across)
 
 
 def read_start(table: Table, of: Sequence[str], units: Units) -> tuple[float, ...]:
@@ -87,6 +105,27 @@ def read_start(table: Table, of: Sequence[str], units: Units) -> tuple[float, ..
         _refuse(table, "start", value, "a finite number" if len(of) == 1 else f"{len(of)} finite numbers")
         return ()
     return tuple(in_si(float(one), unit, units) for one, unit in zip(values, of, strict=True))
+
+
+def read_limits(table: Table, of: Sequence[str], units: Units) -> tuple[tuple[float, float], ...]:
+    """Return `lower` and `upper` of each variable of a joint in [rad] and [m]; empty where it has neither.
+
+    Args:
+        table: The table of the joint.
+        of: The unit of each variable, rad or m.
+        units: The units of the file.
+    """
+    ends = []
+    for key, default in (("lower", -math.inf), ("upper", math.inf)):
+        value = table.value(key)
+        values = [value] if len(of) == 1 and is_number(value, infinite=True) else value
+        if value is not None and not are_numbers(values, len(of), infinite=True):
+            _refuse(table, key, value, "a number" if len(of) == 1 else f"{len(of)} numbers")
+        is_right = are_numbers(values, len(of), infinite=True)
+        numbers = values if is_right else [default] * len(of)
+        ends.append([in_si(float(one), unit, units) for one, unit in zip(numbers, of, strict=True)])
+    limits = tuple(zip(*ends, strict=True))
+    return limits if any(map(math.isfinite, (*ends[0], *ends[1]))) else ()
 
 
 def read_drives(table: Table, of: Sequence[str], units: Units) -> tuple[Expression | None, ...]:

@@ -37,7 +37,7 @@ class Gap:
         name: The cut joint, or the element.
         loop: The names of the joints of its loop; of an element its own.
         metres: How far apart it is in [m]; what an element is too long or too short by.
-        radians: By which angle it is turned away in [rad].
+        radians: By which angle it is turned away in [rad]; what a gear or a rocker is off by.
     """
 
     name: str

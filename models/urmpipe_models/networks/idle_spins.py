@@ -62,7 +62,8 @@ def spinning_parts(mechanism: Mechanism, x: FloatArray) -> tuple[str, ...]:
     joints, found = mechanism.network.joints, []
     for spin in idle_spins(mechanism):
         ends = [_part_frame(joint, spin, frames).translation for joint in spin.joints]
-        apart = [one.name for one in joints if _turns_about(one, frames, ends, mechanism.length)]
+        loose = (one for one in joints if one.name not in mechanism.network.coupled_joints)
+        apart = [one.name for one in loose if _turns_about(one, frames, ends, mechanism.length)]
         pieces = parts_without(mechanism.network, [one.name for one in spin.joints] + apart)
         inner = (piece for piece in pieces if piece <= set(spin.bodies))
         found += [" + ".join(name for name in spin.bodies if name in piece) for piece in inner]

@@ -139,7 +139,8 @@ class Mechanism:
     @cached_property
     def angles(self) -> IndexArray:
         """The numbers of free variables that are the same after a full turn, shape (angles,) [-]."""
-        kinds = {one.name: one.kind for one in self.network.joints}
+        coupled = self.network.coupled_joints
+        kinds = {one.name: one.kind for one in self.network.joints if one.name not in coupled}
         turning = ("revolute", "cylindrical")
         found = [
             k
@@ -172,19 +173,19 @@ class Mechanism:
     def length(self) -> float:
         """The largest distance in [m] between two joints of a body, or length of an element; 1 if it is 0."""
         pairs = zip(self.network.elements, self.lengths(self.start), strict=True)
-        spans = [abs(float(length.value)) for one, length in pairs if one.kind != "eg"]
+        spans = [abs(float(length.value)) for one, length in pairs if one.length_key == "d"]
         for some in self.points.values():
             spans += [float(np.linalg.norm(subtract(a, b))) for a, b in combinations(some, 2)]
         return max(spans, default=0.0) or 1.0
 
     @cached_property
     def points(self) -> dict[str, list[Vector]]:
-        """Of each body the points in [m] where joints and elements tie it; a plane has none in particular."""
+        """Of each body the points in [m] where joints and elements tie it; a plane or a pair has none."""
         found: dict[str, list[Vector]] = {name: [] for name in self.network.body_names}
         for joint in self.network.joints:
             for name, frame in zip(joint.bodies, joint.frames, strict=True):
                 found[name].append(frame.translation)
-        for element in self.network.elements:
+        for element in (one for one in self.network.elements if not one.is_pair):
             skipped = int(element.kind == "eg")
             for name, point in [*zip(element.bodies, element.points, strict=True)][skipped:]:
                 found[name].append(point)
@@ -194,7 +195,8 @@ class Mechanism:
     def row_scales(self) -> FloatArray:
         """What makes each row one of [-] and [rad], shape (rows,): 1 / length of those in [m]."""
         loop = [1.0 / self.length] * 3 + [1.0] * 3
-        return np.array(loop * len(self.graph.cuts) + [1.0 / self.length] * len(self.network.elements))
+        elements = [1.0 / self.length if unit == "m" else 1.0 for unit in self.network.element_units]
+        return np.array(loop * len(self.graph.cuts) + elements)
 
     @cached_property
     def column_scales(self) -> FloatArray:
@@ -228,7 +230,7 @@ class Mechanism:
                     yield of_controls(drive, controls), unit
             for k, part in enumerate(joint.motion):
                 yield of_controls(part, controls), "m" if k >= 6 else "rad"
-        yield from ((length, "m") for length in self.lengths(x))
+        yield from zip(self.lengths(x), self.network.element_units, strict=True)
 
     def control_slopes(self, x: Configuration) -> dict[str, Given]:
         """Return the value of each control, and its derivatives by the variables.
@@ -246,7 +248,7 @@ class Mechanism:
         return found
 
     def lengths(self, x: Configuration) -> list[Given]:
-        """Return the length of each element in [m], and its derivatives."""
+        """Return the length of each element in [m] or [rad], and its derivatives."""
         controls = self.control_slopes(x)
         return [of_controls(one.length, controls) for one in self.network.elements]
 

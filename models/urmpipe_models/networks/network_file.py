@@ -28,15 +28,18 @@ from urmpipe_models.networks.file_values import (
     read_drives,
     read_expression,
     read_frames,
+    read_limits,
     read_motion,
     read_points,
     read_start,
     read_vectors,
 )
+from urmpipe_models.networks.higher_pairs import read_pair
 from urmpipe_models.networks.network import Network
 from urmpipe_models.networks.parts import (
     FREEDOMS,
     GROUND,
+    PAIR_JOINTS,
     POSE_UNITS,
     Body,
     ConstraintElement,
@@ -45,6 +48,7 @@ from urmpipe_models.networks.parts import (
     Joint,
     JointKind,
     Parts,
+    exceeded_limits,
 )
 from urmpipe_models.robots.robot_frames import Units
 
@@ -52,8 +56,10 @@ READ_BY = {
     "untied": {"bodies", "body", "robot"},
     "idle": {"driven", "value", "m", "n", "a", "d", "h", "kind"},
     "parallel": {"bodies", "body", "kind", "driven", "value", "m", "n", "a", "start", "pitch", "s", "theta"},
+    "coupled": {"robot", "kind"},
 }
-"""The keys without which a body seems to be untied, a control to drive nothing, and lines to be parallel."""
+"""The keys without which a body seems to be untied, a control to drive nothing, lines to be parallel, and a
+joint of a pair to be missing or of another kind."""
 
 
 def network_names() -> tuple[str, ...]:
@@ -151,7 +157,7 @@ class _Reader:
         bodies = [*self._bodies()]
         controls = [self._control(*row) for row in self._rows("controls")]
         joints = [self._joint(*row) for row in self._rows("joints")]
-        elements = [self._element(*row) for row in self._rows("elements")]
+        element_rows = [*self._rows("elements")]
         for joint, body in read_dh(self.table.table("dh"), self.units, self.ground, self.places):
             joints.append(joint)
             bodies += [] if body is None else [body]
@@ -166,6 +172,8 @@ class _Reader:
             else:
                 bodies, joints = bodies + chain.bodies, joints + chain.joints
                 controls += chain.controls
+        named = {one.name: one for one in joints}
+        elements = [self._element(*row, named) for row in element_rows]
         self.table.close()
         bodies += _standing_in(unread, (*joints, *elements))
         return Parts("", tuple(bodies), tuple(joints), tuple(elements), tuple(controls), self.ground)
@@ -232,11 +240,24 @@ class _Reader:
             frames, start = read_frames(table, self.units), read_start(table, FREEDOMS[kind], self.units)
             values = read_drives(table, FREEDOMS[kind], self.units)
             pitch = self.units.length(table.number("pitch")) if kind == "helical" else 0.0
-            joint = Joint(name, kind, ends, frames, start, values, pitch)
+            limits = () if kind == "global" else read_limits(table, FREEDOMS[kind], self.units)
+            joint = Joint(name, kind, ends, frames, start, values, pitch, limits=limits)
+            self._check_start(table, joint)
             if table.has("driven"):
                 self.places[f"joints.{name}.value"] = f"joints.{name}.driven"
         table.close()
         return joint
+
+    def _check_start(self, table: Table, joint: Joint) -> None:
+        """Note a start of a free variable beyond its limits."""
+        starts = zip(joint.start or (0.0,) * len(joint.units), joint.drives, strict=False)
+        free = [start if drive is None else math.nan for start, drive in starts]  # NaN is beyond no limit
+        if any(lower > upper for lower, upper in joint.limits):
+            return
+        for unit, value, end, limit in exceeded_limits(joint, free, is_coupled=True):
+            size = in_si(1.0, unit, self.units)
+            allowed = "at least lower" if end == "lower" else "at most upper"
+            table.fault("start", f"found {value / size:.6g}, allowed: {allowed}, {limit / size:.6g}")
 
     def _kind(self, table: Table, kinds: tuple[str, ...]) -> str:
         """Return the kind of a joint or an element; "" where it has none, and so no known keys."""
@@ -244,8 +265,10 @@ class _Reader:
         kind = table.choice("kind", kinds)
         return kind if len(self.faults) == many else ""
 
-    def _element(self, name: str, table: Table) -> ConstraintElement:
+    def _element(self, name: str, table: Table, joints: Mapping[str, Joint]) -> ConstraintElement:
         """Read an element."""
+        if table.value("kind") in [*PAIR_JOINTS]:
+            return read_pair(name, table.value("kind"), table, joints, self.units, self.folder)
         ends = _ends(table)
         kind = cast("ElementKind", self._kind(table, get_args(ElementKind)))
         if not kind:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from functools import cached_property
@@ -19,7 +19,7 @@ GROUND = "ground"
 """What the body that stands still is called by default."""
 
 JointKind = Literal["revolute", "prismatic", "cylindrical", "helical", "global", "user"]
-ElementKind = Literal["gg", "eg", "crc", "gc"]
+ElementKind = Literal["gg", "eg", "crc", "gc", "gear", "rack", "cam"]
 
 FREEDOMS: dict[JointKind, tuple[str, ...]] = {
     "revolute": ("rad",),
@@ -33,6 +33,18 @@ FREEDOMS: dict[JointKind, tuple[str, ...]] = {
 
 POSE_UNITS = ("m", "m", "m", "rad", "rad", "rad")
 """Those of a body that no joint ties to the ground: x, y, z and a rotation vector."""
+
+_ANGLES: tuple[JointKind, ...] = ("revolute", "cylindrical", "helical")
+
+PAIR_JOINTS: dict[ElementKind, tuple[tuple[JointKind, ...], tuple[JointKind, ...]]] = {
+    "gear": (_ANGLES, _ANGLES),
+    "rack": (_ANGLES, ("prismatic", "cylindrical")),
+    "cam": (_ANGLES, ("prismatic", "revolute")),
+}  # of a pair, the kinds of its first joint, whose angle counts, and of its second: a rack moves s of it
+
+ORTHONORMAL = 1e-9  # of lengths and products of unit vectors: rounding, not a forgotten normalisation
+
+LIMIT_TOLERANCE = 1e-6  # [m], [rad]: assemblies that differ by less are the same
 
 _NUMBERS = tuple[float, float, float]
 
@@ -66,6 +78,7 @@ class Joint:
         values: What drives each variable, in [rad] and [m]; None where it is free; empty: all are.
         pitch: Of a helical joint in [m/rad].
         motion: Of a user joint: m, n (unit vectors) and a in [m], each three functions of controls.
+        limits: The least and the largest value of each variable, in [rad] and [m]; empty: no limits.
 
     Source: [KinematicSystems]_ eq. 3-2 to 3-4 and section 3.2.2, with its errata.
     """
@@ -78,6 +91,7 @@ class Joint:
     values: tuple[Expression | None, ...] = ()
     pitch: float = 0.0
     motion: tuple[Expression, ...] = ()
+    limits: tuple[tuple[float, float], ...] = ()
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -92,17 +106,22 @@ class Joint:
 
 @dataclass(frozen=True)
 class ConstraintElement:
-    """One constraint between two bodies.
+    """One constraint between two bodies, or between the variables of two joints: a higher pair.
 
     Attributes:
         name: Its name.
         kind: gg: the two points are at a distance d; eg: the second point is in a plane of the first body
             with normal n, at h from its origin; crc: two lines, through the points along n, are at a distance
-            d; gc: the second point is at a distance d from a line of the first body.
-        bodies: The first and the second body.
-        points: a of each in [m]; of eg that of the first means nothing.
-        normals: n of each, unit vectors [-]; of gg both, of eg and gc the second mean nothing.
-        length: d or h in [m].
+            d; gc: the second point is at a distance d from a line of the first body; gear, rack, cam: the
+            variable of the second joint is a function of the angle of the first, see `higher_pairs`.
+        bodies: The first and the second body; of a pair `pair_bodies` of its joints.
+        length: d or h in [m]; of a pair the offset of its second variable in [m] or [rad].
+        points: a of each in [m]; of eg that of the first means nothing; of a pair both mean nothing.
+        normals: n of each, unit vectors [-]; of gg and of a pair both, of eg and gc the second mean nothing.
+        joints: Of a pair the names of the first and the second joint; else empty.
+        teeth: Of a gear those of both wheels, negative of an internal one.
+        radius: Of a rack that of its pinion in [m], with a sign.
+        profile: Of a cam its points: the angle in [rad] and the follower's variable in [m] or [rad].
 
     Source: [KinematicSystems]_ section 3.2.3, with its errata.
     """
@@ -117,6 +136,20 @@ class ConstraintElement:
     normals: tuple[Vector, Vector] = field(
         default=((0.0, 1.0, 0.0), (0.0, 1.0, 0.0)), metadata={"stored": tuple[_NUMBERS, _NUMBERS]}
     )
+    joints: tuple[str, ...] = ()
+    teeth: tuple[float, ...] = ()
+    radius: float = 0.0
+    profile: tuple[tuple[float, float], ...] = ()
+
+    @property
+    def is_pair(self) -> bool:
+        """Whether it relates the variables of two joints."""
+        return self.kind in PAIR_JOINTS
+
+    @property
+    def length_key(self) -> str:
+        """The key of its length in a file."""
+        return "offset" if self.is_pair else "h" if self.kind == "eg" else "d"
 
     @cached_property
     def meeting(self) -> bool:
@@ -195,10 +228,28 @@ class Parts:
 
     @cached_property
     def lengths(self) -> tuple[Placed, ...]:
-        """The lengths of elements: h of eg, d of the others."""
+        """The lengths of elements: h of eg, the offset of a pair, d of the others."""
+        return tuple((f"elements.{one.name}.{one.length_key}", one.length) for one in self.elements)
+
+    def coupled(self, element: ConstraintElement) -> tuple[tuple[Joint, int], ...]:
+        """Return the joints of a pair that there are, each with the number of its variable."""
+        joints = {joint.name: joint for joint in self.joints}
+        known = [joints[name] for name in element.joints if name in joints]
         return tuple(
-            (f"elements.{one.name}.{'h' if one.kind == 'eg' else 'd'}", one.length) for one in self.elements
+            (joint, len(joint.units) - 1 if k == 1 and element.kind == "rack" else 0)
+            for k, joint in enumerate(known)
         )
+
+    @cached_property
+    def coupled_joints(self) -> frozenset[str]:
+        """The names of joints in pairs: a full turn of these is another configuration."""
+        return frozenset(name for one in self.elements for name in one.joints)
+
+    @cached_property
+    def element_units(self) -> tuple[str, ...]:
+        """The unit of each element's length: m, or rad of a pair whose second joint turns."""
+        seconds = (self.coupled(one)[1:] for one in self.elements)
+        return tuple(some[0][0].units[some[0][1]] if some else "m" for some in seconds)
 
     def unit_of(self, control: str) -> tuple[str, Decimal] | None:
         """Return what a control is, m or rad, and how many of these one of it is.
@@ -206,7 +257,7 @@ class Parts:
         None where it drives neither a joint nor a length by itself, or both, or in several units.
         """
         driven = [pair for one in self.joints for pair in zip(one.units, one.drives, strict=True)]
-        driven += [("m", one.length) for one in self.elements]
+        driven += zip(self.element_units, (one.length for one in self.elements), strict=True)
         alone = {control: Decimal(1)}  # as files in m and rad, in mm and in deg have it
         alone |= {f"({control}) * 0.001": Decimal("0.001"), f"({control}) * pi / 180": DEGREE}
         found = {(unit, alone[one.text]) for unit, one in driven if one is not None and one.text in alone}
@@ -265,3 +316,35 @@ def ranged(control: Control) -> tuple[float, float]:
     if math.isfinite(control.upper - control.lower):
         return control.lower, control.upper
     return max(control.lower, control.start - 1.0), min(control.upper, control.start + 1.0)
+
+
+def pair_bodies(first: Joint, second: Joint) -> tuple[str, str]:
+    """Return the bodies that a pair of two joints connects in the graph: the second of each, if they differ.
+
+    Else the first of each; if these are the same, too, both bodies of the first joint.
+    """
+    ends = [*zip(first.bodies[::-1], second.bodies[::-1], strict=True), first.bodies]
+    return next((one for one in ends if one[0] != one[1]), first.bodies)
+
+
+def exceeded_limits(
+    joint: Joint, values: Sequence[float], *, is_coupled: bool
+) -> Iterator[tuple[str, float, str, float]]:
+    """Yield each variable beyond its limits: its unit, its value, `lower` or `upper`, and that limit.
+
+    The angle of a revolute or cylindrical joint with two finite limits is within them if it is so after any
+    number of full turns, unless the joint is in a pair, where full turns count.
+
+    Args:
+        joint: The joint.
+        values: Its variables in [rad] and [m].
+        is_coupled: Whether it is in a pair.
+    """
+    is_periodic = joint.kind in ("revolute", "cylindrical") and not is_coupled
+    for unit, value, (lower, upper) in zip(joint.units, values, joint.limits, strict=False):
+        nearest = value
+        if is_periodic and unit == "rad" and math.isfinite(upper - lower):
+            nearest -= 2.0 * math.pi * round((value - 0.5 * (lower + upper)) / (2.0 * math.pi))
+        if nearest < lower - LIMIT_TOLERANCE or nearest > upper + LIMIT_TOLERANCE:
+            end, limit = ("lower", lower) if value < lower else ("upper", upper)
+            yield unit, value, end, limit

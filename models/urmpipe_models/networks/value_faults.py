@@ -11,10 +11,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.elementwise import Element, cross, dot
 from urmpipe_models.errors import Finding
 from urmpipe_models.networks.mechanism import mechanism_of
-from urmpipe_models.networks.parts import Control, Joint, Parts, ordered_controls, ranged
-
-ORTHONORMAL = 1e-9
-"""Lengths and scalar products of unit vectors may be off by this: rounding, not a forgotten normalisation."""
+from urmpipe_models.networks.parts import ORTHONORMAL, Control, Joint, Parts, ordered_controls, ranged
 
 LARGEST = 1e9
 """No length in [m] or angle in [rad] of a mechanism is larger: rounding would leave nothing of it."""
@@ -60,9 +57,9 @@ def control_values(controls: tuple[Control, ...], given: Mapping[str, Element]) 
 
 
 def _length_faults(parts: Parts, values: Mapping[str, float], at: str) -> Iterator[Finding]:
-    """Yield lengths that are too small where controls start; h of eg may be less than 0."""
+    """Yield lengths that are too small where controls start; h and offsets may be less than 0."""
     for element, (where, function) in zip(parts.elements, parts.lengths, strict=True):
-        if element.kind != "eg" and function.names <= values.keys():
+        if element.length_key == "d" and function.names <= values.keys():
             length, lines = float(function.value(values)), element.kind == "crc"
             if length < 0.0 or (length == 0.0 and not lines):
                 allowed = "0 or more" if lines else "more than 0"

@@ -10,13 +10,15 @@ from urmpipe_models.display import number_of
 from urmpipe_models.errors import Finding, OptionError, for_each, shown
 from urmpipe_models.messages import Hint
 from urmpipe_models.networks.assembly import MOST_STARTS, RESTARTS, Assembled, assemble
-from urmpipe_models.networks.findings import Mobility
+from urmpipe_models.networks.findings import Assembly, Mobility
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.mobility import mobility_of, stuck_controls
 from urmpipe_models.networks.network import Network
+from urmpipe_models.networks.parts import exceeded_limits
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.networks.result import Command, NetworkResult
 from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.text import allowed, in_words
 
 ROUNDED = 1e-4
 """A gap of less, in lengths of the mechanism and [rad], may come of figures with few digits."""
@@ -108,6 +110,7 @@ def find_network(
         reason=found.reason,
         warnings=(
             *_warnings(mechanism, found, mobility, every=search.every),
+            *_limit_warnings(network, found.assemblies),
             *(_branch_warnings(mechanism, controls) if command == "solve" and not search.every else ()),
         ),
         provenance=provenance(f"network {command}", options, inputs),
@@ -141,6 +144,16 @@ def _warnings(
     for name in stuck_controls(mechanism, found.x_nearest):
         said = f"control {name} cannot move: there are too many controls, or it is at a dead point"
         yield LogWarning("stuck-control", said)
+
+
+def _limit_warnings(network: Network, assemblies: Sequence[Assembly]) -> Iterator[LogWarning]:
+    """Yield the joints that the first assembly has beyond their limits."""
+    for joint in network.joints if assemblies else ():
+        values = assemblies[0].values.get(joint.name, ())
+        is_coupled = joint.name in network.coupled_joints
+        for unit, value, end, limit in exceeded_limits(joint, values, is_coupled=is_coupled):
+            words = f"joint {joint.name} is at {in_words(value, unit)}, beyond its {end} limit"
+            yield LogWarning("beyond-limit", f"{words}, {allowed(limit, unit)}")
 
 
 def _branch_warnings(mechanism: Mechanism, controls: Mapping[str, float]) -> Iterator[LogWarning]:

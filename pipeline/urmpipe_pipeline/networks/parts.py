@@ -28,7 +28,8 @@ ROUNDED = 9
 def gap_words(gap: Gap) -> str:
     """Return what does not close, and by how much: "loop A, B, C, D is 12.3 mm and 1.2 deg apart"."""
     if gap.loop == (gap.name,):
-        return f"element {gap.name} is {in_words(gap.metres, 'm')} off its length"
+        off = in_words(gap.radians, "rad") if gap.radians else in_words(gap.metres, "m")
+        return f"element {gap.name} is {off} off its {'angle' if gap.radians else 'length'}"
     apart = [in_words(gap.metres, "m")] * bool(gap.metres)
     apart += [in_words(gap.radians, "rad")] * _is_turned(gap)
     return f"loop {', '.join(gap.loop)} is {' and '.join(apart)} apart"

@@ -72,6 +72,8 @@ OPEN = 1e-6
 VERTICAL = 0.9
 """An axis whose z component is larger is vertical: its plane is seen from above."""
 
+PARALLEL = 1e-6  # sine of the angle between the axes of two wheels below which they have pitch circles
+
 Kind: TypeAlias = Literal["body", "joint", "element"]
 
 
@@ -106,7 +108,7 @@ class Placed:
         network: The network.
         poses: Where each body is, as a matrix [-] and [m], shape (4, 4), by its name.
         points: Where joints and elements tie each body, in its own frame in [m], by its name.
-        lengths: The length of each element in [m].
+        lengths: The length of each element in [m], of a pair its offset in [m] or [rad].
         extent: The diagonal of the box around all points of its bodies in [m].
         sides: Of what is round.
     """
@@ -317,9 +319,12 @@ def _rail(first: FloatArray, second: FloatArray, n: FloatArray, beyond: float) -
 
 
 def _element(at: Placed, element: ConstraintElement, length: float) -> Part:
-    """Return an element: a rod, a plane, two lines, or a tube about a line."""
+    """Return an element: a rod, a plane, two lines, a tube about a line, or a pair."""
     colour, e = CONTROL_COLOUR if is_driven(element) else ELEMENT_COLOUR, at.extent
     lines = element_lines(at, element, length)
+    if element.is_pair:
+        dots = tuple(ball(point, DOT * e, at.sides) for point in lines[0])
+        return Part(element.name, "element", colour, lines[0].mean(axis=0), dots, lines)
     foot, q = lines[-1]
     n = at.direction(element.bodies[0], element.normals[0])
     dots = (ball(foot, DOT * e, at.sides), ball(q, DOT * e, at.sides))
@@ -342,8 +347,11 @@ def _element(at: Placed, element: ConstraintElement, length: float) -> Part:
 def element_lines(at: Placed, element: ConstraintElement, length: float) -> tuple[FloatArray, ...]:
     """Return the lines of an element of a length in [m], shape (k, 3) each; the last is what it measures.
 
-    That is from point to point, from the foot in the plane or on the line to the point, or from line to line.
+    That is from point to point, from the foot in the plane or on the line to the point, or from line to line. Of a
+    pair the first is from joint to joint.
     """
+    if element.is_pair:
+        return _pair_lines(at, element)
     p, q = (at.point(body, point) for body, point in zip(element.bodies, element.points, strict=True))
     n, e = at.direction(element.bodies[0], element.normals[0]), at.extent
     match element.kind:
@@ -359,6 +367,28 @@ def element_lines(at: Placed, element: ConstraintElement, length: float) -> tupl
     other = at.direction(element.bodies[1], element.normals[1])
     feet = _nearest(p, n, q, other)
     return (_around(p, feet[0], n, e), _around(q, feet[1], other, e), feet)
+
+
+def _pair_lines(at: Placed, pair: ConstraintElement) -> tuple[FloatArray, ...]:
+    """Return the line between the joints of a pair, and the pitch circles of a gear or a pinion about them."""
+    first, second = (joint for joint, _ in at.network.coupled(pair))
+    p, q = at.point(first.bodies[0], first.frames[0].translation), _joint(at, second).at
+    axes = [at.axes(joint.bodies[0], joint.frames[0])[:, 1] for joint in (first, second)]
+    lines = [np.array([p, q])]
+    if pair.kind == "rack":
+        lines.append(_ring(p, axes[0], abs(pair.radius), at.sides))
+    elif pair.kind == "gear" and float(np.linalg.norm(np.cross(axes[0], axes[1]))) < PARALLEL:
+        across = q - p - float((q - p) @ axes[0]) * axes[0]
+        module = float(np.linalg.norm(across)) / (abs(sum(pair.teeth)) or 1.0)
+        for centre, teeth in ((p, pair.teeth[0]), (p + across, pair.teeth[1])):
+            lines.append(_ring(centre, axes[0], module * abs(teeth), at.sides))
+    return tuple(lines)
+
+
+def _ring(centre: FloatArray, n: FloatArray, radius: float, sides: int) -> FloatArray:
+    """Return a closed circle in [m] about a centre across a unit vector, shape (k, 3)."""
+    corners = circle(centre, n, radius, 2 * sides)
+    return np.vstack((corners, corners[:1]))
 
 
 def _nearest(p: FloatArray, n: FloatArray, q: FloatArray, other: FloatArray) -> FloatArray:

@@ -6,11 +6,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.display import line_of, number_of
 from urmpipe_models.networks.findings import Assembly, Gap, Mobility
 from urmpipe_models.networks.graph import Structure
 from urmpipe_models.networks.mechanism import mechanism_of
 from urmpipe_models.networks.network import Network
+from urmpipe_models.orientation import quaternions
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
@@ -129,6 +133,7 @@ class NetworkResult(Result):
             "idle": list(moves.idle) if moves else [],
             "special": moves and moves.special,
             "residual": self.residual,
+            "assemblies": self._assemblies(),
             "gaps": self._gaps(),
             "warnings": [one.to_dict(voice) for one in self.warnings],
             "output": str(self.recording) if self.recording else None,
@@ -139,17 +144,7 @@ class NetworkResult(Result):
         return {
             "schema": SCHEMA,
             "name": self.name,
-            "assemblies": [
-                {
-                    "variables": {
-                        name: values[0] if len(values) == 1 else list(values)
-                        for name, values in one.values.items()
-                    },
-                    "residual": one.residual,
-                    "mobility": one.mobility,
-                }
-                for one in self.assemblies
-            ],
+            "assemblies": self._assemblies(),
             "restarts": max(self.tried - 1, 0),
             "reason": self.reason,
             "gaps": self._gaps(),
@@ -157,12 +152,38 @@ class NetworkResult(Result):
             "output": str(self.recording) if self.recording else None,
         }
 
+    def _assemblies(self) -> list[dict[str, Any]]:
+        """Return the variables and the poses of each assembly."""
+        return [
+            {
+                "variables": {
+                    name: values[0] if len(values) == 1 else list(values)
+                    for name, values in one.values.items()
+                },
+                "poses": dict(zip(self.network.body_names, _poses(one.poses), strict=True)),
+                "residual": one.residual,
+                "mobility": one.mobility,
+            }
+            for one in self.assemblies
+        ]
+
     def _gaps(self) -> list[dict[str, Any]]:
         """Return what does not close."""
         return [
             {"name": one.name, "loop": list(one.loop), "m": one.metres, "rad": one.radians}
             for one in self.gaps
         ]
+
+
+def _poses(matrices: FloatArray) -> list[dict[str, list[float]]]:
+    """Return positions in [m] and quaternions x, y, z, w with w >= 0 of poses, shape (bodies, 4, 4)."""
+    quats = quaternions(matrices[:, :3, :3].reshape(-1, 9), "matrix")
+    quats = np.where(quats[:, 3:] < 0.0, -quats, quats) + 0.0  # no -0
+    positions = matrices[:, :3, 3] + 0.0
+    return [
+        {"position": position, "quat_xyzw": quat}
+        for position, quat in zip(positions.tolist(), quats.tolist(), strict=True)
+    ]
 
 
 def _flat(values: dict[str, tuple[float, ...]]) -> dict[str, float]:

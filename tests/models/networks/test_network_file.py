@@ -361,7 +361,7 @@ net.toml:31: joints.B.a: found [0, 0, 'x'], allowed: 3 finite numbers, or two li
 net.toml:33: joints.B.value: found beside driven; allowed: one of the two
 net.toml:38: joints.C.start: found 0.3, allowed: 2 finite numbers
 net.toml:39: joints.C.driven: control found 'q', allowed: half, limit, pi, ring, round, s, u, word
-net.toml:40: joints.C.pitch: unknown; allowed: bodies, kind, m, n, a, start, driven, value
+net.toml:40: joints.C.pitch: unknown; allowed: bodies, kind, m, n, a, start, driven, value, lower, upper
 net.toml:44: joints.D.bodies: found rod twice, allowed: two bodies
 net.toml:45: joints.D.value: found 's + ', no arithmetic; allowed: numbers, names of controls, pi, + - * / ** and brackets, sin, cos, tan, atan2, sqrt, exp
 net.toml:45: joints.D.value: found '1) + (s', no arithmetic; allowed: numbers, names of controls, pi, + - * / ** and brackets, sin, cos, tan, atan2, sqrt, exp

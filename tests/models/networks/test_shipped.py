@@ -57,6 +57,10 @@ MOVES = {
     "nine-revolute": Expected(3, 6, 3),
     "nine-revolute-controlled": Expected(1, 6, 1),
     "stewart-gough": Expected(0, 6, 0, kind="structure"),
+    "stewart-gough-driven": Expected(6, 6, 6),
+    "geared-five-bar": Expected(1, 4, -2),
+    "cam-follower": Expected(1, 1, 1),
+    "rack-and-pinion": Expected(1, 3, 1),
     "cluster-gg": Expected(1, 5, 1),
     "cluster-eg": Expected(1, 5, 1),
     "cluster-crc": Expected(1, 5, 1),
@@ -269,6 +273,58 @@ def test_elements_measure_what_the_file_gives(kind: str) -> None:
     start[:3, :3], start[:3, 3] = Rotation.from_rotvec(x[3:]).as_matrix(), x[:3]
     assert_elements_measure(tables, start, 1e-3)  # lengths are rounded to 1 mm
     assert_elements_measure(tables, pose_of(mechanism, assemble(mechanism).assemblies[0], "plate"))
+
+
+@pytest.mark.parametrize("turn", [60.0, -20.0, 500.0])
+def test_the_tip_of_the_geared_five_bar_is_where_two_circles_meet(turn: float) -> None:
+    mechanism, assembled = every_assembly(tables_of("geared-five-bar"), {"turn": turn})
+    left, right = math.radians(turn), math.radians(60 - 2 * turn)
+    p = 0.1 * np.array([math.cos(left), math.sin(left)])
+    q = np.array([0.3, 0.0]) + 0.1 * np.array([math.cos(right), math.sin(right)])
+    across = np.array([p[1] - q[1], q[0] - p[0]]) / np.linalg.norm(q - p)
+    height = math.sqrt(0.35**2 - float((q - p) @ (q - p)) / 4)
+    expected = sorted([((p + q) / 2 + sign * height * across).tolist() for sign in (1, -1)])
+    tips = [pose_of(mechanism, one, "left_rod") @ [0.35, 0, 0, 1] for one in assembled.assemblies]
+    np.testing.assert_allclose(sorted(tip[:2].tolist() for tip in tips), expected, rtol=0, atol=ANSWER)
+    assert {round(one.values["right"][0] - right, 9) for one in assembled.assemblies} == {0.0}
+
+
+@pytest.mark.parametrize("turn", [3.0, 47.0, 119.0, 130.0, 200.0, 299.0, 340.0, 407.0, -313.0])
+def test_the_cam_lifts_its_follower_by_the_cycloidal_law(turn: float) -> None:
+    angle = turn % 360
+    x = min(angle, 120) / 120 if angle < 180 else 1 - min(angle - 180, 120) / 120
+    found = assemble(mechanism_of(load_network("cam-follower")), {"turn": turn}).assemblies[0].values["lift"]
+    law = 0.02 * (x - math.sin(2 * math.pi * x) / (2 * math.pi))
+    assert found[0] == pytest.approx(law, abs=1e-6)  # the file: the spline is within 0.001 mm of the law
+
+
+@pytest.mark.parametrize("turn", [0.0, 360.0, -500.0])
+def test_the_wheels_of_the_steering_are_where_its_rods_reach(turn: float) -> None:
+    """|K + l u(left) - rack| = d with the knuckle K and its arm's length l: two angles of each wheel."""
+    mechanism, assembled = every_assembly(tables_of("rack-and-pinion"), {"turn": turn}, restarts=200)
+    arm, d2 = math.hypot(0.03, 0.14), 0.22**2 + 0.02**2
+    answers: list[list[float]] = []
+    for side in (-1.0, 1.0):
+        x, y = side * 0.6 - (0.007 * math.radians(turn) + side * 0.35), 0.12
+        own = math.atan2(-0.14, -side * 0.03)
+        answers.append([q - own for q in roots(2 * arm * x, 2 * arm * y, d2 - arm**2 - x**2 - y**2)])
+    expected: list[Answer] = [{"left": (a,), "right": (b,)} for a in answers[0] for b in answers[1]]
+    assert_same_answers(mechanism, assembled, expected, ANSWER)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_legs_of_a_pose_bring_the_driven_platform_there(seed: int) -> None:
+    """The inverse in closed form: leg = |p + R b - a|."""
+    rng, tables = np.random.default_rng(seed), tables_of("stewart-gough-driven")
+    p = np.array(tables["bodies"]["platform"]["start"][:3]) + rng.uniform(-0.05, 0.05, 3)
+    R = Rotation.from_rotvec(rng.uniform(-0.15, 0.15, 3)).as_matrix()
+    points = np.array([one["a"] for one in tables["elements"].values()])
+    lengths = np.linalg.norm(p + points[:, 1] @ R.T - points[:, 0], axis=1)
+    legs = {f"leg{k}": float(length) for k, length in enumerate(lengths, 1)}
+    mechanism = mechanism_of(load_network(tables))
+    pose = pose_of(mechanism, assemble(mechanism, legs).assemblies[0], "platform")
+    np.testing.assert_allclose(pose[:3, :3], R, rtol=0, atol=ANSWER)
+    np.testing.assert_allclose(pose[:3, 3], p, rtol=0, atol=ANSWER)
 
 
 # --- perturbed mechanisms

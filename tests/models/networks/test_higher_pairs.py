@@ -1,0 +1,315 @@
+"""Gears, racks and cams: closed forms, derivatives against differences, redundancy, texts of faults."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from asserting import refusal, there
+from random_networks import difference
+from urmpipe import load_network, network_check, network_solve
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.errors import NetworkError
+from urmpipe_models.networks.closure import closure_of, released
+from urmpipe_models.networks.higher_pairs import transmitted
+from urmpipe_models.networks.mechanism import mechanism_of
+
+ROUNDING = 1e-12  # [m], [rad]: relations of numbers near 1, solved by Newton steps
+
+UNEVEN = [[10, 0.0], [55, 4.0], [90, 9.0], [200, -3.0], [310, 1.5]]  # deg and mm
+
+
+def shaft(bodies: tuple[str, str], x: float = 0.0, **more: Any) -> dict[str, Any]:
+    return {"kind": "revolute", "bodies": bodies, "n": [0, 0, 1], "a": [[x, 0, 0], [0, 0, 0]], **more}
+
+
+def wheels(element: dict[str, Any], **joints: dict[str, Any]) -> dict[str, Any]:
+    """Return tables of a driven shaft A, what else is on the ground, and a pair; in mm and deg."""
+    names = ["A", *joints]
+    return {
+        "length_unit": "mm", "angle_unit": "deg",
+        "bodies": {name.lower(): {} for name in names},
+        "controls": {"turn": {"start": 50}},
+        "joints": {"A": shaft(("ground", "a"), driven="turn"), **joints},
+        "elements": {"pair": {"joints": ["A", names[-1]], **element}},
+    }  # fmt: skip
+
+
+SLIDE = {"kind": "prismatic", "bodies": ["ground", "s"], "n": [1, 0, 0]}
+GEARED = wheels({"kind": "gear", "teeth": [20, 40], "offset": 30}, B=shaft(("ground", "b"), 300))
+RACK = wheels({"kind": "rack", "radius": -8, "offset": 3}, S=SLIDE)
+CAM = wheels({"kind": "cam", "profile": UNEVEN}, S=SLIDE)
+
+
+def value(tables: dict[str, Any], joint: str, turn: float) -> float:
+    """Return a joint's variable in [rad] or [m] with the first shaft at an angle in [deg]."""
+    return there(network_check(tables, controls={"turn": turn}).assemblies[0]).values[joint][-1]
+
+
+@pytest.mark.parametrize("turn", [0.0, 50.0, 1000.0, -2000.0])
+def test_full_turns_of_a_gear_and_a_rack_count(turn: float) -> None:
+    assert value(GEARED, "B", turn) == pytest.approx(math.radians(30 - 0.5 * turn), abs=ROUNDING)
+    assert value(RACK, "S", turn) == pytest.approx(0.003 - 0.008 * math.radians(turn), abs=ROUNDING)
+
+
+def test_full_turns_count_where_neither_joint_is_driven() -> None:
+    tables = {
+        **GEARED,
+        "controls": {},
+        "joints": {**GEARED["joints"], "A": shaft(("ground", "a"), start=900)},
+    }
+    found = network_check(tables).assemblies[0].values
+    assert found["B"][0] == pytest.approx(math.pi / 6 - 0.5 * found["A"][0], abs=ROUNDING)
+    assert found["A"][0] > 4 * math.pi  # near its start, 5 pi
+
+
+def test_an_internal_wheel_turns_the_same_way() -> None:
+    ring = {**GEARED, "elements": {"pair": {"kind": "gear", "joints": ["A", "B"], "teeth": [20, -80]}}}
+    assert value(ring, "B", 100.0) == pytest.approx(math.radians(25), abs=ROUNDING)
+
+
+def test_a_planetary_gear_moves_by_the_equation_of_willis() -> None:
+    """Of a fixed ring, (w_ring - w_carrier) / (w_sun - w_carrier) = -z_sun / z_ring."""
+    tables = {
+        "angle_unit": "deg",
+        "bodies": {name: {} for name in ("carrier", "sun", "planet", "ring")},
+        "controls": {"turn": {"start": 40}},
+        "joints": {
+            "arm": shaft(("ground", "carrier"), driven="turn"),
+            "sun_shaft": shaft(("carrier", "sun")),
+            "planet_shaft": shaft(("carrier", "planet"), 0.06),
+            "ring_shaft": shaft(("carrier", "ring")),
+            "frame": {"kind": "user", "bodies": ["ground", "ring"], "m": [1, 0, 0], "n": [0, 1, 0],
+                      "a": [0, 0, 0]},
+        },
+        "elements": {
+            "outer": {"kind": "gear", "joints": ["sun_shaft", "planet_shaft"], "teeth": [20, 20]},
+            "inner": {"kind": "gear", "joints": ["planet_shaft", "ring_shaft"], "teeth": [20, -60]},
+        },
+    }  # fmt: skip
+    found = network_check(tables)
+    sun = found.assemblies[0].values["sun_shaft"][0] + math.radians(40)
+    assert sun == pytest.approx((1 + 60 / 20) * math.radians(40), abs=ROUNDING)
+    assert (there(found.mobility).mobility, found.structure) == (1, "closed chain")
+
+
+def oracle(profile: list[list[float]]) -> CubicSpline:
+    """Return SciPy's periodic spline of a profile in [deg] and [mm], in [rad] and [m]."""
+    x, y = np.array([*profile, [profile[0][0] + 360, profile[0][1]]]).T
+    return CubicSpline(np.radians(x), 1e-3 * y, bc_type="periodic", extrapolate="periodic")
+
+
+def test_a_cam_lifts_by_the_periodic_spline_of_its_profile() -> None:
+    (cam,) = load_network(CAM).elements
+    angles = np.linspace(-20.0, 20.0, 4001)
+    lift, slope = transmitted(cam, angles)
+    spline = oracle(UNEVEN)
+    np.testing.assert_allclose(lift, spline(angles), atol=1e-15)  # lifts of 1e-2 m: rounding
+    np.testing.assert_allclose(slope, spline(angles, 1), atol=1e-14)
+    assert value(CAM, "S", 400.0) == pytest.approx(float(spline(math.radians(40.0))), abs=ROUNDING)
+
+
+def test_a_rocker_follows_in_degrees() -> None:
+    tables = wheels({"kind": "cam", "profile": UNEVEN, "offset": 5}, R=shaft(("ground", "r"), 100))
+    expected = math.radians(5) + 1e3 * math.radians(float(oracle(UNEVEN)(math.radians(40.0))))
+    assert value(tables, "R", 400.0) == pytest.approx(expected, abs=ROUNDING)
+
+
+def test_numbers_columns_and_symbols_pass_through_the_same_lines() -> None:
+    import casadi as ca
+
+    (cam,) = load_network(CAM).elements
+    angles = np.linspace(-10.0, 10.0, 41)
+    columns = transmitted(cam, angles)
+    symbol = ca.SX.sym("q")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)  # CasADi's notice of how it takes NumPy's functions
+        traced = ca.Function("cam", [symbol], [*transmitted(cam, symbol)])
+    for k, angle in enumerate(angles.tolist()):
+        for column, number, symbolic in zip(columns, transmitted(cam, angle), traced(angle), strict=True):
+            assert number == column[k]
+            assert float(symbolic) == pytest.approx(number, abs=1e-15)  # sums in another order
+
+
+def test_joints_of_denavit_hartenberg_elements_and_of_arms_are_coupled() -> None:
+    tables = {
+        "angle_unit": "deg",
+        "dh": {"elements": {"J": {"kind": "R"}, "K": {"kind": "P"}}},
+        "chains": {"arm": {"robot": "ur5e"}},
+        "elements": {
+            "belt": {"kind": "rack", "joints": ["J", "K"], "radius": 0.05, "offset": 0.1},
+            "wrist": {"kind": "gear", "joints": ["arm.wrist_1_joint", "arm.wrist_2_joint"], "teeth": [1, -2]},
+        },
+    }
+    values = network_check(tables).assemblies[0].values
+    assert values["K"][0] == pytest.approx(0.1 + 0.05 * values["J"][0], abs=ROUNDING)
+    wrists = [values[f"arm.wrist_{k}_joint"][0] for k in (1, 2)]
+    assert wrists[1] == pytest.approx(0.5 * wrists[0], abs=ROUNDING)
+
+
+# --- derivatives, mobility and redundancy
+
+MANY: dict[str, Any] = {
+    "bodies": {name: {} for name in ("a", "b", "c", "d")},
+    "controls": {"t": {"start": 0.3}, "u": {"value": "t ** 2"}},
+    "joints": {
+        "A": shaft(("ground", "a"), value="sin(t) + u"),
+        "B": {"kind": "cylindrical", "bodies": ["a", "b"], "value": ["", "0.1 * t"]},
+        "C": {"kind": "helical", "bodies": ["b", "c"], "pitch": 0.05},
+        "D": {"kind": "cylindrical", "bodies": ["ground", "c"], "a": [0.1, 0.2, 0]},  # closes a loop
+        "E": {"kind": "prismatic", "bodies": ["c", "d"], "n": [0.6, 0, 0.8]},
+    },
+    "elements": {
+        "AB": {"kind": "gear", "joints": ["A", "B"], "teeth": [3, -7], "offset": "u"},
+        "BC": {"kind": "gear", "joints": ["C", "B"], "teeth": [2, 1]},
+        "BD": {"kind": "rack", "joints": ["B", "D"], "radius": -0.2, "offset": "0.1 + t"},
+        "AE": {"kind": "cam", "joints": ["A", "E"], "profile": [[0, 0], [1, 0.3], [2, -0.1], [4, 0.2]]},
+        "rod": {"kind": "gg", "bodies": ["ground", "d"], "a": [0.1, 0, 0], "d": 0.3},
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_jacobian_is_that_of_differences(seed: int) -> None:
+    mechanism = mechanism_of(load_network(MANY))
+    x = mechanism.start + np.random.default_rng(seed).normal(size=len(mechanism.start))
+
+    def pairs(at: FloatArray) -> FloatArray:
+        return closure_of(mechanism, at).residual[6:]
+
+    expected = difference(pairs, x)
+    found = closure_of(mechanism, x[:, np.newaxis]).jacobian[6:, :, 0]
+    # differences of step 1e-3 round to 1e-12; a knot of the spline within the step would cost 1e-7
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-8 * np.abs(expected).max())
+
+
+def test_a_pair_counts_as_one_equation_and_closes_a_loop() -> None:
+    found = network_check(GEARED)
+    moves = there(found.mobility)
+    assert (moves.variables, moves.kutzbach, moves.mobility, moves.kind) == (2, 1, 1, "mechanism")
+    assert found.loops == (("A", "B", "pair"),)
+
+
+def test_a_second_gear_of_the_same_ratio_is_redundant_and_one_of_another_locks() -> None:
+    gear = GEARED["elements"]["pair"]
+    same = {**GEARED, "elements": {"pair": gear, "twin": {**gear, "teeth": [10, 20]}}}
+    moves = there(network_check(same).mobility)
+    assert (moves.mobility, moves.kutzbach) == (1, 0)
+    assert [(one.joint, one.constraint) for one in moves.redundant] == [("twin", "mesh")]
+    other = {**GEARED, "elements": {"pair": gear, "other": {**gear, "teeth": [20, 30]}}}
+    held = network_check(other, controls={"turn": 0})
+    assert there(held.mobility).kind == "structure"
+    assert [one.kind for one in held.warnings] == ["stuck-control"]
+
+
+def test_a_drive_that_repeats_a_gear_is_redundant() -> None:
+    both = {**GEARED, "joints": {**GEARED["joints"], "B": shaft(("ground", "b"), 300, value="30 - turn / 2")}}
+    moves = there(network_check(both).mobility)
+    assert (moves.mobility, moves.kutzbach) == (1, 0)
+    assert [(one.joint, one.constraint) for one in moves.redundant] == [("pair", "mesh")]
+
+
+def test_a_drive_set_free_turns_its_wheel() -> None:
+    both = {**GEARED, "joints": {**GEARED["joints"], "B": shaft(("ground", "b"), 300, value="30 - turn / 2")}}
+    mechanism = mechanism_of(load_network(both))
+    found = {name: column for name, what, column in released(mechanism, mechanism.start) if what == "drive"}
+    assert {name: column.tolist() for name, column in found.items()} == {"A": [0.5], "B": [1.0]}
+
+
+def test_what_a_gear_is_off_by_is_an_angle() -> None:
+    blocked = {**GEARED, "joints": {**GEARED["joints"], "B": shaft(("ground", "b"), 300, value=0)}}
+    found = network_solve(blocked, controls={"turn": 20}, restarts=1)
+    assert [(one.name, one.metres) for one in found.gaps] == [("pair", 0.0)]
+    assert found.gaps[0].radians == pytest.approx(math.radians(20), abs=ROUNDING)
+
+
+# --- faults
+
+
+def test_everything_wrong_with_pairs_is_reported_at_once() -> None:
+    pairs = {
+        "p1": {"kind": "gear", "joints": ["A", "a"], "teeth": [20, 0]},
+        "p2": {"kind": "gear", "joints": ["A", "A"], "teeth": [-20, -30]},
+        "p3": {"kind": "rack", "joints": ["S", "A"], "radius": 0, "teeth": [1, 2]},
+        "p4": {"kind": "cam", "joints": ["A"], "profile": [[0, 0], [20, 1], [20, 2]]},
+        "p5": {"kind": "cam", "joints": ["A", "S"], "profile": [[0, 0], [9, 1], [50, 2], [360, 1]]},
+        "p6": {"kind": "cam", "joints": ["A", "S"], "profile": [[0, 0], "x"], "offset": "speed"},
+        "p7": {"kind": "rack", "joints": ["A", "S"]},
+    }
+    assert refusal(NetworkError, lambda: load_network({**RACK, "elements": pairs})).splitlines() == [
+        "elements.p3.teeth: unknown; allowed: kind, joints, offset, radius",
+        "elements.p6.profile[1]: found 'x', allowed: [angle, lift], two finite numbers",
+        "elements.p7.radius: found nothing, allowed: a finite number",
+        "elements.p1.joints: joint found 'a' (did you mean A?), allowed: A, S",
+        "elements.p1.teeth: found 20, 0, allowed: two numbers other than 0, at most one of them negative:"
+        " that of an internal wheel",
+        "elements.p2.joints: found A twice, allowed: two joints",
+        "elements.p2.teeth: found -20, -30, allowed: two numbers other than 0, at most one of them negative:"
+        " that of an internal wheel",
+        "elements.p3.joints: found S, a prismatic joint, allowed as the first of a rack:"
+        " revolute, cylindrical, helical",
+        "elements.p3.joints: found A, a revolute joint, allowed as the second of a rack:"
+        " prismatic, cylindrical",
+        "elements.p3.radius: found 0 m, allowed: a radius other than 0, 1e+09 m at most;"
+        " its sign is that of the motion",
+        "elements.p4.joints: found 1, allowed: the names of two joints",
+        "elements.p4.profile: found 3 points, allowed: 4 to 1000",
+        "elements.p4.profile[2]: found the angle 0.349066 rad after 0.349066 rad,"
+        " allowed: angles that increase",
+        "elements.p5.profile: found angles over 6.28319 rad, allowed: less than a full turn:"
+        " the first point repeats after it",
+        "elements.p6.offset: control found 'speed', allowed: turn",
+    ]
+
+
+def test_joints_that_could_not_be_read_are_no_faults_of_their_pairs() -> None:
+    wrong = {**GEARED, "joints": {**GEARED["joints"], "B": {**GEARED["joints"]["B"], "kind": "round"}}}
+    text = refusal(NetworkError, lambda: load_network(wrong))
+    assert text.startswith("joints.B.kind: found 'round'")
+    assert "\n" not in text
+
+    chain = {**wrong, "chains": {"arm": {"robot": "ur50"}}}
+    chain["elements"] = {"pair": {**GEARED["elements"]["pair"], "joints": ["A", "arm.elbow"]}}
+    assert "elements" not in refusal(NetworkError, lambda: load_network(chain))
+
+
+def test_the_bodies_of_a_pair_in_python_are_those_of_its_joints() -> None:
+    network = load_network(GEARED)
+    pair = replace(network.elements[0], bodies=("ground", "b"))
+    text = refusal(NetworkError, lambda: replace(network, elements=(pair,)))
+    assert text == "elements.pair.bodies: found ground, b, allowed: those of its joints, a, b"
+
+
+def test_a_profile_is_read_from_a_file_beside_the_network(tmp_path: Path) -> None:
+    (tmp_path / "lift.csv").write_text("angle,lift\n" + "".join(f"{a},{b}\n\n" for a, b in UNEVEN))
+    (tmp_path / "net.toml").write_text(
+        'angle_unit = "deg"\nlength_unit = "mm"\n[bodies]\na = {}\ns = {}\n'
+        '[joints.A]\nkind = "revolute"\nbodies = ["ground", "a"]\nn = [0, 0, 1]\n'
+        '[joints.S]\nkind = "prismatic"\nbodies = ["ground", "s"]\n'
+        '[elements.lift]\nkind = "cam"\njoints = ["A", "S"]\nprofile = "lift.csv"\n'
+    )
+    assert load_network(tmp_path / "net.toml").elements[0].profile == load_network(CAM).elements[0].profile
+
+
+def test_faults_of_a_file_of_a_profile_have_its_lines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lift.csv").write_text("0,0\n1;2\n3,inf\n4,5,6\n7,8\n")
+    expected = [
+        f"elements.pair.profile: lift.csv, line {line}, allowed: angle,lift, two finite numbers"
+        for line in ("2: found '1;2'", "3: found '3,inf'", "4: found '4,5,6'")
+    ]
+    for file, lines in (("lift.csv", expected), ("no.csv", [
+        "elements.pair.profile: 'no.csv' cannot be read: No such file or directory;"
+        " allowed: a .csv file of two columns",
+    ])):  # fmt: skip
+        wrong = {**CAM, "elements": {"pair": {**CAM["elements"]["pair"], "profile": file}}}
+        assert refusal(NetworkError, lambda tables=wrong: load_network(tables)).splitlines() == lines
