@@ -87,7 +87,7 @@ def by_kinematics(run: Run) -> Trajectory:
     Raises:
         LogError: If it has no kinematics.
     """
-    if run.robot is None and run.log.source == NETWORK and run.log.tcp_position is not None:
+    if traces_point(run):
         return as_recorded(run)
     if run.tcp is None or run.robot is None:
         raise LogError(without_robot(run))
@@ -96,6 +96,11 @@ def by_kinematics(run: Run) -> Trajectory:
         still = np.zeros_like(run.rows.q)
         tcp = point_over_log(run.robot, run.rows.q, still, still)
     return _by_joints(run, tcp.position, continuous_quaternions(quaternions(tcp.euler_zyx, "zyx")))
+
+
+def traces_point(run: Run) -> bool:
+    """Return whether a run is the motion of a network with a traced point, which stands for kinematics."""
+    return run.robot is None and run.log.source == NETWORK and run.log.tcp_position is not None
 
 
 def as_recorded(run: Run) -> Trajectory:

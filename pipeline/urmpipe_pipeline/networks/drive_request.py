@@ -1,6 +1,6 @@
 """From a request to drive a network to its motion: values with units, the assembly, the motion, its rates.
 
-1. `DriveRequest` checks what does not depend on the network.
+1. `DriveRequest`: what is requested; `check` refuses what makes no sense with any network.
 2. `_parse_drives`, `_parse_values`, `_parse_point`, `_parse_wrench`: texts with units become SI.
 3. `drive_network`: assembly (by default that of the file's start, else the nearest to start values, or one by
    its number), motion along a line or along a log, rates, transmission, static forces, singular poses in words.
@@ -97,7 +97,8 @@ class DriveRequest:
     restarts: int = RESTARTS
     seed: int = 0
 
-    def __post_init__(self) -> None:
+    def check(self) -> None:
+        """Raise an `OptionError` with everything that makes no sense, whatever the network is."""
         if faults := list(self._faults()):
             raise OptionError(*faults)
 
@@ -156,19 +157,17 @@ def drive_network(
     mechanism = mechanism_of(network)
     columns = _log_columns(network, request, log) if log is not None else {}
     names = list(columns) if log is not None else list(request.drives)
-    if not names:
-        listed = ", ".join([one.name for one in network.controls if one.value is None] or [one.name for one in network.joints])
-        raise OptionError(Finding(f"found nothing that drives {network.name}, allowed: {listed}", parameter="drives"))
     parts: tuple[Callable[[], Any], ...] = (
-        lambda: find_driven(mechanism, names),
+        request.check,
+        lambda: _find_driven(mechanism, names),
         lambda: _parse_ranges(network, request.drives) if log is None else None,
         lambda: _parse_start(network, request.start),
         lambda: _parse_point(network, request.point),
         lambda: [_parse_wrench(network, one) for one in request.wrenches],
         lambda: _parse_torques(network, request.torques),
-        lambda: request.times_ns() if log is None else log.t_ns,
     )
-    driven, ranges, start, point, wrenches, torques, t_ns = for_each(lambda make: make(), parts)
+    _, driven, ranges, start, point, wrenches, torques = for_each(lambda make: make(), parts)
+    t_ns = request.times_ns() if log is None else log.t_ns
     factors = np.array([_factor(network, name) for name in driven.names])
     values, d_values, dd_values = _drive_values(driven, ranges, factors, columns, log, request, t_ns)
     _check_control_ranges(mechanism, driven, values, log)
@@ -225,6 +224,17 @@ def drive_network(
         warnings=warnings,
         provenance=provenance("network drive", options, inputs),
     )
+
+
+def _find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
+    """Return the prescribed variables; raise an `OptionError` if there are none."""
+    if not names:
+        network = mechanism.network
+        controls = [control.name for control in network.controls if control.value is None]
+        listed = ", ".join(controls or [joint.name for joint in network.joints])
+        message = f"found nothing that drives {network.name}, allowed: {listed}"
+        raise OptionError(Finding(message, parameter="drives"))
+    return find_driven(mechanism, names)
 
 
 def _duration(request: DriveRequest, t_ns: Any) -> float:

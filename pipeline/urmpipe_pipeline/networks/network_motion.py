@@ -260,7 +260,9 @@ class NetworkMotion(Result):
         x = self.x[rows].T
         poses = np.zeros((x.shape[1], len(self.network.body_names), 4, 4))
         poses[:, :, 3, 3] = 1.0
-        for k, frame in enumerate(self.mechanism.poses(x).values()):
+        frames = self.mechanism.poses(x)
+        for k, name in enumerate(self.network.body_names):
+            frame = frames[name]
             for i, row in enumerate(frame.rotation):
                 for j, entry in enumerate((*row, frame.translation[i])):
                     poses[:, k, i, j] = entry
@@ -492,7 +494,7 @@ def _tables(motion: NetworkMotion) -> Iterator[Table]:
         note = "Rate of the variable per rate of the drive. At a dead point it is 0: the variable cannot drive there."
         yield Table("Transmission", columns_of(motion.transmission, cells), note, brief=len(motion.transmission) < 13)
     if motion.forces is not None:
-        yield _forces_table(motion, motion.forces)
+        yield from _force_tables(motion, motion.forces)
 
 
 def _drive_cell(name: str, unit: str, event: MotionEvent) -> Value:
@@ -508,13 +510,16 @@ def _direction_words(direction: dict[str, float]) -> str:
     return ", ".join(f"{name} {share:+.3g}" for name, share in ranked[:NAMED])
 
 
-def _forces_table(motion: NetworkMotion, forces: MotionForces) -> Table:
-    """Return the largest force of each drive and of each reaction; "not determined" where it is."""
+def _force_tables(motion: NetworkMotion, forces: MotionForces) -> Iterator[Table]:
+    """Yield the largest force of each drive, and of each reaction; "not determined" where it is not."""
+    heads = {"name": "Force", "value": "Largest", "t": "At t"}
     rows: list[tuple[Any, ...]] = []
     for k, one in enumerate(motion.drives):
         unit = {"rad": "N.m", "m": "N"}.get(one.unit, "")
         at = int(np.argmax(np.abs(forces.drives[:, k])))
-        rows.append((f"{one.name} (drive)", Value(float(forces.drives[at, k]), unit), Value(float(motion.t[at]), "s")))
+        rows.append((one.name, Value(float(forces.drives[at, k]), unit), Value(float(motion.t[at]), "s")))
+    yield table_of("Static forces of the drives", heads, rows, brief=True)
+    rows = []
     for k, name in enumerate(forces.names):
         values = forces.reactions[:, k]
         if np.isnan(values).any():
@@ -523,8 +528,7 @@ def _forces_table(motion: NetworkMotion, forces: MotionForces) -> Table:
             at = int(np.argmax(np.abs(values)))
             unit = "N.m" if " moment " in name else "N"
             rows.append((name, Value(float(values[at]), unit), Value(float(motion.t[at]), "s")))
-    heads = {"name": "Force", "value": "Largest", "t": "At t"}
-    return table_of("Static forces", heads, rows, brief=len(rows) < 13)
+    yield table_of("Reactions of joints and elements", heads, rows)
 
 
 def _check(motion: NetworkMotion) -> Check:
