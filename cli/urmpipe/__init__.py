@@ -11,6 +11,7 @@
     urmpipe.plan("contour.csv", robot="ur5e", output="plan.csv")
     urmpipe.accuracy("contour.csv", "irb60", limit=0.4e-3).running_speed
     urmpipe.network_check("bennett").mobility
+    urmpipe.network_drive("four-bar", {"crank": (0, "360deg")}, point="coupler:0.45,0.2,0").to_frame()
     urmpipe.build_fmu("kinematic_chain", robot="urm6")
 
 The functions are loaded when they are first used.
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from urmpipe.api.load_robot import load_robot as load_robot
     from urmpipe.api.network import load_network as load_network
     from urmpipe.api.network import network_check as network_check
+    from urmpipe.api.network import network_drive as network_drive
     from urmpipe.api.network import network_solve as network_solve
     from urmpipe.api.plan import plan as plan
     from urmpipe.api.read_map import read_map as read_map
@@ -75,6 +77,7 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.comparison.deviation import Deviation as Deviation
     from urmpipe_pipeline.diagnosis.result import Diagnosis as Diagnosis
     from urmpipe_pipeline.joint_log import JointLog as JointLog
+    from urmpipe_pipeline.networks.network_motion import NetworkMotion as NetworkMotion
     from urmpipe_pipeline.networks.result import NetworkResult as NetworkResult
     from urmpipe_pipeline.planned_paths.result import PlannedPath as PlannedPath
     from urmpipe_pipeline.runs.results import Run as Run
@@ -104,6 +107,7 @@ _HOME = {
     "LogMap": "urmpipe_pipeline.sources",
     "Network": "urmpipe_models.networks.network",
     "NetworkError": "urmpipe_models.errors",
+    "NetworkMotion": "urmpipe_pipeline.networks.network_motion",
     "NetworkResult": "urmpipe_pipeline.networks.result",
     "OptionError": "urmpipe_models.errors",
     "OutputError": "urmpipe_models.errors",
@@ -135,6 +139,7 @@ _HOME = {
     "load_network": "urmpipe.api.network",
     "load_robot": "urmpipe.api.load_robot",
     "network_check": "urmpipe.api.network",
+    "network_drive": "urmpipe.api.network",
     "network_names": "urmpipe_models.networks.network_file",
     "network_solve": "urmpipe.api.network",
     "plan": "urmpipe.api.plan",

@@ -212,9 +212,23 @@ KINDS = {
     "lazy": FLAG,
     "limit": Kind(_is_number, "a number, in m"),
     "log_map": Kind(_is_map, "a map (TOML), or what `read_map` returned"),
+    "branch": COUNT,
+    "drives": Kind(
+        lambda value: isinstance(value, Mapping),
+        'a mapping of names to pairs of numbers or texts, such as {"crank": (0, "360deg")}',
+    ),
     "load_network.network": Kind(_is_tables, "a name, a TOML file, or the tables of one"),
     "method": _one_of("auto", "closed", "iterative"),
     "name_or_path": ROBOT_FILE,
+    "network_drive.law": _one_of("uniform", "trapezoid", "quintic"),
+    "network_drive.start": Kind(
+        lambda value: isinstance(value, Mapping),
+        'a mapping of joints to numbers or texts, such as {"theta4": "85deg"}',
+    ),
+    "network_solve.start": Kind(
+        lambda value: isinstance(value, Mapping),
+        'a mapping of joints to numbers or texts, such as {"theta4": "85deg"}',
+    ),
     "network": Kind(_is_network, "a name, a TOML file, the tables of one, or a Network"),
     "noise": KIND_OF_TOLERANCE,
     "options": Kind(lambda value: isinstance(value, Mapping), 'a mapping, such as {"joints": 6}'),
@@ -231,6 +245,8 @@ KINDS = {
     "seed": COUNT,
     "sides": Kind(_are_sides, 'two words in the names of columns, such as ("target", "actual")'),
     "step": SECONDS,
+    "steps": COUNT,
+    "torques": Kind(lambda value: isinstance(value, Mapping), "a mapping of joints to numbers in N.m or N"),
     "strict": FLAG,
     "sync": Kind(
         lambda value: _is_number(value) or (isinstance(value, str) and value in ("stamps", "start", "auto")),
@@ -251,6 +267,7 @@ KINDS = {
     "velocity": Kind(_is_number, "a number, in m/s"),
     "voice": _one_of("python", "command line"),
     "within_pi": FLAG,
+    "wrenches": Kind(_one_or_many(lambda value: True), "a text or a list of texts"),
     "write_map": PATH,
     "write_map.robot": ROBOT_FILE,
 }

@@ -68,7 +68,7 @@ IN_MAP = {
 IN_FILE = {**IN_MAP, "log_map": "map", "robot": "robot"}
 """Where a system file, or the map of a log in it, says what is a parameter elsewhere; others are options."""
 
-ARGUMENTS = ("path",)
+ARGUMENTS = ("path", "drives")
 """Parameters that the command line takes without an option, by their names in capitals."""
 
 _QUOTES = "'\u2018\u2019\u201a\u201b"

@@ -31,6 +31,8 @@ SOLVED = "ik"
 """The source of a log that inverse kinematics made: a reader's name stands in others."""
 
 
+NETWORK = "network"  # source of a log that is the motion of a network: its traced point is its kinematics
+
 ASSUMED_PERIOD = "assumed-period"
 """The kind of the warning of a log whose rows have neither times nor a given period."""
 

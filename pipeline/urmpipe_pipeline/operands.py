@@ -24,6 +24,7 @@ from urmpipe_models.errors import (
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.unjudged import Unjudged
+from urmpipe_pipeline.networks.network_motion import NetworkMotion
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.repolarization.audit import turning
@@ -46,8 +47,8 @@ OF_A_BLOCK = Hint("block", None, "takes the motion of a block", call="compare")
 
 WITH_BASELINE = Hint("baseline", None, "compares it, alone, with an earlier one")
 
-MadeRun: TypeAlias = Run | SolvedTargets | PlannedPath
-MADE_RUNS: tuple[type[MadeRun], ...] = (Run, SolvedTargets, PlannedPath)
+MadeRun: TypeAlias = Run | SolvedTargets | PlannedPath | NetworkMotion
+MADE_RUNS: tuple[type[MadeRun], ...] = (Run, SolvedTargets, PlannedPath, NetworkMotion)
 """Results that are a run, or have one."""
 
 Operand: TypeAlias = Path | Held | MadeRun | Simulation

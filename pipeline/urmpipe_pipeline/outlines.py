@@ -22,6 +22,8 @@ class Piece:
         opacity: Of the fill, 0..1.
         dashed: Whether the line is.
         front: Whether it is drawn before what is not, however near that is.
+        faint: Whether it is a further position: it is drawn behind all else, and its line is as transparent
+            as its fill.
     """
 
     points: FloatArray
@@ -31,6 +33,7 @@ class Piece:
     opacity: float = 1.0
     dashed: bool = False
     front: bool = False
+    faint: bool = False
 
 
 def drawn_pieces(
@@ -43,9 +46,14 @@ def drawn_pieces(
         placed: Returns points in [m], shape (n, 3), in pixels, shape (n, 2).
         towards: The way to who looks at them [-], shape (3,).
     """
-    for one in sorted(pieces, key=lambda one: (one.front, round(float((one.points @ towards).mean()), 9))):
+
+    def order(one: Piece) -> tuple[int, float]:
+        return one.front - one.faint, round(float((one.points @ towards).mean()), 9)
+
+    for one in sorted(pieces, key=order):
         dashed = ' stroke-dasharray="6 4"' if one.dashed else ""
         line = f'stroke="{one.colour}" stroke-width="{one.width:g}" stroke-linejoin="round"{dashed}'
+        line += f' stroke-opacity="{one.opacity:g}"' if one.faint else ""
         if one.fill:
             way = " ".join(f"{x:.1f},{y:.1f}" for x, y in outline(placed(one.points)))
             yield f'<polygon points="{way}" fill="{one.fill}" fill-opacity="{one.opacity:g}" {line}/>'

@@ -16,11 +16,11 @@ from urmpipe_pipeline.text import encodable
 
 OutputKind = Literal[
     "recording", "report", "map", "export", "audit", "junit", "statistics", "figure", "drawing", "fmu",
-    "joints", "plan", "system",
+    "joints", "plan", "motion", "system",
 ]  # fmt: skip
 
 NOUNS: dict[str, str] = {
-    "junit": "JUnit file", "statistics": "table of statistics", "fmu": "FMU", "joints": "joint log",
+    "junit": "JUnit file", "statistics": "table of statistics", "fmu": "FMU", "joints": "joint log", "motion": "motion log",
     "system": "system file",
 }  # fmt: skip
 """What people call a kind, where that is not its name."""
@@ -28,7 +28,7 @@ NOUNS: dict[str, str] = {
 SUFFIXES: dict[OutputKind, tuple[str, ...]] = {
     "recording": (".rrd",), "report": (".html", ".htm"), "map": (".toml",), "audit": (".csv",),
     "junit": (".xml",), "statistics": (".csv",), "drawing": (".svg",), "fmu": (".fmu",), "joints": (".csv",),
-    "plan": (".csv",), "system": (".toml",),
+    "plan": (".csv",), "motion": (".csv",), "system": (".toml",),
 }  # fmt: skip
 """How a file of a kind is called; exports and figures say it by their formats."""
 
@@ -74,6 +74,9 @@ name; a remark above the header would tell as well, but not every reader of CSV 
 PATH_ROW = "urmpipe_path_row"
 """The last column of a plan of ours, likewise: the data row of the path that each sample belongs to."""
 
+MOTION_ROW = "urmpipe_motion_row"
+"""The last column of the motion of a network, likewise: the number of each row."""
+
 GENERATION_TOOL = re.compile(rb"<fmiModelDescription\s[^>]*\sgenerationTool=\"urmpipe\b")
 """How the model description of an FMU of ours tells where it comes from."""
 
@@ -87,7 +90,7 @@ FIRST_LINES = {
 _MARKS: dict[str, re.Pattern[bytes]] = {
     **{
         kind: re.compile(rb"\A[^\n]*," + last.encode() + rb"\r?\n")
-        for kind, last in (("joints", TARGET_ROW), ("plan", PATH_ROW))
+        for kind, last in (("joints", TARGET_ROW), ("plan", PATH_ROW), ("motion", MOTION_ROW))
     },
     **{kind: re.compile(re.escape(first.encode())) for kind, first in FIRST_LINES.items()},
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,10 +16,10 @@ from urmpipe_pipeline.lettering import Box, box_about, freest, width_of
 from urmpipe_pipeline.outlines import Piece, drawn_pieces, polyline
 from urmpipe_pipeline.palette import INK_COLOUR, MASS_COLOUR, REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.parts import spot_at
-from urmpipe_pipeline.presentation.scene import Spot, ball_sizes
+from urmpipe_pipeline.presentation.scene import PlaneView, Spot, ball_sizes
 
-SIZE = 420
-"""Longest extent of what is drawn, in pixels."""
+SIZE, LARGE = 420, 620
+"""Longest extent of what is drawn, in pixels: in one of several views, and in a view by itself."""
 
 MARGIN = 50
 """Free around what is drawn in each view, in pixels: a name stands beside its point."""
@@ -75,6 +75,7 @@ class View:
         up: Number of the one that goes up.
         column: Its place among the views from the left.
         row: And from the top: views above each other share `right`, those beside each other `up`.
+        names: What the axes to the right and up are called.
     """
 
     title: str
@@ -82,6 +83,12 @@ class View:
     up: int
     column: int
     row: int
+    names: tuple[str, str] = ("", "")
+
+    @property
+    def axis_names(self) -> tuple[str, str]:
+        """Names of the axes to the right and up: x, y or z where no others are set."""
+        return self.names[0] or "xyz"[self.right], self.names[1] or "xyz"[self.up]
 
 
 SIDEWAYS = View("from the side", 0, 2, 0, 0)
@@ -173,7 +180,29 @@ class _Frame:
         return step * np.arange(math.ceil(first / step), math.floor(last / step) + 1)
 
 
-def projected(sketch: Sketch, views: Sequence[View], title: str, mark: str = "") -> str:
+def projected_along(sketch: Sketch, plane: PlaneView, title: str) -> str:
+    """Return a sketch as one large view along the normal of a plane, in the coordinates of that plane.
+
+    Args:
+        sketch: What is drawn.
+        plane: From where it is seen.
+        title: What the picture shows.
+    """
+    axes, (right, up, normal) = plane.axes, plane.axis_names
+    view = View(f"along {normal}", 0, 1, 0, 0, (right, up))
+
+    def turned(spots: Sequence[Spot]) -> list[Spot]:
+        return [replace(one, position=spot_at(np.array(one.position) @ axes)) for one in spots]
+
+    flat = Sketch(
+        spots=turned(sketch.spots),
+        pieces=[replace(one, points=one.points @ axes) for one in sketch.pieces],
+        names=turned(sketch.names),
+    )
+    return projected(flat, (view,), title, size=LARGE)
+
+
+def projected(sketch: Sketch, views: Sequence[View], title: str, mark: str = "", size: float = SIZE) -> str:
     """Return views of a sketch, each with its axes.
 
     Args:
@@ -181,15 +210,16 @@ def projected(sketch: Sketch, views: Sequence[View], title: str, mark: str = "")
         views: From where it is seen.
         title: What the picture shows.
         mark: A comment at its start, by which a file of ours is known.
+        size: Longest extent of what is drawn, in pixels.
     """
-    frames = _frames(sketch, views)
+    frames = _frames(sketch, views, size)
     width, bottom = np.max([one.corner + one.size for one in frames], axis=0) + np.array([20.0, SCALE_PX])
     width, height = (max(width, LEGEND_WIDE), bottom + LEGEND_PX) if sketch.masses else (width, bottom)
-    size = f'width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.0f} {height:.0f}"'
+    box = f'width="{width:.0f}" height="{height:.0f}" viewBox="0 0 {width:.0f} {height:.0f}"'
     return "\n".join(
         (
             *([f"<!-- {mark} -->"] if mark else []),
-            f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="sans-serif" font-size="13">',
+            f'<svg xmlns="http://www.w3.org/2000/svg" {box} font-family="sans-serif" font-size="13">',
             f"<title>{in_html(title)}</title>",
             '<rect width="100%" height="100%" fill="white"/>',
             f'<text x="{SCALE_PX}" y="24" font-size="17">{in_html(title)}</text>',
@@ -200,10 +230,11 @@ def projected(sketch: Sketch, views: Sequence[View], title: str, mark: str = "")
     )
 
 
-def _frames(sketch: Sketch, views: Sequence[View]) -> list[_Frame]:
+def _frames(sketch: Sketch, views: Sequence[View], size: float) -> list[_Frame]:
     """Return where the views stand: columns as wide and rows as high as what is seen in them."""
     low, high = sketch.extent
-    scale = SIZE / float((high - low).max() or 1.0)
+    shown = sorted({axis for view in views for axis in (view.right, view.up)})
+    scale = size / float((high - low)[shown].max() or 1.0)
     sizes = 2 * MARGIN + scale * (high - low)
     across = {view.column: sizes[view.right] + SCALE_PX for view in views}
     down = {view.row: sizes[view.up] + SCALE_PX + TITLE_PX for view in views}
@@ -228,7 +259,7 @@ def _scales(frame: _Frame) -> Iterator[str]:
     """Yield the title of a view, its frame, and lines at round values of its axes, with numbers."""
     (left, top), (width, height) = frame.corner, frame.size
     bottom, right = top + height, left + width
-    names = ["xyz"[axis] for axis in frame.axes]
+    names = frame.view.axis_names
     yield f'<text x="{left:.1f}" y="{top - 8:.1f}" fill="#555">{in_html(frame.view.title)}</text>'
     box = f'x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}"'
     yield f'<rect {box} fill="none" stroke="#c3cad0"/>'
@@ -265,7 +296,8 @@ def _drawn(sketch: Sketch, frame: _Frame) -> Iterator[str]:
     for spot, (x, y) in zip(sketch.spots, placed.tolist(), strict=True):
         yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{5 if alone else 3}" fill="{spot.colour}"/>'
     for (x, y), words in _names(placed, [spot.words for spot in sketch.spots]):
-        yield f'<text x="{x + 8:.1f}" y="{y - 6:.1f}" {HALO}>{in_html(words)}</text>'
+        if words:
+            yield f'<text x="{x + 8:.1f}" y="{y - 6:.1f}" {HALO}>{in_html(words)}</text>'
     yield from _beside(sketch.names, frame)
 
 

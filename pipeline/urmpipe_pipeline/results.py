@@ -18,7 +18,9 @@ from urmpipe_pipeline.comparison import exports as comparison_exports
 from urmpipe_pipeline.comparison import presenter as comparison
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.diagnosis.result import Diagnosis
+from urmpipe_pipeline.networks import network_motion
 from urmpipe_pipeline.networks import presenter as networks
+from urmpipe_pipeline.networks.network_motion import NetworkMotion
 from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.planned_paths import presenter as planned_paths
 from urmpipe_pipeline.planned_paths.result import PlannedPath
@@ -68,6 +70,7 @@ KINDS: tuple[Kind, ...] = (
     Kind("plan", PlannedPath, planned_paths.present, planned_paths.exports),
     Kind("accuracy", Accuracy, accuracy.present, accuracy_exports.exports),
     Kind("network", NetworkResult, networks.present),
+    Kind("network motion", NetworkMotion, network_motion.present, network_motion.exports),
 )
 """Every kind."""
 

@@ -249,7 +249,7 @@ def test_quiet_says_nothing(urmpipe: RunCommand) -> None:
 
 def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunCommand) -> None:
     listed = json.loads(urmpipe("simulate", "--list", "--json").out)["systems"]
-    assert [one["name"] for one in listed] == ["driven-arm", "log-to-delta", "one-drive", "six-drives"]
+    assert [one["name"] for one in listed] == ["crank-rocker", "driven-arm", "log-to-delta", "one-drive", "six-drives"]
     assert listed[1]["arguments"]["log"] == "coppeliasim.csv"
     assert "log=coppeliasim.csv" in urmpipe("simulate", "--list").out
 
@@ -259,7 +259,7 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
     ("arguments", "said"),
     [
         ((), "error: found neither a system nor --list, allowed: one of the two"),
-        (("nosuch",), "system: found 'nosuch', allowed: a TOML file, or one of driven-arm, log-to-delta"),
+        (("nosuch",), "system: found 'nosuch', allowed: a TOML file, or one of crank-rocker, driven-arm"),
         (("log-to-delta", "--set", "lgo=1"), "argument lgo: found 'lgo' (did you mean log?), allowed: log"),
         (("log-to-delta", "--set", "log"), "found 'log', allowed: NAME=VALUE, each name once"),
         (

@@ -68,6 +68,7 @@ UNITS: dict[str, tuple[str, dict[str, Any]]] = {
     "a load": ("inertia", {}),
     "a controller": ("drive_controller", {}),
     "a set point": ("set_point", {}),
+    "a network": ("network_motion", {"network": "rccc", "points": ["c3.body:0,0.1,0"]}),
     "sliding joints with masses": ("chain_dynamics", {"robot": sprung_arm()}),
     "a URM arm with drives": ("driven_arm", {"robot": ARM}),
     "driven, relieved and held sliding joints": ("driven_arm", {"robot": sprung_arm()}),

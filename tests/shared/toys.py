@@ -92,10 +92,11 @@ def root_of(one: Presentation) -> Any:
 
 def eye_of(one: Presentation) -> tuple[FloatArray, FloatArray]:
     """Return where the eye of a presentation's 3D view is and what it looks at in [m], shape (3,) each."""
-    left, *_ = root_of(one).contents
+    root = root_of(one)
+    left = root.contents if hasattr(root.contents[0], "properties") else root.contents[0].contents
     (controls,) = (
         view.properties["EyeControls3D"]
-        for view in left.contents
+        for view in left
         if "EyeControls3D" in getattr(view, "properties", {})
     )
     eye, target = (

@@ -1,20 +1,35 @@
-"""`urmpipe.load_network`, `network_check` and `network_solve`: kinematic networks."""
+"""`urmpipe.load_network`, `network_check`, `network_solve` and `network_drive`: kinematic networks."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, Unpack
 
-from urmpipe.keyword_checks import PathLike, public, refuse_warnings
-from urmpipe.output_files import guarded_outputs, write_drawing
+import numpy as np
+
+from urmpipe.api.ingest import ingest
+from urmpipe.keyword_checks import PathLike, public, public_reading, refuse_warnings
+from urmpipe.output_files import guarded_outputs, output_kind, write_drawing
+from urmpipe.reading import Reading, map_files
+from urmpipe_models.errors import Finding, OptionError, for_each
 from urmpipe_models.networks import network_file
 from urmpipe_models.networks.assembly import RESTARTS
+from urmpipe_models.networks.driving import Law
+from urmpipe_models.networks.forces import Wrench
 from urmpipe_models.networks.network import Network
 from urmpipe_pipeline.networks.drawing import network_svg
+from urmpipe_pipeline.networks.drive_request import DriveRequest, Range, drive_network
 from urmpipe_pipeline.networks.finding import Search, find_network
+from urmpipe_pipeline.networks.network_motion import NetworkMotion, motion_drawing
 from urmpipe_pipeline.networks.result import Command, NetworkResult
+from urmpipe_pipeline.outputs import MOTION_ROW, OutputKind
+from urmpipe_pipeline.runs.derivatives import Method
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.sources import TableLike
 from urmpipe_pipeline.sources.tables.text import fingerprint
+from urmpipe_pipeline.tables.joint_file import write_joint_log
 
 NetworkLike: TypeAlias = PathLike | Mapping[str, Any] | Network
 """A name, a file, the tables of one, or a network."""
@@ -137,3 +152,119 @@ def _found(
         refuse_warnings(strict, found.warnings)
         written.write("drawing", lambda part, path: write_drawing(part, network_svg(found)))
         return written.recorded(found, lambda share: tell(SEARCHING + (1.0 - SEARCHING) * share))
+
+
+@public_reading(Reading)
+def network_drive(
+    network: NetworkLike,
+    drives: Mapping[str, Range] | None = None,
+    *,
+    steps: int | None = None,
+    duration: float | None = None,
+    law: Law = "uniform",
+    tsp: float | None = None,
+    branch: int | None = None,
+    start: Mapping[str, Any] | None = None,
+    point: str | tuple[str, Sequence[float]] | None = None,
+    wrenches: Sequence[str | Wrench] = (),
+    torques: Mapping[str, float | str] | None = None,
+    log: PathLike | TableLike | Run | None = None,
+    derivative: Method | None = None,
+    restarts: int = RESTARTS,
+    seed: int = 0,
+    strict: bool = False,
+    draw: PathLike | None = None,
+    output: PathLike | None = None,
+    progress: Callable[[float], None] | None = None,
+    **reading: Unpack[Reading],
+) -> NetworkMotion:
+    """Move a network by its controls, or by joints in their place, on one branch. See docs/networks.md.
+
+    The motion follows the branch of an assembly by continuation. It names singular poses, and ends where it turns
+    back, or a joint reaches its limit.
+
+    Args:
+        network: A name, a file, the tables of one, or a `Network`.
+        drives: From and to by name, such as {"crank": (0, "360deg")}; one value holds a variable. Of controls
+            numbers are in the units of the network, of joints in [rad] and [m]; texts have units. With a log: the
+            joint of the log that drives each, such as {"crank": "q1"}; default: those of the same names.
+        steps: Equal steps, one per `tsp`; default: 200.
+        duration: Duration in [s] instead of steps.
+        law: How the drives move over the duration: uniform, trapezoid (a third each), quintic (from rest to rest).
+        tsp: Time from row to row in [s]; default: 0.005. With a log: the period of its grid.
+        branch: Number of the assembly at the begin of the drives, as `network_solve` with `every` lists them.
+        start: Values of joints in [rad] and [m], or texts with units: the motion begins at the assembly nearest to
+            them; default: that which continues the network's own start.
+        point: A point of a body to trace, such as "coupler:0.45,0.2,0" in [m]: the tool centre point of the run.
+        wrenches: Loads, such as "coupler:0.45,0,0:0,-50,0": point in the frame of the body in [m], force in [N],
+            and if wanted the moment in [N.m], along the axes of the ground.
+        torques: Loads at joints in [N.m] or [N], by name.
+        log: A log whose joints drive the network, row by row.
+        derivative: central or savgol: how the log is differentiated; default: by its resolution.
+        restarts: Random starts in a row without anything new that end a search for assemblies.
+        seed: Of the random starts.
+        strict: Whether a warning is an error.
+        draw: An SVG file to draw the motion to.
+        output: A recording (.rrd) or a log (.csv) to write.
+        progress: Called with the share that is done, 0..1.
+        **reading: How to read the log, as in `ingest`.
+
+    Returns:
+        `joints`, `joint_motion` (values, rates, second derivatives in [rad] or [m] and per [s], shape (n, joints)),
+        `point_motion` (likewise of the traced point, shape (n, 3) each), `events` (singular poses and limits),
+        `transmission`, `distance` to a singular pose [-], shape (n,), `forces`, `verdict` ("pass" if the drives
+        reach their end), `to_frame()`.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the network, a drive, the log or an output.
+
+    Source: [KinematicSystems]_ section 3.
+    """
+    written = None if output is None else Path(output)
+    parts: tuple[Callable[[], Any], ...] = (
+        lambda: network if isinstance(network, Network) else network_file.load_network(network),
+        lambda: DriveRequest(
+            drives or {}, steps, duration, law, 0.005 if tsp is None else tsp, branch, start or {}, point, wrenches,
+            torques or {}, restarts, seed,
+        ),
+        lambda: _refuse_together(log, steps, duration, law),
+        lambda: output_kind(written, "motion"),
+    )  # fmt: skip
+    loaded, request, _, kind = for_each(lambda make: make(), parts)
+    run = None if log is None else log if isinstance(log, Run) else ingest(log, tsp=tsp, derivative=derivative, **reading)
+    named = [Path(one) for one in (network, log) if isinstance(one, (str, Path))]
+    files = [path for path in named if path.is_file()] + map_files(reading)
+    outputs: dict[OutputKind, PathLike | None] = {"drawing": draw}
+    if kind is not None:
+        outputs[kind] = written
+    share = progress or (lambda done: None)
+    with guarded_outputs(outputs, files) as targets:
+        inputs = [fingerprint(path) for path in files if path.is_file()]
+        motion = drive_network(loaded, request, run, inputs, lambda done: share(SEARCHING * done))
+        refuse_warnings(strict, motion.warnings)
+        targets.write("drawing", lambda part, path: write_drawing(part, motion_drawing(motion)))
+        targets.write("motion", lambda part, path: _write_motion(motion, part, path))
+        motion = targets.recorded(motion, lambda done: share(SEARCHING + (1.0 - SEARCHING) * done))
+    return replace(motion, log=written) if kind == "motion" else motion
+
+
+def _refuse_together(log: Any, steps: int | None, duration: float | None, law: str) -> None:
+    """Raise an `OptionError` for options that a log leaves without a meaning."""
+    given = {"steps": steps, "duration": duration, "law": None if law == "uniform" else law}
+    faults = [
+        Finding("found together with a log, allowed: without one, which has times of its own", parameter=name)
+        for name, value in given.items()
+        if log is not None and value is not None
+    ]
+    if faults:
+        raise OptionError(*faults)
+
+
+def _write_motion(motion: NetworkMotion, part: Path, path: Path) -> None:
+    """Write a motion as a log: times, joints, and the traced point as the recorded tool centre point."""
+    position = None if motion.point_motion is None else motion.point_motion[0]
+    write_joint_log(
+        part, path, joints=motion.joints, units=motion.joint_units, q=motion.joint_motion[0],
+        row=np.arange(1, len(motion) + 1), t_ns=motion.t_ns, position=position, quat_xyzw=motion.quat_xyzw,
+        row_column=MOTION_ROW,
+    )  # fmt: skip

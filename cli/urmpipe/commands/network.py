@@ -1,4 +1,4 @@
-"""`urmpipe network list|check|solve`."""
+"""`urmpipe network list|check|solve|drive`."""
 
 from __future__ import annotations
 
@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
+from urmpipe.headings import HeadedCommand, Heading, option
 from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.named import NamedType, control_names, named_values
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.reading import STRICT_OPTION
-from urmpipe.options.types import DRAWING, NETWORK, WholeType
+from urmpipe.options.reading import STRICT_OPTION, motion_log_options
+from urmpipe.options.types import ANY_FILE, DRAWING, DURATION, NETWORK, OneOf, WholeType
 from urmpipe.usage import Group
 
 if TYPE_CHECKING:
+    from urmpipe_pipeline.networks.network_motion import NetworkMotion
     from urmpipe_pipeline.networks.result import NetworkResult
 
 
@@ -131,6 +133,124 @@ def solve(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
     with terminal.progress(f"Assembling {name}") as progress:
         result = urmpipe.network_solve(name, output=output, progress=progress, **options)
     return _answered(result, terminal, replaces)
+
+
+@network.command(cls=HeadedCommand, short_help="Move a network by its controls.")
+@click.argument("name", metavar="NAME|FILE", type=NETWORK)
+@click.argument("drives", metavar="[CONTROL=FROM:TO]...", nargs=-1, callback=named_values)
+@option(
+    Heading.RUNNING,
+    "--steps",
+    type=WholeType(),
+    help="Equal steps of the drives, one per sample period [default: 200].",
+)
+@option(Heading.RUNNING, "--duration", type=DURATION, help="Duration of the motion instead of steps.")
+@option(
+    Heading.RUNNING,
+    "--law",
+    type=OneOf(["uniform", "trapezoid", "quintic"]),
+    default="uniform",
+    show_default=True,
+    help="Motion of the drives over the duration.",
+)
+@option(
+    Heading.RUNNING,
+    "--branch",
+    type=WholeType(),
+    metavar="N",
+    help="Begin at this assembly of `network solve --all`, with the drives at FROM.",
+)
+@option(
+    Heading.RUNNING,
+    "--start",
+    multiple=True,
+    callback=named_values,
+    metavar="JOINT=VALUE",
+    help="Begin at the assembly nearest to these joint values, such as theta4=85deg, with the drives at FROM"
+    " [default: the one that continues the network's start].",
+)
+@option(
+    Heading.RUNNING,
+    "--log",
+    metavar="LOG.csv",
+    type=ANY_FILE,
+    help="Drive by the joints of a log, by their names or as CONTROL=JOINT says.",
+)
+@option(
+    Heading.RUNNING,
+    "--point",
+    metavar="BODY:X,Y,Z",
+    help="Trace a point of a body (m): the tool centre point of the recording.",
+)
+@option(
+    Heading.RUNNING,
+    "--wrenches",
+    "--wrench",
+    multiple=True,
+    metavar="BODY:X,Y,Z:FX,FY,FZ[,MX,MY,MZ]",
+    help="Load at a point of a body (m), force (N) and moment (N.m) along the axes of the ground.",
+)
+@option(
+    Heading.RUNNING,
+    "--torques",
+    "--torque",
+    multiple=True,
+    callback=named_values,
+    metavar="JOINT=VALUE",
+    help="Load at a joint, in N.m or N.",
+)
+@option(
+    Heading.SOLVING,
+    "--restarts",
+    type=WholeType(),
+    default=2000,
+    show_default=True,
+    help="End a search for assemblies after this many random starts without a new one.",
+)
+@option(Heading.SOLVING, "--seed", type=WholeType(), default=0, show_default=True, help="Seed of the random starts.")
+@option(Heading.OUTPUT, "--draw", metavar="FILE.svg", type=DRAWING, help="Draw the motion.")
+@output_option("RUN.rrd|RUN.csv", "Recording, or log, to write.")
+@motion_log_options
+@output_options
+def drive(name: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
+    """Move a network by its controls, on the branch of one assembly.
+
+    A joint can be driven by its name in place of a control; CONTROL=VALUE holds a control. Numbers are in
+    the units of the network's file, or have a unit. Singular poses are named, with what becomes free there:
+    the motion turns back, branches, or goes through. It ends where it turns back, or a joint or a control is
+    at its limit. The CSV is a log that `urmpipe ingest` reads.
+
+    \b
+    Examples:
+      urmpipe network drive four-bar crank=0:360deg --point coupler:0.45,0.2,0 -o run.rrd
+      urmpipe network drive four-bar crank=0:360deg --duration 2s --law trapezoid -o run.csv
+      urmpipe network drive four-bar theta4=85deg:120deg --json
+      urmpipe network drive stewart-gough-driven --log legs.csv --point platform:0,0,0.1 -o run.rrd
+      urmpipe network drive slider-crank crank=0:360deg --wrench slider:0,0,0:-100,0,0
+
+    Exit codes: 0 the drives reach their end, 1 the motion ends before, 2 bad file or usage.
+    """
+    replaces = output is not None and output.exists()
+    with terminal.progress(f"Driving {name}") as progress:
+        result = urmpipe.network_drive(name, output=output, progress=progress, **options)
+    terminal.warn(result.warnings)
+    terminal.answer(lambda: result.to_dict("command line"), lambda: _print_motion(result, replaces))
+    return 0 if result.verdict == "pass" else 1
+
+
+def _print_motion(result: NetworkMotion, replaces: bool) -> None:
+    """Print a motion, and what was written."""
+    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.terminal import print_recording, say
+    from urmpipe_models.spelling import pasted
+    from urmpipe_pipeline.results import present
+
+    print_presentation(present(result))
+    if result.recording is not None:
+        print_recording(result.recording, replaced=replaces)
+    elif result.log is not None:
+        earlier = "; it replaced an earlier one" if replaces else ""
+        say(f"Log: {result.log}  (read it: urmpipe ingest {pasted(result.log)}{earlier})")
 
 
 def _answered(result: NetworkResult, terminal: Terminal, replaces: bool) -> int:

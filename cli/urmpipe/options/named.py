@@ -9,13 +9,13 @@ import click
 from click.shell_completion import CompletionItem
 
 from urmpipe.options.completion import items, operands
-from urmpipe.options.types import robots
+from urmpipe.options.types import networks, robots
 from urmpipe_models.errors import shown
 from urmpipe_models.files.toml_text import TomlError, toml_values
 
 
 class NamedType(click.ParamType[str]):
-    """NAME=VALUE; the names complete in the shell, and those of robots as values.
+    """NAME=VALUE; the names complete in the shell, and those of robots and networks as values.
 
     Args:
         names: Gives the names, from what stands on the line already.
@@ -33,8 +33,9 @@ class NamedType(click.ParamType[str]):
         from urmpipe_models.errors import UrmpipeError
 
         name, _, begun = incomplete.partition("=")
-        if name == "robot":
-            return items(robots(), begun, "robot=")
+        catalogue = {"robot": robots, "network": networks}.get(name)
+        if catalogue is not None:
+            return items(catalogue(), begun, f"{name}=")
         try:
             return items([f"{name}=" for name in self._names(ctx)], incomplete)
         except UrmpipeError:

@@ -258,3 +258,8 @@ def row_options(command: Command) -> Command:
 def log_options(command: Command) -> Command:
     """Add the arm, how a log becomes a run, and --strict."""
     return with_options(command, ROBOT_OPTION, *PLACING, *ROWS, *JOINTS, STRICT_OPTION)
+
+
+def motion_log_options(command: Command) -> Command:
+    """Add how a log that drives a network becomes a motion of its joints, and --strict."""
+    return with_options(command, *ROWS, *JOINTS, STRICT_OPTION)

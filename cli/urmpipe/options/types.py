@@ -82,7 +82,7 @@ def _systems() -> Iterable[str]:
     return system_names()
 
 
-def _networks() -> Iterable[str]:
+def networks() -> Iterable[str]:
     """Return the names of the networks."""
     from urmpipe_models.networks.network_file import network_names
 
@@ -98,7 +98,7 @@ UNIT = CatalogueType("UNIT|FILE", _units, ".py")
 SYSTEM = CatalogueType("SYSTEM|FILE", _systems, ".toml")
 """A shipped system's name, or a system file."""
 
-NETWORK = CatalogueType("NAME|FILE", _networks, ".toml")
+NETWORK = CatalogueType("NAME|FILE", networks, ".toml")
 """A shipped network's name, or a network file."""
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from urmpipe.printing.terminal import LISTED, new_console, new_table, say
-from urmpipe.systems.units import FROM_LOG, example_of, example_robot
+from urmpipe.systems.units import FROM_LOG, example_of, example_subject
 from urmpipe_fmus.cosim.interface import ELEMENT
 from urmpipe_fmus.documentation import TITLES as VARIABLE_HEADS
 from urmpipe_fmus.documentation import variable_row
@@ -85,15 +85,15 @@ def print_unit(name: str) -> None:
     """Print the inputs, outputs and parameters of a unit, and its equations."""
     unit = example_of(name)
     table = new_table(*VARIABLE_HEADS, title=f"{unit.name}: {unit.description}")
-    robot = example_robot(name)
+    subject, kind = example_subject(name)
     rows = [variable_row(one, digits=FIGURES) for one in unit.variables]
     for row in sorted(rows, key=lambda row: _part_order(row[1])):
         table.add_row(*row)
     new_console().print(table)
     for line in unit.equations:
         say(line)
-    if robot:
-        say(f"These are the variables for {robot}. Those for another arm: build it, then urmpipe fmu check")
+    if subject:
+        say(f"These are the variables for {subject}. Those for another {kind}: build it, then urmpipe fmu check")
     say("A parameter is set where the unit runs: in a system by start, in another tool as its start value")
 
 

@@ -139,8 +139,8 @@ class Blocks:
         arm = place_robot(robot)
         if arm is not None:
             self.chains[block.name] = arm
-        if robot is not None and Path(robot).is_file():
-            self.files.append(Path(robot))
+        parts = (robot, options.get("network"))
+        self.files += [Path(part) for part in parts if isinstance(part, str) and Path(part).is_file()]
         if log is None and log_map is not None:
             found = f"{log_map} without a log"
             raise OptionError(Finding(about="map", found=found, allowed="with log = ..."))

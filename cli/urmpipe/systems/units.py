@@ -31,6 +31,7 @@ EXAMPLES: Mapping[str, Mapping[str, Any]] = {
     "kinematic_chain": {"robot": "urm6"},
     "chain_dynamics": {"robot": "ur3"},
     "repolarizer": {"options": {"joints": 6}},
+    "network_motion": {"options": {"network": "four-bar"}},
     "log_source": {"log": LOGS / "matlab.csv"},
 }
 """What the units are given, where they need it, to show their variables."""
@@ -92,10 +93,13 @@ def example_of(unit: str) -> Unit:
     return unit_of(unit, **EXAMPLES.get(unit_name(unit), {}))
 
 
-def example_robot(unit: str) -> str:
-    """Return the arm of a unit's example; empty if it has none."""
+def example_subject(unit: str) -> tuple[str, str]:
+    """Return the arm or the network of a unit's example, and which of them it is; empty if it has none."""
     name = unit_name(unit)
-    return DRIVEN if name == "driven_arm" else EXAMPLES.get(name, {}).get("robot", "")
+    if name == "network_motion":
+        return str(EXAMPLES[name]["options"]["network"]), "network"
+    robot = DRIVEN if name == "driven_arm" else EXAMPLES.get(name, {}).get("robot", "")
+    return robot, "arm" if robot else ""
 
 
 def _driven(robot: Chain) -> Chain:

@@ -28,7 +28,13 @@ def slave_of(module: dict[str, Any], names: dict[str, Any]) -> type[Fmi2Slave]:
         module: The script's globals.
         names: The script's names where it calls: its globals when it is imported.
     """
-    _leave_path(module["__name__"])
+    try:
+        return _slave_of(module, names)
+    finally:  # packages that the unit alone needs are found on the path until here
+        _leave_path(module["__name__"])
+
+
+def _slave_of(module: dict[str, Any], names: dict[str, Any]) -> type[Fmi2Slave]:
     if names is not module:
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(module))
         again: type[Fmi2Slave] = module["Slave"]

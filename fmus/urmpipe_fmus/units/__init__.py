@@ -25,6 +25,7 @@ _UNITS: dict[str, str] = {
     "drive_controller": "sampled control of a drive's voltage",
     "chain_dynamics": "motion of an arm with masses under the torques of its joints",
     "driven_arm": "an arm with masses, a flexible drive and a sampled controller on each joint",
+    "network_motion": "joints and points of a kinematic network, from its controls",
     "set_point": "set position, velocity and acceleration over time: step, ramp, trapezoid",
 }
 """What each unit does, in a line."""

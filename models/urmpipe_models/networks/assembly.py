@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -60,6 +60,8 @@ class Assembled:
         reason: Why the search ended.
         elsewhere: Whether only a random start closed, not the network's own.
         continuum: Of how many dimensions the assemblies are where controls and idle spins are held; 0: apart.
+        distances: How far all assemblies that the search came to are from the start, in [rad] and lengths of the
+            mechanism, rising: those of `assemblies` come first.
     """
 
     x: FloatArray
@@ -71,12 +73,14 @@ class Assembled:
     reason: str
     elsewhere: bool
     continuum: int
+    distances: tuple[float, ...] = ()
 
 
 def assemble(
     mechanism: Mechanism,
     controls: Mapping[str, float] | None = None,
     *,
+    start: Mapping[str, Sequence[float]] | None = None,
     every: bool = False,
     restarts: int = RESTARTS,
     seed: int = 0,
@@ -93,6 +97,8 @@ def assemble(
     Args:
         mechanism: The network.
         controls: Values to hold controls at instead of their starts.
+        start: Values of joints, and of bodies with freedoms of their own, to be near to instead of the network's
+            start, by name, in [rad] and [m]; of variables that controls drive they count nothing.
         every: Whether all assemblies are sought.
         restarts: Random starts in a row without anything new that end the search; 0: the own start alone.
         seed: Of the random starts.
@@ -101,9 +107,13 @@ def assemble(
     Raises:
         NetworkError: If a control is not of the network, or its value out of its range.
     """
-    start = start_with(mechanism, controls or {})
-    own = descend(mechanism, start[:, np.newaxis], mechanism.free)
-    found = _Found(mechanism, start)
+    begin = start_with(mechanism, controls or {})
+    for name, values in (start or {}).items():
+        for index, value in enumerate(values):
+            if (name, index) in mechanism.places:
+                begin[mechanism.places[name, index]] = value
+    own = descend(mechanism, begin[:, np.newaxis], mechanism.free)
+    found = _Found(mechanism, begin)
     closed = any(found.add(own))
     tried, reason = 1, "the start closes"
     rng = np.random.default_rng(seed)
@@ -112,8 +122,8 @@ def assemble(
     continuum = _continuum(mechanism, found.kept[0]) if found.kept else 0
     if found.kept and not continuum:
         _seek_nearer(found, min(restarts, NEARER), seed)
-        if every:
-            more, reason = _search(found, True, restarts, rng, progress)
+        if every or start:  # the others tell how clearly the nearest one is the nearest
+            more, reason = _search(found, True, restarts if every else min(restarts, NEARER), rng, progress)
             tried += more - 1
     if continuum and every:
         reason = (
@@ -267,7 +277,7 @@ class _Found:
 
     def result(self, every: bool, tried: int, reason: str, *, elsewhere: bool, continuum: int) -> Assembled:
         """Return the nearest assembly, or every one, sorted by the distance from the start."""
-        near = self.distances().round(6) if self.kept else ()
+        near = self.distances().round(6) if self.kept else np.empty(0)
         order = [x for _, x in sorted(zip(near, self.kept, strict=True), key=lambda one: (one[0], *one[1]))]
         order = order if every else order[:1]
         nearest = order[0] if order else self._turned(self._nearest[:, np.newaxis])[:, 0]
@@ -281,6 +291,7 @@ class _Found:
             reason,
             elsewhere,
             continuum,
+            tuple(sorted(near.tolist())) if self.kept else (),
         )
 
     def _turned(self, x: FloatArray) -> FloatArray:

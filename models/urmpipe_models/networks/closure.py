@@ -13,7 +13,7 @@ from urmpipe_models.networks.element_measures import MEASURES, measure
 from urmpipe_models.networks.higher_pairs import transmitted
 from urmpipe_models.networks.joint_motion import Screws, forbidden, joint_frame, joint_screws
 from urmpipe_models.networks.mechanism import Given, Mechanism, Pose, Posed, of_controls
-from urmpipe_models.networks.parts import ConstraintElement
+from urmpipe_models.networks.parts import ConstraintElement, Joint
 from urmpipe_models.networks.rotations import turning_of, untwisted
 from urmpipe_models.orientation import quaternions, rotation_vectors
 from urmpipe_models.transform import Transform
@@ -136,7 +136,7 @@ def _equations(
         moved = joint_frame(joint, [one.value for one in mechanism.values(joint, x, controls)])
         here = posed.joints[joint.name] @ moved
         gap = gap_of(here.inverse() @ posed.bodies[joint.bodies[1]].frame @ joint.frames[1], n)
-        movers = _between(posed.bodies, joint.bodies, joint.name)
+        movers = relative_movers(posed.bodies, joint.bodies, joint.name)
         yield _Equation(slice(6 * k, 6 * k + 6), gap, _carrier(here, gap), movers, {})
     first = 6 * len(mechanism.graph.cuts)
     for row, element in enumerate(mechanism.network.elements, first):
@@ -147,7 +147,7 @@ def _equations(
         measured = measure(element, *(posed.bodies[name].frame for name in element.bodies))
         wrench = _stacked((*measured.moment, *measured.force), n)[np.newaxis]
         excess = _stacked((measured.distance - length.value,), n)
-        movers = _between(posed.bodies, element.bodies)
+        movers = relative_movers(posed.bodies, element.bodies)
         yield _Equation(slice(row, row + 1), excess, wrench, movers, length.slopes)
 
 
@@ -193,11 +193,11 @@ def _screws(
         vector = (x[first + 3], x[first + 4], x[first + 5])
         p = posed.bodies[name].frame.translation
         turning = [(axis, cross(p, axis)) for axis in turning_of(vector)]
-        found[name] = _combined([*_SLIDING, *turning], values, n)
+        found[name] = _combined([*SLIDING_SCREWS, *turning], values, n)
     return found
 
 
-_SLIDING: Screws = [
+SLIDING_SCREWS: Screws = [
     ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
     ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
@@ -235,7 +235,7 @@ def _carrier(here: Transform, gap: FloatArray) -> FloatArray:
     return carried
 
 
-def _between(posed: dict[str, Pose], bodies: tuple[str, str], cut: str = "") -> dict[str, int]:
+def relative_movers(posed: dict[str, Pose], bodies: tuple[str, str], cut: str = "") -> dict[str, int]:
     """Return the sign with which each mover moves the second body against the first; -1 of the cut joint."""
     first, second = (posed[name].movers for name in bodies)
     signs = {name: second.get(name, 0) - first.get(name, 0) for name in {**first, **second}}
@@ -261,3 +261,41 @@ def _stacked(elements: Sequence[Element], n: int) -> FloatArray:
     for k, one in enumerate(elements):
         rows[k] = one
     return rows
+
+
+def body_twists(mechanism: Mechanism, x: FloatArray) -> dict[str, FloatArray]:
+    """Return the twist of each body in the ground per unit of each variable, shape (6, variables, n).
+
+    Angular velocity in [rad], then the velocity in [m] of the point at the origin of the ground.
+
+    Args:
+        mechanism: The network.
+        x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
+    """
+    posed, controls = mechanism.posed(x), mechanism.control_slopes(x)
+    screws = _screws(mechanism, x, posed, controls)
+    twists = {}
+    for name, pose in posed.bodies.items():
+        twists[name] = np.zeros((6, len(mechanism.variables), x.shape[1]))
+        for mover, sign in pose.movers.items():
+            places, own = screws[mover]
+            twists[name][:, places] += sign * own
+    return twists
+
+
+def wrench_carriers(
+    mechanism: Mechanism, x: FloatArray
+) -> Iterator[tuple[Joint | ConstraintElement, slice, FloatArray]]:
+    """Yield of each cut joint and element its rows, and what turns twists in the ground into rates of the rows.
+
+    The transpose turns multipliers of the rows, in [N] and [N.m], into the moment and force, about the origin of
+    the ground, on the second body. Shape (rows, 6, n).
+
+    Args:
+        mechanism: The network.
+        x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
+    """
+    ties = (*(mechanism.network.joints[cut] for cut in mechanism.graph.cuts), *mechanism.network.elements)
+    equations = _equations(mechanism, x, mechanism.posed(x), mechanism.control_slopes(x))
+    for tie, equation in zip(ties, equations, strict=True):
+        yield tie, equation.rows, equation.carrier

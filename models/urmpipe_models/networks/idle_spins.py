@@ -9,13 +9,13 @@ from itertools import combinations
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.elementwise import Vector, cross, scale, subtract
+from urmpipe_models.elementwise import Element, Vector, cross, dot, scale, subtract
 from urmpipe_models.networks.closure import gap_of
 from urmpipe_models.networks.graph import parts_without
 from urmpipe_models.networks.joint_motion import joint_frame
-from urmpipe_models.networks.mechanism import Mechanism
+from urmpipe_models.networks.mechanism import Configuration, Mechanism
 from urmpipe_models.networks.parts import Joint
-from urmpipe_models.networks.rotations import rotation_of
+from urmpipe_models.networks.rotations import SMALL, rotation_of
 from urmpipe_models.orientation import quaternions
 from urmpipe_models.transform import Transform
 
@@ -120,6 +120,34 @@ def unspun(mechanism: Mechanism, spins: Sequence[IdleSpin], x: FloatArray, start
             held = own @ rotation_of(scale(turn, along))
             x[first : first + 3] = gap_of(held.inverse() if inverted else held, x.shape[1])[3:]
     return x
+
+
+def spin_angles(mechanism: Mechanism, spins: Sequence[IdleSpin], x: Configuration) -> list[Element]:
+    """Return the angles of idle spins in [rad], which `unspun` keeps: twists of the first joints about the lines.
+
+    phi = 2 atan2(q . u sin(a / 2) / a, cos(a / 2)), a = |q|: q is the rotation vector of the joint, u the line.
+
+    Args:
+        mechanism: The network.
+        spins: Its idle spins.
+        x: The variables, one element each.
+    """
+    angles: list[Element] = []
+    frames = mechanism.poses(x)
+    for spin in spins:
+        first, second = (_part_frame(joint, spin, frames) for joint in spin.joints)
+        joint, distance = spin.joints[0], subtract(second.translation, first.translation)
+        line = scale(1.0 / np.maximum(np.sqrt(dot(distance, distance)), 1e-300), distance)
+        place = mechanism.places[joint.name, 0]
+        q: Vector = (x[place], x[place + 1], x[place + 2])
+        square = dot(q, q)
+        angle = np.sqrt(np.where(square < SMALL, 1.0, square))
+        sine = np.where(square < SMALL, 0.5 - square / 48.0, np.sin(0.5 * angle) / angle)
+        cosine = np.where(square < SMALL, 1.0 - square / 8.0, np.cos(0.5 * angle))
+        along = dot(q, Transform(first.columns).rotate(line))
+        sign = -1.0 if joint.bodies[0] in spin.bodies else 1.0
+        angles.append(2.0 * np.arctan2(sign * sine * along, cosine))
+    return angles
 
 
 def _part_frame(joint: Joint, spin: IdleSpin, frames: dict[str, Transform]) -> Transform:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import NetworkError
@@ -20,6 +20,8 @@ class Network(Parts, Shown):
     Attributes:
         description: One line for people.
         source: Where the numbers come from.
+        length_unit: m or mm: the unit in which its file has lengths, and people give them.
+        angle_unit: rad or deg, likewise of angles.
 
     Raises:
         NetworkError: With everything that is wrong.
@@ -27,6 +29,8 @@ class Network(Parts, Shown):
 
     description: str = ""
     source: str = ""
+    length_unit: str = field(default="m", compare=False)
+    angle_unit: str = field(default="rad", compare=False)
 
     def __post_init__(self) -> None:
         if found := tuple(dict.fromkeys(faults_of(self))):

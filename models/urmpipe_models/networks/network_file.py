@@ -111,6 +111,8 @@ def _network(tables: Mapping[str, Any], name: str, folder: Path) -> Network:
         elements=parts.elements,
         controls=parts.controls,
         ground=parts.ground,
+        length_unit="mm" if read.units.millimetres else "m",
+        angle_unit="deg" if read.units.degrees else "rad",
         **texts,
     )
 

@@ -10,7 +10,8 @@ from functools import cached_property
 from typing import Literal, TypeAlias
 
 from urmpipe_models.elementwise import ZERO, Vector, cross
-from urmpipe_models.measure_units import DEGREE
+from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.measure_units import DEGREE, NAMES, WRITTEN, quantity
 from urmpipe_models.networks.expressions import Expression
 from urmpipe_models.transform import Transform
 
@@ -261,6 +262,26 @@ class Parts:
         alone |= {f"({control}) * 0.001": Decimal("0.001"), f"({control}) * pi / 180": DEGREE}
         found = {(unit, alone[one.text]) for unit, one in driven if one is not None and one.text in alone}
         return found.pop() if len(found) == 1 else None
+
+    def control_value(self, control: str, value: float | str) -> float:
+        """Return the value of a control as it is given, of a number or a text with a unit.
+
+        Args:
+            control: Its name.
+            value: A number in the units of the network, or a text such as "40deg".
+
+        Raises:
+            OptionError: If a text is no number, or its unit is not that of what the control drives by itself.
+        """
+        if not isinstance(value, str):
+            return value
+        si, factor = self.unit_of(control) or ("", Decimal(1))
+        units = {unit: in_si / factor for unit, in_si in WRITTEN.get(si, {}).items()} | {"": Decimal(1)}
+        number = quantity(value, units)
+        if not math.isfinite(number):
+            allowed = f"a number, or {NAMES[si].partition(' in ')[0]} with its unit" if si else "a number"
+            raise OptionError(Finding(parameter="controls", found=f"{control} = {value}", allowed=allowed))
+        return number
 
     @cached_property
     def between_controls(self) -> tuple[Placed, ...]:

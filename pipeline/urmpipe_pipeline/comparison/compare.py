@@ -24,6 +24,7 @@ from urmpipe_pipeline.comparison.matching import (
     as_recorded,
     by_joints_alone,
     by_kinematics,
+    traces_point,
     file_of,
     lacking,
     match,
@@ -224,7 +225,7 @@ def _joints_alone(reference: Run, runs: Sequence[Run], options: CompareOptions) 
         LogError: If a place is judged, and a run with joints has no kinematics.
     """
     every = (reference, *runs)
-    lacks = [run for run in every if run.log.joints and run.tcp is None]
+    lacks = [run for run in every if run.log.joints and run.tcp is None and not traces_point(run)]
     if not lacks or options.tcp == "recorded" or not all(run.log.joints for run in every):
         return False
     if options.align == "none" and set(deviations_of(options.tolerance)) == {"joint"}:

@@ -16,6 +16,7 @@ from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import quaternions, slerp
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
 from urmpipe_pipeline.diagnosis.sides import Side
+from urmpipe_pipeline.joint_log import NETWORK
 from urmpipe_pipeline.runs.grid import ROUNDING_NS, interpolate
 from urmpipe_pipeline.runs.results import Run
 
@@ -81,9 +82,13 @@ JOINTS_ALONE = Hint("tolerance", "joint=0.1deg", "compares the joints only")
 def by_kinematics(run: Run) -> Trajectory:
     """Return where a run's tool centre point was by its joints, on its log's own rows.
 
+    The motion of a network has the traced point by the kinematics of the network.
+
     Raises:
         LogError: If it has no kinematics.
     """
+    if traces_point(run):
+        return as_recorded(run)
     if run.tcp is None or run.robot is None:
         raise LogError(without_robot(run))
     tcp = run.tcp
@@ -91,6 +96,11 @@ def by_kinematics(run: Run) -> Trajectory:
         still = np.zeros_like(run.rows.q)
         tcp = point_over_log(run.robot, run.rows.q, still, still)
     return _by_joints(run, tcp.position, continuous_quaternions(quaternions(tcp.euler_zyx, "zyx")))
+
+
+def traces_point(run: Run) -> bool:
+    """Return whether a run is the motion of a network with a traced point, which stands for kinematics."""
+    return run.robot is None and run.log.source == NETWORK and run.log.tcp_position is not None
 
 
 def as_recorded(run: Run) -> Trajectory:

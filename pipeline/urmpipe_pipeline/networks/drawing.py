@@ -1,4 +1,4 @@
-"""All drawings of a network in one SVG: its graph, the mechanism in three projections, its assemblies."""
+"""All drawings of a network in one SVG: its graph, the mechanism, its assemblies."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from urmpipe_models.messages import in_html
 from urmpipe_pipeline.networks.gallery import gallery_svg
 from urmpipe_pipeline.networks.graph_drawing import graph_svg
 from urmpipe_pipeline.networks.result import NetworkResult
-from urmpipe_pipeline.networks.sketch import mechanism_svg
+from urmpipe_pipeline.networks.scene import motion_plane
+from urmpipe_pipeline.networks.sketch import mechanism_svg, view_words
 from urmpipe_pipeline.presentation.figure import Drawing
 from urmpipe_pipeline.text import counted
 
@@ -37,7 +38,7 @@ def drawings(result: NetworkResult) -> Iterator[Drawing]:
         graph_svg(result),
     )
     if svg := mechanism_svg(result):
-        yield Drawing("Mechanism", f"{bodies} of {result.name} from the side, the front and above.", svg)
+        yield Drawing("Mechanism", f"{bodies} of {result.name}, {view_words(motion_plane(result))}.", svg)
     if result.every and len(result.assemblies) > 1:
         alt = f"The assemblies of {result.name} as {len(result.assemblies)} small pictures."
         yield Drawing("Assemblies", alt, gallery_svg(result))

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
-from functools import partial
 from numbers import Integral, Real
 
 from urmpipe_models.display import number_of
 from urmpipe_models.errors import Finding, OptionError, for_each, shown
-from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
 from urmpipe_models.messages import Hint
 from urmpipe_models.networks.assembly import MOST_STARTS, RESTARTS, Assembled, assemble
 from urmpipe_models.networks.findings import Assembly, Mobility
@@ -86,8 +82,8 @@ def find_network(
         NetworkError: If a control is not of the network, or its value out of its range.
     """
     mechanism = mechanism_of(network)
-    read = partial(_control, network)
-    controls = dict(zip(search.controls, for_each(read, search.controls.items()), strict=True))
+    values = for_each(lambda pair: network.control_value(*pair), search.controls.items())
+    controls = dict(zip(search.controls, values, strict=True))
     found = assemble(
         mechanism, controls, every=search.every, restarts=search.restarts, seed=search.seed,
         progress=progress,
@@ -119,24 +115,6 @@ def find_network(
         ),
         provenance=provenance(f"network {command}", options, inputs),
     )
-
-
-def _control(network: Network, given: tuple[str, float | str]) -> float:
-    """Return the value of a control in the units of the network.
-
-    Raises:
-        OptionError: If a text is no number, or its unit is not that of what the control drives by itself.
-    """
-    name, value = given
-    if not isinstance(value, str):
-        return value
-    si, factor = network.unit_of(name) or ("", Decimal(1))
-    own = {unit: in_si / factor for unit, in_si in WRITTEN.get(si, {}).items()} | {"": Decimal(1)}
-    number = quantity(value, own)
-    if not math.isfinite(number):
-        allowed = f"a number, or {NAMES[si].partition(' in ')[0]} with its unit" if si else "a number"
-        raise OptionError(Finding(parameter="controls", found=f"{name} = {value}", allowed=allowed))
-    return number
 
 
 def _warnings(

@@ -10,9 +10,8 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.messages import in_html
 from urmpipe_models.networks.findings import Assembly
 from urmpipe_models.networks.network import Network
-from urmpipe_pipeline.networks.parts_in_space import body_points, parts, placed
+from urmpipe_pipeline.networks.parts_in_space import body_points, find_plane, parts, placed
 from urmpipe_pipeline.networks.result import NetworkResult
-from urmpipe_pipeline.networks.shapes import principal
 from urmpipe_pipeline.networks.sketch import mechanism_pieces
 from urmpipe_pipeline.outlines import Piece, drawn_pieces
 
@@ -20,7 +19,7 @@ SMALL_PX, HEAD_PX, ABREAST = 190.0, 44.0, 5
 """Width and height of a small picture, room for a title, and pictures beside each other."""
 
 AZIMUTHS, ELEVATION = np.radians([-60.0, -40.0, -20.0, 20.0, 40.0, 60.0]), np.radians(28.0)
-"""From where a mechanism that is not flat may be seen in the small pictures: from the front, above."""
+"""From where a mechanism that is not planar may be seen in the small pictures: from the front, above."""
 
 SIDES = 8
 """Sides of what is round: the pictures are small."""
@@ -32,7 +31,8 @@ MOST = 60
 def gallery_svg(result: NetworkResult) -> str:
     """Return each assembly as a small picture with its number, all of one scale and seen from one side."""
     network, every = result.network, result.assemblies[:MOST]
-    look = _look(network, every)
+    plane = find_plane(placed(network, every[0]))
+    look = _look(network, every) if plane is None else plane.axes.T[:2]
     drawn = [list(mechanism_pieces(network, parts(placed(network, one, SIDES)))) for one in every]
     flat = np.concatenate([piece.points @ look.T for pieces in drawn for piece in pieces])
     low, high = flat.min(axis=0), flat.max(axis=0)
@@ -60,7 +60,7 @@ def gallery_svg(result: NetworkResult) -> str:
 
 
 def _look(network: Network, every: Sequence[Assembly]) -> FloatArray:
-    """Return what goes right and up in the small pictures, shape (2, 3): of a flat one from before."""
+    """Return what goes right and up in the small pictures, shape (2, 3), so that most is seen."""
     points = np.concatenate(
         [
             body_points(at, name)
@@ -68,17 +68,9 @@ def _look(network: Network, every: Sequence[Assembly]) -> FloatArray:
             for name in network.body_names
         ]
     )
-    flat, axes = principal(points)
-    if not flat:
-        away = points - points.mean(axis=0)
-        looks = [_from(azimuth) for azimuth in AZIMUTHS.tolist()]
-        return max(looks, key=lambda one: float(np.linalg.svd(away @ one.T, compute_uv=False)[1]))
-    normal = axes[:, 2]
-    up = np.array([0.0, 0.0, 1.0]) if abs(normal[2]) < 0.9 else np.array([0.0, 1.0, 0.0])
-    up = up - (up @ normal) * normal
-    up /= np.linalg.norm(up)
-    right = np.cross(up, normal)
-    return np.array([right if right[int(np.argmax(np.abs(right)))] > 0.0 else -right, up])
+    away = points - points.mean(axis=0)
+    looks = [_from(azimuth) for azimuth in AZIMUTHS.tolist()]
+    return max(looks, key=lambda one: float(np.linalg.svd(away @ one.T, compute_uv=False)[1]))
 
 
 def _from(azimuth: float) -> FloatArray:

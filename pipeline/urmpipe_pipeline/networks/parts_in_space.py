@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -31,6 +30,8 @@ from urmpipe_pipeline.networks.shapes import (
     square,
 )
 from urmpipe_pipeline.palette import DEVIATION_COLOUR, JOINT_COLOURS, NEUTRAL_COLOUR, REFERENCE_COLOUR
+from urmpipe_pipeline.presentation.parts import spot_at
+from urmpipe_pipeline.presentation.scene import PlaneView
 
 GROUND_COLOUR, CONTROL_COLOUR, JOINT_COLOUR, ELEMENT_COLOUR = (
     REFERENCE_COLOUR,
@@ -53,14 +54,23 @@ all as shares of the mechanism's extent."""
 PLANE, LINE, TUBE = 0.3, 0.5, 0.12
 """Width of a plane's piece, lengths of lines and heights of tubes, as shares of the mechanism's extent."""
 
+KNOB = 0.028
+"""Radius of a body with all its joints at one point, such as a slider: it shows around their symbols."""
+
 SEEN_THROUGH, GROUND_OPACITY, HULL_OPACITY = 0.22, 0.4, 0.55
 """Opacity of planes and tubes, of the ground where it is no bar, and of bodies that are no plates."""
+
+PARALLEL = 1e-6
+"""Axes are parallel if the sine of their angle is less: assemblies close to 1e-9."""
 
 SAME = 1e-9
 """Points of a body nearer than this share of the mechanism's extent are one."""
 
 OPEN = 1e-6
 """A joint whose points are further apart, as a share of the mechanism's extent, has a line between them."""
+
+VERTICAL = 0.9
+"""An axis whose z component is larger is vertical: its plane is seen from above."""
 
 PARALLEL = 1e-6  # sine of the angle between the axes of two wheels below which they have pitch circles
 
@@ -126,7 +136,6 @@ class Placed:
 
 def placed(network: Network, assembly: Assembly, sides: int = SIDES) -> Placed:
     """Return where everything is in an assembly, to be drawn with so many sides of what is round."""
-    poses = dict(zip(network.body_names, np.asarray(assembly.poses), strict=True))
     mechanism = mechanism_of(network)
     x = np.array(
         [
@@ -134,12 +143,77 @@ def placed(network: Network, assembly: Assembly, sides: int = SIDES) -> Placed:
             for one in mechanism.variables
         ]
     ).reshape(-1)
-    lengths = tuple(float(one.value) for one in mechanism.lengths(x))
-    unscaled = Placed(network, poses, mechanism.points, lengths, 1.0)
+    lengths = np.array([float(one.value) for one in mechanism.lengths(x)])
+    return placed_at(network, np.asarray(assembly.poses), lengths, sides)
+
+
+def placed_at(network: Network, poses: FloatArray, lengths: FloatArray, sides: int = SIDES) -> Placed:
+    """Return where everything is.
+
+    Args:
+        network: The network.
+        poses: Of the bodies in the order of `Network.body_names`, as matrices [-] and [m], shape
+            (bodies, 4, 4).
+        lengths: Of the elements in [m], shape (elements,).
+        sides: Of what is round.
+    """
+    mechanism, by_name = mechanism_of(network), dict(zip(network.body_names, poses, strict=True))
+    known = tuple(lengths.tolist())
+    unscaled = Placed(network, by_name, mechanism.points, known, 1.0)
     points = np.concatenate([body_points(unscaled, name) for name in network.body_names])
     extent = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
-    extent = extent or max((mechanism.length, *map(abs, lengths)))
-    return Placed(network, poses, mechanism.points, lengths, extent, sides)
+    extent = extent or max((mechanism.length, *map(abs, known)))
+    return Placed(network, by_name, mechanism.points, known, extent, sides)
+
+
+def find_plane(at: Placed) -> PlaneView | None:
+    """Return how a planar linkage is seen along the common axis of its revolute joints; None of others.
+
+    All its axes are parallel, what slides does so perpendicular to them, and elements act in the plane.
+    x goes to the right and z up where they lie in the plane; in the plane of x and y, y goes up.
+    """
+    network = at.network
+    axes = [at.axes(one.bodies[0], one.frames[0])[:, 1] for one in network.joints if one.kind == "revolute"]
+    if not axes or len(mechanism_of(network).graph.roots) > 1:
+        return None
+    normal = axes[0] * np.sign(axes[0][np.argmax(np.abs(axes[0]))])
+    planar = all(_is_planar_joint(at, one, normal) for one in network.joints)
+    if not planar or not all(_is_planar_element(at, one, normal) for one in network.elements):
+        return None
+    normal = normal.round(9) + 0.0  # axes of the ground stay exact, without a negative zero
+    normal /= np.linalg.norm(normal)
+    vertical = np.eye(3)[1 if abs(normal[2]) > VERTICAL else 2]
+    up = vertical - (vertical @ normal) * normal
+    up /= np.linalg.norm(up)
+    right = np.cross(up, normal)
+    right *= np.sign(right[np.argmax(np.abs(right))])
+    return PlaneView(spot_at(right + 0.0), spot_at(up))
+
+
+def _is_planar_joint(at: Placed, joint: Joint, normal: FloatArray) -> bool:
+    """Return whether a joint leaves the planes perpendicular to a unit vector in place."""
+    n = at.axes(joint.bodies[0], joint.frames[0])[:, 1]
+    if joint.kind == "revolute":
+        return bool(np.linalg.norm(np.cross(n, normal)) < PARALLEL)
+    if joint.kind == "prismatic":
+        return bool(abs(n @ normal) < PARALLEL)
+    return joint.kind == "user" and not any(
+        part.names for part in joint.motion
+    )  # two bodies that are fixed to each other
+
+
+def _is_planar_element(at: Placed, element: ConstraintElement, normal: FloatArray) -> bool:
+    """Return whether an element acts in the planes perpendicular to a unit vector."""
+    p, q = (at.point(body, point) for body, point in zip(element.bodies, element.points, strict=True))
+    n = at.direction(element.bodies[0], element.normals[0])
+    match element.kind:
+        case "gg":
+            return bool(abs((q - p) @ normal) < PARALLEL * at.extent)
+        case "eg":
+            return bool(abs(n @ normal) < PARALLEL)
+        case "gc":
+            return bool(np.linalg.norm(np.cross(n, normal)) < PARALLEL)
+    return False
 
 
 def body_points(at: Placed, body: str) -> FloatArray:
@@ -186,7 +260,7 @@ def _body(at: Placed, name: str) -> Part:
         return Part(name, "body", colour, here, (ball(here, DOT * e, at.sides),))
     middle = points.mean(axis=0)
     if len(points) == 1:
-        return Part(name, "body", colour, middle, (ball(middle, 1.5 * DOT * e, at.sides),))
+        return Part(name, "body", colour, middle, (ball(middle, KNOB * e, at.sides),))
     if in_line(points):
         along = (points - middle) @ (points[np.argmax(np.linalg.norm(points - middle, axis=1))] - middle)
         start, end = points[np.argmin(along)], points[np.argmax(along)]
@@ -246,46 +320,60 @@ def _rail(first: FloatArray, second: FloatArray, n: FloatArray, beyond: float) -
 
 def _element(at: Placed, element: ConstraintElement, length: float) -> Part:
     """Return an element: a rod, a plane, two lines, a tube about a line, or a pair."""
-    p, q = (at.point(body, point) for body, point in zip(element.bodies, element.points, strict=True))
     colour, e = CONTROL_COLOUR if is_driven(element) else ELEMENT_COLOUR, at.extent
+    lines = element_lines(at, element, length)
     if element.is_pair:
-        return _pair(at, element, colour)
+        dots = tuple(ball(point, DOT * e, at.sides) for point in lines[0])
+        return Part(element.name, "element", colour, lines[0].mean(axis=0), dots, lines)
+    foot, q = lines[-1]
     n = at.direction(element.bodies[0], element.normals[0])
-    dots = (ball(p, DOT * e, at.sides), ball(q, DOT * e, at.sides))
-
-    def made(where: FloatArray, *pieces: FloatArray, lines: Iterator[FloatArray] | None = None) -> Part:
-        """Return the element with its pieces and lines."""
-        opacity = SEEN_THROUGH if element.kind in ("eg", "gc") else 1.0
-        return Part(element.name, "element", colour, where, pieces, tuple(lines or ()), opacity)
-
+    dots = (ball(foot, DOT * e, at.sides), ball(q, DOT * e, at.sides))
+    where, opacity = foot, SEEN_THROUGH
+    pieces: tuple[FloatArray, ...]
     match element.kind:
         case "gg":
-            return made(0.5 * (p + q), bar(p, q, ROD * e, at.sides), *dots, lines=iter((np.array([p, q]),)))
+            where, pieces, opacity = 0.5 * (foot + q), (bar(foot, q, ROD * e, at.sides), *dots), 1.0
+        case "eg":
+            pieces = (sheet(foot, n, PLANE * e), dots[1])
+        case "gc":
+            radius, height = max(abs(length), ROD * e), TUBE * e * n
+            tube = prism(circle(foot - 0.5 * height, n, radius, at.sides), height)
+            pieces = (tube[2 * (at.sides - 2) :], dots[1])  # one sees into it
+        case _:
+            where, pieces, opacity = 0.5 * (foot + q), (bar(foot, q, ROD * e, at.sides),), 1.0
+    return Part(element.name, "element", colour, where, pieces, lines, opacity)
+
+
+def element_lines(at: Placed, element: ConstraintElement, length: float) -> tuple[FloatArray, ...]:
+    """Return the lines of an element of a length in [m], shape (k, 3) each; the last is what it measures.
+
+    That is from point to point, from the foot in the plane or on the line to the point, or from line to line. Of a
+    pair the first is from joint to joint.
+    """
+    if element.is_pair:
+        return _pair_lines(at, element)
+    p, q = (at.point(body, point) for body, point in zip(element.bodies, element.points, strict=True))
+    n, e = at.direction(element.bodies[0], element.normals[0]), at.extent
+    match element.kind:
+        case "gg":
+            return (np.array([p, q]),)
         case "eg":
             origin = at.poses[element.bodies[0]][:3, 3]
             foot = q - (float(n @ (q - origin)) - length) * n
-            plane = sheet(foot, n, PLANE * e)
-            rim = square(foot, n, PLANE * e)
-            return made(foot, plane, dots[1], lines=iter((rim[[0, 1, 2, 3, 0]], np.array([foot, q]))))
+            return (square(foot, n, PLANE * e)[[0, 1, 2, 3, 0]], np.array([foot, q]))
         case "gc":
             nearest = p + float(n @ (q - p)) * n
-            radius, height = max(abs(length), ROD * e), TUBE * e * n
-            tube = prism(circle(nearest - 0.5 * height, n, radius, at.sides), height)
-            wall = tube[2 * (at.sides - 2) :]  # one sees into it
-            return made(
-                nearest, wall, dots[1], lines=iter((_around(p, nearest, n, e), np.array([nearest, q])))
-            )
+            return (_around(p, nearest, n, e), np.array([nearest, q]))
     other = at.direction(element.bodies[1], element.normals[1])
     feet = _nearest(p, n, q, other)
-    lines = [_around(p, foot, axis, e) for p, foot, axis in ((p, feet[0], n), (q, feet[1], other))]
-    return made(feet.mean(axis=0), bar(feet[0], feet[1], ROD * e, at.sides), lines=iter((*lines, feet)))
+    return (_around(p, feet[0], n, e), _around(q, feet[1], other, e), feet)
 
 
-def _pair(at: Placed, pair: ConstraintElement, colour: str) -> Part:
-    """Return a pair: a line between its joints, and the pitch circles of a gear or a pinion about them."""
+def _pair_lines(at: Placed, pair: ConstraintElement) -> tuple[FloatArray, ...]:
+    """Return the line between the joints of a pair, and the pitch circles of a gear or a pinion about them."""
     first, second = (joint for joint, _ in at.network.coupled(pair))
     p, q = at.point(first.bodies[0], first.frames[0].translation), _joint(at, second).at
-    axes = [at.axes(one.bodies[0], one.frames[0])[:, 1] for one in (first, second)]
+    axes = [at.axes(joint.bodies[0], joint.frames[0])[:, 1] for joint in (first, second)]
     lines = [np.array([p, q])]
     if pair.kind == "rack":
         lines.append(_ring(p, axes[0], abs(pair.radius), at.sides))
@@ -294,8 +382,7 @@ def _pair(at: Placed, pair: ConstraintElement, colour: str) -> Part:
         module = float(np.linalg.norm(across)) / (abs(sum(pair.teeth)) or 1.0)
         for centre, teeth in ((p, pair.teeth[0]), (p + across, pair.teeth[1])):
             lines.append(_ring(centre, axes[0], module * abs(teeth), at.sides))
-    dots = tuple(ball(one, DOT * at.extent, at.sides) for one in (p, q))
-    return Part(pair.name, "element", colour, 0.5 * (p + q), dots, tuple(lines))
+    return tuple(lines)
 
 
 def _ring(centre: FloatArray, n: FloatArray, radius: float, sides: int) -> FloatArray:

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from urmpipe_models.networks.findings import Assembly
 from urmpipe_pipeline.networks.drives import Tie, drive_words, ties
-from urmpipe_pipeline.networks.parts_in_space import CONTROL_COLOUR, OPEN_COLOUR, Part, Placed, parts, placed
+from urmpipe_pipeline.networks.parts_in_space import (
+    CONTROL_COLOUR,
+    OPEN_COLOUR,
+    Part,
+    Placed,
+    find_plane,
+    parts,
+    placed,
+)
 from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.palette import GHOST_COLOURS
 from urmpipe_pipeline.presentation.figure import SpaceFigure
 from urmpipe_pipeline.presentation.parts import spot_at
-from urmpipe_pipeline.presentation.scene import Scene, Solid
+from urmpipe_pipeline.presentation.scene import PlaneView, Scene, Solid
 
 MANY, FEW = 7, 3
 """Further assemblies that are all seen at first; of more, so many are, and the others can be switched on."""
@@ -40,7 +48,7 @@ GROUPS = {"body": "bodies", "joint": "joints", "element": "elements"}
 def scene(result: NetworkResult) -> Scene | None:
     """Return a network in space; None where nothing was found of it."""
     found = tuple(solids(result))
-    return Scene(title(result), solids=found) if found else None
+    return Scene(title(result), solids=found, plane=motion_plane(result)) if found else None
 
 
 def space_figure(result: NetworkResult) -> Iterator[SpaceFigure]:
@@ -53,8 +61,28 @@ def space_figure(result: NetworkResult) -> Iterator[SpaceFigure]:
     caption += " Crimson: a joint whose bodies do not meet." if result.gaps else ""
     caption += " Faint: further assemblies, which the legend switches." if others > 0 else ""
     alt = f"{result.name} in three dimensions, {len(result.network.body_names)} bodies."
-    found = (replace(one, label="" if one.group == "ghosts" else one.label) for one in solids(result))
-    yield SpaceFigure("In space", caption, alt, solids=tuple(found))
+    shown_solids = [
+        replace(solid, label="" if solid.group == "ghosts" else solid.label) for solid in solids(result)
+    ]
+    yield SpaceFigure(
+        "In space", caption, alt, solids=joined_labels(shown_solids), plane=motion_plane(result)
+    )
+
+
+def joined_labels(labelled: Sequence[Solid]) -> tuple[Solid, ...]:
+    """Return solids, the labels of those at the same place as one label of the first: "slider, B, s"."""
+    places = [tuple(np.round(solid.at, 6).tolist()) for solid in labelled]
+    labels: dict[tuple[float, ...], list[str]] = {}
+    for solid, place in zip(labelled, places, strict=True):
+        labels.setdefault(place, []).extend([solid.label] if solid.label else [])
+    joined = [", ".join(labels.pop(place, ())) for place in places]
+    return tuple(replace(solid, label=words) for solid, words in zip(labelled, joined, strict=True))
+
+
+def motion_plane(result: NetworkResult) -> PlaneView | None:
+    """Return the plane in which it moves; None if it is not planar."""
+    shown = shown_assembly(result)
+    return None if shown is None else find_plane(placed(result.network, shown))
 
 
 def title(result: NetworkResult) -> str:
@@ -75,13 +103,18 @@ def solids(result: NetworkResult) -> Iterator[Solid]:
     shown = shown_assembly(result)
     if shown is None:
         return
-    at, network = placed(result.network, shown), result.network
-    owners = ties(network)
-    for part in parts(at):
-        yield _solid(part, owners.get(part.name) if part.kind != "body" else None)
+    network = result.network
+    yield from part_solids(placed(network, shown))
     many = len(result.assemblies) - 1 > MANY
     for number, other in enumerate(result.assemblies[1 : MOST + 1]):
         yield _ghost(placed(network, other, SIDES), number, hidden=many and number >= FEW)
+
+
+def part_solids(at: Placed) -> Iterator[Solid]:
+    """Yield the bodies, elements and joints of an assembly."""
+    owners = ties(at.network)
+    for part in parts(at):
+        yield _solid(part, owners.get(part.name) if part.kind != "body" else None)
 
 
 def _solid(part: Part, owner: Tie | None) -> Solid:

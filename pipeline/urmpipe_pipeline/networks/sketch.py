@@ -1,4 +1,4 @@
-"""A mechanism as SVG in three projections, and the pieces that any drawing of it is made of."""
+"""A mechanism as SVG: a planar one in its plane, others in three projections; the pieces of any drawing."""
 
 from __future__ import annotations
 
@@ -6,17 +6,27 @@ from collections.abc import Iterator, Sequence
 
 from urmpipe_models.networks.network import Network
 from urmpipe_pipeline.networks.drives import Tie, drive_words, is_driven, ties
-from urmpipe_pipeline.networks.parts_in_space import CONTROL_COLOUR, OPEN_COLOUR, Part, parts, placed
+from urmpipe_pipeline.networks.parts_in_space import (
+    CONTROL_COLOUR,
+    OPEN_COLOUR,
+    Part,
+    find_plane,
+    parts,
+    placed,
+)
 from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.networks.scene import shown_assembly, title
 from urmpipe_pipeline.outlines import Piece
 from urmpipe_pipeline.palette import INK_COLOUR
 from urmpipe_pipeline.presentation.parts import spot_at
-from urmpipe_pipeline.presentation.scene import Spot
-from urmpipe_pipeline.projections import ABOVE, FRONT, SIDEWAYS, Sketch, projected
+from urmpipe_pipeline.presentation.scene import PlaneView, Spot
+from urmpipe_pipeline.projections import ABOVE, FRONT, SIDEWAYS, Sketch, projected, projected_along
 
 NAMED = 24
 """Bodies and joints up to which each has its name in the projections."""
+
+TURNING = ("revolute", "global")
+"""Joints that are drawn after those that slide, whose symbols are larger: a pin shows on its slider."""
 
 JOINT_EDGE, JOINT_FILL, BALL_FILL, DRIVEN_FILL, ELEMENT_EDGE = (
     "#303a42",
@@ -29,21 +39,34 @@ JOINT_EDGE, JOINT_FILL, BALL_FILL, DRIVEN_FILL, ELEMENT_EDGE = (
 
 
 def mechanism_svg(result: NetworkResult) -> str:
-    """Return the first assembly, or what comes nearest to one, in three projections."""
+    """Return the first assembly, or what comes nearest to one, in its plane or in three projections."""
     shown = shown_assembly(result)
     if shown is None:
         return ""
-    found = parts(placed(result.network, shown))
+    at = placed(result.network, shown)
+    found = parts(at)
     sketch = Sketch(
-        pieces=list(mechanism_pieces(result.network, found)), names=list(_names(result.network, found))
+        pieces=list(mechanism_pieces(result.network, found)), names=list(part_names(result.network, found))
     )
-    return projected(sketch, (SIDEWAYS, FRONT, ABOVE), title(result))
+    return sketch_svg(sketch, find_plane(at), title(result))
+
+
+def sketch_svg(sketch: Sketch, plane: PlaneView | None, heading: str) -> str:
+    """Return a sketch along the normal of a plane, or in three projections if there is none."""
+    if plane is None:
+        return projected(sketch, (SIDEWAYS, FRONT, ABOVE), heading)
+    return projected_along(sketch, plane, heading)
+
+
+def view_words(plane: PlaneView | None) -> str:
+    """Return from where a mechanism is seen: "seen along z"."""
+    return "from the side, the front and above" if plane is None else f"seen along {plane.axis_names[2]}"
 
 
 def mechanism_pieces(network: Network, found: Sequence[Part]) -> Iterator[Piece]:
     """Yield what is drawn of each part: bodies in their colours, elements dashed, joints before both."""
     owners = ties(network)
-    for part in found:
+    for part in sorted(found, key=lambda part: part.kind == "joint" and owners[part.name].kind in TURNING):
         if part.kind == "body":
             for piece in part.pieces:
                 opacity = 0.75 if part.opacity == 1.0 else part.opacity
@@ -67,7 +90,7 @@ def _joint(part: Part, joint: Tie) -> Iterator[Piece]:
     yield from (Piece(one.reshape(-1, 3), edge, 1.6, fill, front=True) for one in part.pieces)
 
 
-def _names(network: Network, found: Sequence[Part]) -> Iterator[Spot]:
+def part_names(network: Network, found: Sequence[Part]) -> Iterator[Spot]:
     """Yield the names of joints, bodies and elements; of many parts only those of bodies."""
     owners, few = ties(network), len(found) <= NAMED
     for part in sorted(found, key=lambda one: one.kind != "joint"):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.presentation.scene import Arrows, BoolArray, Path, Sheets, Solid, Spot
+from urmpipe_pipeline.presentation.scene import Arrows, BoolArray, Path, PlaneView, Sheets, Solid, Spot
 
 Shape: TypeAlias = Literal["up", "down", "cross", "diamond"]
 
@@ -189,6 +189,7 @@ class SpaceFigure:
         sheets: Flat pieces of planes, None for none.
         solids: Bodies.
         folded: Whether a page opens it only on request.
+        plane: The view along the normal of a planar mechanism; None for the general one.
     """
 
     title: str
@@ -200,6 +201,7 @@ class SpaceFigure:
     sheets: Sheets | None = None
     solids: tuple[Solid, ...] = ()
     folded: bool = False
+    plane: PlaneView | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy import bool_
@@ -12,9 +12,42 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.elementwise import Element
+from urmpipe_models.elementwise import Element, Vector
+from urmpipe_models.orientation import matrices
 
 BoolArray: TypeAlias = NDArray[bool_]
+
+
+class PlaneView(NamedTuple):
+    """A view along the normal of a plane.
+
+    Attributes:
+        right: Direction that goes to the right, a unit vector [-].
+        up: Direction that goes up, a unit vector [-], perpendicular to `right`.
+    """
+
+    right: Vector
+    up: Vector
+
+    @property
+    def axes(self) -> FloatArray:
+        """The directions to the right, up and towards the viewer as columns [-], shape (3, 3)."""
+        right, up = np.array([self.right, self.up], np.float64)
+        return np.column_stack((right, up, np.cross(right, up)))
+
+    @property
+    def axis_names(self) -> tuple[str, str, str]:
+        """What these directions are called: x, y, z with their sign, others by their components."""
+        right, up, normal = self.axes.T
+        normal = normal * np.sign(normal[np.argmax(np.abs(normal))])  # a view has no direction by its name
+        return _direction_name(right), _direction_name(up), _direction_name(normal)
+
+
+def _direction_name(direction: FloatArray) -> str:
+    largest = int(np.argmax(np.abs(direction)))
+    if abs(direction[largest]) > 1.0 - 1e-9:
+        return ("-" if direction[largest] < 0.0 else "") + "xyz"[largest]
+    return f"({', '.join(f'{part:.3g}' for part in (direction + 0.0).tolist())})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,8 +190,28 @@ class Balls:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """The pose of a frame over time.
+
+    Attributes:
+        position: Origin in [m], shape (n, 3).
+        quat_xyzw: Orientation as unit quaternions [-], shape (n, 4).
+        t_ns: Times in [ns], shape (n,).
+    """
+
+    position: FloatArray
+    quat_xyzw: FloatArray
+    t_ns: IntArray
+
+    def points(self, points: FloatArray) -> FloatArray:
+        """Return points of the frame in [m], shape (k, 3), over time in [m], shape (n, k, 3)."""
+        turned = np.einsum("nij,kj->nki", matrices(self.quat_xyzw), points)
+        return np.asarray(turned + self.position[:, np.newaxis])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """A thing that does not move, as its surface, with lines on and about it.
+    """A thing as its surface, with lines on and about it.
 
     Attributes:
         group: What it belongs to, such as bodies: the viewer's tree has it below that.
@@ -171,6 +224,8 @@ class Solid:
         at: Where that is written, x, y, z in [m].
         legend: What a page's legend calls it; solids that share it are one entry.
         hidden: Whether it is there to be switched on only.
+        motion: Pose of its frame over time, in which triangles, lines and `at` are then; None if it does not
+            move.
     """
 
     group: str
@@ -183,11 +238,40 @@ class Solid:
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
     legend: str = ""
     hidden: bool = False
+    motion: Motion | None = None
 
     @property
     def points(self) -> FloatArray:
-        """Its corners and vertices in [m], shape (n, 3)."""
-        return np.concatenate([self.triangles.reshape(-1, 3), *self.lines])
+        """Its corners and vertices in [m], shape (n, 3); if it moves, those of its box at all times."""
+        points = np.concatenate([self.triangles.reshape(-1, 3), *self.lines])
+        if self.motion is None or not len(points):
+            return points
+        low, high = points.min(axis=0), points.max(axis=0)
+        corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
+        return self.motion.points(low + corners * (high - low)).reshape(-1, 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MovingLines:
+    """Lines whose points move, such as a rod between two bodies.
+
+    Attributes:
+        group: What they belong to, such as elements.
+        name: What they are called there, unique within the group.
+        colour: As #rrggbb.
+        lines: Points of each line over time in [m], shape (n, k, 3) each.
+        t_ns: Times in [ns], shape (n,).
+        radius: Of the lines in [m]; 0 for thin lines.
+        label: What is written in the middle of the first line; empty for nothing.
+    """
+
+    group: str
+    name: str
+    colour: str
+    lines: tuple[FloatArray, ...]
+    t_ns: IntArray
+    radius: float = 0.0
+    label: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,7 +322,9 @@ class Scene:
         targets: What was asked for, if it was poses.
         arrows: What is drawn at places, at all times.
         balls: What is drawn about places, at all times.
-        solids: Things that do not move.
+        solids: Bodies and other things, at rest or moving.
+        moving_lines: Lines whose points move.
+        plane: The view along the normal of a planar mechanism; None for the general one.
     """
 
     title: str = ""
@@ -249,6 +335,8 @@ class Scene:
     arrows: Arrows | None = None
     balls: Balls | None = None
     solids: tuple[Solid, ...] = ()
+    moving_lines: tuple[MovingLines, ...] = ()
+    plane: PlaneView | None = None
 
 
 def ball_sizes(masses: Sequence[Element]) -> FloatArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,8 @@ from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.palette import VALUE_SCALE
 from urmpipe_pipeline.presentation.figure import SpaceFigure
 from urmpipe_pipeline.presentation.layout import LIMITED_SCALE, value_scales
-from urmpipe_pipeline.presentation.scene import Arrows, Path, Sheets, Solid, Spot
+from urmpipe_pipeline.presentation.parts import spot_at
+from urmpipe_pipeline.presentation.scene import Arrows, Path, PlaneView, Sheets, Solid, Spot
 from urmpipe_pipeline.report.spec import Figure, Spec, base_layout, space_axis, typed
 from urmpipe_pipeline.report.traces import label
 
@@ -43,6 +45,11 @@ BACK_PX, FRONT_PX, VALUES_PX = 2, 5, 6
 """Width of a path: of those in the back, of the one in front, and of one that its values colour."""
 
 
+PLANE_SIZE, PLANE_DISTANCE, PLANE_CENTRE, PLANE_TILT = 1.75, 1.9, -0.1, 0.25
+"""Of a planar mechanism: its longest axis, how far away the eye is, and what it looks at above the middle, in
+lengths of the scene; the angle between the eye and the normal in [rad]."""
+
+
 def drawn_space(figure: SpaceFigure) -> Figure:
     """Return paths, places and solids in space."""
     lined = any(path.line for path in figure.paths)
@@ -57,13 +64,13 @@ def drawn_space(figure: SpaceFigure) -> Figure:
     if figure.sheets is not None and len(figure.sheets.corners):
         traces = [*_sheets(figure.sheets), *traces]
         places.append(figure.sheets.corners.reshape(-1, 3))
-    traces += _solids(figure.solids)
+    traces += _solids(_lifted(figure))
     places += [one.points for one in figure.solids if not one.hidden]
     return Figure(
         figure.title,
         figure.caption,
         figure.alt,
-        _scene([*traces, *_spots(figure.spots)], places),
+        _scene([*traces, *_spots(figure.spots)], places, figure.plane),
         SCENE_PX,
         space=True,
         folded=figure.folded,
@@ -150,6 +157,16 @@ def _sheets(sheets: Sheets) -> Iterator[Spec]:
     yield _in_space(closed.reshape(-1, 3)) | shared | style
 
 
+def _lifted(figure: SpaceFigure) -> tuple[Solid, ...]:
+    """Return solids; those of a planar mechanism have their words before them, where none hides them."""
+    if figure.plane is None or not figure.solids:
+        return figure.solids
+    normal = figure.plane.axes[:, 2]
+    front = max(float((one.points @ normal).max()) for one in figure.solids if len(one.points))
+    places = (np.array(one.at) + (front - np.array(one.at) @ normal) * normal for one in figure.solids)
+    return tuple(replace(one, at=spot_at(place)) for one, place in zip(figure.solids, places, strict=True))
+
+
 def _solids(solids: tuple[Solid, ...]) -> Iterator[Spec]:
     """Yield solids with their lines and words; those of one entry of the legend are switched together."""
     told: set[str] = set()
@@ -221,19 +238,35 @@ def _in_space(position: FloatArray) -> Spec:
     return {"type": "scatter3d", "x": x, "y": y, "z": z}
 
 
-def _scene(traces: list[Spec], positions: list[FloatArray]) -> Spec:
+def _scene(traces: list[Spec], positions: list[FloatArray], plane: PlaneView | None) -> Spec:
     """Return a scene with equal scale on all axes; around slim paths in [m], all axes are equally long."""
     axes = {f"{name}axis": space_axis(f"{name} [m]") for name in "xyz"}
     scene = axes | {"aspectmode": "data", "camera": CAMERA}
     every = np.concatenate([np.empty((0, 3)), *positions])
     known = every[np.isfinite(every).all(axis=1)]
-    if len(known) and _slim(low := known.min(axis=0), high := known.max(axis=0)):
-        half = max(float((high - low).max()) / 2.0 * (1.0 + AROUND), CLOSEST)
-        for name, middle in zip("xyz", ((low + high) / 2.0).tolist(), strict=True):
-            axes[f"{name}axis"]["range"] = [middle - half, middle + half]
-        scene["aspectmode"] = "cube"
+    low, high = (known.min(axis=0), known.max(axis=0)) if len(known) else (np.zeros(3), np.zeros(3))
+    half = np.maximum((high - low) / 2.0 * (1.0 + AROUND), CLOSEST)
+    if plane is not None:  # plotly.js would enlarge what is flat beyond the view
+        shape = dict(zip("xyz", (PLANE_SIZE * half / half.max()).tolist(), strict=True))
+        scene |= {"aspectmode": "manual", "aspectratio": shape, "camera": _camera(plane)}
+        across = "xyz"[int(np.argmax(np.abs(plane.axes[:, 2])))]
+        axes[f"{across}axis"] |= {"showticklabels": False, "title": {"text": ""}}  # seen from its end
+    elif len(known) and _slim(low, high):
+        half, scene["aspectmode"] = np.full(3, half.max()), "cube"
+    if scene["aspectmode"] != "data":
+        for name, middle, around in zip("xyz", (low + high) / 2.0, half, strict=True):
+            axes[f"{name}axis"]["range"] = [float(middle - around), float(middle + around)]
     layout = base_layout() | {"scene": scene, "margin": {"l": 0, "r": 0, "t": 0, "b": 56}}
     return {"data": traces, "layout": layout}
+
+
+def _camera(plane: PlaneView) -> Spec:
+    """Return a camera that looks along the normal of a plane, a little from above or from the front."""
+    _, up, normal = plane.axes.T
+    tilt = PLANE_TILT if up[2] > 0.5 else -PLANE_TILT
+    eye = PLANE_DISTANCE * (np.cos(tilt) * normal + np.sin(tilt) * up)
+    places = {"eye": eye, "up": up, "center": PLANE_CENTRE * up}  # the numbers of an axis stand below
+    return {name: dict(zip("xyz", place.tolist(), strict=True)) for name, place in places.items()}
 
 
 def _slim(low: FloatArray, high: FloatArray) -> bool:

@@ -41,7 +41,7 @@ def write_joint_log(
     value of a joint is left out, and the others keep their times.
 
     Args:
-        part: Where to write it, as `guarded_output` gives it for the kind "joints" or "plan".
+        part: Where to write it, as `guarded_output` gives it for the kind "joints", "plan" or "motion".
         path: The name it is to have, for messages.
         joints: Names of the joints, in the robot's order; none for a path alone.
         units: Of each: rad or m.
@@ -50,7 +50,7 @@ def write_joint_log(
         t_ns: Times in integer [ns], shape (n,); None writes no time.
         position: Of the tool centre point in [m], shape (n, 3); None writes none.
         quat_xyzw: Its orientation as unit quaternions [-], shape (n, 4); None writes none.
-        row_column: Name of the last column: `TARGET_ROW`, or `PATH_ROW` of a plan.
+        row_column: Name of the last column: `TARGET_ROW`, `PATH_ROW` of a plan, or `MOTION_ROW` of a network.
 
     Returns:
         How many rows were written.

@@ -44,6 +44,8 @@ def shipped_unit(name: str) -> Unit:
         options = {"robot": with_drives(with_masses(load_robot("urm6")))}
     elif name == "repolarizer":
         options = {"joints": 6}
+    elif name == "network_motion":
+        options = {"network": "four-bar"}
     return make_unit(name, **options)
 
 

@@ -139,6 +139,7 @@ def test_a_failed_build_leaves_the_file_that_was_there(make: Make, tmp_path: Pat
 OPTIONS: dict[str, dict[str, Any]] = {
     "kinematic_chain": {"robot": load_robot("urm6"), "rates": True},
     "repolarizer": {"joints": 6},
+    "network_motion": {"network": "rssr", "points": ["output:0.25,0.04,0"]},
     "chain_dynamics": {"robot": with_drives(with_masses(load_robot("urm6")))},
     "driven_arm": {"robot": with_drives(with_masses(load_robot("urm6")))},
 }

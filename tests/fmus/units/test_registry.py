@@ -28,6 +28,7 @@ def test_the_options_told_are_the_arguments_taken_and_a_unit_has_its_own_name() 
         "log_source": {"table": TABLE, "columns": [["q", "rad", 2]]},
         "chain_dynamics": {"robot": ARM},
         "driven_arm": {"robot": ARM},
+        "network_motion": {"network": "four-bar"},
     }
     for name in unit_names():
         module = importlib.import_module(f"urmpipe_fmus.units.{name}")
@@ -50,6 +51,7 @@ def test_a_unit_made_again_by_its_recipe_is_the_same_bit_by_bit(robot: str) -> N
         make_unit("chain_dynamics", robot=with_masses(load_robot(robot))),
         make_unit("driven_arm", robot=with_drives(with_masses(load_robot(robot)))),
         make_unit("repolarizer", joints=3),
+        make_unit("network_motion", network="rccc", points={"tip": {"body": "c3.body", "point": [0, 1, 0]}}),
         make_unit("delta_meter"),
         make_unit("log_source", table=TABLE, columns=[["q", "rad"], ["d", "m", None, "a way"]]),
     ):

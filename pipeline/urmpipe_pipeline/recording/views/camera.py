@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.presentation.scene import PlaneView
 
 EYE = np.array([0.62, -0.66, 0.42]) / np.linalg.norm([0.62, -0.66, 0.42])
 """The way from the middle of the scene to the eye [-]: from the front right, a little above."""
@@ -15,11 +16,27 @@ FIELD_OF_VIEW, FILLED, WIDE = np.radians(55.0), 0.85, 1.2
 Eye::DEFAULT_FOV_Y), the share of it that the scene fills, and how wide a view is at least, in heights."""
 
 
-def seen(points: FloatArray) -> FloatArray:
+TILT = np.radians(20.0)
+"""Angle between the eye and the normal of a planar mechanism in [rad]: depth shows, and lengths keep 94 %."""
+
+
+def eye_axes(plane: PlaneView | None = None) -> FloatArray:
+    """Return the directions to the right, upwards and towards the eye as columns [-], shape (3, 3).
+
+    Of a plane, the eye is turned from its normal towards the side from which other scenes are seen.
+    """
+    if plane is None:
+        right = np.cross((0.0, 0.0, 1.0), EYE)
+        right /= np.linalg.norm(right)
+        return np.column_stack((right, np.cross(EYE, right), EYE))
+    right, up, normal = plane.axes.T
+    eye = np.cos(TILT) * normal + np.sin(TILT) * np.sign(EYE @ up) * up
+    return np.column_stack((right, np.cross(eye, right), eye))
+
+
+def seen(points: FloatArray, plane: PlaneView | None = None) -> FloatArray:
     """Return how far points in [m], shape (..., 3), lie to the right, upwards and towards the eye in [m]."""
-    right = np.cross((0.0, 0.0, 1.0), EYE)
-    right /= np.linalg.norm(right)
-    return np.asarray(points @ np.column_stack((right, np.cross(EYE, right), EYE)))
+    return np.asarray(points @ eye_axes(plane))
 
 
 def eye_distance(points: FloatArray) -> float:

@@ -16,7 +16,17 @@ from urmpipe_models.dynamics.over_log import mass_centres_over_log
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_models.orientation import matrices
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, rgb
-from urmpipe_pipeline.presentation.scene import Arm, ArmMark, Arrows, Balls, Path, Scene, Solid, Targets
+from urmpipe_pipeline.presentation.scene import (
+    Arm,
+    ArmMark,
+    Arrows,
+    Balls,
+    MovingLines,
+    Path,
+    Scene,
+    Solid,
+    Targets,
+)
 from urmpipe_pipeline.recording.views.label_places import name_places, placed_names
 from urmpipe_pipeline.recording.views.shapes import Body, bodies_over_log, opaque, own_shapes
 from urmpipe_pipeline.recording.views.tracks import (
@@ -284,6 +294,7 @@ def extent(
     arrows: Arrows | None = None,
     balls: Balls | None = None,
     solids: Sequence[Solid] = (),
+    moving_lines: Sequence[MovingLines] = (),
 ) -> FloatArray:
     """Return every point that is to be in view in [m], shape (n, 3); the origin if there is none.
 
@@ -298,6 +309,7 @@ def extent(
         reach = balls.radius[:, np.newaxis]
         points += [balls.centre - reach, balls.centre + reach]
     points += [one.points for one in solids if not one.hidden]
+    points += [line.reshape(-1, 3) for lines in moving_lines for line in lines.lines]
     points += [ends.reshape(-1, 3) for ghost in ghosts for ends in (ghost.start, ghost.end)]
     if targets is not None:
         points.append(targets.reached)

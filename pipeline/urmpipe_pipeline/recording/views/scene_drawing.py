@@ -21,7 +21,7 @@ from urmpipe_pipeline.palette import (
 )
 from urmpipe_pipeline.presentation.scene import ArmMark, Arrows, Balls, Scene, Spot, ball_sizes
 from urmpipe_pipeline.recording.sending import ROOT, keys, shown_path, times_at
-from urmpipe_pipeline.recording.views.camera import EYE, eye_distance, seen
+from urmpipe_pipeline.recording.views.camera import eye_axes, eye_distance, seen
 from urmpipe_pipeline.recording.views.geometry import (
     DrawnArm,
     DrawnGhost,
@@ -79,9 +79,9 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
     ghosts = drawn_ghosts(scene.arms)
     paths = [drawn_path(path) for path in scene.paths]
     targets = None if scene.targets is None else drawn_targets(scene.targets)
-    if arm is None and not (paths or ghosts or targets is not None or scene.solids):
+    if arm is None and not (paths or ghosts or targets is not None or scene.solids or scene.moving_lines):
         return None
-    points = extent(arm, ghosts, paths, targets, scene.arrows, scene.balls, scene.solids)
+    points = extent(arm, ghosts, paths, targets, scene.arrows, scene.balls, scene.solids, scene.moving_lines)
     size = ball(points)[1]
     stream.log(ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     labelled = [one for one in scene.arms if one.label]
@@ -108,8 +108,8 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
     if arm is not None:
         inside = arm.masses.size > 0 or (arm.shows_joints and len(ghosts) > 0)
         _draw_arm(stream, arm, size, lifts[len(spots) :], seen_through=inside)
-    hidden = draw_solids(stream, scene.solids, THREAD * size)
-    return _view(scene.title, points, hidden)
+    hidden = draw_solids(stream, scene, size, THREAD * size)
+    return _view(scene, points, hidden)
 
 
 def _label_lifts(arm: DrawnArm | None, spots: Sequence[Spot], opens_at_ns: int, line: float) -> FloatArray:
@@ -134,17 +134,19 @@ def _label_lifts(arm: DrawnArm | None, spots: Sequence[Spot], opens_at_ns: int, 
     return lifts / raised
 
 
-def _view(title: str, points: FloatArray, hidden: Sequence[str]) -> Spatial3DView:
+def _view(scene: Scene, points: FloatArray, hidden: Sequence[str]) -> Spatial3DView:
     """Return the view, its eye so that it sees points in [m], shape (n, 3); some entities are hidden."""
     import rerun.blueprint as rrb
 
     centre, size = ball(points)
-    position = centre + max(size, eye_distance(seen(points - centre))) * EYE
-    eye = rrb.EyeControls3D(position=position, look_target=centre, eye_up=(0.0, 0.0, 1.0))
+    plane = scene.plane
+    distance = max(size, eye_distance(seen(points - centre, plane)))
+    position, up = centre + distance * eye_axes(plane)[:, 2], (0.0, 0.0, 1.0) if plane is None else plane.up
+    eye = rrb.EyeControls3D(position=position, look_target=centre, eye_up=up)
     return rrb.Spatial3DView(
         origin=ROOT,
         contents=shown_path("scene") + "/**",
-        name=encodable(title),
+        name=encodable(scene.title),
         eye_controls=eye,
         overrides={entity: [rrb.EntityBehavior(visible=False)] for entity in hidden},
     )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.orientation import FORMS, NAMES, width
 from urmpipe_pipeline.joint_log import ROLES, Inference
-from urmpipe_pipeline.outputs import PATH_ROW, TARGET_ROW
+from urmpipe_pipeline.outputs import MOTION_ROW, PATH_ROW, TARGET_ROW
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.columns.roles import (
     Roles,
@@ -24,15 +24,15 @@ TOOL = ("x", "y", "z")
 
 
 def own_joints(columns: Sequence[Column]) -> tuple[Column, ...]:
-    """Return the joints: the columns with a unit of joints, but for the tool of a plan.
+    """Return the joints: the columns with a unit of joints, but for the tool of a plan or the traced point of a motion.
 
     What stands behind the rows of targets or path was added by somebody else.
     """
-    rows = [column for column in columns if column.header in (TARGET_ROW, PATH_ROW)]
+    rows = [column for column in columns if column.header in (TARGET_ROW, PATH_ROW, MOTION_ROW)]
     before = columns[: columns.index(rows[0])] if rows else columns
     sized = tuple(one for one in before if one.unit and one.unit.quantity in ("angle", "length"))
     tool = tuple(one.key.removeprefix("tcp_") for one in sized[-len(TOOL) :])
-    planned = any(column.header == PATH_ROW for column in rows)
+    planned = any(column.header in (PATH_ROW, MOTION_ROW) for column in rows)
     return sized[: -len(TOOL)] if planned and tool == TOOL else sized
 
 

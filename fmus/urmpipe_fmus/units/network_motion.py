@@ -1,0 +1,365 @@
+"""The motion of a kinematic network as a unit: its controls in, its joints and points out."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from urmpipe_fmus.unit import Recipe, Unit
+from urmpipe_fmus.units.options import whole_number
+from urmpipe_fmus.values import Values
+from urmpipe_fmus.variable import Input, Memory, Output, Variable
+from urmpipe_models.elementwise import Element, Vector
+from urmpipe_models.errors import UnitError, shown
+from urmpipe_models.files.tables import are_numbers
+from urmpipe_models.measure_units import read_quantity
+from urmpipe_models.names import not_among
+from urmpipe_models.networks.assembly import assemble
+from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.network import Network
+from urmpipe_models.networks.network_file import load_network
+from urmpipe_models.networks.network_tables import network_tables, with_start
+from urmpipe_models.networks.newton import changes, close_network, largest_residual, predict_variables
+from urmpipe_models.networks.parts import POSE_UNITS
+
+OPTIONS: Mapping[str, str] = {
+    "network": "a kinematic network: a name of the catalogue, or a .toml file",
+    "controls": 'start values of controls, such as { crank = "40deg" } (default: those of the network)',
+    "start": "joint values, in rad and m or with units, to which the assembly at the start is the nearest",
+    "points": 'points of bodies in m whose places are outputs, such as ["coupler:0.45,0.1,0"]',
+    "newton": "Newton steps per evaluation (default: 3)",
+}
+
+NEWTON = 3  # 100 values of the control per turn: within 3e-10 rad of what is closed; 2 steps: 2e-5 rad
+
+DISPLAY = {"rad": "deg", "m": "mm", "": ""}
+
+LAST = ("control_values", "free_variables")
+CHANGES = ("control_changes", "free_changes")
+"""The memories: of controls and of free variables, in the order of the variables of a mechanism."""
+
+
+def network_motion(
+    network: Network | str | Path | Mapping[str, Any],
+    *,
+    controls: Mapping[str, float | str] | None = None,
+    start: Mapping[str, Any] | None = None,
+    points: Mapping[str, Any] | Sequence[str] | str | None = None,
+    newton: int = NEWTON,
+) -> Unit:
+    """Return the unit that computes how a network follows its controls.
+
+    Inputs are the controls that can be set: in [rad] or [m] if a control is an angle or a length, else the
+    number that its functions take. They have no limits, as the joints of `kinematic_chain` have none. Outputs
+    are the variables of joints and of bodies without joints to the ground, points, and the residual.
+
+    Args:
+        network: The network, its name, its file or its tables.
+        controls: Start values of inputs, as `network check --set` takes them.
+        start: Values of joints by name, in [rad] and [m] or texts with units; a list for several variables.
+        points: Names with {"body": name, "point": [x, y, z]} in [m] of the body; or texts "BODY:X,Y,Z",
+            whose names are p1, p2, ...
+        newton: Newton steps per evaluation.
+
+    Raises:
+        UnitError: With everything that is wrong with the options, or if the start does not assemble.
+        NetworkError: With everything that is wrong with the network or its controls.
+
+    Source: [KinematicSystems]_ section 3.
+    """
+    loaded = network if isinstance(network, Network) else load_network(_network_source(network))
+    for option, value in (("controls", controls), ("start", start)):
+        if value is not None and not isinstance(value, Mapping):
+            raise _option_error(option, f"found {shown(value)}, allowed: a table of names and values")
+    mechanism = mechanism_of(_at_joint_values(loaded, start or {}))
+    values = {name: loaded.control_value(name, value) for name, value in (controls or {}).items()}
+    assembled = assemble(mechanism, values)
+    if not assembled.assemblies:
+        gap = assembled.gaps[0]
+        found = f"gap of {gap.metres:g} m and {gap.radians:g} rad at {gap.name}"
+        raise UnitError(
+            f"unit network_motion: {loaded.name} does not close: found a {found}; see urmpipe network check"
+        )
+    return _unit(with_start(loaded, assembled.x[:, 0].tolist()), points, newton)
+
+
+def from_tables(network: str, points: Mapping[str, Any], newton: int) -> Unit:
+    """Return `network_motion` of a JSON text of `network_tables`, assembled where it starts."""
+    return _unit(load_network(json.loads(network)), points, newton)
+
+
+def _unit(network: Network, points: Any, newton: int) -> Unit:
+    """Return the unit of a network whose start is assembled."""
+    whole_number("network_motion", "newton", newton)
+    model = _Model(network, mechanism_of(network), _read_points(network, points), newton)
+    if not model.inputs:
+        raise _option_error("network", f"found {network.name} without a control to set, allowed: one or more")
+    remembers = len(model.mechanism.free) > 0
+    return Unit(
+        name="network_motion",
+        description=f"Motion of {network.name} by its controls",
+        variables=tuple(model.variables()),
+        outputs=model.outputs,
+        update=model.update if remembers else None,
+        equations=(
+            "e(x, c) = 0: gaps of cut joints (p2 - p1 and the skew part of R2 R1^T), errors of elements,",
+            "      with c the controls and x the free variables, in lengths of the mechanism and rad",
+            "x starts on the line through the last two communication points, then per Newton step",
+            "x := x - (J^T J + mu I)^-1 J^T e, J = de/dx, mu = 1e-13",
+            "residual = max |e|",
+        ),
+        source="Kinematic systems, section 3: docs/networks.md",
+        recipe=Recipe(
+            __name__,
+            "from_tables",
+            {
+                "network": json.dumps(network_tables(network), allow_nan=False),
+                "points": {name: {"body": body, "point": list(place)} for name, body, place in model.points},
+                "newton": newton,
+            },
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class _Control:
+    """An input: the name of its variable and of its control, its unit, and how much of that one of it is."""
+
+    variable: str
+    control: str
+    unit: str
+    factor: float
+
+
+@dataclass(frozen=True)
+class _Group:
+    """Variables of a joint or a body that are one output: their owner, indices and unit."""
+
+    variable: str
+    owner: str
+    description: str
+    indices: tuple[int, ...]
+    unit: str
+
+
+@dataclass(frozen=True)
+class _Model:
+    """The functions of the unit.
+
+    Attributes:
+        network: The network.
+        mechanism: The same in numbers.
+        points: Name, body and place in the body in [m] of each point.
+        newton: Newton steps per evaluation.
+    """
+
+    network: Network
+    mechanism: Mechanism
+    points: Sequence[tuple[str, str, Vector]]
+    newton: int
+
+    @cached_property
+    def _names(self) -> dict[str, str]:
+        """The names of the variables of controls, joints and bodies, by theirs in the network."""
+        taken = {"time", "table", "residual", *LAST, *CHANGES, *(name for name, _, _ in self.points)}
+        owners = dict.fromkeys(variable.owner for variable in self.mechanism.variables)
+        found: dict[str, str] = {}
+        for owner in (*owners, *(joint.name for joint in self.network.joints)):
+            if owner not in found:
+                found[owner] = _identifier(owner, taken)
+                taken |= _forms(found[owner])
+        return found
+
+    @cached_property
+    def inputs(self) -> tuple[_Control, ...]:
+        """The controls that can be set, in the order of the mechanism's variables."""
+        found = []
+        for k in self.mechanism.controls:
+            control = self.mechanism.variables[k].owner
+            unit, factor = self.network.unit_of(control) or ("", 1)
+            found.append(_Control(self._names[control], control, unit, float(factor)))
+        return tuple(found)
+
+    @cached_property
+    def groups(self) -> tuple[_Group, ...]:
+        """The outputs of joints, and of bodies without a joint to the ground."""
+        found = []
+        for joint in self.network.joints:
+            variable, what = self._names[joint.name], f"joint {joint.name}"
+            if joint.kind == "cylindrical":
+                found.append(_Group(f"{variable}_theta", joint.name, f"Angle of {what}", (0,), "rad"))
+                found.append(_Group(f"{variable}_s", joint.name, f"Displacement of {what}", (1,), "m"))
+            elif joint.units:
+                word = {"prismatic": "Displacement", "global": "Rotation vector"}.get(joint.kind, "Angle")
+                indices = tuple(range(len(joint.units)))
+                found.append(_Group(variable, joint.name, f"{word} of {what}", indices, joint.units[0]))
+        for name in self.mechanism.graph.roots[1:]:
+            variable = self._names[name]
+            found.append(_Group(f"{variable}_p", name, f"Position of body {name}: x, y, z", (0, 1, 2), "m"))
+            found.append(_Group(f"{variable}_q", name, f"Rotation vector of body {name}", (3, 4, 5), "rad"))
+        return tuple(found)
+
+    def variables(self) -> Iterator[Variable]:
+        """Yield the variables of the unit."""
+        starts = self.mechanism.start
+        for control, start in zip(self.inputs, starts, strict=False):
+            yield Input(
+                name=control.variable,
+                description=f"Control {control.control}",
+                unit=control.unit,
+                display_unit=DISPLAY[control.unit],
+                start=float(start) * control.factor,
+            )
+        for group in self.groups:
+            size = len(group.indices) if len(group.indices) > 1 else None
+            yield _output(group.variable, group.description, group.unit, size)
+        for name, body, place in self.points:
+            at = ", ".join(f"{value:g}" for value in place)
+            yield _output(name, f"Place of the point ({at}) m of {body}: x, y, z", "m", 3)
+        yield _output("residual", "Largest error of the closure, in rad and lengths of the network", "", None)
+        if len(self.mechanism.free):
+            yield from self._memories()
+
+    def _memories(self) -> Iterator[Memory]:
+        """Yield the last configuration, and its change from the one before."""
+        count = len(self.inputs)
+        starts = [float(value) for value in self.mechanism.start]
+        words = ("Controls", "Free variables of the network")
+        for words_of, last, change, part in zip(
+            words, LAST, CHANGES, (starts[:count], starts[count:]), strict=True
+        ):
+            when = "at the last communication point"
+            yield Memory(name=last, description=f"{words_of} {when}", start=tuple(part), size=len(part))
+            yield Memory(name=change, description=f"Their change up to there: {last}", size=len(part))
+
+    def outputs(self, v: Values) -> Mapping[str, Any]:
+        """Return joints, points and the residual."""
+        x = self._configuration(v)
+        mechanism, network = self.mechanism, self.network
+        values = {
+            joint.name: [given.value for given in mechanism.joint_values(joint, x)]
+            for joint in network.joints
+            if joint.units
+        }
+        for name in mechanism.graph.roots[1:]:
+            first = mechanism.places[name, 0]
+            values[name] = x[first : first + len(POSE_UNITS)]
+        found: dict[str, Any] = {"residual": largest_residual(mechanism, x)}
+        for group in self.groups:
+            elements = tuple(values[group.owner][index] for index in group.indices)
+            found[group.variable] = elements if len(elements) > 1 else elements[0]
+        poses = mechanism.poses(x) if self.points else {}
+        return found | {name: poses[body].point(place) for name, body, place in self.points}
+
+    def update(self, v: Values) -> Mapping[str, Any]:
+        """Return the configuration as the last one, and how it has changed."""
+        x = self._configuration(v)
+        change = changes(self.mechanism, self._last(v), x)
+        count = len(self.inputs)
+        parts = zip((*LAST, *CHANGES), (x[:count], x[count:], change[:count], change[count:]), strict=True)
+        return {name: tuple(part) for name, part in parts}
+
+    def _last(self, v: Values) -> list[Element]:
+        return [element for name in LAST for element in getattr(v, name)]
+
+    def _configuration(self, v: Values) -> list[Element]:
+        """Return the variables that close the network at the present inputs."""
+        controls = [getattr(v, control.variable) / control.factor for control in self.inputs]
+        if not len(self.mechanism.free):
+            return controls
+        change = [element for name in CHANGES for element in getattr(v, name)]
+        predicted = predict_variables(self.mechanism, self._last(v), change, controls)
+        return close_network(self.mechanism, predicted, self.newton)
+
+
+def _network_source(network: Any) -> str | Path | Mapping[str, Any]:
+    """Return a name, a file or tables of a network."""
+    if isinstance(network, (str, Path, Mapping)):
+        return network
+    raise _option_error("network", f"found {shown(network)}, allowed: a name, a file, or tables")
+
+
+def _at_joint_values(network: Network, start: Mapping[str, Any]) -> Network:
+    """Return a network whose joints start at other values, in [rad] and [m]."""
+    joints = {joint.name: joint for joint in network.joints if joint.units}
+    faults = [f"start: joint {not_among(name, joints)}" for name in start if name not in joints]
+    for name, value in start.items():
+        if name not in joints:
+            continue
+        units = joints[name].units
+        values = list(value) if isinstance(value, (list, tuple)) else [value]
+        read = [
+            read_quantity(one, unit, positive=False) if isinstance(one, str) else one
+            for one, unit in zip(values, units, strict=False)
+        ]
+        if len(values) == len(units) and are_numbers(read, len(units)):
+            joints[name] = replace(joints[name], start=tuple(float(one) for one in read))
+        else:
+            count = "a number" if len(units) == 1 else f"a list of {len(units)} numbers"
+            faults.append(f"start: found {name} = {shown(value)}, allowed: {count} in {', '.join(units)}")
+    if faults:
+        raise UnitError(*(f"unit network_motion: option {fault}" for fault in faults))
+    return replace(network, joints=tuple(joints.get(joint.name, joint) for joint in network.joints))
+
+
+def _read_points(network: Network, points: Any) -> tuple[tuple[str, str, Vector], ...]:
+    """Return the points of the option: name, body, and place in the body in [m]."""
+    rows: dict[str, tuple[Any, Any]] = {}
+    if isinstance(points, Mapping):
+        for name, table in points.items():
+            entries = table if isinstance(table, Mapping) and {*table} == {"body", "point"} else {}
+            rows[name] = (entries.get("body"), entries.get("point"))
+    elif points is not None:
+        words = points if isinstance(points, (list, tuple)) else [points]
+        joined = ",".join(map(str, words))  # the shell's points=A:1,2,3,B:4,5,6 is a list of six words
+        for k, text in enumerate(re.split(r",(?=[^,]*:)", joined), 1):
+            body, _, place = text.rpartition(":")
+            rows[f"p{k}"] = (body, _numbers(place))
+    faults, found = [], []
+    for name, (body, place) in rows.items():
+        if body not in network.body_names:
+            faults.append(f"{name}: body {not_among(str(body), network.body_names)}")
+        elif not are_numbers(place, 3):
+            faults.append(f"{name}: found {shown(place)}, allowed: x, y, z in m")
+        else:
+            found.append((name, body, (float(place[0]), float(place[1]), float(place[2]))))
+    if faults:
+        form = 'allowed form: "BODY:X,Y,Z", or NAME = { body = "BODY", point = [X, Y, Z] }'
+        raise UnitError(*(f"unit network_motion: option points: {fault}; {form}" for fault in faults))
+    return tuple(found)
+
+
+def _numbers(text: str) -> list[float] | str:
+    """Return numbers with commas between them; any other text as it is."""
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        return text
+
+
+def _identifier(name: str, taken: set[str]) -> str:
+    """Return a name as FMI variables have it: letters, digits and _, unlike those that are taken."""
+    identifier = re.sub(r"\W", "_", name, flags=re.ASCII)
+    if not identifier[:1].isalpha():
+        identifier = f"v{identifier}"
+    while _forms(identifier) & taken:
+        identifier += "_"
+    return identifier
+
+
+def _forms(identifier: str) -> set[str]:
+    """Return the names of all variables that an owner of variables may have."""
+    return {identifier, *(f"{identifier}_{suffix}" for suffix in ("theta", "s", "p", "q"))}
+
+
+def _output(name: str, description: str, unit: str, size: int | None) -> Output:
+    return Output(name=name, description=description, unit=unit, display_unit=DISPLAY[unit], size=size)
+
+
+def _option_error(option: str, message: str) -> UnitError:
+    return UnitError(f"unit network_motion: option {option}: {message}")

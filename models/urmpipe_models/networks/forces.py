@@ -1,0 +1,191 @@
+"""Static forces in a network: what the drives must hold, and what joints and elements transmit.
+
+With loads Q (forces on the variables by virtual work) and the closure F(y, d) = 0, multipliers lambda hold the
+variables that follow, and the drives the rest:
+
+    J_y^T lambda = -Q_y,    tau_d = -(Q_d + J_d^T lambda)
+
+lambda are the wrenches of cut joints and the forces of elements; the joints of the spanning tree transmit what
+the bodies beyond them need for equilibrium. If constraints are redundant, lambda is not unique: components of
+reactions that depend on the choice are NaN, as they depend on the elasticity of the bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IndexArray
+from urmpipe_models.elementwise import Vector, cross, dot, subtract
+from urmpipe_models.networks.closure import body_twists, closure_of, wrench_carriers
+from urmpipe_models.networks.mechanism import Mechanism
+from urmpipe_models.networks.motion import iter_chunks
+from urmpipe_models.transform import Transform
+
+UNDETERMINED = 1e-7  # share of a unit multiplier that a component takes from redundant constraints
+
+
+@dataclass(frozen=True, slots=True)
+class Wrench:
+    """A load on a body.
+
+    Attributes:
+        body: Name of the body.
+        point: Where it acts, in the frame of the body in [m].
+        force: Along the axes of the ground in [N].
+        moment: About the axes of the ground in [N.m].
+    """
+
+    body: str
+    point: Vector = (0.0, 0.0, 0.0)
+    force: Vector = (0.0, 0.0, 0.0)
+    moment: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Forces:
+    """Forces of a network in equilibrium at n configurations.
+
+    Attributes:
+        drives: Forces of the prescribed variables in [N.m] of an angle, [N] of a length, shape (driven, n); of a
+            control per its own unit.
+        reactions: Of each joint by its name, on its second body: force [N] along m, n, m x n of its frame and
+            moment [N.m] about them, shape (6, n); of each element its force [N], positive if it pushes its bodies
+            apart, shape (1, n). NaN where redundant constraints leave it undetermined.
+    """
+
+    drives: FloatArray
+    reactions: dict[str, FloatArray]
+
+
+def compute_forces(
+    mechanism: Mechanism,
+    x: FloatArray,
+    driven: IndexArray,
+    free: IndexArray,
+    wrenches: Sequence[Wrench] = (),
+    torques: Mapping[str, float] | None = None,
+) -> Forces:
+    """Return the forces that hold a network under loads.
+
+    Args:
+        mechanism: The network.
+        x: Configurations that close, shape (variables, n), in [m], [rad] and as controls are given.
+        driven: The numbers of the prescribed variables, shape (driven,) [-].
+        free: The numbers of those that follow, shape (free,) [-].
+        wrenches: Loads on bodies.
+        torques: Loads on the first variable of joints, by their names, in [N.m] or [N].
+    """
+    n = x.shape[1]
+    drives = np.zeros((len(driven), n))
+    names = [joint.name for joint in mechanism.network.joints]
+    reactions = {name: np.zeros((6, n)) for name in names}
+    reactions |= {element.name: np.zeros((1, n)) for element in mechanism.network.elements}
+    for rows in iter_chunks(n):
+        own = _Equilibrium(mechanism, x[:, rows], driven, free, wrenches, torques or {})
+        drives[:, rows] = own.drives
+        for name, values in own.reactions().items():
+            reactions[name][:, rows] = values
+    return Forces(drives, reactions)
+
+
+class _Equilibrium:
+    """The equilibrium of some configurations."""
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        x: FloatArray,
+        driven: IndexArray,
+        free: IndexArray,
+        wrenches: Sequence[Wrench],
+        torques: Mapping[str, float],
+    ) -> None:
+        self.mechanism, self.x = mechanism, x
+        self.loads = _wrenches_in_ground(mechanism, x, wrenches)
+        twists = body_twists(mechanism, x)
+        forces = np.zeros_like(x)
+        for body, wrench in self.loads.items():
+            forces += np.einsum("kn,kvn->vn", wrench, twists[body])
+        for joint in mechanism.network.joints:
+            if joint.name in torques:
+                value = mechanism.joint_values(joint, x)[0]
+                for place, slope in value.slopes.items():
+                    forces[place] += torques[joint.name] * slope
+        jacobian = closure_of(mechanism, x).jacobian * mechanism.row_scales[:, np.newaxis, np.newaxis]
+        followers = jacobian[:, free] * mechanism.column_scales[free, np.newaxis]
+        left, values, right = np.linalg.svd(followers.transpose(2, 0, 1))
+        count = values.shape[1]
+        kept = values > 1e-9 * values[:, :1] if count else values.astype(bool)
+        inverse = np.where(kept, 1.0 / np.where(kept, values, 1.0), 0.0)
+        loads = -(forces[free] * mechanism.column_scales[free, np.newaxis]).T
+        turned = np.einsum("nkf,nf->nk", right[:, :count], loads) * inverse
+        multipliers = np.einsum("nrk,nk->rn", left[:, :, :count], turned)
+        self.drives = -(forces[driven] + np.einsum("rdn,rn->dn", jacobian[:, driven], multipliers))
+        self.multipliers = multipliers * mechanism.row_scales[:, np.newaxis]
+        rank = int(kept.sum(axis=1).min()) if kept.size else 0
+        self.redundant = (
+            left[:, :, rank:].transpose(1, 2, 0) * mechanism.row_scales[:, np.newaxis, np.newaxis]
+        )
+
+    def reactions(self) -> dict[str, FloatArray]:
+        """Return what each joint and element transmits; NaN where it is not determined."""
+        reactions = self._transmitted(self.multipliers, self.loads)
+        for k in range(self.redundant.shape[1]):
+            shares = self._transmitted(self.redundant[:, k], {})
+            sizes = self.mechanism.length * np.ones((6, 1))
+            sizes[:3] = 1.0
+            for name, share in shares.items():
+                unknown = np.abs(share) * self.mechanism.length > UNDETERMINED * sizes[: len(share)]
+                reactions[name] = np.where(unknown, np.nan, reactions[name])
+        return reactions
+
+    def _transmitted(self, multipliers: FloatArray, loads: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+        """Return reactions for multipliers, shape (rows, n), and wrenches on bodies in the ground, (6, n)."""
+        network, n = self.mechanism.network, self.x.shape[1]
+        on_bodies = {name: np.array(loads.get(name, np.zeros((6, n)))) for name in network.body_names}
+        ground_wrenches: dict[str, FloatArray] = {}
+        reactions: dict[str, FloatArray] = {}
+        for tie, rows, carrier in wrench_carriers(self.mechanism, self.x):
+            wrench = np.einsum("rkn,rn->kn", carrier, multipliers[rows])
+            on_bodies[tie.bodies[1]] += wrench
+            on_bodies[tie.bodies[0]] -= wrench
+            ground_wrenches[tie.name] = wrench
+            if len(carrier) == 1:
+                reactions[tie.name] = multipliers[rows]
+        for branch in reversed(self.mechanism.graph.branches):
+            joint = network.joints[branch.joint]
+            needed = -on_bodies[branch.child]  # what the joint must exert on the body beyond it
+            on_bodies[branch.parent] = on_bodies[branch.parent] - needed
+            ground_wrenches[joint.name] = needed * branch.sign
+        posed = self.mechanism.posed(self.x)
+        for joint in network.joints:
+            reactions[joint.name] = _at_frame(ground_wrenches[joint.name], posed.joints[joint.name])
+        return reactions
+
+
+def _wrenches_in_ground(
+    mechanism: Mechanism, x: FloatArray, wrenches: Sequence[Wrench]
+) -> dict[str, FloatArray]:
+    """Return moments about the origin of the ground [N.m] and forces [N] on bodies, shape (6, n) each."""
+    poses, loads = mechanism.poses(x), {}
+    for wrench in wrenches:
+        arm = cross(poses[wrench.body].point(wrench.point), wrench.force)
+        moment = [lever + own for lever, own in zip(arm, wrench.moment, strict=True)]
+        rows = np.zeros((6, x.shape[1]))
+        for k, component in enumerate((*moment, *wrench.force)):
+            rows[k] = component
+        loads[wrench.body] = loads.get(wrench.body, 0.0) + rows
+    return loads
+
+
+def _at_frame(wrench: FloatArray, at: Transform) -> FloatArray:
+    """Return force and moment of a wrench in the ground along the axes of a frame, about its origin, (6, n)."""
+    moment, force = tuple(wrench[:3]), tuple(wrench[3:])
+    moment = subtract(moment, cross(at.translation, force))
+    rows = np.empty_like(wrench)
+    for k, axis in enumerate(at.columns):
+        rows[k], rows[3 + k] = dot(axis, force), dot(axis, moment)
+    return rows

@@ -1,0 +1,619 @@
+"""Motion of a driven network: the configurations along its drives, on the branch of the start.
+
+1. `Drive`: which variables are prescribed and which follow; the closure F(y, s) = 0 along a straight line of the
+   prescribed ones, x_d = x_d0 + s dx_d, in scaled coordinates z = (y, s).
+2. `trace`: predictor-corrector continuation of F = 0 by arc length. The tangent t spans the null space of
+   dF/dz; each step follows it and returns to the curve at right angles to it; the steps follow the curvature.
+   The orientation det [dF/dz; t^T] has one sign along a branch. A step that changes it is refined, until the
+   branch itself bends, or the point is reached where two branches cross.
+3. Singular poses, where the rank of dF/dy falls: the motion turns back (dF/ds is not in the range of dF/dy),
+   branches (two curves cross), or goes through.
+4. `sample`: configurations at values of s, by Newton from cubic curves between the nodes; about singular poses
+   by polynomials through configurations around them.
+5. `follow`: the same along the rows of a log. All rows are solved side by side; the continuity of neighbouring
+   rows is verified, and where it fails they are solved one after another.
+
+Source: Allgower and Georg 2003, Introduction to Numerical Continuation Methods, chapters 2, 6 and 8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IndexArray
+from urmpipe_models.inverse.iterative.descent import damped_step
+from urmpipe_models.networks.closure import scaled_closure
+from urmpipe_models.networks.descent import FLOOR
+from urmpipe_models.networks.idle_spins import spinning_parts
+from urmpipe_models.networks.mechanism import Mechanism
+from urmpipe_models.networks.rotations import wrapped
+
+Passage = Literal["turns back", "branches", "goes through"]
+
+FIRST_STEP, MAX_STEP, MIN_STEP = 0.02, 0.15, 1e-8  # arc length, in lengths of the mechanism and rad
+MAX_TURN = 0.12  # rad between tangents: a cubic curve between nodes misses the branch by about 1e-6
+MAX_CORRECTION = 0.2  # share of a step: a corrector that moves further has left the neighbourhood
+CORRECTIONS = 7  # Newton steps of a corrector; four are usual
+CONVERGED = 1e-10  # size of a Newton step after which the next one is rounding
+ROUNDING = 1e-13  # residual of a closed configuration, in lengths of the mechanism and rad
+CROSSING = 1e-4  # determinant, as a share of that at the last node, which counts as 0: rounding is 1e-5
+SINGULAR = 1e-6  # smallest singular value of the scaled Jacobian that counts as 0
+STENCIL = 2e-3  # arc length between the configurations around a singular pose that interpolate it
+OVERRUN = 0.02  # arc length of the drive that is traced beyond an end near a singular pose
+MAX_NODES = 100_000  # of a trace
+COARSE = 0.05  # scaled length of the drives between the rows of a log that are solved first
+CHUNK = 4096  # configurations solved side by side: their Jacobians fit the cache
+
+Segment: TypeAlias = "tuple[Node, Node]"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SingularPose:
+    """A pose of a motion at which the Jacobian of the variables that follow loses rank.
+
+    Attributes:
+        passage: What the motion does there: it turns back, branches or goes through.
+        s: Its place along the drive [-]; of a log its row from 0, with a fraction.
+        x: The variables in [m], [rad] and as controls are given, shape (variables,).
+        direction: The direction that becomes free, in `column_scales` [-], the largest entry 1, shape
+            (variables,).
+    """
+
+    passage: Passage
+    s: float
+    x: FloatArray
+    direction: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class LimitStop:
+    """A limit of a variable that ends a motion.
+
+    Attributes:
+        variable: The number of the variable.
+        limit: The limit in [m], [rad] or as the control is given.
+        s: Where the motion ends, as in `SingularPose`.
+    """
+
+    variable: int
+    limit: float
+    s: float
+
+
+class Node(NamedTuple):
+    """A solution z = (y, s) with its unit tangent and the matrix [dF/dz; W^T; t^T], W the idle spins.
+
+    `distance` is the smallest singular value of dF/dy without idle spins: how far a singular pose is.
+    """
+
+    z: FloatArray
+    tangent: FloatArray
+    matrix: FloatArray
+    distance: float
+
+
+@dataclass(eq=False)
+class Trace:
+    """A branch along a straight drive.
+
+    Attributes:
+        segments: Its pieces between two nodes in the same coordinates, s increasing.
+        singular: The singular poses on it, each with its node.
+        stop: The limit that ends it, if one does.
+        complete: Whether the end of the drive is reached.
+    """
+
+    segments: list[Segment] = field(default_factory=list)
+    singular: list[tuple[SingularPose, Node]] = field(default_factory=list)
+    stop: LimitStop | None = None
+    complete: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """A straight drive of a mechanism.
+
+    Attributes:
+        mechanism: The network.
+        x: The prescribed variables where s is 0, and all others anywhere on the branch, shape (variables,), in
+            [m], [rad] and as controls are given.
+        change: What s = 1 adds to the prescribed variables, shape (variables,); 0 of all others.
+        free: The numbers of the variables that follow, shape (free,) [-].
+        limits: Lower and upper limits of all variables, shape (variables, 2); infinite without a limit.
+    """
+
+    mechanism: Mechanism
+    x: FloatArray
+    change: FloatArray
+    free: IndexArray
+    limits: FloatArray
+
+    @cached_property
+    def scales(self) -> FloatArray:
+        """A step of each variable that follows, shape (free,)."""
+        return self.mechanism.column_scales[self.free]
+
+    @cached_property
+    def length(self) -> float:
+        """The scaled length of the drive [-]: s times it is the last coordinate of z."""
+        return float(np.linalg.norm(self.change / self.mechanism.column_scales))
+
+    @cached_property
+    def spins(self) -> int:
+        """The number of idle spins, which no drive prescribes."""
+        return len(spinning_parts(self.mechanism, self.x))
+
+    def at(self, z: FloatArray) -> FloatArray:
+        """Return the variables, shape (variables, n), of scaled coordinates, shape (free + 1, n)."""
+        x = self.x[:, np.newaxis] + self.change[:, np.newaxis] * (z[-1:] / self.length)
+        x[self.free] = z[:-1] * self.scales[:, np.newaxis]
+        return x
+
+    def coordinates(self, x: FloatArray, s: float) -> FloatArray:
+        """Return z of variables of shape (variables,)."""
+        return np.append(x[self.free] / self.scales, s * self.length)
+
+    def closure(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return F and dF/dz, of shapes (rows,) and (rows, free + 1), of z of shape (free + 1,)."""
+        closure = scaled_closure(self.mechanism, self.at(z[:, np.newaxis]))
+        jacobian = closure.jacobian[:, :, 0]
+        along = jacobian @ (self.change / self.mechanism.column_scales) / self.length
+        return closure.residual[:, 0], np.column_stack((jacobian[:, self.free], along))
+
+    def wrapped(self, z: FloatArray) -> FloatArray:
+        """Return z with rotation vectors of pi at most: at two pi they are singular."""
+        x = self.at(z[:, np.newaxis])
+        for part in self.mechanism.rotations:
+            x[part] = wrapped(x[part])
+        return self.coordinates(x[:, 0], float(z[-1]) / self.length)
+
+    def correct(self, z: FloatArray, normal: FloatArray) -> FloatArray | None:
+        """Return the solution of F = 0, normal . (z - z_start) = 0 next to z; None without convergence."""
+        start, size = z, np.inf
+        for _ in range(CORRECTIONS):
+            residual, jacobian = self.closure(z)
+            if not np.isfinite(jacobian).all():
+                return None
+            matrix = np.vstack((jacobian, normal))
+            step = np.linalg.lstsq(matrix, -np.append(residual, normal @ (z - start)), rcond=1e-12)[0]
+            z, before, size = z + step, size, float(np.linalg.norm(step))
+            if size < CONVERGED:
+                return z
+            if size > 0.5 * before:  # it does not converge, or only rounding is left next to a singular pose
+                return z if size < 1e-6 and np.abs(residual).max() < ROUNDING else None
+        return None
+
+    def node(self, z: FloatArray, before: FloatArray | None = None) -> Node:
+        """Return the node at a solution; its tangent has the direction of `before`, else that of s.
+
+        Of the null space of dF/dz the tangent is the part at right angles to the idle spins: these leave s.
+        """
+        jacobian = self.closure(z)[1]
+        columns = len(z)
+        null = np.linalg.svd(jacobian)[2][columns - self.spins - 1 :].T
+        along = null[-1]
+        tangent = null @ along if np.linalg.norm(along) > 1e-3 or before is None else null @ (null.T @ before)
+        tangent = tangent / (float(np.linalg.norm(tangent)) or 1.0)
+        if before is not None and tangent @ before < 0.0:
+            tangent = -tangent
+        values = np.zeros(columns)
+        own = np.linalg.svd(jacobian[:, :-1], compute_uv=False)
+        values[: len(own)] = own
+        distance = float(values[columns - 2 - self.spins])
+        spins = np.linalg.svd(null - np.outer(tangent, tangent @ null))[0][:, : self.spins]
+        return Node(z, tangent, np.vstack((jacobian, spins.T, tangent)), distance)
+
+
+def _orientation(before: Node, after: Node, spins: int) -> tuple[float, float]:
+    """Return the cosine between the orientations of two nodes, and det(A^T B) / det(A^T A).
+
+    A and B are the matrices of the nodes. By Cauchy and Binet det(A^T B) is the scalar product of their minors,
+    defined for redundant rows, too. Its sign changes where branches cross.
+    """
+    first, second = before.matrix, after.matrix
+    if spins and np.linalg.det(second[-1 - spins : -1] @ first[-1 - spins : -1].T) < 0.0:
+        second = np.array(second)  # the basis of the spins has either orientation: the same is taken
+        second[-2] = -second[-2]
+    sign, size = np.linalg.slogdet(first.T @ second)
+    own = [float(np.linalg.slogdet(matrix.T @ matrix)[1]) for matrix in (first, second)]
+    with np.errstate(under="ignore", invalid="ignore"):
+        cosine, share = np.exp(size - 0.5 * (own[0] + own[1])), np.exp(size - own[0])
+    return float(np.nan_to_num(sign * cosine)), float(np.nan_to_num(sign * share))
+
+
+def _turn(before: Node, after: Node) -> float:
+    """Return the angle between the tangents of two nodes in [rad]."""
+    return float(np.arccos(np.clip(before.tangent @ after.tangent, -1.0, 1.0)))
+
+
+# ---------------------------------------------------------------------------------------- continuation
+
+
+def trace(drive: Drive, s: float, progress: Callable[[float], None] = lambda share: None) -> Trace:
+    """Trace the branch of `drive.x`, which closes at s, over s from 0 to 1.
+
+    Args:
+        drive: The drive.
+        s: The place of `drive.x` along it; before 0 and beyond 1, the branch is traced from there.
+        progress: Called with the share of the drive that is done, 0..1.
+    """
+    first = drive.node(drive.coordinates(drive.x, s))
+    ways = [end for end in (1.0, 0.0) if (end > s if end else s > 0.0)]
+    traces = {end: _Tracer(drive, first, end, progress).run() for end in ways}
+    forward, back = traces.get(1.0, Trace(complete=True)), traces.get(0.0, Trace(complete=True))
+    reversed_segments = [(_reversed(b), _reversed(a)) for a, b in reversed(back.segments)]
+    return Trace(
+        reversed_segments + forward.segments,
+        [*reversed(back.singular), *forward.singular],
+        forward.stop or back.stop,
+        forward.complete and back.complete,
+    )
+
+
+def _reversed(node: Node) -> Node:
+    return node._replace(tangent=-node.tangent, matrix=np.vstack((node.matrix[:-1], -node.tangent)))
+
+
+class _Tracer:
+    """The trace from a node in one direction of s."""
+
+    def __init__(self, drive: Drive, first: Node, end: float, progress: Callable[[float], None]) -> None:
+        self.drive, self.progress = drive, progress
+        self.begin, self.end = float(first.z[-1]), end * drive.length
+        self.sign = 1.0 if self.end > self.begin else -1.0
+        self.here = first if self.sign > 0.0 else _reversed(first)
+        self.before = self.here
+        self.step = FIRST_STEP
+        self.trace = Trace()
+
+    def run(self) -> Trace:
+        """Trace to the end, and beyond it where a singular pose is near: poses there are interpolated."""
+        while len(self.trace.segments) < MAX_NODES:
+            there = self._advance()
+            if there is None:
+                return self.trace
+            if self.sign * there.tangent[-1] <= 0.0:
+                self._turn_back(there)
+                return self.trace
+            if self._is_beyond(there):
+                if not self._reach(there):
+                    return self.trace
+                continue
+            self._touch(there)
+            self._append(there)
+            if not self.trace.complete:
+                self.progress(abs((there.z[-1] - self.begin) / (self.end - self.begin)))
+        return self.trace
+
+    def _append(self, there: Node) -> None:
+        """Add a segment, and go on from its end, in coordinates that are far from singular."""
+        self.trace.segments.append((self.here, there))
+        self.before, z = self.here, self.drive.wrapped(there.z)
+        if (z != there.z).any():
+            moved = self.drive.wrapped(there.z + 1e-5 * there.tangent) - z
+            there = self.drive.node(z, moved)
+        self.here = there
+
+    def _is_beyond(self, there: Node) -> bool:
+        x = self.drive.at(there.z[:, np.newaxis])[self.drive.free, 0]
+        lower, upper = self.drive.limits[self.drive.free].T
+        return bool(((x < lower) | (x > upper)).any() or self.sign * (there.z[-1] - self.end) >= 0.0)
+
+    def _advance(self) -> Node | None:
+        """Return the next node; None where no step succeeds."""
+        here = self.here
+        while self.step > MIN_STEP:
+            there = self._try(here, self.step)
+            if there is not None and (turn := _turn(here, there)) < MAX_TURN:
+                cosine, _ = _orientation(here, there, self.drive.spins)
+                crossing = self._crossing(here, there) if cosine < 0.0 else None
+                if crossing is not None:
+                    self._record("branches", crossing, there.tangent)
+                if cosine > 0.3 or crossing is not None:
+                    self.step = min(self.step * min(2.0, 0.7 * MAX_TURN / max(turn, 1e-9)), MAX_STEP)
+                    return there
+            self.step *= 0.5
+        return None
+
+    def _try(self, here: Node, step: float) -> Node | None:
+        """Return the node a step further along the tangent; None if the corrector leaves it."""
+        predicted = here.z + step * here.tangent
+        z = self.drive.correct(predicted, here.tangent)
+        if z is None or np.linalg.norm(z - predicted) > MAX_CORRECTION * abs(step) + CONVERGED:
+            return None
+        return self.drive.node(z, here.tangent)
+
+    def _crossing(self, here: Node, there: Node) -> Node | None:
+        """Return where branches cross between two nodes: the determinant is continuous, and 0 there.
+
+        None where it jumps: the step went from one branch to another that is near. The pose itself is the root
+        of a cubic polynomial through configurations around it: there Newton's method loses half of the digits.
+        """
+
+        def share(node: Node) -> float:
+            return _orientation(here, node, self.drive.spins)[1]
+
+        rough = self._root(here, there, share, CROSSING)
+        if rough is None:
+            return None
+        middle = float(here.tangent @ (rough.z - here.z))
+        steps = middle + STENCIL * np.array([-2.0, -1.0, 1.0, 2.0])
+        nodes = [self._try(here, step) for step in steps.tolist()]
+        around = [node for node in nodes if node is not None]
+        if len(around) < len(nodes):
+            return rough
+        shares = np.polyfit(steps - middle, [share(node) for node in around], 3)
+        roots = np.roots(shares)
+        root = float(roots[np.argmin(np.abs(roots))].real)
+        z = np.array(
+            [np.polyval(part, root) for part in np.polyfit(steps - middle, [node.z for node in around], 3).T]
+        )
+        return self.drive.node(z, here.tangent)
+
+    def _turn_back(self, there: Node) -> None:
+        """End at the pose between two nodes where s has its extreme."""
+        node = self._root(self.here, there, lambda node: self.sign * float(node.tangent[-1]), 1e-13)
+        node = there if node is None else node
+        self.trace.segments.append((self.here, node))
+        self._record("turns back", node, node.tangent)
+
+    def _root(
+        self, here: Node, there: Node, function: Callable[[Node], float], tolerance: float
+    ) -> Node | None:
+        """Return the node between two at which a function vanishes; None if it jumps over 0."""
+        low, high = 0.0, float(here.tangent @ (there.z - here.z))
+        at_low, at_high, best = function(here), function(there), there
+        for count in range(80):
+            share = at_low / (at_low - at_high) if count % 3 else 0.5
+            middle = low + float(np.clip(share, 0.02, 0.98)) * (high - low)
+            node = self._try(here, middle)
+            if node is None:
+                return None
+            best, value = node, function(node)
+            if abs(value) < tolerance:
+                return node
+            if value > 0.0:
+                low, at_low = middle, value
+            else:
+                high, at_high = middle, value
+            if high - low < 1e-15:
+                break
+        return best if max(abs(at_low), abs(at_high)) < 1e3 * tolerance else None
+
+    def _touch(self, there: Node) -> None:
+        """Record a singular pose that the motion passes without a change of its orientation."""
+        before, here = self.before, self.here
+        if before is here or not before.distance > here.distance < there.distance:
+            return
+        low, high = -float(here.tangent @ (here.z - before.z)), float(here.tangent @ (there.z - here.z))
+        best, golden = here, 0.5 * (5.0**0.5 - 1.0)
+        for _ in range(60):
+            steps = (high - golden * (high - low), low + golden * (high - low))
+            nodes = [self._try(here, step) if abs(step) > MIN_STEP else here for step in steps]
+            values = [np.inf if node is None else node.distance for node in nodes]
+            least = min(values)
+            if least < best.distance:
+                best = nodes[values.index(least)] or best
+            low, high = (low, steps[1]) if values[0] < values[1] else (steps[0], high)
+            falls = max(before.distance, there.distance) * (high - low)
+            if best.distance < SINGULAR or best.distance > 4.0 * falls:
+                break  # at 0, or in a valley above it
+        known = [node for _, node in self.trace.singular]
+        if best.distance < 10.0 * SINGULAR and not any(
+            np.allclose(best.z, node.z, atol=1e-4) for node in known
+        ):
+            passage: Passage = "branches" if self._branches(best, here.tangent) else "goes through"
+            self._record(passage, best, here.tangent)
+
+    def _branches(self, node: Node, tangent: FloatArray) -> bool:
+        """Return whether another curve of solutions passes through a singular node."""
+        rows = self.drive.mechanism.rows
+        _, values, vectors = np.linalg.svd(node.matrix[:rows])
+        null = vectors[int((values > 1e-4).sum()) :].T
+        radius = 1e-2
+        for direction in np.random.default_rng(0).normal(size=(24, null.shape[1])):
+            way = null @ (direction / np.linalg.norm(direction))
+            z = self.drive.correct(node.z + radius * way, way)
+            if z is not None and 0.5 * radius < (size := float(np.linalg.norm(z - node.z))) < 2.0 * radius:
+                if abs((z - node.z) @ tangent) < 0.9 * size:
+                    return True
+        return False
+
+    def _reach(self, there: Node) -> bool:
+        """Add the node at the end of the drive, or at the first limit before it; return whether to go on."""
+        drive, here = self.drive, self.here
+        share, coordinate, value = 1.0, -1, float(there.z[-1])
+        if self.sign * (there.z[-1] - self.end) >= 0.0:
+            share, value = _share_of(here, there, -1, self.end), self.end
+        for k, bounds in enumerate(drive.limits[drive.free] / drive.scales[:, np.newaxis]):
+            for bound in bounds[np.isfinite(bounds)].tolist():
+                if (here.z[k] - bound) * (there.z[k] - bound) < 0.0:
+                    at = _share_of(here, there, k, bound)
+                    if at < share:
+                        share, coordinate, value = at, k, bound
+        z = _cubic(here, there, np.array([share]))[:, 0]
+        z[coordinate] = value
+        solution = drive.correct(z, np.eye(len(z))[coordinate])
+        node = there if solution is None else drive.node(solution, here.tangent)
+        self._touch(node)
+        self._append(node)
+        if coordinate >= 0:
+            place = float(node.z[-1]) / drive.length
+            self.trace.stop = LimitStop(
+                int(drive.free[coordinate]), value * float(drive.scales[coordinate]), place
+            )
+            return False
+        if self.trace.complete or node.distance > OVERRUN:
+            self.trace.complete = True
+            return False
+        self.trace.complete, self.end = True, self.end + self.sign * OVERRUN
+        return True
+
+    def _record(self, passage: Passage, node: Node, tangent: FloatArray) -> None:
+        drive, direction = self.drive, np.zeros(len(self.drive.x))
+        vectors = np.linalg.svd(node.matrix[: drive.mechanism.rows, :-1])[2]
+        followers = vectors[len(drive.free) - 1 - drive.spins]
+        direction[drive.free] = node.tangent[:-1] if passage == "turns back" else followers
+        direction /= direction[int(np.argmax(np.abs(direction)))] or 1.0
+        x = drive.at(node.z[:, np.newaxis])[:, 0]
+        pose = SingularPose(passage, float(node.z[-1]) / drive.length, x, direction)
+        self.trace.singular.append((pose, node._replace(tangent=tangent)))
+
+
+def _cubic(here: Node, there: Node, share: FloatArray) -> FloatArray:
+    """Return points of the cubic curve between two nodes with their tangents, shape (coordinates, n)."""
+    chord = float(np.linalg.norm(there.z - here.z))
+    return _hermite(
+        here.z[:, np.newaxis], there.z[:, np.newaxis], chord * here.tangent[:, np.newaxis],
+        chord * there.tangent[:, np.newaxis], share,
+    )  # fmt: skip
+
+
+def _hermite(
+    first: FloatArray, second: FloatArray, leaving: FloatArray, arriving: FloatArray, share: FloatArray
+) -> FloatArray:
+    """Return cubic curves with given ends and derivatives at shares 0..1 between them."""
+    square, cube = share * share, share * share * share
+    return np.asarray(
+        (1.0 - 3.0 * square + 2.0 * cube) * first
+        + (3.0 * square - 2.0 * cube) * second
+        + (share - 2.0 * square + cube) * leaving
+        + (cube - square) * arriving
+    )
+
+
+def _share_of(here: Node, there: Node, coordinate: int, value: float) -> float:
+    """Return where the cubic curve between two nodes takes a value of a coordinate first."""
+    shares = np.linspace(0.0, 1.0, 65)
+    values = _cubic(here, there, shares)[coordinate] - value
+    first = int(np.argmax(values * values[0] <= 0.0))
+    low, high = shares[max(first - 1, 0)], shares[first]
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        at = _cubic(here, there, np.array([middle]))[coordinate, 0] - value
+        low, high = (middle, high) if at * values[0] > 0.0 else (low, middle)
+    return float(0.5 * (low + high))
+
+
+# ---------------------------------------------------------------------------------------- samples
+
+
+def sample(drive: Drive, branch: Trace, s: FloatArray) -> FloatArray:
+    """Return the configurations of a trace at places s, shape (variables, n).
+
+    Args:
+        drive: The drive.
+        branch: Its trace, which reaches all places.
+        s: The places [-], shape (n,).
+    """
+    at = s * drive.length
+    ends = np.array([second.z[-1] for _, second in branch.segments])
+    which = np.minimum(np.searchsorted(ends, at), len(ends) - 1)
+    stacks = [np.array([pair[k].z for pair in branch.segments]).T for k in (0, 1)]
+    chords = np.linalg.norm(stacks[1] - stacks[0], axis=0)
+    slopes = [chords * np.array([pair[k].tangent for pair in branch.segments]).T for k in (0, 1)]
+    x = np.empty((len(drive.x), len(s)))
+    for rows in iter_chunks(len(s)):
+        own = which[rows]
+        curve = [part[:, own] for part in (*stacks, *slopes)]
+        z = _hermite(*curve, _shares(curve, at[rows]))
+        z[-1] = at[rows]
+        x[:, rows] = settle(drive.mechanism, drive.at(z), drive.free)[0]
+    for pose, node in branch.singular:
+        _interpolate(drive, pose, node, at, x)
+    return x
+
+
+def _shares(curve: list[FloatArray], at: FloatArray) -> FloatArray:
+    """Return where cubic curves reach values of their last coordinate, by bisection."""
+    last = [part[-1] for part in curve]
+    low, high = np.zeros(len(at)), np.ones(len(at))
+    for _ in range(45):
+        middle = 0.5 * (low + high)
+        before = _hermite(*last, middle) < at
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    return 0.5 * (low + high)
+
+
+def _interpolate(drive: Drive, pose: SingularPose, node: Node, at: FloatArray, x: FloatArray) -> None:
+    """Replace configurations next to a singular pose, where Newton's method loses half of the digits.
+
+    The branch is smooth in its arc length through the pose, where it turns back, too: a polynomial passes through
+    eight configurations around it. Where s has its extreme, only the way there is of the motion.
+    """
+    places = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
+    around = [
+        drive.correct(node.z + STENCIL * place * node.tangent, node.tangent) for place in places.tolist()
+    ]
+    if any(z is None for z in around):
+        return
+    terms = [np.polynomial.Polynomial.fit(places, values, 7) for values in np.array(around).T]
+    last = 0.0 if pose.passage == "turns back" else 1.0
+    inner = np.linspace(-1.0, last, 2001)
+    s = terms[-1](inner)
+    order = np.argsort(s)
+    near = np.flatnonzero((at >= s.min()) & (at <= s.max()))
+    place = np.interp(at[near], s[order], inner[order])
+    slope = terms[-1].deriv()
+    for _ in range(6):
+        rate = slope(place)
+        safe = np.abs(rate) > 1e-8 * STENCIL
+        step = np.where(safe, (at[near] - terms[-1](place)) / np.where(safe, rate, 1.0), 0.0)
+        place = np.clip(place + step, -1.0, last)
+    z = np.array([term(place) for term in terms])
+    z[-1] = at[near]
+    x[:, near] = drive.at(z)
+
+
+def settle(
+    mechanism: Mechanism, x: FloatArray, free: IndexArray, *, wrap: bool = False
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return configurations that close next to others, by Newton's method with some variables free.
+
+    Args:
+        mechanism: The network.
+        x: Configurations near, shape (variables, n), in [m], [rad] and as controls are given.
+        free: The numbers of the variables that may change, shape (free,) [-].
+        wrap: Whether rotation vectors are turned back to pi at most.
+
+    Returns:
+        The configurations, the scaled size of the first step and of the last one, shape (n,) each [-].
+    """
+    x, scales = np.array(x), mechanism.column_scales[free, np.newaxis]
+    first = last = np.zeros(x.shape[1])
+    for count in range(10):
+        closure = scaled_closure(mechanism, x)
+        step = damped_step(closure.jacobian[:, free], -closure.residual, FLOOR)
+        x[free] += step * scales
+        for part in mechanism.rotations if wrap else ():
+            x[part] = wrapped(x[part])
+        last = np.sqrt(np.einsum("kn,kn->n", step, step))
+        first = first if count else last
+        if not (last > 1e-13).any():
+            break
+    return x, first, last
+
+
+def nearest_rotations(mechanism: Mechanism, x: FloatArray, to: FloatArray) -> FloatArray:
+    """Return configurations whose rotation vectors are those of the same rotations nearest to others.
+
+    q and (1 - 2 pi / |q|) q are one rotation. All arrays have the shape (variables, n).
+    """
+    x = np.array(x)
+    for part in mechanism.rotations:
+        angle = np.sqrt(np.einsum("kn,kn->n", x[part], x[part]))
+        other = x[part] * (1.0 - 2.0 * np.pi / np.maximum(angle, 1e-9))
+        squares = [np.square(vector - to[part]).sum(axis=0) for vector in (x[part], other)]
+        x[part] = np.where((squares[1] < squares[0]) & (angle > 1e-9), other, x[part])
+    return x
+
+
+def iter_chunks(count: int) -> Iterator[slice]:
+    """Yield slices of at most CHUNK configurations, in their order."""
+    for start in range(0, count, CHUNK):
+        yield slice(start, min(start + CHUNK, count))

@@ -1,0 +1,127 @@
+"""A network as tables in m and rad that need no other file: the inverse of `load_network`.
+
+Arms and Denavit-Hartenberg elements stand in them as the joints and bodies that they became. Functions of
+controls stay as they are, with the factors that their file's units gave them; so do the values of controls.
+The third axis of a frame is not stored, since it is m x n: read back, it may differ in the last digit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from urmpipe_models.elementwise import Vector
+from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.network import Network
+from urmpipe_models.networks.parts import POSE_UNITS, Body, ConstraintElement, Control, Joint
+
+
+def network_tables(network: Network) -> dict[str, Any]:
+    """Return the tables of a network, of texts, finite numbers, lists and dictionaries alone.
+
+    `load_network` makes an equal network of them; docs/networks.md has the keys.
+
+    Args:
+        network: The network.
+    """
+    tables: dict[str, Any] = {
+        "name": network.name,
+        "description": network.description,
+        "source": network.source,
+        "length_unit": "m",
+        "angle_unit": "rad",
+        "ground": network.ground,
+        "controls": {control.name: _control_table(control) for control in network.controls},
+        "bodies": {body.name: _body_table(body) for body in network.bodies},
+        "joints": {joint.name: _joint_table(joint) for joint in network.joints},
+        "elements": {element.name: _element_table(element) for element in network.elements},
+    }
+    return {key: value for key, value in tables.items() if value not in ("", {})}
+
+
+def with_start(network: Network, x: Sequence[float]) -> Network:
+    """Return a network that starts at a configuration.
+
+    Args:
+        network: The network.
+        x: The variables of its mechanism in [m], [rad] and as controls are given, shape (variables,).
+    """
+    mechanism = mechanism_of(network)
+    places = mechanism.places
+
+    def start_of(owner: str, old: Sequence[float], count: int) -> tuple[float, ...]:
+        """Return the variables of an owner, and the old start of those that are driven."""
+        filled = old or (0.0,) * count
+        return tuple(float(x[places[owner, k]]) if (owner, k) in places else filled[k] for k in range(count))
+
+    roots = mechanism.graph.roots[1:]
+    return replace(
+        network,
+        controls=tuple(
+            replace(one, start=start_of(one.name, (one.start,), 1)[0]) for one in network.controls
+        ),
+        joints=tuple(
+            replace(joint, start=start_of(joint.name, joint.start, len(joint.units)))
+            for joint in network.joints
+        ),
+        bodies=tuple(
+            replace(body, start=start_of(body.name, body.start, len(POSE_UNITS)))
+            if body.name in roots
+            else body
+            for body in network.bodies
+        ),
+    )
+
+
+def _control_table(control: Control) -> dict[str, Any]:
+    if control.value is not None:
+        return {"value": control.value.text}
+    limits = {"lower": control.lower, "upper": control.upper}
+    return {
+        "start": float(control.start),
+        **{key: float(limit) for key, limit in limits.items() if math.isfinite(limit)},
+    }
+
+
+def _body_table(body: Body) -> dict[str, Any]:
+    return {"start": _numbers(body.start)} if body.start else {}
+
+
+def _joint_table(joint: Joint) -> dict[str, Any]:
+    table: dict[str, Any] = {"kind": joint.kind, "bodies": list(joint.bodies)}
+    if joint.kind == "user":
+        texts = [expression.text for expression in joint.motion]
+        return {**table, "m": texts[:3], "n": texts[3:6], "a": texts[6:]}
+    axes = [frame.columns for frame in joint.frames]
+    table["m"], table["n"] = [_numbers(m) for m, _, _ in axes], [_numbers(n) for _, n, _ in axes]
+    table["a"] = [_numbers(frame.translation) for frame in joint.frames]
+    if joint.start:
+        table["start"] = _numbers(joint.start)
+    if joint.values:
+        texts = [_text(value) for value in joint.values]
+        table["value"] = texts if len(texts) > 1 else texts[0]
+    if joint.kind == "helical":
+        table["pitch"] = float(joint.pitch)
+    return table
+
+
+def _element_table(element: ConstraintElement) -> dict[str, Any]:
+    points, normals = [_numbers(point) for point in element.points], [_numbers(n) for n in element.normals]
+    table: dict[str, Any] = {"kind": element.kind, "bodies": list(element.bodies)}
+    if element.kind == "eg":
+        return {**table, "a": points[1], "n": normals[0], "h": element.length.text}
+    if element.kind != "gg":
+        table["n"] = normals if element.kind == "crc" else normals[0]
+    return {**table, "a": points, "d": element.length.text}
+
+
+def _text(drive: Expression | None) -> str:
+    """Return what drives a variable as files have it: "" where it is free."""
+    return "" if drive is None else drive.text
+
+
+def _numbers(values: Sequence[float] | Vector) -> list[float]:
+    return [float(value) for value in values]

@@ -1,0 +1,264 @@
+"""Motion of a network along the rows of a log: one configuration per row, on the branch of the first one.
+
+1. `follow` solves some rows first, apart by a scaled length of COARSE of the drives, side by side: each from the
+   start along a straight line of the drives.
+2. Such a line may end on another branch than the log does. So each pair of neighbours is verified: their
+   difference must agree with the tangents at both, and the Jacobian must keep its orientation. Where a pair
+   fails, the rows between are traced one after another (`motion.trace`), until both agree again.
+3. The rows between are solved side by side, from the tangents at both neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray
+from urmpipe_models.inverse.iterative.descent import damped_step
+from urmpipe_models.networks.closure import scaled_closure
+from urmpipe_models.networks.descent import FLOOR
+from urmpipe_models.networks.idle_spins import idle_spins, unspun
+from urmpipe_models.networks.mechanism import Mechanism
+from urmpipe_models.networks.motion import (
+    ROUNDING,
+    Drive,
+    LimitStop,
+    SingularPose,
+    iter_chunks,
+    nearest_rotations,
+    sample,
+    settle,
+    trace,
+)
+
+COARSE = 0.05  # scaled length of the drives between rows that are solved first
+MAX_DISAGREEMENT = (
+    0.1  # share of a difference by which the tangents may miss it; usual is the square of COARSE
+)
+SAME = 1e-7  # scaled difference below which two solutions are the same
+
+
+@dataclass(eq=False)
+class RowMotion:
+    """Configurations along rows.
+
+    Attributes:
+        x: The variables, shape (variables, n), in [m], [rad] and as controls are given; n rows are reached.
+        singular: Singular poses between rows that were traced one after another.
+        stop: The limit that ends the motion; None without one.
+    """
+
+    x: FloatArray
+    singular: list[SingularPose] = field(default_factory=list)
+    stop: LimitStop | None = None
+
+
+def follow(
+    mechanism: Mechanism,
+    x: FloatArray,
+    driven: IndexArray,
+    rows: FloatArray,
+    free: IndexArray,
+    limits: FloatArray,
+    progress: Callable[[float], None] = lambda share: None,
+) -> RowMotion:
+    """Return the motion of a network whose driven variables take the values of rows.
+
+    Args:
+        mechanism: The network.
+        x: The configuration of the first row, shape (variables,), in [m], [rad] and as controls are given.
+        driven: The numbers of the driven variables, shape (driven,) [-].
+        rows: Their values, likewise, shape (n, driven).
+        free: The numbers of the variables that follow, shape (free,) [-].
+        limits: Lower and upper limits of all variables, shape (variables, 2).
+        progress: Called with the share that is done, 0..1.
+    """
+    following = _Follower(mechanism, x, driven, rows, free, limits)
+    return following.run(progress)
+
+
+class _Follower:
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        x: FloatArray,
+        driven: IndexArray,
+        rows: FloatArray,
+        free: IndexArray,
+        limits: FloatArray,
+    ) -> None:
+        self.mechanism, self.driven, self.rows, self.free, self.limits = mechanism, driven, rows, free, limits
+        self.start, self.spins = x, idle_spins(mechanism)
+        self.motion = RowMotion(np.repeat(x[:, np.newaxis], len(rows), axis=1))
+        self.motion.x[driven] = rows.T
+        scaled = rows / mechanism.column_scales[driven]
+        length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(scaled, axis=0), axis=1)))
+        marks = np.searchsorted(length, np.arange(0.0, length[-1], COARSE))
+        self.coarse = np.unique(np.append(marks, len(rows) - 1))
+        self.length = length
+
+    def run(self, progress: Callable[[float], None]) -> RowMotion:
+        """Solve the coarse rows, verify them, then fill in the others."""
+        with np.errstate(all="ignore"):  # rows out of reach: their values are not finite, and verified
+            self.motion.x[:, self.coarse] = self._along_lines(self.motion.x[:, self.coarse])
+        progress(0.3)
+        last = self._verify()
+        progress(0.5)
+        for piece in iter_chunks(last + 1):
+            self._fill(np.arange(piece.start, piece.stop))
+            progress(0.5 + 0.5 * piece.stop / (last + 1))
+        self.motion.x = self.motion.x[:, : last + 1]
+        self._stop_at_limit()
+        return self.motion
+
+    def _along_lines(self, ends: FloatArray) -> FloatArray:
+        """Return configurations at other values of the drives, each along a line from the start."""
+        begin = self.start[self.driven, np.newaxis]
+        scales = self.mechanism.column_scales[self.driven, np.newaxis]
+        farthest = np.linalg.norm((ends[self.driven] - begin) / scales, axis=0).max()
+        steps = max(1, int(np.ceil(farthest / (2.0 * COARSE))))
+        x = np.repeat(self.start[:, np.newaxis], ends.shape[1], axis=1)
+        for piece in iter_chunks(ends.shape[1]):
+            own = x[:, piece]
+            for step in range(1, steps + 1):
+                own[self.driven] = begin + step / steps * (ends[self.driven, piece] - begin)
+                own = settle(self.mechanism, own, self.free, wrap=True)[0]
+            x[:, piece] = own
+        return unspun(self.mechanism, self.spins, x, self.start)
+
+    def _verify(self) -> int:
+        """Verify the coarse rows in their order, correct those of other branches; return the last row reached."""
+        x, coarse = self.motion.x, self.coarse
+        good = self._is_continuous(x[:, coarse[:-1]], x[:, coarse[1:]])
+        synchronous = True
+        for k in range(len(coarse) - 1):
+            first, second = int(coarse[k]), int(coarse[k + 1])
+            if synchronous and good[k]:
+                continue
+            line = x[:, second].copy()
+            end = self._step(x[:, first], second) if not synchronous else None
+            if end is None:
+                last, end = self._trace_rows(first, second)
+                if last < second:
+                    return last
+            x[:, second] = end
+            synchronous = bool(np.abs(self._difference(line[:, np.newaxis], end[:, np.newaxis])).max() < SAME)
+        return len(self.rows) - 1
+
+    def _step(self, x: FloatArray, row: int) -> FloatArray | None:
+        """Return the configuration of a row next to that of an earlier one; None unless it is continuous."""
+        end = x[:, np.newaxis].copy()
+        end[self.driven] = self.rows[row][:, np.newaxis]
+        change = end - x[:, np.newaxis]
+        end[self.free] += self._tangents(x[:, np.newaxis], change)[self.free]
+        end = unspun(
+            self.mechanism, self.spins, settle(self.mechanism, end, self.free, wrap=True)[0], self.start
+        )
+        return end[:, 0] if self._is_continuous(x[:, np.newaxis], end)[0] else None
+
+    def _trace_rows(self, first: int, second: int) -> tuple[int, FloatArray]:
+        """Trace the rows between two, one after another; return the last row reached and its configuration."""
+        x = self.motion.x[:, first]
+        for row in range(first, second):
+            change = np.zeros(len(x))
+            change[self.driven] = self.rows[row + 1] - self.rows[row]
+            if np.any(change):
+                drive = Drive(self.mechanism, x, change, self.free, self.limits)
+                branch = trace(drive, 0.0)
+                for pose, _ in branch.singular:
+                    if pose.s <= 1.0:
+                        self.motion.singular.append(
+                            SingularPose(pose.passage, row + pose.s, pose.x, pose.direction)
+                        )
+                if not branch.complete:
+                    if branch.stop is not None:
+                        self.motion.stop = LimitStop(
+                            branch.stop.variable, branch.stop.limit, row + branch.stop.s
+                        )
+                    return row, x
+                x = sample(drive, branch, np.ones(1))[:, 0]
+            x = unspun(self.mechanism, self.spins, x[:, np.newaxis], self.start)[:, 0]
+            self.motion.x[:, row + 1] = x
+        return second, x
+
+    def _fill(self, rows: IndexArray) -> None:
+        """Solve rows between the coarse ones from the tangents at both neighbours."""
+        after = np.clip(np.searchsorted(self.coarse, rows), 1, len(self.coarse) - 1)
+        first, second = self.coarse[after - 1], self.coarse[after]
+        inner = (rows != first) & (rows != second)
+        rows, first, second = rows[inner], first[inner], second[inner]
+        if not len(rows):
+            return
+        known = self.motion.x
+        span = self.length[second] - self.length[first]
+        share = (self.length[rows] - self.length[first]) / np.where(span > 0.0, span, 1.0)
+        weight = share * share * (3.0 - 2.0 * share)
+        x = known[:, rows]
+        predicted = []
+        for ends in (first, second):
+            change = np.zeros_like(x)
+            change[self.driven] = x[self.driven] - known[:, ends][self.driven]
+            predicted.append(known[:, ends] + self._tangents(known[:, ends], change))
+        near = nearest_rotations(self.mechanism, predicted[1], predicted[0])
+        x[self.free] = ((1.0 - weight) * predicted[0] + weight * near)[self.free]
+        solved, first_step, last_step = settle(self.mechanism, x, self.free, wrap=True)
+        solved = unspun(self.mechanism, self.spins, solved, self.start)
+        doubtful = ~((first_step < 0.5 * COARSE) & (last_step < 1e-9))
+        known[:, rows] = solved
+        for begin, end in sorted({*zip(first[doubtful].tolist(), second[doubtful].tolist(), strict=True)}):
+            self._trace_rows(begin, end)
+
+    def _is_continuous(self, first: FloatArray, second: FloatArray) -> BoolArray:
+        """Return whether configurations are neighbours on one branch, shape (n,).
+
+        x_2 - x_1 is the mean of both tangents times the change of the drives, up to the square of that; on
+        another branch it is not, and the Jacobians of two branches that are near have other orientations.
+        """
+        good = np.zeros(first.shape[1], dtype=np.bool_)
+        for piece in iter_chunks(first.shape[1]):
+            own, other = first[:, piece], second[:, piece]
+            difference = self._difference(own, other)
+            change = np.zeros_like(difference)
+            change[self.driven] = other[self.driven] - own[self.driven]
+            mean = 0.5 * (self._tangents(own, change) + self._tangents(other, change))
+            scales = self.mechanism.column_scales[:, np.newaxis]
+            miss = np.linalg.norm(((difference - mean) / scales)[self.free], axis=0)
+            size = np.linalg.norm((difference / scales)[self.free], axis=0)
+            closures = [scaled_closure(self.mechanism, x) for x in (own, other)]
+            closed = np.abs(closures[1].residual).max(axis=0, initial=0.0) < 1e3 * ROUNDING
+            own_good = closed & (miss < MAX_DISAGREEMENT * size + SAME)
+            if not self.spins:
+                jacobians = [closure.jacobian[:, self.free] for closure in closures]
+                products = np.einsum("kin,kjn->nij", *jacobians)
+                finite = np.isfinite(products).all(axis=(1, 2))
+                own_good &= finite & (np.linalg.det(np.where(finite[:, None, None], products, 0.0)) > 0.0)
+            good[piece] = own_good
+        return good
+
+    def _difference(self, first: FloatArray, second: FloatArray) -> FloatArray:
+        """Return x_2 - x_1 with rotation vectors next to each other."""
+        return np.asarray(nearest_rotations(self.mechanism, second, first) - first)
+
+    def _tangents(self, x: FloatArray, change: FloatArray) -> FloatArray:
+        """Return how all variables change with the driven ones, to first order, shape (variables, n)."""
+        scales = self.mechanism.column_scales[:, np.newaxis]
+        jacobian = scaled_closure(self.mechanism, x).jacobian
+        load = np.einsum("kdn,dn->kn", jacobian[:, self.driven], (change / scales)[self.driven])
+        moved = np.array(change)
+        moved[self.free] = damped_step(jacobian[:, self.free], -load, FLOOR) * scales[self.free]
+        return moved
+
+    def _stop_at_limit(self) -> None:
+        """End before the first row at which a variable is beyond a limit."""
+        lower, upper = self.limits[:, :1], self.limits[:, 1:]
+        beyond = (self.motion.x < lower) | (self.motion.x > upper)
+        beyond[self.driven] = False
+        if beyond.any():
+            row = int(np.argmax(beyond.any(axis=0)))
+            variable = int(np.argmax(beyond[:, row]))
+            value = self.motion.x[variable, row]
+            limit = float(self.limits[variable, int(value > self.limits[variable, 1])])
+            self.motion.stop = LimitStop(variable, limit, float(row))
+            self.motion.x = self.motion.x[:, :row]
