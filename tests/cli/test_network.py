@@ -249,6 +249,7 @@ def test_pairs_are_drawn_recorded_and_reported(urmpipe: Run, tmp_path: Path, nam
     for one in network.elements:
         assert f"{one.name} {one.kind}" in words
     read = api.read_recording(run)
+    assert isinstance(read, api.NetworkResult)
     assert read.network.elements == network.elements
     assert [one.limits for one in read.network.joints] == [one.limits for one in network.joints]
     assert urmpipe("report", run, "-o", tmp_path / "run.html").code == 0

@@ -10,7 +10,6 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IndexArray
 from urmpipe_models.elementwise import Element, add, cross
 from urmpipe_models.networks.element_measures import MEASURES, measure
-from urmpipe_models.networks.higher_pairs import transmitted
 from urmpipe_models.networks.joint_motion import Screws, forbidden, joint_frame, joint_screws
 from urmpipe_models.networks.mechanism import Given, Mechanism, Pose, Posed, of_controls
 from urmpipe_models.networks.parts import ConstraintElement, Joint
@@ -140,37 +139,18 @@ def _equations(
         yield _Equation(slice(6 * k, 6 * k + 6), gap, _carrier(here, gap), movers, {})
     first = 6 * len(mechanism.graph.cuts)
     for row, element in enumerate(mechanism.network.elements, first):
-        length = of_controls(element.length, controls)
         if element.is_pair:
-            yield _pair_equation(mechanism, element, row, x, length, controls)
+            error, rates = mechanism.pair_error(element, x, controls)
+            slopes = {place: -slope for place, slope in error.slopes.items()}
+            values, no_wrench = _stacked((error.value,), n), np.zeros((1, 6, n))
+            yield _Equation(slice(row, row + 1), values, no_wrench, {}, slopes, rates)
             continue
+        length = of_controls(element.length, controls)
         measured = measure(element, *(posed.bodies[name].frame for name in element.bodies))
         wrench = _stacked((*measured.moment, *measured.force), n)[np.newaxis]
         excess = _stacked((measured.distance - length.value,), n)
         movers = relative_movers(posed.bodies, element.bodies)
         yield _Equation(slice(row, row + 1), excess, wrench, movers, length.slopes)
-
-
-def _pair_equation(
-    mechanism: Mechanism,
-    element: ConstraintElement,
-    row: int,
-    x: FloatArray,
-    offset: Given,
-    controls: dict[str, Given],
-) -> _Equation:
-    """Return q_2 - f(q_1) - offset = 0 of a pair, see `higher_pairs`."""
-    (first, j), (second, k) = mechanism.network.coupled(element)
-    angle, follower = mechanism.values(first, x, controls)[j], mechanism.values(second, x, controls)[k]
-    value, slope = transmitted(element, angle.value)
-    slopes = dict(offset.slopes)
-    for place, inner in angle.slopes.items():
-        slopes[place] = slopes.get(place, 0.0) + slope * inner
-    for place, inner in follower.slopes.items():
-        slopes[place] = slopes.get(place, 0.0) - inner
-    error = _stacked((follower.value - value - offset.value,), x.shape[1])
-    rates = {(first.name, j): -slope, (second.name, k): 1.0}
-    return _Equation(slice(row, row + 1), error, np.zeros((1, 6, x.shape[1])), {}, slopes, rates)
 
 
 def _screws(

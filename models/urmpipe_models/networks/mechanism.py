@@ -14,8 +14,16 @@ from urmpipe_models.arrays import FloatArray, IndexArray
 from urmpipe_models.elementwise import Element, Vector, subtract
 from urmpipe_models.networks.expressions import Expression, Slopes
 from urmpipe_models.networks.graph import Graph, graph_of
+from urmpipe_models.networks.higher_pairs import transmitted
 from urmpipe_models.networks.joint_motion import joint_frame
-from urmpipe_models.networks.parts import POSE_UNITS, Joint, Parts, ordered_controls, ranged
+from urmpipe_models.networks.parts import (
+    POSE_UNITS,
+    ConstraintElement,
+    Joint,
+    Parts,
+    ordered_controls,
+    ranged,
+)
 from urmpipe_models.networks.rotations import rotation_of
 from urmpipe_models.transform import Transform
 
@@ -266,6 +274,29 @@ class Mechanism:
             else:
                 found.append(of_controls(drive, controls))
         return found or [of_controls(one, controls) for one in joint.motion]
+
+    def pair_error(
+        self, element: ConstraintElement, x: Configuration, controls: dict[str, Given]
+    ) -> tuple[Given, dict[tuple[str, int], Element]]:
+        """Return q_2 - f(q_1) - offset of a pair, in [rad] or [m], see `higher_pairs`.
+
+        Then, its derivatives by the values of its joints: by the joint and the value's number.
+
+        Args:
+            element: The pair.
+            x: The variables, one element each.
+            controls: What `control_slopes` returns.
+        """
+        (first, j), (second, k) = self.network.coupled(element)
+        angle, follower = self.values(first, x, controls)[j], self.values(second, x, controls)[k]
+        offset = of_controls(element.length, controls)
+        value, rate = transmitted(element, angle.value)
+        slopes: dict[int, Element] = {}
+        for factor, given in ((-rate, angle), (1.0, follower), (-1.0, offset)):
+            for place, slope in given.slopes.items():
+                slopes[place] = slopes.get(place, 0.0) + factor * slope
+        error = Given(follower.value - value - offset.value, slopes)
+        return error, {(first.name, j): -rate, (second.name, k): 1.0}
 
     def poses(self, x: Configuration) -> dict[str, Transform]:
         """Return the pose of each body in the ground.

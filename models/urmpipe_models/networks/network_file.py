@@ -254,7 +254,7 @@ class _Reader:
         free = [start if drive is None else math.nan for start, drive in starts]  # NaN is beyond no limit
         if any(lower > upper for lower, upper in joint.limits):
             return
-        for unit, value, end, limit in exceeded_limits(joint, free, is_coupled=True):
+        for unit, value, end, limit in exceeded_limits(joint, free, is_coupled=False):
             size = in_si(1.0, unit, self.units)
             allowed = "at least lower" if end == "lower" else "at most upper"
             table.fault("start", f"found {value / size:.6g}, allowed: {allowed}, {limit / size:.6g}")

@@ -16,7 +16,14 @@ from urmpipe_models.elementwise import Vector
 from urmpipe_models.networks.expressions import Expression
 from urmpipe_models.networks.mechanism import mechanism_of
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import POSE_UNITS, Body, ConstraintElement, Control, Joint
+from urmpipe_models.networks.parts import (
+    POSE_UNITS,
+    Body,
+    ConstraintElement,
+    Control,
+    Joint,
+    exceeded_limits,
+)
 
 
 def network_tables(network: Network) -> dict[str, Any]:
@@ -106,12 +113,22 @@ def _joint_table(joint: Joint) -> dict[str, Any]:
         table["value"] = texts if len(texts) > 1 else texts[0]
     if joint.kind == "helical":
         table["pitch"] = float(joint.pitch)
+    starts = joint.start or (0.0,) * len(joint.units)
+    if not any(exceeded_limits(joint, starts, is_coupled=False)):  # files refuse a start beyond limits
+        for key, limits in zip(("lower", "upper"), zip(*joint.limits, strict=True), strict=False):
+            table[key] = _numbers(limits) if len(limits) > 1 else float(limits[0])
     return table
 
 
 def _element_table(element: ConstraintElement) -> dict[str, Any]:
+    table: dict[str, Any]
+    if element.is_pair:
+        own: dict[str, Any] = {"gear": {"teeth": _numbers(element.teeth)}, "rack": {"radius": element.radius}}
+        profile = {"profile": [_numbers(point) for point in element.profile]}
+        table = {"kind": element.kind, "joints": list(element.joints), "offset": element.length.text}
+        return table | own.get(element.kind, profile)
     points, normals = [_numbers(point) for point in element.points], [_numbers(n) for n in element.normals]
-    table: dict[str, Any] = {"kind": element.kind, "bodies": list(element.bodies)}
+    table = {"kind": element.kind, "bodies": list(element.bodies)}
     if element.kind == "eg":
         return {**table, "a": points[1], "n": normals[0], "h": element.length.text}
     if element.kind != "gg":

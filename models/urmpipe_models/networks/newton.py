@@ -117,7 +117,7 @@ def closure_residual(mechanism: Mechanism, x: Sequence[Element]) -> Column:
     """Return what does not close, in lengths of the mechanism and [rad].
 
     Rows: of each cut joint its gap along x, y, z of the ground and the skew part of its rotation about them,
-    which is sin(a) u of a rotation by a about u; then of each element its error.
+    which is sin(a) u of a rotation by a about u; then of each element its error, of a pair in its own unit.
 
     Args:
         mechanism: The network.
@@ -194,7 +194,11 @@ def _residual(mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls
         # of small turns d the sum over the axes c of c x (c + d x c) is 2 d
         pairs = zip(first.columns, second.columns, strict=True)
         rows += scale(0.5, reduce(add, (cross(before, after) for before, after in pairs)))
-    for element in mechanism.network.elements:
+    scales = mechanism.row_scales[len(rows) :].tolist()
+    for element, per_unit in zip(mechanism.network.elements, scales, strict=True):
+        if element.is_pair:
+            rows.append(times(per_unit, mechanism.pair_error(element, x, controls)[0].value))
+            continue
         frames = (posed.bodies[name].frame for name in element.bodies)
         length = of_controls(element.length, controls).value
         rows.append(times(per_length, minus(measure(element, *frames).distance, length)))
@@ -218,6 +222,12 @@ def _jacobian(
                 entries = (*scale(factor * per_length, velocity), *scale(factor, w))
                 columns[k - first_free][6 * row : 6 * row + 6] = entries
     for row, element in enumerate(mechanism.network.elements, 6 * len(cut_joints)):
+        if element.is_pair:
+            error, _ = mechanism.pair_error(element, x, controls)
+            for k in error.slopes.keys() & set(mechanism.free.tolist()):
+                factor = float(scales[k] * mechanism.row_scales[row])
+                columns[k - first_free][row] = times(factor, error.slopes[k])
+            continue
         measured = measure(element, *(posed.bodies[name].frame for name in element.bodies))
         for mover, sign in relative_movers(posed.bodies, element.bodies).items():
             for k, w, v in screws[mover]:

@@ -343,7 +343,7 @@ def exceeded_limits(
     is_periodic = joint.kind in ("revolute", "cylindrical") and not is_coupled
     for unit, value, (lower, upper) in zip(joint.units, values, joint.limits, strict=False):
         nearest = value
-        if is_periodic and unit == "rad" and math.isfinite(upper - lower):
+        if is_periodic and unit == "rad" and math.isfinite(upper - lower + value):
             nearest -= 2.0 * math.pi * round((value - 0.5 * (lower + upper)) / (2.0 * math.pi))
         if nearest < lower - LIMIT_TOLERANCE or nearest > upper + LIMIT_TOLERANCE:
             end, limit = ("lower", lower) if value < lower else ("upper", upper)

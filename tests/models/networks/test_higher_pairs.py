@@ -312,4 +312,4 @@ def test_faults_of_a_file_of_a_profile_have_its_lines(
         " allowed: a .csv file of two columns",
     ])):  # fmt: skip
         wrong = {**CAM, "elements": {"pair": {**CAM["elements"]["pair"], "profile": file}}}
-        assert refusal(NetworkError, lambda tables=wrong: load_network(tables)).splitlines() == lines
+        assert refusal(NetworkError, load_network, wrong).splitlines() == lines

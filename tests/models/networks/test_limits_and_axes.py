@@ -1,4 +1,4 @@
-"""Limits of joints: read in the units of the file, checked, and compared with the assembly that is shown."""
+"""Limits of joints and m by default: read in the units of the file, checked, compared with an assembly."""
 
 from __future__ import annotations
 
