@@ -1,7 +1,8 @@
-"""Values with their first and second derivative by time, as an element: what a model computes of them is exact.
+"""Values with two derivatives by time, as an element: velocity and acceleration of what a model computes.
 
-A `Taylor` passes through elementwise NumPy as a float or a column does, so that velocity and acceleration of a
-model's outputs come from the same lines as the outputs. Rules: (f(u))' = f' u', (f(u))'' = f'' u'^2 + f' u''.
+A `Taylor` passes through elementwise NumPy as a float or a column does, so that velocity and acceleration
+of a model's outputs come from the same lines as the outputs. Rules: (f(u))' = f' u', (f(u))'' = f'' u'^2 +
+f' u''.
 
 Source: Griewank and Walther 2008, Evaluating Derivatives, chapter 13.
 """
@@ -46,15 +47,15 @@ class Taylor(NDArrayOperatorsMixin):
         if function is not np.where or options:
             return NotImplemented
         condition, *choices = arguments
-        first, second = (one if isinstance(one, Taylor) else Taylor(one) for one in choices)
-        return Taylor(
-            np.where(condition, first.value, second.value),
-            np.where(condition, first.first, second.first),
-            np.where(condition, first.second, second.second),
-        )
+        return _where(condition, *(term if isinstance(term, Taylor) else Taylor(term) for term in choices))
 
 
 _COMPARISONS = {"less", "less_equal", "greater", "greater_equal", "equal", "not_equal"}
+
+
+def _where(condition: Any, u: Taylor, v: Taylor) -> Taylor:
+    pairs = ((u.value, v.value), (u.first, v.first), (u.second, v.second))
+    return Taylor(*(np.where(condition, *pair) for pair in pairs))
 
 
 def _chain(u: Taylor, value: Element, slope: Element, curvature: Element) -> Taylor:
@@ -139,8 +140,7 @@ def _arctan2(y: Taylor, x: Taylor) -> Taylor:
 def _choose(larger: bool) -> Callable[[Taylor, Taylor], Taylor]:
     def rule(u: Taylor, v: Taylor) -> Taylor:
         condition = u.value >= v.value if larger else u.value <= v.value
-        chosen: Taylor = np.where(condition, u, v)
-        return chosen
+        return _where(condition, u, v)
 
     return rule
 
@@ -162,7 +162,7 @@ _RULES: dict[str, Callable[..., Taylor]] = {
     "arctan2": _arctan2,
     "floor": lambda u: Taylor(np.floor(u.value)),
     "remainder": lambda u, period: Taylor(np.remainder(u.value, period.value), u.first, u.second),
-    "absolute": lambda u: np.where(u.value < 0.0, _negative(u), u),
+    "absolute": lambda u: _where(u.value < 0.0, _negative(u), u),
     "maximum": _choose(larger=True),
     "minimum": _choose(larger=False),
 }

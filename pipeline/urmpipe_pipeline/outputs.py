@@ -20,7 +20,8 @@ OutputKind = Literal[
 ]  # fmt: skip
 
 NOUNS: dict[str, str] = {
-    "junit": "JUnit file", "statistics": "table of statistics", "fmu": "FMU", "joints": "joint log", "motion": "motion log",
+    "junit": "JUnit file", "statistics": "table of statistics", "fmu": "FMU", "joints": "joint log",
+    "motion": "motion log",
     "system": "system file",
 }  # fmt: skip
 """What people call a kind, where that is not its name."""

@@ -20,8 +20,9 @@ from urmpipe_models.networks.driving import Law
 from urmpipe_models.networks.forces import Wrench
 from urmpipe_models.networks.network import Network
 from urmpipe_pipeline.networks.drawing import network_svg
-from urmpipe_pipeline.networks.drive_request import DriveRequest, Range, drive_network
+from urmpipe_pipeline.networks.drive_request import DriveRequest, drive_network
 from urmpipe_pipeline.networks.finding import Search, find_network
+from urmpipe_pipeline.networks.given_values import Range
 from urmpipe_pipeline.networks.network_motion import NetworkMotion, motion_drawing
 from urmpipe_pipeline.networks.result import Command, NetworkResult
 from urmpipe_pipeline.outputs import MOTION_ROW, OutputKind
@@ -106,10 +107,10 @@ def network_solve(
     output: PathLike | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> NetworkResult:
-    """Assemble a network with its controls held: on the branch of its start, nearest to start values, or every way.
+    """Assemble a network with its controls held: on the branch of its start, nearest to values, or every way.
 
-    Controls away from their start are moved there from the assembly at the start. If no motion leads there, the
-    assembly nearest to the start is returned, and a warning says that it is of another branch.
+    Controls away from their start are moved there from the assembly at the start. If no motion leads there,
+    the assembly nearest to the start is returned, and a warning says that it is of another branch.
 
     Args:
         network: A name, a file, the tables of one, or a `Network`.
@@ -126,8 +127,8 @@ def network_solve(
         progress: Called with the share that is done, 0..1.
 
     Returns:
-        `assemblies`, each with its `values` by name in [m] and [rad], `residual` and `mobility`; `distances` of
-        all that the search came to from the start; `reason`; `gaps` where nothing closes.
+        `assemblies`, each with its `values` by name in [m] and [rad], `residual` and `mobility`;
+        `distances` of all that the search came to from the start; `reason`; `gaps` where nothing closes.
 
     Raises:
         UrmpipeError: With everything that is wrong with the network, an option or an output.
@@ -186,24 +187,27 @@ def network_drive(
 ) -> NetworkMotion:
     """Move a network by its controls, or by joints in their place, on one branch. See docs/networks.md.
 
-    The motion follows the branch of an assembly by continuation. It names singular poses, and ends where it turns
-    back, or a joint reaches its limit.
+    The motion follows the branch of an assembly by continuation. It names singular poses, and ends where it
+    turns back, or a joint reaches its limit.
 
     Args:
         network: A name, a file, the tables of one, or a `Network`.
         drives: From and to by name, such as {"crank": (0, "360deg")}; one value holds a variable. Of controls
-            numbers are in the units of the network, of joints in [rad] and [m]; texts have units. With a log: the
-            joint of the log that drives each, such as {"crank": "q1"}; default: those of the same names.
+            numbers are in the units of the network, of joints in [rad] and [m]; texts have units. With a
+            log: the joint of the log that drives each, such as {"crank": "q1"}; default: those of the same
+                names.
         steps: Equal steps, one per `tsp`; default: 200.
         duration: Duration in [s] instead of steps.
-        law: How the drives move over the duration: uniform, trapezoid (a third each), quintic (from rest to rest).
+        law: How the drives move over the duration: uniform, trapezoid (a third each), quintic (from rest to
+            rest).
         tsp: Time from row to row in [s]; default: 0.005. With a log: the period of its grid.
         branch: Number of the assembly at the begin of the drives, as `network_solve` with `every` lists them.
-        start: Values of joints in [rad] and [m], or texts with units: the motion begins at the assembly nearest to
-            them; default: that which continues the network's own start.
-        point: A point of a body to trace, such as "coupler:0.45,0.2,0" in [m]: the tool centre point of the run.
-        wrenches: Loads, such as "coupler:0.45,0,0:0,-50,0": point in the frame of the body in [m], force in [N],
-            and if wanted the moment in [N.m], along the axes of the ground.
+        start: Values of joints in [rad] and [m], or texts with units: the motion begins at the assembly
+            nearest to them; default: that which continues the network's own start.
+        point: A point of a body to trace, such as "coupler:0.45,0.2,0" in [m]: the tool centre point of the
+            run.
+        wrenches: Loads, such as "coupler:0.45,0,0:0,-50,0": point in the frame of the body in [m], force in
+            [N], and if wanted the moment in [N.m], along the axes of the ground.
         torques: Loads at joints in [N.m] or [N], by name.
         log: A log whose joints drive the network, row by row.
         derivative: central or savgol: how the log is differentiated; default: by its resolution.
@@ -216,10 +220,10 @@ def network_drive(
         **reading: How to read the log, as in `ingest`.
 
     Returns:
-        `joints`, `joint_motion` (values, rates, second derivatives in [rad] or [m] and per [s], shape (n, joints)),
-        `point_motion` (likewise of the traced point, shape (n, 3) each), `events` (singular poses and limits),
-        `transmission`, `distance` to a singular pose [-], shape (n,), `forces`, `verdict` ("pass" if the drives
-        reach their end), `to_frame()`.
+        `joints`, `joint_motion` (values, rates, second derivatives in [rad] or [m] and per [s], shape (n,
+        joints)), `point_motion` (likewise of the traced point, shape (n, 3) each), `events` (singular poses
+        and limits), `transmission`, `distance` to a singular pose [-], shape (n,), `forces`, `verdict`
+        ("pass" if the drives reach their end), `to_frame()`.
 
     Raises:
         UrmpipeError: With everything that is wrong with the network, a drive, the log or an output.
@@ -230,14 +234,20 @@ def network_drive(
     parts: tuple[Callable[[], Any], ...] = (
         lambda: network if isinstance(network, Network) else network_file.load_network(network),
         lambda: DriveRequest(
-            drives or {}, steps, duration, law, 0.005 if tsp is None else tsp, branch, start or {}, point, wrenches,
-            torques or {}, restarts, seed,
+            drives or {}, steps, duration, law, 0.005 if tsp is None else tsp, branch, start or {}, point,
+            wrenches, torques or {}, restarts, seed,
         ),
         lambda: _refuse_together(log, steps, duration, law),
         lambda: output_kind(written, "motion"),
     )  # fmt: skip
     loaded, request, _, kind = for_each(lambda make: make(), parts)
-    run = None if log is None else log if isinstance(log, Run) else ingest(log, tsp=tsp, derivative=derivative, **reading)
+    run = (
+        None
+        if log is None
+        else log
+        if isinstance(log, Run)
+        else ingest(log, tsp=tsp, derivative=derivative, **reading)
+    )
     named = [Path(one) for one in (network, log) if isinstance(one, (str, Path))]
     files = [path for path in named if path.is_file()] + map_files(reading)
     outputs: dict[OutputKind, PathLike | None] = {"drawing": draw}

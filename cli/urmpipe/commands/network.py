@@ -67,8 +67,8 @@ def _search_options(command: Command) -> Command:
             multiple=True,
             callback=named_values,
             metavar="JOINT=VALUE",
-            help="Assemble nearest to these joint values, such as theta4=85deg [default: where a motion from the"
-            " network's start leads].",
+            help="Assemble nearest to these joint values, such as theta4=85deg [default: where a motion from"
+            " the network's start leads].",
         ),
         click.option(
             "--restarts",
@@ -215,7 +215,14 @@ def solve(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
     show_default=True,
     help="End a search for assemblies after this many random starts without a new one.",
 )
-@option(Heading.SOLVING, "--seed", type=WholeType(), default=0, show_default=True, help="Seed of the random starts.")
+@option(
+    Heading.SOLVING,
+    "--seed",
+    type=WholeType(),
+    default=0,
+    show_default=True,
+    help="Seed of the random starts.",
+)
 @option(Heading.OUTPUT, "--draw", metavar="FILE.svg", type=DRAWING, help="Draw the motion.")
 @output_option("RUN.rrd|RUN.csv", "Recording, or log, to write.")
 @motion_log_options

@@ -60,8 +60,8 @@ class Assembled:
         reason: Why the search ended.
         elsewhere: Whether only a random start closed, not the network's own.
         continuum: Of how many dimensions the assemblies are where controls and idle spins are held; 0: apart.
-        distances: How far all assemblies that the search came to are from the start, in [rad] and lengths of the
-            mechanism, rising: those of `assemblies` come first.
+        distances: How far all assemblies that the search came to are from the start, in [rad] and lengths
+            of the mechanism, rising: those of `assemblies` come first.
     """
 
     x: FloatArray
@@ -97,8 +97,8 @@ def assemble(
     Args:
         mechanism: The network.
         controls: Values to hold controls at instead of their starts.
-        start: Values of joints, and of bodies with freedoms of their own, to be near to instead of the network's
-            start, by name, in [rad] and [m]; of variables that controls drive they count nothing.
+        start: Values of joints, and of bodies with freedoms of their own, to be near to instead of the
+            network's start, by name, in [rad] and [m]; of variables that controls drive they count nothing.
         every: Whether all assemblies are sought.
         restarts: Random starts in a row without anything new that end the search; 0: the own start alone.
         seed: Of the random starts.

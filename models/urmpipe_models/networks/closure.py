@@ -266,16 +266,17 @@ def body_twists(mechanism: Mechanism, x: FloatArray) -> dict[str, FloatArray]:
 def wrench_carriers(
     mechanism: Mechanism, x: FloatArray
 ) -> Iterator[tuple[Joint | ConstraintElement, slice, FloatArray]]:
-    """Yield of each cut joint and element its rows, and what turns twists in the ground into rates of the rows.
+    """Yield of each cut joint and element its rows, and the matrix from twists in the ground to their rates.
 
-    The transpose turns multipliers of the rows, in [N] and [N.m], into the moment and force, about the origin of
-    the ground, on the second body. Shape (rows, 6, n).
+    The transpose turns multipliers of the rows, in [N] and [N.m], into the moment and force, about the
+    origin of the ground, on the second body. Shape (rows, 6, n).
 
     Args:
         mechanism: The network.
         x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
     """
-    ties = (*(mechanism.network.joints[cut] for cut in mechanism.graph.cuts), *mechanism.network.elements)
+    cuts = [mechanism.network.joints[cut] for cut in mechanism.graph.cuts]
+    ties: list[Joint | ConstraintElement] = [*cuts, *mechanism.network.elements]
     equations = _equations(mechanism, x, mechanism.posed(x), mechanism.control_slopes(x))
     for tie, equation in zip(ties, equations, strict=True):
         yield tie, equation.rows, equation.carrier

@@ -1,8 +1,8 @@
-"""From drives in words to a motion: which variables are prescribed, which follow, and where the motion begins.
+"""From drives by name to a motion: which variables are prescribed, which follow, and where it begins.
 
 1. `find_driven`: controls and joint variables by name.
-2. `split_variables`: which variables follow. Controls without a drive keep their value; if joints are driven in
-   their place, controls follow.
+2. `split_variables`: which variables follow. Controls without a drive keep their value; if joints are
+   driven in their place, controls follow.
 3. `move_to`: from an assembly along a straight line of the drives to where the motion begins.
 4. `drive_line`, `drive_rows`: the motion along a line or along the rows of a log (`motion`, `row_motion`).
 5. `compute_shares`: how far along the line it is over time.
@@ -11,8 +11,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -96,8 +96,8 @@ def find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
             places.append(mechanism.places[owner, index or 0])
             unit = mechanism.network.unit_of(name) if name in controls else None
             units.append(unit[0] if unit else "" if name in controls else joints[owner].units[index or 0])
-    for name in sorted({name for name in names if names.count(name) > 1}):
-        faults.append(Finding(f"{name} is driven twice, allowed: once", parameter="drives"))
+    twice = sorted({name for name in names if names.count(name) > 1})
+    faults += [Finding(f"{name} is driven twice, allowed: once", parameter="drives") for name in twice]
     if faults:
         raise NetworkError(*faults)
     return Driven(tuple(names), np.array(places, dtype=np.intp), tuple(units))
@@ -154,7 +154,9 @@ def split_variables(mechanism: Mechanism, x: FloatArray, driven: Driven) -> Inde
     if still > 0:
         names = ", ".join(dict.fromkeys(mechanism.variables[k].owner for k in free[:12].tolist()))
         message = f"with {', '.join(driven.names)} driven, the network still moves, with mobility {still}"
-        raise NetworkError(Finding(f"{message}; allowed: {still} more drives, of {names}", parameter="drives"))
+        raise NetworkError(
+            Finding(f"{message}; allowed: {still} more drives, of {names}", parameter="drives")
+        )
     return np.asarray(free, dtype=np.intp)
 
 
@@ -172,7 +174,7 @@ def variable_limits(mechanism: Mechanism) -> FloatArray:
 
 
 def within_turns(mechanism: Mechanism, x: FloatArray, limits: FloatArray) -> FloatArray:
-    """Return an assembly with angles beyond their limits turned by whole turns, where that brings them within."""
+    """Return an assembly with angles beyond their limits turned by whole turns, if that helps."""
     x = np.array(x)
     for k in mechanism.angles.tolist():
         lower, upper = limits[k]
@@ -183,7 +185,12 @@ def within_turns(mechanism: Mechanism, x: FloatArray, limits: FloatArray) -> Flo
 
 
 def move_to(
-    mechanism: Mechanism, x: FloatArray, places: IndexArray, values: FloatArray, free: IndexArray, limits: FloatArray
+    mechanism: Mechanism,
+    x: FloatArray,
+    places: IndexArray,
+    values: FloatArray,
+    free: IndexArray,
+    limits: FloatArray,
 ) -> tuple[FloatArray, Trace | None]:
     """Return the configuration at values of the drives on a straight line from an assembly.
 
@@ -196,8 +203,8 @@ def move_to(
         limits: Lower and upper limits of all variables, shape (variables, 2).
 
     Returns:
-        The configuration, shape (variables,), and the trace that leads there; without one if it is there already.
-        If the trace is not complete, as from a singular pose, the configuration is the assembly.
+        The configuration, shape (variables,), and the trace that leads there; without one if it is there
+        already. If the trace is not complete, as from a singular pose, the configuration is the assembly.
     """
     change = np.zeros(len(x))
     change[places] = values - x[places]
@@ -224,7 +231,8 @@ def drive_line(
 
     Args:
         mechanism: The network.
-        x: An assembly, shape (variables,), in [m], [rad] and as controls are given: the motion stays on its branch.
+        x: An assembly, shape (variables,), in [m], [rad] and as controls are given: the motion stays on its
+            branch.
         driven: The prescribed variables.
         begin: Their values at the begin of the line, shape (driven,), as in x.
         end: Their values at its end.
@@ -232,7 +240,8 @@ def drive_line(
         progress: Called with the share that is done, 0..1.
 
     Raises:
-        NetworkError: If the drives do not determine the motion, or no motion from the assembly leads to the begin.
+        NetworkError: If the drives do not determine the motion, or no motion from the assembly leads to the
+            begin.
     """
     limits, places = variable_limits(mechanism), driven.places
     x = within_turns(mechanism, x, limits)
@@ -245,18 +254,18 @@ def drive_line(
         motion[places] = begin[:, np.newaxis] + np.outer(end - begin, shares)
         return Motion(motion, free, spins)
     scaled = (change / mechanism.column_scales)[places]
-    at = ((x[places] - begin) / mechanism.column_scales[places]) @ scaled / (scaled @ scaled or 1.0)
-    off = np.linalg.norm((x[places] - begin) / mechanism.column_scales[places] - at * scaled)
-    if off > SAME_PLACE:
-        x = _approach(mechanism, x, driven, begin, free, limits)
-        at = 0.0
+    begun = (x[places] - begin) / mechanism.column_scales[places]
+    at = float(begun @ scaled) / (float(scaled @ scaled) or 1.0)
+    distance = float(np.linalg.norm(begun - at * scaled))
+    if distance > SAME_PLACE:
+        x, at = _approach(mechanism, x, driven, begin, free, limits), 0.0
     if not scaled.any():
         return Motion(np.repeat(x[:, np.newaxis], len(shares), axis=1), free, spins)
     base = np.array(x)
     base[places] = begin
     drive = Drive(mechanism, base, change, free, limits)
-    _check_start(drive, x, float(at), driven)
-    branch = trace(drive, float(at), progress)
+    _check_start(drive, x, at, driven)
+    branch = trace(drive, at, progress)
     first, last = branch.segments[0][0].z[-1] / drive.length, branch.segments[-1][1].z[-1] / drive.length
     if first > SAME_PLACE:
         _refuse_begin(mechanism, driven, begin, branch)
@@ -269,9 +278,7 @@ def drive_line(
         motion,
         free,
         spins,
-        tuple(
-            rows.place(pose) for pose, _ in branch.singular if -SAME_PLACE < pose.s < 1.0 + SAME_PLACE
-        ),
+        tuple(rows.place(pose) for pose, _ in branch.singular if -SAME_PLACE < pose.s < 1.0 + SAME_PLACE),
         rows.place_stop(branch.stop),
         len(reached) == len(shares),
     )
@@ -288,7 +295,8 @@ def drive_rows(
 
     Args:
         mechanism: The network.
-        x: An assembly, shape (variables,), in [m], [rad] and as controls are given: the motion stays on its branch.
+        x: An assembly, shape (variables,), in [m], [rad] and as controls are given: the motion stays on its
+            branch.
         driven: The prescribed variables.
         values: Their values, shape (n, driven), as in x.
         progress: Called with the share that is done, 0..1.
@@ -306,9 +314,7 @@ def drive_rows(
         return Motion(motion, free, spins)
     x = _approach(mechanism, x, driven, values[0], free, limits)
     found = follow(mechanism, x, places, values, free, limits, progress)
-    return Motion(
-        found.x, free, spins, tuple(found.singular), found.stop, found.x.shape[1] == len(values)
-    )
+    return Motion(found.x, free, spins, tuple(found.singular), found.stop, found.x.shape[1] == len(values))
 
 
 @dataclass(frozen=True, slots=True)
@@ -328,7 +334,12 @@ class _Rows:
 
 
 def _approach(
-    mechanism: Mechanism, x: FloatArray, driven: Driven, begin: FloatArray, free: IndexArray, limits: FloatArray
+    mechanism: Mechanism,
+    x: FloatArray,
+    driven: Driven,
+    begin: FloatArray,
+    free: IndexArray,
+    limits: FloatArray,
 ) -> FloatArray:
     """Return the configuration at the begin of the drives.
 
@@ -345,13 +356,15 @@ def _check_start(drive: Drive, x: FloatArray, s: float, driven: Driven) -> None:
     """Raise a `NetworkError` if the branch of an assembly is not defined, or does not move."""
     node = drive.node(drive.coordinates(x, s))
     if abs(node.tangent[-1]) < SINGULAR and node.distance > SINGULAR:
-        said = f"{', '.join(driven.names)} cannot move at the start: the network has too many drives"
-        raise NetworkError(Finding(said, parameter="drives"))
+        message = f"{', '.join(driven.names)} cannot move at the start: the network has too many drives"
+        raise NetworkError(Finding(message, parameter="drives"))
     if node.distance < SINGULAR:
         values = ", ".join(
             f"{name} = {value:.6g}" for name, value in zip(driven.names, x[driven.places], strict=True)
         )
-        message = f"found a singular pose at the start, {values}, where branches meet or the motion turns back"
+        message = (
+            f"found a singular pose at the start, {values}, where branches meet or the motion turns back"
+        )
         allowed = "a start away from it: other start values in the file, or --start and --branch"
         raise NetworkError(Finding(f"{message}; allowed: {allowed}", parameter="drives"))
 
@@ -362,9 +375,11 @@ def _refuse_begin(mechanism: Mechanism, driven: Driven, begin: FloatArray, branc
     why = "no step of the continuation succeeds"
     ends = [pose for pose, _ in branch.singular if pose.passage == "turns back"]
     if branch.stop is not None:
-        why = f"{mechanism.variables[branch.stop.variable].owner} is at its limit {branch.stop.limit:.6g} before"
+        limited = mechanism.variables[branch.stop.variable].owner
+        why = f"{limited} reaches its limit {branch.stop.limit:.6g} before"
     elif ends:
-        at = [f"{name} = {value:.6g}" for name, value in zip(driven.names, ends[0].x[driven.places], strict=True)]
+        known = zip(driven.names, ends[0].x[driven.places], strict=True)
+        at = [f"{name} = {value:.6g}" for name, value in known]
         why = f"the motion turns back at {', '.join(at)}"
     message = f"no motion from the assembly at the start leads to {wanted}: {why}"
     allowed = "a range on its branch, or another assembly by --branch or --start"
@@ -374,7 +389,8 @@ def _refuse_begin(mechanism: Mechanism, driven: Driven, begin: FloatArray, branc
 def compute_shares(law: Law, shares: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return how far a motion is at shares of its duration, with its first and second derivative by them.
 
-    uniform: s = u. trapezoid: a third of the time accelerated, a third at the speed 3/2, a third braked. quintic:
+    uniform: s = u. trapezoid: a third of the time accelerated, a third at the speed 3/2, a third braked.
+        quintic:
     s = 10 u^3 - 15 u^4 + 6 u^5, whose speed and acceleration are 0 at both ends.
 
     Args:
@@ -390,7 +406,9 @@ def compute_shares(law: Law, shares: FloatArray) -> tuple[FloatArray, FloatArray
         return s, 30.0 * u * u * (1.0 - u) ** 2, 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
     if law == "trapezoid":
         late = 1.0 - u
-        s = np.where(u < 1 / 3, 2.25 * u * u, np.where(late < 1 / 3, 1.0 - 2.25 * late * late, 1.5 * u - 0.25))
+        s = np.where(
+            u < 1 / 3, 2.25 * u * u, np.where(late < 1 / 3, 1.0 - 2.25 * late * late, 1.5 * u - 0.25)
+        )
         speed = np.minimum(1.5, 4.5 * np.minimum(u, late))
         return s, speed, np.where(u < 1 / 3, 4.5, np.where(late < 1 / 3, -4.5, 0.0))
     return np.array(u), np.ones_like(u), np.zeros_like(u)

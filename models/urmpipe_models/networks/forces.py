@@ -1,13 +1,13 @@
 """Static forces in a network: what the drives must hold, and what joints and elements transmit.
 
-With loads Q (forces on the variables by virtual work) and the closure F(y, d) = 0, multipliers lambda hold the
-variables that follow, and the drives the rest:
+With loads Q (forces on the variables by virtual work) and the closure F(y, d) = 0, multipliers lambda hold
+the variables that follow, and the drives the rest:
 
     J_y^T lambda = -Q_y,    tau_d = -(Q_d + J_d^T lambda)
 
-lambda are the wrenches of cut joints and the forces of elements; the joints of the spanning tree transmit what
-the bodies beyond them need for equilibrium. If constraints are redundant, lambda is not unique: components of
-reactions that depend on the choice are NaN, as they depend on the elasticity of the bodies.
+lambda are the wrenches of cut joints and the forces of elements; the joints of the spanning tree transmit
+what the bodies beyond them need for equilibrium. If constraints are redundant, lambda is not unique:
+components of reactions that depend on the choice are NaN, as they depend on the elasticity of the bodies.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ class Forces:
     """Forces of a network in equilibrium at n configurations.
 
     Attributes:
-        drives: Forces of the prescribed variables in [N.m] of an angle, [N] of a length, shape (driven, n); of a
-            control per its own unit.
+        drives: Forces of the prescribed variables in [N.m] of an angle, [N] of a length, shape (driven, n);
+            of a control per its own unit.
         reactions: Of each joint by its name, on its second body: force [N] along m, n, m x n of its frame and
-            moment [N.m] about them, shape (6, n); of each element its force [N], positive if it pushes its bodies
-            apart, shape (1, n). NaN where redundant constraints leave it undetermined.
+            moment [N.m] about them, shape (6, n); of each element its force [N], positive if it pushes its
+            bodies apart, shape (1, n). NaN where redundant constraints leave it undetermined.
     """
 
     drives: FloatArray
@@ -170,7 +170,8 @@ def _wrenches_in_ground(
     mechanism: Mechanism, x: FloatArray, wrenches: Sequence[Wrench]
 ) -> dict[str, FloatArray]:
     """Return moments about the origin of the ground [N.m] and forces [N] on bodies, shape (6, n) each."""
-    poses, loads = mechanism.poses(x), {}
+    poses = mechanism.poses(x)
+    loads: dict[str, FloatArray] = {}
     for wrench in wrenches:
         arm = cross(poses[wrench.body].point(wrench.point), wrench.force)
         moment = [lever + own for lever, own in zip(arm, wrench.moment, strict=True)]
@@ -182,7 +183,7 @@ def _wrenches_in_ground(
 
 
 def _at_frame(wrench: FloatArray, at: Transform) -> FloatArray:
-    """Return force and moment of a wrench in the ground along the axes of a frame, about its origin, (6, n)."""
+    """Return force and moment of a wrench in the ground along the axes of a frame about its origin."""
     moment, force = tuple(wrench[:3]), tuple(wrench[3:])
     moment = subtract(moment, cross(at.translation, force))
     rows = np.empty_like(wrench)

@@ -123,9 +123,10 @@ def unspun(mechanism: Mechanism, spins: Sequence[IdleSpin], x: FloatArray, start
 
 
 def spin_angles(mechanism: Mechanism, spins: Sequence[IdleSpin], x: Configuration) -> list[Element]:
-    """Return the angles of idle spins in [rad], which `unspun` keeps: twists of the first joints about the lines.
+    """Return the angles of idle spins in [rad], which `unspun` keeps: twists of first joints about the lines.
 
-    phi = 2 atan2(q . u sin(a / 2) / a, cos(a / 2)), a = |q|: q is the rotation vector of the joint, u the line.
+    phi = 2 atan2(q . u sin(a / 2) / a, cos(a / 2)), a = |q|: q is the rotation vector of the joint, u the
+    line.
 
     Args:
         mechanism: The network.

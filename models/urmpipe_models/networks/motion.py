@@ -1,17 +1,17 @@
 """Motion of a driven network: the configurations along its drives, on the branch of the start.
 
-1. `Drive`: which variables are prescribed and which follow; the closure F(y, s) = 0 along a straight line of the
-   prescribed ones, x_d = x_d0 + s dx_d, in scaled coordinates z = (y, s).
+1. `Drive`: which variables are prescribed and which follow; the closure F(y, s) = 0 along a straight line
+   of the prescribed ones, x_d = x_d0 + s dx_d, in scaled coordinates z = (y, s).
 2. `trace`: predictor-corrector continuation of F = 0 by arc length. The tangent t spans the null space of
    dF/dz; each step follows it and returns to the curve at right angles to it; the steps follow the curvature.
    The orientation det [dF/dz; t^T] has one sign along a branch. A step that changes it is refined, until the
    branch itself bends, or the point is reached where two branches cross.
 3. Singular poses, where the rank of dF/dy falls: the motion turns back (dF/ds is not in the range of dF/dy),
    branches (two curves cross), or goes through.
-4. `sample`: configurations at values of s, by Newton from cubic curves between the nodes; about singular poses
-   by polynomials through configurations around them.
-5. `follow`: the same along the rows of a log. All rows are solved side by side; the continuity of neighbouring
-   rows is verified, and where it fails they are solved one after another.
+4. `sample`: configurations at values of s, by Newton from cubic curves between the nodes; about singular
+   poses by polynomials through configurations around them.
+5. `follow`: the same along the rows of a log. All rows are solved side by side; the continuity of
+   neighbouring rows is verified, and where it fails they are solved one after another.
 
 Source: Allgower and Georg 2003, Introduction to Numerical Continuation Methods, chapters 2, 6 and 8.
 """
@@ -120,8 +120,8 @@ class Drive:
 
     Attributes:
         mechanism: The network.
-        x: The prescribed variables where s is 0, and all others anywhere on the branch, shape (variables,), in
-            [m], [rad] and as controls are given.
+        x: The prescribed variables where s is 0, and all others anywhere on the branch, shape (variables,),
+            in [m], [rad] and as controls are given.
         change: What s = 1 adds to the prescribed variables, shape (variables,); 0 of all others.
         free: The numbers of the variables that follow, shape (free,) [-].
         limits: Lower and upper limits of all variables, shape (variables, 2); infinite without a limit.
@@ -212,8 +212,8 @@ class Drive:
 def _orientation(before: Node, after: Node, spins: int) -> tuple[float, float]:
     """Return the cosine between the orientations of two nodes, and det(A^T B) / det(A^T A).
 
-    A and B are the matrices of the nodes. By Cauchy and Binet det(A^T B) is the scalar product of their minors,
-    defined for redundant rows, too. Its sign changes where branches cross.
+    A and B are the matrices of the nodes. By Cauchy and Binet det(A^T B) is the scalar product of their
+    minors, defined for redundant rows, too. Its sign changes where branches cross.
     """
     first, second = before.matrix, after.matrix
     if spins and np.linalg.det(second[-1 - spins : -1] @ first[-1 - spins : -1].T) < 0.0:
@@ -331,8 +331,9 @@ class _Tracer:
     def _crossing(self, here: Node, there: Node) -> Node | None:
         """Return where branches cross between two nodes: the determinant is continuous, and 0 there.
 
-        None where it jumps: the step went from one branch to another that is near. The pose itself is the root
-        of a cubic polynomial through configurations around it: there Newton's method loses half of the digits.
+        None where it jumps: the step went from one branch to another that is near. The pose itself is the
+        root of a cubic polynomial through configurations around it: there Newton's method loses half of the
+        digits.
         """
 
         def share(node: Node) -> float:
@@ -419,9 +420,10 @@ class _Tracer:
         for direction in np.random.default_rng(0).normal(size=(24, null.shape[1])):
             way = null @ (direction / np.linalg.norm(direction))
             z = self.drive.correct(node.z + radius * way, way)
-            if z is not None and 0.5 * radius < (size := float(np.linalg.norm(z - node.z))) < 2.0 * radius:
-                if abs((z - node.z) @ tangent) < 0.9 * size:
-                    return True
+            away = np.zeros_like(way) if z is None else z - node.z
+            size = float(np.linalg.norm(away))
+            if 0.5 * radius < size < 2.0 * radius and abs(away @ tangent) < 0.9 * size:
+                return True
         return False
 
     def _reach(self, there: Node) -> bool:
@@ -436,7 +438,7 @@ class _Tracer:
                     at = _share_of(here, there, k, bound)
                     if at < share:
                         share, coordinate, value = at, k, bound
-        z = _cubic(here, there, np.array([share]))[:, 0]
+        z = _Cubic.between(here, there).at(np.array([share]))[:, 0]
         z[coordinate] = value
         solution = drive.correct(z, np.eye(len(z))[coordinate])
         node = there if solution is None else drive.node(solution, here.tangent)
@@ -465,38 +467,52 @@ class _Tracer:
         self.trace.singular.append((pose, node._replace(tangent=tangent)))
 
 
-def _cubic(here: Node, there: Node, share: FloatArray) -> FloatArray:
-    """Return points of the cubic curve between two nodes with their tangents, shape (coordinates, n)."""
-    chord = float(np.linalg.norm(there.z - here.z))
-    return _hermite(
-        here.z[:, np.newaxis], there.z[:, np.newaxis], chord * here.tangent[:, np.newaxis],
-        chord * there.tangent[:, np.newaxis], share,
-    )  # fmt: skip
+class _Cubic(NamedTuple):
+    """Cubic curves of z between ends, with derivatives by their shares there, shape (coordinates, n) each."""
 
+    first: FloatArray
+    second: FloatArray
+    leaving: FloatArray
+    arriving: FloatArray
 
-def _hermite(
-    first: FloatArray, second: FloatArray, leaving: FloatArray, arriving: FloatArray, share: FloatArray
-) -> FloatArray:
-    """Return cubic curves with given ends and derivatives at shares 0..1 between them."""
-    square, cube = share * share, share * share * share
-    return np.asarray(
-        (1.0 - 3.0 * square + 2.0 * cube) * first
-        + (3.0 * square - 2.0 * cube) * second
-        + (share - 2.0 * square + cube) * leaving
-        + (cube - square) * arriving
-    )
+    @classmethod
+    def between(cls, here: Node, there: Node) -> _Cubic:
+        """Return the curve between two nodes with their tangents."""
+        chord = float(np.linalg.norm(there.z - here.z))
+        parts = (here.z, there.z, chord * here.tangent, chord * there.tangent)
+        return cls(*(part[:, np.newaxis] for part in parts))
+
+    def at(self, share: FloatArray) -> FloatArray:
+        """Return points at shares 0..1, shape (coordinates, n)."""
+        square, cube = share * share, share * share * share
+        return np.asarray(
+            (1.0 - 3.0 * square + 2.0 * cube) * self.first
+            + (3.0 * square - 2.0 * cube) * self.second
+            + (share - 2.0 * square + cube) * self.leaving
+            + (cube - square) * self.arriving
+        )
+
+    def shares(self, last: FloatArray) -> FloatArray:
+        """Return where the curves reach values of their last coordinate, by bisection, shape (n,)."""
+        along = _Cubic(*(part[-1:] for part in self))
+        low, high = np.zeros(len(last)), np.ones(len(last))
+        for _ in range(45):
+            middle = 0.5 * (low + high)
+            before = along.at(middle)[0] < last
+            low, high = np.where(before, middle, low), np.where(before, high, middle)
+        return 0.5 * (low + high)
 
 
 def _share_of(here: Node, there: Node, coordinate: int, value: float) -> float:
     """Return where the cubic curve between two nodes takes a value of a coordinate first."""
-    shares = np.linspace(0.0, 1.0, 65)
-    values = _cubic(here, there, shares)[coordinate] - value
+    curve, shares = _Cubic.between(here, there), np.linspace(0.0, 1.0, 65)
+    values = curve.at(shares)[coordinate] - value
     first = int(np.argmax(values * values[0] <= 0.0))
     low, high = shares[max(first - 1, 0)], shares[first]
     for _ in range(50):
         middle = 0.5 * (low + high)
-        at = _cubic(here, there, np.array([middle]))[coordinate, 0] - value
-        low, high = (middle, high) if at * values[0] > 0.0 else (low, middle)
+        is_before = (curve.at(np.array([middle]))[coordinate, 0] - value) * values[0] > 0.0
+        low, high = (middle, high) if is_before else (low, middle)
     return float(0.5 * (low + high))
 
 
@@ -520,8 +536,8 @@ def sample(drive: Drive, branch: Trace, s: FloatArray) -> FloatArray:
     x = np.empty((len(drive.x), len(s)))
     for rows in iter_chunks(len(s)):
         own = which[rows]
-        curve = [part[:, own] for part in (*stacks, *slopes)]
-        z = _hermite(*curve, _shares(curve, at[rows]))
+        curve = _Cubic(*(part[:, own] for part in (*stacks, *slopes)))
+        z = curve.at(curve.shares(at[rows]))
         z[-1] = at[rows]
         x[:, rows] = settle(drive.mechanism, drive.at(z), drive.free)[0]
     for pose, node in branch.singular:
@@ -529,22 +545,11 @@ def sample(drive: Drive, branch: Trace, s: FloatArray) -> FloatArray:
     return x
 
 
-def _shares(curve: list[FloatArray], at: FloatArray) -> FloatArray:
-    """Return where cubic curves reach values of their last coordinate, by bisection."""
-    last = [part[-1] for part in curve]
-    low, high = np.zeros(len(at)), np.ones(len(at))
-    for _ in range(45):
-        middle = 0.5 * (low + high)
-        before = _hermite(*last, middle) < at
-        low, high = np.where(before, middle, low), np.where(before, high, middle)
-    return 0.5 * (low + high)
-
-
 def _interpolate(drive: Drive, pose: SingularPose, node: Node, at: FloatArray, x: FloatArray) -> None:
     """Replace configurations next to a singular pose, where Newton's method loses half of the digits.
 
-    The branch is smooth in its arc length through the pose, where it turns back, too: a polynomial passes through
-    eight configurations around it. Where s has its extreme, only the way there is of the motion.
+    The branch is smooth in its arc length through the pose, where it turns back, too: a polynomial passes
+    through eight configurations around it. Where s has its extreme, only the way there is of the motion.
     """
     places = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
     around = [

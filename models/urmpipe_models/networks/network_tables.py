@@ -124,9 +124,9 @@ def _element_table(element: ConstraintElement) -> dict[str, Any]:
     table: dict[str, Any]
     if element.is_pair:
         own: dict[str, Any] = {"gear": {"teeth": _numbers(element.teeth)}, "rack": {"radius": element.radius}}
-        profile = {"profile": [_numbers(point) for point in element.profile]}
+        profile: dict[str, Any] = {"profile": [_numbers(point) for point in element.profile]}
         table = {"kind": element.kind, "joints": list(element.joints), "offset": element.length.text}
-        return table | own.get(element.kind, profile)
+        return {**table, **own.get(element.kind, profile)}
     points, normals = [_numbers(point) for point in element.points], [_numbers(n) for n in element.normals]
     table = {"kind": element.kind, "bodies": list(element.bodies)}
     if element.kind == "eg":

@@ -6,8 +6,9 @@ With the prescribed variables d and those that follow y, the closure F(y, d) = 0
     J_y y'' = -J_d d'' - J' x'               accelerations
     T = dy/dd = -J_y^+ J_d                   transmission
 
-J' x' is the second derivative of F for y'' = d'' = 0: `taylor.Taylor` carries it exactly through the lines that
-compute F. Points of bodies get their velocity and acceleration likewise from those that compute their place.
+J' x' is the second derivative of F for y'' = d'' = 0: `taylor.Taylor` carries it exactly through the lines
+that compute F. Points of bodies get their velocity and acceleration likewise from those that compute their
+place.
 """
 
 from __future__ import annotations
@@ -37,10 +38,10 @@ class Rates:
     Attributes:
         xd: Velocities in [m/s], [rad/s] and as controls are given per [s], shape (variables, n).
         xdd: Accelerations, likewise per [s2].
-        transmission: dy/dd of the variables that follow by the prescribed ones, in their units, shape (variables,
-            driven, n); the unit matrix for the prescribed ones.
-        distance: Smallest singular value of the scaled J_y without idle spins [-], shape (n,): 0 at a singular
-            pose.
+        transmission: dy/dd of the variables that follow by the prescribed ones, in their units, shape
+            (variables, driven, n); the unit matrix for the prescribed ones.
+        distance: Smallest singular value of the scaled J_y without idle spins [-], shape (n,): 0 at a
+            singular pose.
     """
 
     xd: FloatArray
@@ -122,7 +123,7 @@ def point_motion(
 def _in_joint_frames(mechanism: Mechanism, x: FloatArray, rows: FloatArray) -> FloatArray:
     """Return rows of `closure_residual`, along the axes of the ground, along those of `scaled_closure`."""
     turned = np.array(rows)
-    frames = cut_frames(mechanism, x, mechanism.posed(x), mechanism.control_slopes(x))
+    frames = cut_frames(mechanism, list(x), mechanism.posed(x), mechanism.control_slopes(x))
     for k, (here, _) in enumerate(frames):
         for first in (6 * k, 6 * k + 3):
             for axis, column in enumerate(here.columns):

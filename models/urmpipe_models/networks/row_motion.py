@@ -1,7 +1,7 @@
 """Motion of a network along the rows of a log: one configuration per row, on the branch of the first one.
 
-1. `follow` solves some rows first, apart by a scaled length of COARSE of the drives, side by side: each from the
-   start along a straight line of the drives.
+1. `follow` solves some rows first, apart by a scaled length of COARSE of the drives, side by side: each
+   from the start along a straight line of the drives.
 2. Such a line may end on another branch than the log does. So each pair of neighbours is verified: their
    difference must agree with the tangents at both, and the Jacobian must keep its orientation. Where a pair
    fails, the rows between are traced one after another (`motion.trace`), until both agree again.
@@ -129,7 +129,7 @@ class _Follower:
         return unspun(self.mechanism, self.spins, x, self.start)
 
     def _verify(self) -> int:
-        """Verify the coarse rows in their order, correct those of other branches; return the last row reached."""
+        """Verify the coarse rows, correct those of other branches, and return the last row reached."""
         x, coarse = self.motion.x, self.coarse
         good = self._is_continuous(x[:, coarse[:-1]], x[:, coarse[1:]])
         synchronous = True
@@ -159,7 +159,7 @@ class _Follower:
         return end[:, 0] if self._is_continuous(x[:, np.newaxis], end)[0] else None
 
     def _trace_rows(self, first: int, second: int) -> tuple[int, FloatArray]:
-        """Trace the rows between two, one after another; return the last row reached and its configuration."""
+        """Trace rows one after another; return the last row reached and its configuration."""
         x = self.motion.x[:, first]
         for row in range(first, second):
             change = np.zeros(len(x))

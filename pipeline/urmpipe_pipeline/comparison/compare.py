@@ -24,10 +24,10 @@ from urmpipe_pipeline.comparison.matching import (
     as_recorded,
     by_joints_alone,
     by_kinematics,
-    traces_point,
     file_of,
     lacking,
     match,
+    traces_point,
     wanted_rows,
     without_robot,
 )

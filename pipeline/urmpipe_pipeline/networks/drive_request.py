@@ -3,7 +3,8 @@
 1. `DriveRequest`: what is requested; `check` refuses what makes no sense with any network.
 2. `_parse_drives`, `_parse_values`, `parse_point`, `parse_wrench`: texts with units become SI.
 3. `drive_network`: assembly (by default that of the file's start, else the nearest to start values, or one by
-   its number), motion along a line or along a log, rates, transmission, static forces, singular poses in words.
+   its number), motion along a line or along a log, rates, transmission, static forces, singular poses in
+   words.
 """
 
 from __future__ import annotations
@@ -11,19 +12,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from decimal import Decimal
-from functools import partial
 from numbers import Integral, Real
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IndexArray
-from urmpipe_models.elementwise import Vector
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import Finding, NetworkError, OptionError, for_each, shown
-from urmpipe_models.measure_units import MEASURES, NAMES, WRITTEN, quantity
 from urmpipe_models.names import not_among
-from urmpipe_models.networks.assembly import CLOSED, RESTARTS, assemble
+from urmpipe_models.networks.assembly import RESTARTS, assemble
 from urmpipe_models.networks.driving import (
     LAWS,
     Driven,
@@ -36,12 +33,10 @@ from urmpipe_models.networks.driving import (
 )
 from urmpipe_models.networks.forces import Wrench, compute_forces
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
-from urmpipe_models.networks.motion import SingularPose
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import POSE_UNITS
 from urmpipe_models.networks.rates import Rates, compute_rates
 from urmpipe_pipeline import text
-from urmpipe_pipeline.joint_log import LogWarning, SourceFile, seconds
+from urmpipe_pipeline.joint_log import SourceFile, seconds
 from urmpipe_pipeline.networks.given_values import (
     Quantity,
     Range,
@@ -65,23 +60,25 @@ from urmpipe_pipeline.runs.results import Run
 DEFAULT_STEPS = 200
 MAX_ROWS = 10_000_000  # of a motion: about 2 GB of variables and rates of a network of ten
 
+
 @dataclass(frozen=True, slots=True)
 class DriveRequest:
     """What drives a network, and what is wanted of its motion.
 
     Attributes:
-        drives: From and to of controls and joints by name; one value holds. Of controls numbers are in the units of
-            the file, of joints in [rad] and [m]; texts have their own unit, or that of the file. With a log: the
-            name of the column that drives each; empty for columns of their names.
+        drives: From and to of controls and joints by name; one value holds. Of controls numbers are in the
+            units of the file, of joints in [rad] and [m]; texts have their own unit, or that of the file.
+            With a log: the name of the column that drives each; empty for columns of their names.
         steps: Equal steps of the drives, `tsp` each; None with a duration or a log.
         duration: Duration in [s]; None with steps.
         law: How the drives move over the duration.
         tsp: Time from row to row in [s].
-        branch: Number of the assembly at the begin of the drives, from 1, as `network solve --all` lists them.
+        branch: Number of the assembly at the begin of the drives, from 1, as `network solve --all` lists
+            them.
         start: Values of joints by name: the nearest assembly to them at the begin of the drives.
         point: A point of a body to trace: "BODY:X,Y,Z", or the body and x, y, z in [m].
-        wrenches: Loads: "BODY:X,Y,Z:FX,FY,FZ" with MX,MY,MZ at the end if wanted, the point in the frame of the
-            body in [m], force [N] and moment [N.m] along the axes of the ground.
+        wrenches: Loads: "BODY:X,Y,Z:FX,FY,FZ" with MX,MY,MZ at the end if wanted, the point in the frame of
+            the body in [m], force [N] and moment [N.m] along the axes of the ground.
         torques: Loads at joints by name in [N.m] or [N].
         restarts: Random starts in a row without a new assembly that end a search.
         seed: Of the random starts.
@@ -106,10 +103,11 @@ class DriveRequest:
             raise OptionError(*faults)
 
     def _faults(self) -> Iterator[Finding]:
-        for key, count, least in (
-            ("steps", self.steps, 1), ("branch", self.branch, 1), ("restarts", self.restarts, 0), ("seed", self.seed, 0)
-        ):  # fmt: skip
-            if count is not None and (isinstance(count, bool) or not isinstance(count, Integral) or count < least):
+        for key, least in (("steps", 1), ("branch", 1), ("restarts", 0), ("seed", 0)):
+            count = getattr(self, key)
+            if count is not None and (
+                isinstance(count, bool) or not isinstance(count, Integral) or count < least
+            ):
                 yield Finding(parameter=key, found=shown(count), allowed=f"a whole number, {least} or more")
         for key, value in (("duration", self.duration), ("tsp", self.tsp)):
             if value is not None and not (isinstance(value, Real) and 1e-9 <= float(value) < 1e9):
@@ -134,7 +132,9 @@ class DriveRequest:
             count = math.floor(self.duration / self.tsp + 1e-9)
         if not 1 <= count <= MAX_ROWS:
             allowed = f"1 to {MAX_ROWS} steps of {self.tsp:g} s"
-            raise OptionError(Finding(parameter="duration" if self.duration else "steps", found=str(count), allowed=allowed))
+            raise OptionError(
+                Finding(parameter="duration" if self.duration else "steps", found=str(count), allowed=allowed)
+            )
         return np.round(np.arange(count + 1) * (self.tsp * 1e9)).astype(np.int64)
 
 
@@ -251,11 +251,15 @@ def _plain(value: Any) -> Any:
 
 def _log_columns(network: Network, request: DriveRequest, log: Run) -> dict[str, str]:
     """Return the joint of the log that drives each variable: as given, else those of the same names."""
-    names = [one.name for one in network.controls if one.value is None] + [one.name for one in network.joints if one.units]
+    names = [one.name for one in network.controls if one.value is None] + [
+        one.name for one in network.joints if one.units
+    ]
     if request.drives:
         wrong = [str(one) for one in request.drives.values() if one not in log.log.joints]
         if wrong:
-            faults = [Finding(f"column {not_among(one, log.log.joints)}", parameter="drives") for one in wrong]
+            faults = [
+                Finding(f"column {not_among(one, log.log.joints)}", parameter="drives") for one in wrong
+            ]
             raise OptionError(*faults)
         return {name: str(column) for name, column in request.drives.items()}
     lowered = {column.casefold(): column for column in log.log.joints}
@@ -266,7 +270,8 @@ def _log_columns(network: Network, request: DriveRequest, log: Run) -> dict[str,
         return same
     if len(controls) == 1 and len(log.log.joints) == 1:
         return {controls[0]: log.log.joints[0]}
-    found = f"found joints {', '.join(log.log.joints)} in the log, none of which is a control or joint of {network.name}"
+    listed = ", ".join(log.log.joints)
+    found = f"found joints {listed} in the log, none of which is a control or joint of {network.name}"
     allowed = f"which of them drives what, such as {(controls or names)[0]}={log.log.joints[0]}"
     raise OptionError(Finding(f"{found}; allowed: {allowed}", parameter="drives"))
 
@@ -280,19 +285,22 @@ def _drive_values(
     request: DriveRequest,
     t_ns: Any,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return values of the drives in their own units, rates per [s] and second derivatives, shape (n, driven)."""
+    """Return values of the drives in their own units with two derivatives by time, shape (n, driven) each."""
     if log is not None:
         which = [log.log.joints.index(columns[name]) for name in driven.names]
         units = log.joint_units
+        pairs = zip(driven.names, driven.units, which, strict=True)
+        wrong = [(name, unit, units[k]) for name, unit, k in pairs if unit and units[k] != unit]
         faults = [
-            Finding(f"column {columns[name]} is in {units[k]}, but {name} is in {unit}; allowed: the same", parameter="drives")
-            for name, unit, k in zip(driven.names, driven.units, which, strict=True)
-            if unit and units[k] != unit
-        ]  # fmt: skip
+            Finding(f"column {columns[name]} is in {other}, allowed: {unit}, as {name}", parameter="drives")
+            for name, unit, other in wrong
+        ]
         q = log.q[:, which]
         if not np.isfinite(q).all():
             row = int(np.argmax(~np.isfinite(q).all(axis=1))) + 1
-            faults.append(Finding(f"row {row} has no value, allowed: a value in each row", log.name, parameter="log"))
+            faults.append(
+                Finding(f"row {row} has no value, allowed: a value in each row", log.name, parameter="log")
+            )
         if not log.timed:
             faults.append(Finding("found static poses, allowed: a log with times", parameter="log"))
         if faults:
@@ -319,7 +327,11 @@ def _check_control_ranges(mechanism: Mechanism, driven: Driven, values: FloatArr
         beyond = np.flatnonzero((values[:, k] < limits[k, 0]) | (values[:, k] > limits[k, 1]))
         if len(beyond):
             where = f"row {beyond[0] + 1} of the log: " if log is not None else ""
-            worst = values[beyond[np.argmax(np.abs(values[beyond, k]))], k] if log is None else values[beyond[0], k]
+            worst = (
+                values[beyond[np.argmax(np.abs(values[beyond, k]))], k]
+                if log is None
+                else values[beyond[0], k]
+            )
             allowed = f"{limits[k, 0]:g} to {limits[k, 1]:g}"
             faults.append(Finding(f"{where}found {name} = {worst:g}, allowed: {allowed}", parameter="drives"))
     if faults:
@@ -363,7 +375,10 @@ def _labels(mechanism: Mechanism) -> list[str]:
     counts: dict[str, int] = {}
     for one in mechanism.variables:
         counts[one.owner] = counts.get(one.owner, 0) + 1
-    return [one.owner if counts[one.owner] == 1 else f"{one.owner}[{one.index + 1}]" for one in mechanism.variables]
+    return [
+        one.owner if counts[one.owner] == 1 else f"{one.owner}[{one.index + 1}]"
+        for one in mechanism.variables
+    ]
 
 
 def _events(
@@ -373,12 +388,14 @@ def _events(
     labels, rows = _labels(mechanism), np.arange(len(t_ns))
     for pose in moved.singular:
         values = dict(zip(driven.names, (pose.x[driven.places] * factors).tolist(), strict=True))
-        parts = {labels[k]: float(share) for k, share in enumerate(pose.direction.tolist()) if abs(share) > 0.01}
+        parts = {
+            labels[k]: float(share) for k, share in enumerate(pose.direction.tolist()) if abs(share) > 0.01
+        }
         free = ", ".join(sorted(parts, key=lambda name: -abs(parts[name]))[:4])
         at = _at_words(driven, values)
         message = {
-            "turns back": f"turns back at {at}: no configuration of this branch lies beyond; there {free} can still move",
-            "branches": f"branches at {at}: two motions cross; this one goes straight on, the other moves {free}",
+            "turns back": f"turns back at {at}: this branch has nothing beyond; there {free} can still move",
+            "branches": f"branches at {at}: motions cross; this one goes straight on, the other moves {free}",
             "goes through": f"goes through a singular pose at {at}, at which {free} can move by themselves",
         }[pose.passage]
         yield MotionEvent(
@@ -389,7 +406,9 @@ def _events(
         variable = mechanism.variables[moved.stop.variable]
         label = labels[moved.stop.variable]
         values = dict(zip(driven.names, (moved.x[driven.places, n - 1] * factors).tolist(), strict=True))
-        limit = moved.stop.limit * (drive_factor(mechanism.network, variable.owner) if variable.kind == "control" else 1.0)
+        limit = moved.stop.limit * (
+            drive_factor(mechanism.network, variable.owner) if variable.kind == "control" else 1.0
+        )
         unit = variable.unit or (mechanism.network.unit_of(variable.owner) or ("",))[0]
         message = f"{label} reaches its limit {text.in_words(limit, unit)}"
         t = float(np.interp(moved.stop.s, rows, seconds(t_ns)))
@@ -415,14 +434,10 @@ def _transmissions(
         if variable.kind != "joint":
             continue
         for d, name in enumerate(driven.names):
-            ratio = rates.transmission[k, d] / factors[d]
-            moves = values[:, d]
-            low, high = int(np.argmin(ratio)), int(np.argmax(ratio))
+            ratio, moves = rates.transmission[k, d] / factors[d], values[:, d]
+            ends = [(float(ratio[row]), float(moves[row])) for row in (np.argmin(ratio), np.argmax(ratio))]
             unit = f"{variable.unit}/{driven.units[d] or '1'}"
-            yield Transmission(
-                labels[k], name, unit, float(ratio[low]), float(moves[low]), float(ratio[high]), float(moves[high]),
-                tuple(_zeros(moves, ratio)),
-            )  # fmt: skip
+            yield Transmission(labels[k], name, unit, *ends[0], *ends[1], tuple(_zeros(moves, ratio)))
 
 
 def _zeros(x: FloatArray, y: FloatArray) -> Iterator[float]:
@@ -434,7 +449,11 @@ def _zeros(x: FloatArray, y: FloatArray) -> Iterator[float]:
         first = min(max(k - 1, 0), max(len(x) - 4, 0))
         around = slice(first, first + 4)
         roots = np.roots(np.polyfit(x[around] - x[k], y[around], min(3, len(x[around]) - 1)))
-        inner = [float(root.real) for root in roots if abs(root.imag) < 1e-9 and 0.0 <= root.real / (x[k + 1] - x[k]) <= 1.0]
+        inner = [
+            float(root.real)
+            for root in roots
+            if abs(root.imag) < 1e-9 and 0.0 <= root.real / (x[k + 1] - x[k]) <= 1.0
+        ]
         yield float(x[k]) + (inner[0] if inner else float(y[k] / (y[k] - y[k + 1]) * (x[k + 1] - x[k])))
 
 
@@ -456,4 +475,6 @@ def _forces(
         else:
             names += [f"{name} {what} {axis}" for what in ("force", "moment") for axis in ("m", "n", "m x n")]
         columns += [*values]
-    return MotionForces(found.drives.T / factors, tuple(names), np.array(columns).T.reshape(moved.x.shape[1], -1))
+    return MotionForces(
+        found.drives.T / factors, tuple(names), np.array(columns).T.reshape(moved.x.shape[1], -1)
+    )

@@ -44,8 +44,8 @@ class Search:
     Attributes:
         controls: Values of controls instead of their starts, in the units of the network; texts with
             their own.
-        start: Values of joints by name to be near to instead of the network's start, in [rad] and [m]; texts with
-            their own units, or those of the file.
+        start: Values of joints by name to be near to instead of the network's start, in [rad] and [m];
+            texts with their own units, or those of the file.
         every: Whether all assemblies are sought.
         restarts: Random starts in a row without anything new that end the search.
         seed: Of the random starts.
@@ -181,10 +181,10 @@ def _assemble(
     search: Search,
     progress: Callable[[float], None] | None,
 ) -> tuple[Assembled, list[LogWarning]]:
-    """Return assemblies, and a warning if the one that is shown is of another branch than the network's start.
+    """Return assemblies, and a warning if the first is of another branch than the start of the network.
 
-    Controls that are away from their start are moved there by continuation, from the assembly at the start. Only
-    if no motion leads there, or with start values, the assembly nearest to the start is searched for.
+    Controls that are away from their start are moved there by continuation, from the assembly at the start.
+    Only if no motion leads there, or with start values, the assembly nearest to the start is searched for.
     """
     settings: dict[str, Any] = {"restarts": search.restarts, "seed": search.seed}
     moved = {
@@ -214,7 +214,7 @@ def _assemble(
         places = [f"{name} = {ends[0].x[mechanism.places[name, 0]]:.6g}" for name in moved]
         why = f": it turns back at {', '.join(places)}"
     message = (
-        f"no motion from the start of the network leads to {at}{why}; the assembly is the nearest to the start, of"
-        " another branch"
+        f"no motion from the start of the network leads to {at}{why}; the assembly is the nearest to the"
+        " start, of another branch"
     )
     return found, [LogWarning("other-branch", message, hints=(Hint("every", True, "lists the assemblies"),))]

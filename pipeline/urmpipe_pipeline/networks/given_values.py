@@ -1,7 +1,7 @@
-"""Values that people give with a network: drives, start values, points and loads, as texts with units or numbers.
+"""Values that people give with a network: drives, start values, points, loads; texts with units, or numbers.
 
-Of controls numbers are in the units of the network's file, of joints in [rad] and [m]; texts have a unit, or that of
-the file. Each function raises an `OptionError` with everything that is wrong.
+Of controls numbers are in the units of the network's file, of joints in [rad] and [m]; texts have a unit,
+or that of the file. Each function raises an `OptionError` with everything that is wrong.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from urmpipe_models.names import not_among
 from urmpipe_models.networks.forces import Wrench
 from urmpipe_models.networks.mechanism import mechanism_of
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import POSE_UNITS
+from urmpipe_models.networks.parts import POSE_UNITS, Parts
 
 Quantity: TypeAlias = float | str
 """A number, or a text with a unit."""
@@ -28,13 +28,15 @@ Range: TypeAlias = Quantity | Sequence[Quantity]
 """From and to; one value holds a variable."""
 
 
-def drive_factor(network: Network, name: str) -> float:
+def drive_factor(network: Parts, name: str) -> float:
     """Return how many SI units one of a drive is: of a control in deg or mm; 1 for all others."""
     unit = network.unit_of(name)
     return float(unit[1]) if unit and name in {one.name for one in network.controls} else 1.0
 
 
-def parse_quantity(network: Network, parameter: str, name: str, value: Quantity, unit: str, factor: Decimal) -> float:
+def parse_quantity(
+    network: Network, parameter: str, name: str, value: Quantity, unit: str, factor: Decimal
+) -> float:
     """Return a value in units of which one is `factor` SI units.
 
     Numbers are in these units; texts have a unit of their own, or the unit of the network's file.
@@ -44,7 +46,9 @@ def parse_quantity(network: Network, parameter: str, name: str, value: Quantity,
     """
     if not isinstance(value, str):
         if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(float(value)):
-            raise OptionError(Finding(parameter=parameter, found=f"{name} = {shown(value)}", allowed="a finite number"))
+            raise OptionError(
+                Finding(parameter=parameter, found=f"{name} = {shown(value)}", allowed="a finite number")
+            )
         return float(value)
     in_file = {"m": network.length_unit, "rad": network.angle_unit}.get(unit, "")
     units = {key: si / factor for key, si in WRITTEN.get(unit, {}).items()}
@@ -73,11 +77,12 @@ def parse_ranges(network: Network, drives: Mapping[str, Range]) -> list[tuple[fl
     def parse(pair: tuple[str, Range]) -> tuple[float, float]:
         name, value = pair
         unit, factor = _unit_anddrive_factor(network, name)
-        ends = [*value] if isinstance(value, (list, tuple)) else [value]
-        if isinstance(value, str):
-            ends = value.split(":")
+        ends: list[Quantity] = [*value.split(":")] if isinstance(value, str) else []
+        ends = ends or ([*value] if isinstance(value, Sequence) else [value])
         if len(ends) not in (1, 2):
-            raise OptionError(Finding(parameter="drives", found=f"{name} = {shown(value)}", allowed="FROM:TO, or one value"))
+            raise OptionError(
+                Finding(parameter="drives", found=f"{name} = {shown(value)}", allowed="FROM:TO, or one value")
+            )
         read = [parse_quantity(network, "drives", name, end, unit, factor) for end in ends]
         return read[0], read[-1]
 
@@ -167,9 +172,15 @@ def parse_torques(network: Network, torques: Mapping[str, float | str]) -> dict[
         name, value = pair
         if name not in joints:
             raise OptionError(Finding(f"joint {not_among(name, joints)}", parameter="torques"))
-        number = quantity(value, {"": Decimal(1), "N": Decimal(1), "N.m": Decimal(1), "Nm": Decimal(1)}) if isinstance(value, str) else value
+        number = (
+            quantity(value, {"": Decimal(1), "N": Decimal(1), "N.m": Decimal(1), "Nm": Decimal(1)})
+            if isinstance(value, str)
+            else value
+        )
         if not math.isfinite(number):
-            raise OptionError(Finding(parameter="torques", found=f"{name} = {value}", allowed="a number in N.m or N"))
+            raise OptionError(
+                Finding(parameter="torques", found=f"{name} = {value}", allowed="a number in N.m or N")
+            )
         return name, float(number)
 
     return dict(for_each(parse, torques.items()))

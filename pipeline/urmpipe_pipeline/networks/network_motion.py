@@ -1,8 +1,9 @@
 """The motion of a driven network: its data, what it shows, its tables and its JSON.
 
 - `NetworkMotion`: the variables over time with their rates; joints, points and poses follow from them.
-- `motion_run`: the same as a run, whose tool centre point is the traced point, for compare, diagnose and export.
-- `present`: headline, facts, tables of singular poses, transmission and forces, plots, scene and drawings.
+- `motion_run`: the same as a run, whose tool centre point is the traced point, for compare, diagnose and
+export. - `present`: headline, facts, tables of singular poses, transmission and forces, plots, scene and
+drawings.
 """
 
 from __future__ import annotations
@@ -17,7 +18,6 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.display import line_of
-from urmpipe_models.elementwise import Vector
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.motion import Passage, iter_chunks
 from urmpipe_models.networks.network import Network
@@ -27,7 +27,7 @@ from urmpipe_models.spelling import Voice
 from urmpipe_models.taylor import Taylor
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import NETWORK, JointLog, LogColumn, LogWarning, seconds
-from urmpipe_pipeline.networks.motion_drawing import moving_scene, motion_space_figure, motion_svg
+from urmpipe_pipeline.networks.motion_drawing import motion_space_figure, motion_svg, moving_scene
 from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.figure import Drawing, Figure, Line, Panel, View
@@ -65,7 +65,7 @@ MAX_SHOWN = 4000  # instants of the viewer's scene; a network of ten bodies then
 SHOWN_NS = 20_000_000  # ns between instants of the scene at least: 50 Hz, as of arms
 DRAWN = 400  # instants of a curve in a drawing
 NAMED = 4  # variables of a direction that are named in a sentence
-"""Sizes of what is shown."""
+FORCE_UNITS = {"rad": "N.m", "m": "N"}  # of what drives an angle or a length
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,8 +138,8 @@ class MotionForces:
     Attributes:
         drives: Of the drives in [N.m], [N], or per unit of the control, shape (n, drives).
         names: Names of the columns of `reactions`, such as "A force m" and "leg1".
-        reactions: Of joints on their second body along m, n, m x n of their frames in [N] and [N.m], of elements
-            in [N], shape (n, columns); NaN where redundant constraints leave them undetermined.
+        reactions: Of joints on their second body along m, n, m x n of their frames in [N] and [N.m], of
+            elements in [N], shape (n, columns); NaN where redundant constraints leave them undetermined.
     """
 
     drives: FloatArray
@@ -162,8 +162,8 @@ class NetworkMotion(Result):
         x: The variables in [m], [rad] and as controls are given, shape (n, variables).
         xd: Their rates per [s], likewise.
         xdd: Their second derivatives per [s2], likewise.
-        distance: Smallest singular value of the scaled Jacobian of the variables that follow [-], shape (n,): 0
-            at a singular pose.
+        distance: Smallest singular value of the scaled Jacobian of the variables that follow [-], shape
+            (n,): 0 at a singular pose.
         body: The body of the traced point; empty without one.
         point: The traced point in the frame of its body in [m].
         events: Singular poses, and the limit that ends the motion, in their order.
@@ -236,14 +236,21 @@ class NetworkMotion(Result):
 
     @cached_property
     def joint_motion(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Their values in [rad] or [m], rates per [s] and second derivatives per [s2], shape (n, joints) each."""
+        """Their values in [rad] or [m], and two derivatives by time, shape (n, joints) each."""
         columns = list(_joint_columns(self.mechanism))
         parts = np.zeros((3, len(self), len(columns)))
         for rows in iter_chunks(len(self)):
-            variables = [Taylor(*terms) for terms in zip(self.x[rows].T, self.xd[rows].T, self.xdd[rows].T, strict=True)]
+            variables = [
+                Taylor(*terms)
+                for terms in zip(self.x[rows].T, self.xd[rows].T, self.xdd[rows].T, strict=True)
+            ]
             for k, (_, _, value) in enumerate(columns):
                 element = value(variables)
-                terms = (element.value, element.first, element.second) if isinstance(element, Taylor) else (element, 0, 0)
+                terms = (
+                    (element.value, element.first, element.second)
+                    if isinstance(element, Taylor)
+                    else (element, 0, 0)
+                )
                 for part, term in zip(parts, terms, strict=True):
                     part[rows, k] = term
         return parts[0], parts[1], parts[2]
@@ -256,7 +263,7 @@ class NetworkMotion(Result):
         return point_motion(self.mechanism, self.x.T, self.xd.T, self.xdd.T, self.body, self.point)
 
     def poses(self, rows: IntArray | slice = slice(None)) -> FloatArray:
-        """Return poses of the bodies in the order of `Network.body_names` [-] and [m], shape (n, bodies, 4, 4)."""
+        """Return poses of the bodies, the ground first, [-] and [m], shape (n, bodies, 4, 4)."""
         x = self.x[rows].T
         poses = np.zeros((x.shape[1], len(self.network.body_names), 4, 4))
         poses[:, :, 3, 3] = 1.0
@@ -297,9 +304,10 @@ class NetworkMotion(Result):
     def to_frame(self) -> pd.DataFrame:
         """Return one row per sample.
 
-        Columns: t [s]; the joints in [rad] or [m], their rates (d_) and second derivatives (dd_); with a traced
-        point x, y, z, vx, vy, vz, ax, ay, az; distance [-]; with loads the forces of the drives (f_NAME) and the
-        reactions.
+        Columns: t [s]; the joints in [rad] or [m], their rates (d_) and second derivatives (dd_); with a
+            traced
+        point x, y, z, vx, vy, vz, ax, ay, az; distance [-]; with loads the forces of the drives (f_NAME)
+        and the reactions.
         """
         import pandas as pd
 
@@ -330,8 +338,12 @@ class NetworkMotion(Result):
             "tsp": self.tsp,
             "joints": list(self.joints),
             "events": [asdict(one) for one in self.events],
-            "transmission": [asdict(one) | {"dead_points": list(one.dead_points)} for one in self.transmission],
-            "distance": {"smallest": float(self.distance[nearest]), "t": float(self.t[nearest])} if known else None,
+            "transmission": [
+                asdict(one) | {"dead_points": list(one.dead_points)} for one in self.transmission
+            ],
+            "distance": {"smallest": float(self.distance[nearest]), "t": float(self.t[nearest])}
+            if known
+            else None,
             "point": {"body": self.body, "point": list(self.point)} if self.body else None,
             "forces": self._forces_dict(),
             "warnings": [one.to_dict(voice) for one in self.warnings],
@@ -342,7 +354,7 @@ class NetworkMotion(Result):
         if self.forces is None:
             return None
         largest = np.abs(self.forces.drives).max(axis=0)
-        unknown = np.isnan(self.forces.reactions).any(axis=0)
+        unknown: list[bool] = np.isnan(self.forces.reactions).any(axis=0).tolist()
         return {
             "drives": {one.name: float(largest[k]) for k, one in enumerate(self.drives)},
             "reactions": {
@@ -353,7 +365,7 @@ class NetworkMotion(Result):
 
 
 def _joint_columns(mechanism: Mechanism) -> Iterator[tuple[str, str, Any]]:
-    """Yield name, unit and value (a function of the variables) of joint variables, and of controls of lengths."""
+    """Yield name, unit and value, a function of the variables, of joint variables and controls of lengths."""
     network = mechanism.network
     texts = {drive.text for joint in network.joints for drive in joint.drives if drive is not None}
     for joint in network.joints:
@@ -364,7 +376,11 @@ def _joint_columns(mechanism: Mechanism) -> Iterator[tuple[str, str, Any]]:
         unit_factor = network.unit_of(control.name)
         spelled = (control.name, f"({control.name}) * 0.001", f"({control.name}) * pi / 180")
         if unit_factor is not None and not texts & set(spelled):
-            yield control.name, unit_factor[0], partial(_control_value, mechanism, control.name, float(unit_factor[1]))
+            yield (
+                control.name,
+                unit_factor[0],
+                partial(_control_value, mechanism, control.name, float(unit_factor[1])),
+            )
 
 
 def _joint_value(mechanism: Mechanism, joint: Any, k: int, x: Any) -> Any:
@@ -390,11 +406,12 @@ def motion_run(motion: NetworkMotion) -> Run:
     log = JointLog(
         name=motion.name, source=NETWORK, files=motion.provenance.inputs, t_ns=motion.t_ns, joints=names, q=q,
         tcp_position=position, tcp_rotation=motion.quat_xyzw,
-        rotation_form=None if position is None else "quat_xyzw", columns=tuple(columns), warnings=motion.warnings,
+        rotation_form=None if position is None else "quat_xyzw", columns=tuple(columns),
+        warnings=motion.warnings,
     )  # fmt: skip
     return Run(
-        name=motion.name, log=log, robot=None, tsp=motion.tsp, t_ns=motion.t_ns, q=q, qd=qd, qdd=qdd, tcp=None,
-        tcp_recorded=position, audit=(), warnings=motion.warnings, provenance=motion.provenance,
+        name=motion.name, log=log, robot=None, tsp=motion.tsp, t_ns=motion.t_ns, q=q, qd=qd, qdd=qdd,
+        tcp=None, tcp_recorded=position, audit=(), warnings=motion.warnings, provenance=motion.provenance,
         derivative="planned",
     )  # fmt: skip
 
@@ -449,11 +466,13 @@ def headline(motion: NetworkMotion) -> str:
         for one in motion.drives[:NAMED]
     )
     ranges += f" and {len(motion.drives) - NAMED} more" if len(motion.drives) > NAMED else ""
-    said = f"{motion.name}: {ranges}, {text.counted(len(motion), 'row')} in {text.seconds(float(motion.t[-1]))} s"
+    rows, duration = text.counted(len(motion), "row"), text.seconds(float(motion.t[-1]))
     if motion.complete:
-        passed = [one for one in motion.events if one.kind != "limit"]
-        return said + (f", through {text.counted(len(passed), 'singular pose')}" if passed else "")
-    return f"{said} of {motion.requested} rows: {motion.events[-1].message if motion.events else 'it ends early'}"
+        passed = [event for event in motion.events if event.kind != "limit"]
+        through = f", through {text.counted(len(passed), 'singular pose')}" if passed else ""
+        return f"{motion.name}: {ranges}, {rows} in {duration} s{through}"
+    why = motion.events[-1].message if motion.events else "no step of the continuation succeeds"
+    return f"{motion.name}: {ranges}, {rows} of {motion.requested} in {duration} s: {why}"
 
 
 def _facts(motion: NetworkMotion) -> Iterator[Fact]:
@@ -463,7 +482,9 @@ def _facts(motion: NetworkMotion) -> Iterator[Fact]:
     if np.isfinite(motion.distance).any():
         nearest = int(np.argmin(motion.distance))
         words = f"{motion.distance[nearest]:.4g} at t = {motion.t[nearest]:.4g} s"
-        help_text = "Smallest singular value of the Jacobian in lengths of the mechanism and rad; 0 is singular."
+        help_text = (
+            "Smallest singular value of the Jacobian in lengths of the mechanism and rad; 0 is singular."
+        )
         yield Fact("Distance to a singular pose", words, help_text)
     yield Fact("Law", motion.law, brief=False)
     yield Fact("Period", Value(motion.tsp, "s"), brief=False)
@@ -474,11 +495,12 @@ def _facts(motion: NetworkMotion) -> Iterator[Fact]:
 def _tables(motion: NetworkMotion) -> Iterator[Table]:
     units = {one.name: one.unit for one in motion.drives}
     if motion.events:
-        heads: Heads[MotionEvent] = {"kind": ("What", lambda one: one.kind), "t": ("t", lambda one: Value(one.t, "s"))}
-        heads |= {
-            name: (name, partial(_drive_cell, name, unit)) for name, unit in list(units.items())[:NAMED]
+        heads: Heads[MotionEvent] = {
+            "kind": ("What", lambda one: one.kind),
+            "t": ("t", lambda one: Value(one.t, "s")),
+            **{name: (name, partial(_drive_cell, name, unit)) for name, unit in [*units.items()][:NAMED]},
+            "direction": ("Becomes free", lambda one: _direction_words(one.direction)),
         }
-        heads |= {"direction": ("Becomes free", lambda one: _direction_words(one.direction))}
         yield Table("Singular poses and limits", columns_of(motion.events, heads))
     if motion.transmission:
         cells: Heads[Transmission] = {
@@ -491,8 +513,12 @@ def _tables(motion: NetworkMotion) -> Iterator[Table]:
             "largest_at": ("at ", lambda one: Value(one.largest_at, units[one.drive])),
             "dead_points": ("Dead points at", lambda one: _values_words(one.dead_points, units[one.drive])),
         }
-        note = "Rate of the variable per rate of the drive. At a dead point it is 0: the variable cannot drive there."
-        yield Table("Transmission", columns_of(motion.transmission, cells), note, brief=len(motion.transmission) < 13)
+        note = (
+            "Rate of the variable per rate of the drive. At a dead point it is 0: the variable cannot drive."
+        )
+        yield Table(
+            "Transmission", columns_of(motion.transmission, cells), note, brief=len(motion.transmission) < 13
+        )
     if motion.forces is not None:
         yield from _force_tables(motion, motion.forces)
 
@@ -502,7 +528,9 @@ def _drive_cell(name: str, unit: str, event: MotionEvent) -> Value:
 
 
 def _values_words(values: tuple[float, ...], unit: str) -> str:
-    return ", ".join(text.in_words(value, unit) for value in values[:NAMED]) + (" ..." if len(values) > NAMED else "")
+    return ", ".join(text.in_words(value, unit) for value in values[:NAMED]) + (
+        " ..." if len(values) > NAMED else ""
+    )
 
 
 def _direction_words(direction: dict[str, float]) -> str:
@@ -515,7 +543,7 @@ def _force_tables(motion: NetworkMotion, forces: MotionForces) -> Iterator[Table
     heads = {"name": "Force", "value": "Largest", "t": "At t"}
     rows: list[tuple[Any, ...]] = []
     for k, one in enumerate(motion.drives):
-        unit = {"rad": "N.m", "m": "N"}.get(one.unit, "")
+        unit = FORCE_UNITS.get(one.unit, "")
         at = int(np.argmax(np.abs(forces.drives[:, k])))
         rows.append((one.name, Value(float(forces.drives[at, k]), unit), Value(float(motion.t[at]), "s")))
     yield table_of("Static forces of the drives", heads, rows, brief=True)
@@ -537,16 +565,22 @@ def _check(motion: NetworkMotion) -> Check:
 
 
 def _figures(motion: NetworkMotion) -> Iterator[Figure]:
-    """Yield joints with their rates and accelerations, the distance to a singular pose, and forces of drives."""
-    instants = {int(round(one.t * 1e9)): one.kind for one in motion.events[:6]}
+    """Yield joints with two derivatives, the distance to a singular pose, and forces of drives."""
+    instants: dict[int, str] = {round(event.t * 1e9): event.kind for event in motion.events[:6]}
     names, units = motion.joints, motion.joint_units
-    views = [
-        View(title, panel)
-        for title, values, per in zip(("Joints", "Rates", "Accelerations"), motion.joint_motion, ("", "/s", "/s2"), strict=True)
-        for panel in [joint_panels(names, units, title.lower(), values, motion.t_ns, per=per)]
-    ]  # fmt: skip
+    titles = {"Joints": "", "Rates": "/s", "Accelerations": "/s2"}
+    views = tuple(
+        View(title, joint_panels(names, units, title.lower(), values, motion.t_ns, per=per))
+        for (title, per), values in zip(titles.items(), motion.joint_motion, strict=True)
+    )
     caption = "Joint values of one branch, and their derivatives by time."
-    yield Figure("Joints", caption, f"Joint values of {motion.name} over time: {', '.join(names)}.", tuple(views), instants)
+    yield Figure(
+        "Joints",
+        caption,
+        f"Joint values of {motion.name} over time: {', '.join(names)}.",
+        tuple(views),
+        instants,
+    )
     if np.isfinite(motion.distance).any():
         line = Line(motion.distance, ("distance",), (AXIS_COLOURS["norm"],))
         panel = Panel("smallest singular value", "", (line,), motion.t_ns, signed=False)
@@ -555,11 +589,17 @@ def _figures(motion: NetworkMotion) -> Iterator[Figure]:
         yield Figure("Distance to a singular pose", caption, alt, (View("Distance", (panel,)),), instants)
     if motion.forces is not None:
         panels = tuple(
-            Panel(one.name, {"rad": "N.m", "m": "N"}.get(one.unit, ""), (Line(motion.forces.drives[:, k], (one.name,), (joint_colour(k),)),), motion.t_ns)
-            for k, one in enumerate(motion.drives)
-        )  # fmt: skip
+            Panel(drive.name, FORCE_UNITS.get(drive.unit, ""), (line,), motion.t_ns)
+            for k, drive in enumerate(motion.drives)
+            for line in (Line(motion.forces.drives[:, k], (drive.name,), (joint_colour(k),)),)
+        )
         caption = "Static force of each drive that holds the loads."
-        yield Figure("Forces of the drives", caption, f"Forces of the drives of {motion.name}.", (View("Forces", panels),))
+        yield Figure(
+            "Forces of the drives",
+            caption,
+            f"Forces of the drives of {motion.name}.",
+            (View("Forces", panels),),
+        )
 
 
 def _shown_rows(motion: NetworkMotion, most: int) -> IntArray:
@@ -579,17 +619,18 @@ def _curves(motion: NetworkMotion, rows: IntArray) -> list[tuple[str, FloatArray
 
 def _scene(motion: NetworkMotion) -> Scene:
     rows = _shown_rows(motion, MAX_SHOWN)
-    return moving_scene(
-        motion.network, motion.poses(rows), motion.element_lengths(rows), motion.t_ns[rows], _curves(motion, rows),
-        f"{motion.name} [m]",
-    )  # fmt: skip
+    poses, lengths = motion.poses(rows), motion.element_lengths(rows)
+    title, curves = f"{motion.name} [m]", _curves(motion, rows)
+    return moving_scene(motion.network, poses, lengths, motion.t_ns[rows], curves, title)
 
 
 def motion_drawing(motion: NetworkMotion) -> str:
     """Return the drawing of a motion as SVG."""
     rows = _shown_rows(motion, DRAWN)
     title = f"{motion.name} [m]"
-    return motion_svg(motion.network, motion.poses(rows), motion.element_lengths(rows), _curves(motion, rows), title)
+    return motion_svg(
+        motion.network, motion.poses(rows), motion.element_lengths(rows), _curves(motion, rows), title
+    )
 
 
 def _page(motion: NetworkMotion) -> Iterator[Block]:
@@ -608,5 +649,5 @@ def _page(motion: NetworkMotion) -> Iterator[Block]:
 def _events(motion: NetworkMotion) -> Iterator[Event]:
     for one in motion.events:
         ends = one.kind in ("turns back", "limit")
-        yield Event(int(round(one.t * 1e9)), one.message, "error" if ends else "warning")
+        yield Event(round(one.t * 1e9), one.message, "error" if ends else "warning")
     yield from (Event(None, warning, "warning") for warning in motion.warnings)

@@ -347,8 +347,8 @@ def _element(at: Placed, element: ConstraintElement, length: float) -> Part:
 def element_lines(at: Placed, element: ConstraintElement, length: float) -> tuple[FloatArray, ...]:
     """Return the lines of an element of a length in [m], shape (k, 3) each; the last is what it measures.
 
-    That is from point to point, from the foot in the plane or on the line to the point, or from line to line. Of a
-    pair the first is from joint to joint.
+    That is from point to point, from the foot in the plane or on the line to the point, or from line to
+    line. Of a pair the first is from joint to joint.
     """
     if element.is_pair:
         return _pair_lines(at, element)
@@ -370,7 +370,7 @@ def element_lines(at: Placed, element: ConstraintElement, length: float) -> tupl
 
 
 def _pair_lines(at: Placed, pair: ConstraintElement) -> tuple[FloatArray, ...]:
-    """Return the line between the joints of a pair, and the pitch circles of a gear or a pinion about them."""
+    """Return the line between the joints of a pair, and the pitch circles of a gear or a pinion."""
     first, second = (joint for joint, _ in at.network.coupled(pair))
     p, q = at.point(first.bodies[0], first.frames[0].translation), _joint(at, second).at
     axes = [at.axes(joint.bodies[0], joint.frames[0])[:, 1] for joint in (first, second)]

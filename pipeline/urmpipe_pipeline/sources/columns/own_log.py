@@ -24,7 +24,7 @@ TOOL = ("x", "y", "z")
 
 
 def own_joints(columns: Sequence[Column]) -> tuple[Column, ...]:
-    """Return the joints: the columns with a unit of joints, but for the tool of a plan or the traced point of a motion.
+    """Return the joints: the columns with a unit of joints, but for the tool of a plan or a traced point.
 
     What stands behind the rows of targets or path was added by somebody else.
     """
