@@ -221,13 +221,12 @@ KINDS = {
     "method": _one_of("auto", "closed", "iterative"),
     "name_or_path": ROBOT_FILE,
     "network_drive.law": _one_of("uniform", "trapezoid", "quintic"),
-    "network_drive.start": Kind(
-        lambda value: isinstance(value, Mapping),
-        'a mapping of joints to numbers or texts, such as {"theta4": "85deg"}',
-    ),
-    "network_solve.start": Kind(
-        lambda value: isinstance(value, Mapping),
-        'a mapping of joints to numbers or texts, such as {"theta4": "85deg"}',
+    **dict.fromkeys(
+        ("network_check.start", "network_drive.start", "network_solve.start"),
+        Kind(
+            lambda value: isinstance(value, Mapping),
+            'a mapping of joints to numbers or texts, such as {"theta4": "85deg"}',
+        ),
     ),
     "network": Kind(_is_network, "a name, a TOML file, the tables of one, or a Network"),
     "noise": KIND_OF_TOLERANCE,

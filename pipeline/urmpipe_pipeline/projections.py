@@ -116,6 +116,7 @@ class Sketch:
         asked: Where the point was to go in [m], shape (k, 3); grey, behind the path.
         pieces: Solids and lines, in any order: what is nearer hides what is behind.
         names: Words beside places, which have no mark of their own.
+        name_gap: Distance of these words from their places in pixels.
     """
 
     arms: Sequence[FloatArray] = ()
@@ -125,6 +126,7 @@ class Sketch:
     asked: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     pieces: Sequence[Piece] = ()
     names: Sequence[Spot] = ()
+    name_gap: float = BESIDE_PX
 
     @property
     def extent(self) -> tuple[FloatArray, FloatArray]:
@@ -198,6 +200,7 @@ def projected_along(sketch: Sketch, plane: PlaneView, title: str) -> str:
         spots=turned(sketch.spots),
         pieces=[replace(one, points=one.points @ axes) for one in sketch.pieces],
         names=turned(sketch.names),
+        name_gap=BESIDE_PX * LARGE / SIZE,
     )
     return projected(flat, (view,), title, size=LARGE)
 
@@ -298,10 +301,10 @@ def _drawn(sketch: Sketch, frame: _Frame) -> Iterator[str]:
     for (x, y), words in _names(placed, [spot.words for spot in sketch.spots]):
         if words:
             yield f'<text x="{x + 8:.1f}" y="{y - 6:.1f}" {HALO}>{in_html(words)}</text>'
-    yield from _beside(sketch.names, frame)
+    yield from _beside(sketch.names, frame, sketch.name_gap)
 
 
-def _beside(names: Sequence[Spot], frame: _Frame) -> Iterator[str]:
+def _beside(names: Sequence[Spot], frame: _Frame, gap: float) -> Iterator[str]:
     """Yield words beside their places, where others leave room; those of places that are near together."""
     placed = frame.placed(np.array([one.position for one in names]).reshape(-1, 3))
     colours = {one.words: one.colour for one in names}
@@ -310,7 +313,7 @@ def _beside(names: Sequence[Spot], frame: _Frame) -> Iterator[str]:
         half = width_of(words, NAME_PX) / 2.0
         box = freest(
             [
-                box_about(x + across * (half + BESIDE_PX), y + up * 17.0, words, NAME_PX)
+                box_about(x + across * (half + gap), y + up * (gap + 5.0), words, NAME_PX)
                 for across, up in AROUND
             ],
             taken,

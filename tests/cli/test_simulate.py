@@ -249,8 +249,9 @@ def test_quiet_says_nothing(urmpipe: RunCommand) -> None:
 
 def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunCommand) -> None:
     listed = json.loads(urmpipe("simulate", "--list", "--json").out)["systems"]
-    assert [one["name"] for one in listed] == ["crank-rocker", "driven-arm", "log-to-delta", "one-drive", "six-drives"]
-    assert listed[1]["arguments"]["log"] == "coppeliasim.csv"
+    names = ["crank-rocker", "driven-arm", "log-to-delta", "one-drive", "six-drives"]
+    assert [one["name"] for one in listed] == names
+    assert listed[2]["arguments"]["log"] == "coppeliasim.csv"
     assert "log=coppeliasim.csv" in urmpipe("simulate", "--list").out
 
 

@@ -26,6 +26,7 @@ def test_names_complete_in_the_shell() -> None:
         (["simulate", "nosuch", "--set"], "", []),
         (["fmu", "build", "kinematic_chain", "-s"], "", ["points=", "sensors=", "rates="]),
         (["fmu", "build", "log_source", "--option"], "c", ["columns="]),
+        (["fmu", "build", "network_motion", "-s"], "network=slid", ["network=slider-crank"]),
     ],
 )
 def test_what_is_set_completes_in_the_shell(line: list[str], begun: str, offered: list[str]) -> None:

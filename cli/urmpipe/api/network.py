@@ -57,6 +57,7 @@ def network_check(
     network: NetworkLike,
     *,
     controls: Mapping[str, float | str] | None = None,
+    start: Mapping[str, Any] | None = None,
     restarts: int = RESTARTS,
     seed: int = 0,
     strict: bool = False,
@@ -70,6 +71,8 @@ def network_check(
         network: A name, a file, the tables of one, or a `Network`.
         controls: Values of controls instead of their starts, by name: numbers in the units of the network,
             or texts with units, such as "40deg".
+        start: Values of joints in [rad] and [m] by name, or texts with units: the assembly nearest to them is
+            returned; default: the one that a motion from the network's start leads to.
         restarts: Random starts that are tried in vain where the network's own start does not close.
         seed: Of the random starts.
         strict: Whether a warning is an error.
@@ -85,7 +88,7 @@ def network_check(
 
     Source: [KinematicSystems]_ section 3.
     """
-    search = Search(controls or {}, False, restarts, seed)
+    search = Search(controls or {}, start or {}, False, restarts, seed)
     return _found(network, "check", search, strict, draw, output, progress)
 
 
@@ -94,6 +97,7 @@ def network_solve(
     network: NetworkLike,
     *,
     controls: Mapping[str, float | str] | None = None,
+    start: Mapping[str, Any] | None = None,
     every: bool = False,
     restarts: int = RESTARTS,
     seed: int = 0,
@@ -102,15 +106,17 @@ def network_solve(
     output: PathLike | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> NetworkResult:
-    """Assemble a network with its controls held: nearest to its start, or in every way there is.
+    """Assemble a network with its controls held: on the branch of its start, nearest to start values, or every way.
 
-    A warning says if controls are away from their start: the nearest assembly may then be of another branch
-    than a motion from the start reaches.
+    Controls away from their start are moved there from the assembly at the start. If no motion leads there, the
+    assembly nearest to the start is returned, and a warning says that it is of another branch.
 
     Args:
         network: A name, a file, the tables of one, or a `Network`.
         controls: Values of controls instead of their starts, by name: numbers in the units of the network,
             or texts with units, such as "40deg".
+        start: Values of joints in [rad] and [m] by name, or texts with units: the assembly nearest to them is
+            returned; default: the one that a motion from the network's start leads to.
         every: Find all assemblies, by random starts.
         restarts: Random starts in a row without anything new that end the search.
         seed: Of the random starts: the same seed, the same assemblies.
@@ -120,15 +126,15 @@ def network_solve(
         progress: Called with the share that is done, 0..1.
 
     Returns:
-        `assemblies`, each with its `values` by name in [m] and [rad], `residual` and `mobility`; `reason`;
-        `gaps` where nothing closes.
+        `assemblies`, each with its `values` by name in [m] and [rad], `residual` and `mobility`; `distances` of
+        all that the search came to from the start; `reason`; `gaps` where nothing closes.
 
     Raises:
         UrmpipeError: With everything that is wrong with the network, an option or an output.
 
     Source: [KinematicSystems]_ section 3.
     """
-    search = Search(controls or {}, every, restarts, seed)
+    search = Search(controls or {}, start or {}, every, restarts, seed)
     return _found(network, "solve", search, strict, draw, output, progress)
 
 

@@ -63,6 +63,14 @@ def _search_options(command: Command) -> Command:
             " file [default: its start value].",
         ),
         click.option(
+            "--start",
+            multiple=True,
+            callback=named_values,
+            metavar="JOINT=VALUE",
+            help="Assemble nearest to these joint values, such as theta4=85deg [default: where a motion from the"
+            " network's start leads].",
+        ),
+        click.option(
             "--restarts",
             type=WholeType(),
             default=2000,
@@ -114,12 +122,12 @@ def check(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
 @_search_options
 @output_options
 def solve(name: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
-    """Find the configuration nearest to the start in which a network closes, or with --all every one.
+    """Find the configuration in which a network closes, or with --all every one.
 
-    Controls keep their values. The search begins at the start, and goes on at random places nearer to the
-    start than what it found; if the start does not close, anywhere. With --all it ends after --restarts
-    random starts without a new assembly. Away from the start of a control, the nearest assembly may be of
-    another branch than a motion from the start reaches.
+    It is the one nearest to the start of the network's file. Controls that --set moves away from there are
+    moved by continuation, on the branch of the start. With --start it is the one nearest to these joint
+    values, and the distances of the others are told. If nothing closes there, the search goes on from random
+    starts. With --all it ends after --restarts random starts without a new assembly.
 
     \b
     Examples:

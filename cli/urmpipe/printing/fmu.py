@@ -93,7 +93,8 @@ def print_unit(name: str) -> None:
     for line in unit.equations:
         say(line)
     if subject:
-        say(f"These are the variables for {subject}. Those for another {kind}: build it, then urmpipe fmu check")
+        another = f"Those for another {kind}: build it, then urmpipe fmu check"
+        say(f"These are the variables for {subject}. {another}")
     say("A parameter is set where the unit runs: in a system by start, in another tool as its start value")
 
 

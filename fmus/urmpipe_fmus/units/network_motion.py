@@ -19,7 +19,7 @@ from urmpipe_models.errors import UnitError, shown
 from urmpipe_models.files.tables import are_numbers
 from urmpipe_models.measure_units import read_quantity
 from urmpipe_models.names import not_among
-from urmpipe_models.networks.assembly import assemble
+from urmpipe_models.networks.assembly import CLOSED, assemble
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.network import Network
 from urmpipe_models.networks.network_file import load_network
@@ -81,9 +81,9 @@ def network_motion(
     assembled = assemble(mechanism, values)
     if not assembled.assemblies:
         gap = assembled.gaps[0]
-        found = f"gap of {gap.metres:g} m and {gap.radians:g} rad at {gap.name}"
         raise UnitError(
-            f"unit network_motion: {loaded.name} does not close: found a {found}; see urmpipe network check"
+            f"unit network_motion: {loaded.name} does not close: found a gap of {gap.metres:g} m and"
+            f" {gap.radians:g} rad at {gap.name}, allowed: {CLOSED:g}; see urmpipe network check"
         )
     return _unit(with_start(loaded, assembled.x[:, 0].tolist()), points, newton)
 
@@ -168,41 +168,41 @@ class _Model:
         """The names of the variables of controls, joints and bodies, by theirs in the network."""
         taken = {"time", "table", "residual", *LAST, *CHANGES, *(name for name, _, _ in self.points)}
         owners = dict.fromkeys(variable.owner for variable in self.mechanism.variables)
-        found: dict[str, str] = {}
+        names: dict[str, str] = {}
         for owner in (*owners, *(joint.name for joint in self.network.joints)):
-            if owner not in found:
-                found[owner] = _identifier(owner, taken)
-                taken |= _forms(found[owner])
-        return found
+            if owner not in names:
+                names[owner] = _identifier(owner, taken)
+                taken |= _forms(names[owner])
+        return names
 
     @cached_property
     def inputs(self) -> tuple[_Control, ...]:
         """The controls that can be set, in the order of the mechanism's variables."""
-        found = []
+        inputs = []
         for k in self.mechanism.controls:
             control = self.mechanism.variables[k].owner
             unit, factor = self.network.unit_of(control) or ("", 1)
-            found.append(_Control(self._names[control], control, unit, float(factor)))
-        return tuple(found)
+            inputs.append(_Control(self._names[control], control, unit, float(factor)))
+        return tuple(inputs)
 
     @cached_property
     def groups(self) -> tuple[_Group, ...]:
         """The outputs of joints, and of bodies without a joint to the ground."""
-        found = []
+        groups = []
         for joint in self.network.joints:
             variable, what = self._names[joint.name], f"joint {joint.name}"
             if joint.kind == "cylindrical":
-                found.append(_Group(f"{variable}_theta", joint.name, f"Angle of {what}", (0,), "rad"))
-                found.append(_Group(f"{variable}_s", joint.name, f"Displacement of {what}", (1,), "m"))
+                groups.append(_Group(f"{variable}_theta", joint.name, f"Angle of {what}", (0,), "rad"))
+                groups.append(_Group(f"{variable}_s", joint.name, f"Displacement of {what}", (1,), "m"))
             elif joint.units:
                 word = {"prismatic": "Displacement", "global": "Rotation vector"}.get(joint.kind, "Angle")
                 indices = tuple(range(len(joint.units)))
-                found.append(_Group(variable, joint.name, f"{word} of {what}", indices, joint.units[0]))
+                groups.append(_Group(variable, joint.name, f"{word} of {what}", indices, joint.units[0]))
         for name in self.mechanism.graph.roots[1:]:
             variable = self._names[name]
-            found.append(_Group(f"{variable}_p", name, f"Position of body {name}: x, y, z", (0, 1, 2), "m"))
-            found.append(_Group(f"{variable}_q", name, f"Rotation vector of body {name}", (3, 4, 5), "rad"))
-        return tuple(found)
+            groups.append(_Group(f"{variable}_p", name, f"Position of body {name}: x, y, z", (0, 1, 2), "m"))
+            groups.append(_Group(f"{variable}_q", name, f"Rotation vector of body {name}", (3, 4, 5), "rad"))
+        return tuple(groups)
 
     def variables(self) -> Iterator[Variable]:
         """Yield the variables of the unit."""
@@ -242,19 +242,19 @@ class _Model:
         x = self._configuration(v)
         mechanism, network = self.mechanism, self.network
         values = {
-            joint.name: [given.value for given in mechanism.joint_values(joint, x)]
+            joint.name: [value.value for value in mechanism.joint_values(joint, x)]
             for joint in network.joints
             if joint.units
         }
         for name in mechanism.graph.roots[1:]:
             first = mechanism.places[name, 0]
             values[name] = x[first : first + len(POSE_UNITS)]
-        found: dict[str, Any] = {"residual": largest_residual(mechanism, x)}
+        results: dict[str, Any] = {"residual": largest_residual(mechanism, x)}
         for group in self.groups:
             elements = tuple(values[group.owner][index] for index in group.indices)
-            found[group.variable] = elements if len(elements) > 1 else elements[0]
+            results[group.variable] = elements if len(elements) > 1 else elements[0]
         poses = mechanism.poses(x) if self.points else {}
-        return found | {name: poses[body].point(place) for name, body, place in self.points}
+        return results | {name: poses[body].point(place) for name, body, place in self.points}
 
     def update(self, v: Values) -> Mapping[str, Any]:
         """Return the configuration as the last one, and how it has changed."""
@@ -294,11 +294,11 @@ def _at_joint_values(network: Network, start: Mapping[str, Any]) -> Network:
         units = joints[name].units
         values = list(value) if isinstance(value, (list, tuple)) else [value]
         read = [
-            read_quantity(one, unit, positive=False) if isinstance(one, str) else one
-            for one, unit in zip(values, units, strict=False)
+            read_quantity(entry, unit, positive=False) if isinstance(entry, str) else entry
+            for entry, unit in zip(values, units, strict=False)
         ]
         if len(values) == len(units) and are_numbers(read, len(units)):
-            joints[name] = replace(joints[name], start=tuple(float(one) for one in read))
+            joints[name] = replace(joints[name], start=tuple(float(entry) for entry in read))
         else:
             count = "a number" if len(units) == 1 else f"a list of {len(units)} numbers"
             faults.append(f"start: found {name} = {shown(value)}, allowed: {count} in {', '.join(units)}")
@@ -320,18 +320,18 @@ def _read_points(network: Network, points: Any) -> tuple[tuple[str, str, Vector]
         for k, text in enumerate(re.split(r",(?=[^,]*:)", joined), 1):
             body, _, place = text.rpartition(":")
             rows[f"p{k}"] = (body, _numbers(place))
-    faults, found = [], []
+    faults, read = [], []
     for name, (body, place) in rows.items():
         if body not in network.body_names:
             faults.append(f"{name}: body {not_among(str(body), network.body_names)}")
         elif not are_numbers(place, 3):
             faults.append(f"{name}: found {shown(place)}, allowed: x, y, z in m")
         else:
-            found.append((name, body, (float(place[0]), float(place[1]), float(place[2]))))
+            read.append((name, body, (float(place[0]), float(place[1]), float(place[2]))))
     if faults:
         form = 'allowed form: "BODY:X,Y,Z", or NAME = { body = "BODY", point = [X, Y, Z] }'
         raise UnitError(*(f"unit network_motion: option points: {fault}; {form}" for fault in faults))
-    return tuple(found)
+    return tuple(read)
 
 
 def _numbers(text: str) -> list[float] | str:

@@ -133,6 +133,19 @@ def assemble(
     return found.result(every, tried, reason, elsewhere=not closed and bool(found.kept), continuum=continuum)
 
 
+def assembled_at(mechanism: Mechanism, x: FloatArray, reason: str) -> Assembled:
+    """Return a configuration that closes as the only assembly, its angles within -pi and pi.
+
+    Args:
+        mechanism: The network.
+        x: The variables, shape (variables,), in [m], [rad] and as controls are given.
+        reason: How it was reached.
+    """
+    found = _Found(mechanism, x)
+    found.kept.append(found.turned(x[:, np.newaxis])[:, 0])
+    return found.result(False, 1, reason, elsewhere=False, continuum=0)
+
+
 def start_with(mechanism: Mechanism, controls: Mapping[str, float]) -> FloatArray:
     """Return where assembly starts with some controls set, in [m], [rad] and as controls are given.
 
@@ -246,7 +259,7 @@ class _Found:
         if known[best] < self._gap:
             self._nearest, self._gap = ends.x[:, best], float(known[best])
         closed = known <= CLOSED
-        held = unspun(self.mechanism, self._spins, self._turned(ends.x[:, closed]), self.start)
+        held = unspun(self.mechanism, self._spins, self.turned(ends.x[:, closed]), self.start)
         places = iter(zip(held.T, self._places_of(held), strict=True))
         for one in closed:
             yield bool(one) and self._keep(*next(places))
@@ -280,7 +293,7 @@ class _Found:
         near = self.distances().round(6) if self.kept else np.empty(0)
         order = [x for _, x in sorted(zip(near, self.kept, strict=True), key=lambda one: (one[0], *one[1]))]
         order = order if every else order[:1]
-        nearest = order[0] if order else self._turned(self._nearest[:, np.newaxis])[:, 0]
+        nearest = order[0] if order else self.turned(self._nearest[:, np.newaxis])[:, 0]
         return Assembled(
             np.array(order).T.reshape(len(self.start), -1),
             tuple(assembly_at(self.mechanism, x) for x in order),
@@ -294,7 +307,7 @@ class _Found:
             tuple(sorted(near.tolist())) if self.kept else (),
         )
 
-    def _turned(self, x: FloatArray) -> FloatArray:
+    def turned(self, x: FloatArray) -> FloatArray:
         """Return the same configurations with angles within -pi and pi; helices stay."""
         angles, turned = self.mechanism.angles, np.array(x)
         turned[angles] -= 2.0 * np.pi * np.round(turned[angles] / (2.0 * np.pi))

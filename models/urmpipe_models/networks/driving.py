@@ -197,14 +197,15 @@ def move_to(
 
     Returns:
         The configuration, shape (variables,), and the trace that leads there; without one if it is there already.
-        If the trace is not complete, the configuration is the assembly.
+        If the trace is not complete, as from a singular pose, the configuration is the assembly.
     """
     change = np.zeros(len(x))
     change[places] = values - x[places]
     if np.abs(change / mechanism.column_scales).max() < 1e-14 or not len(free):
         return np.where(np.isin(np.arange(len(x)), places), x + change, x), None
     drive = Drive(mechanism, x, change, free, limits)
-    branch = trace(drive, 0.0)
+    singular = drive.node(drive.coordinates(x, 0.0)).distance < SINGULAR
+    branch = Trace() if singular else trace(drive, 0.0)
     if not branch.complete:
         return x, branch
     return unspun(mechanism, idle_spins(mechanism), sample(drive, branch, np.ones(1)), x)[:, 0], branch

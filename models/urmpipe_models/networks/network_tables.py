@@ -1,6 +1,6 @@
 """A network as tables in m and rad that need no other file: the inverse of `load_network`.
 
-Arms and Denavit-Hartenberg elements stand in them as the joints and bodies that they became. Functions of
+Arms and Denavit-Hartenberg elements are in them as joints and bodies. Functions of
 controls stay as they are, with the factors that their file's units gave them; so do the values of controls.
 The third axis of a frame is not stored, since it is m x n: read back, it may differ in the last digit.
 """
@@ -68,7 +68,8 @@ def with_start(network: Network, x: Sequence[float]) -> Network:
     return replace(
         network,
         controls=tuple(
-            replace(one, start=start_of(one.name, (one.start,), 1)[0]) for one in network.controls
+            replace(control, start=start_of(control.name, (control.start,), 1)[0])
+            for control in network.controls
         ),
         joints=tuple(
             replace(joint, start=start_of(joint.name, joint.start, len(joint.units)))

@@ -106,10 +106,10 @@ def changes(mechanism: Mechanism, before: Sequence[Element], x: Sequence[Element
     start = list(before)
     for part in mechanism.rotations:
         vector = _vector(start, part)
-        apart = subtract(_vector(x, part), vector)
+        difference = subtract(_vector(x, part), vector)
         angle = np.sqrt(dot(vector, vector))
         other = 1.0 - 2.0 * np.pi / np.maximum(angle, 1.0)  # the same rotation, the other way round
-        start[part] = scale(np.where(dot(apart, apart) > np.pi**2, other, 1.0), vector)
+        start[part] = scale(np.where(dot(difference, difference) > np.pi**2, other, 1.0), vector)
     return [now - then for now, then in zip(x, start, strict=True)]
 
 
@@ -145,8 +145,8 @@ def closure_jacobian(mechanism: Mechanism, x: Sequence[Element]) -> list[Column]
 def damped_normal_step(columns: Sequence[Column], residual: Column, damping: float = FLOOR) -> Column:
     """Return dx of (J^T J + mu I) dx = -J^T e.
 
-    As J^T J is positive semidefinite, no pivot is less than mu; rounding, which could make it so, is held to
-    that.
+    As J^T J is positive semidefinite, no pivot is less than mu; rounding may not make it
+    so.
 
     Args:
         columns: J, a list of columns.
@@ -242,7 +242,7 @@ def cut_frames(
     """Yield the frame of each cut joint in the ground, once from each of its two bodies."""
     for cut in mechanism.graph.cuts:
         joint = mechanism.network.joints[cut]
-        moved = joint_frame(joint, [given.value for given in mechanism.values(joint, x, controls)])
+        moved = joint_frame(joint, [value.value for value in mechanism.values(joint, x, controls)])
         yield posed.joints[joint.name] @ moved, posed.bodies[joint.bodies[1]].frame @ joint.frames[1]
 
 
@@ -250,14 +250,14 @@ def _free_screws(
     mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls: dict[str, Given]
 ) -> dict[str, list[tuple[int, Vector, Vector]]]:
     """Return the free variables of each mover by number, with the twist in the ground of one unit of each."""
-    found: dict[str, list[tuple[int, Vector, Vector]]] = {}
+    twists: dict[str, list[tuple[int, Vector, Vector]]] = {}
     for joint in mechanism.network.joints:
         drives = joint.drives
         screws: Screws = []
         if any(drive is None for drive in drives):
-            values = [given.value for given in mechanism.values(joint, x, controls)]
+            values = [value.value for value in mechanism.values(joint, x, controls)]
             screws = joint_screws(joint, values, posed.joints[joint.name])
-        found[joint.name] = [
+        twists[joint.name] = [
             (mechanism.places[joint.name, index], *screw)
             for index, (drive, screw) in enumerate(zip(drives, screws, strict=False))
             if drive is None
@@ -267,8 +267,8 @@ def _free_screws(
         p = posed.bodies[name].frame.translation
         axes = turning_of((x[first + 3], x[first + 4], x[first + 5]))
         screws = [*SLIDING_SCREWS, *((axis, cross(p, axis)) for axis in axes)]
-        found[name] = [(first + index, *screw) for index, screw in enumerate(screws)]
-    return found
+        twists[name] = [(first + index, *screw) for index, screw in enumerate(screws)]
+    return twists
 
 
 def _vector(x: Sequence[Element], part: slice) -> Vector:

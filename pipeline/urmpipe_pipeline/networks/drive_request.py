@@ -1,7 +1,7 @@
 """From a request to drive a network to its motion: values with units, the assembly, the motion, its rates.
 
 1. `DriveRequest`: what is requested; `check` refuses what makes no sense with any network.
-2. `_parse_drives`, `_parse_values`, `_parse_point`, `_parse_wrench`: texts with units become SI.
+2. `_parse_drives`, `_parse_values`, `parse_point`, `parse_wrench`: texts with units become SI.
 3. `drive_network`: assembly (by default that of the file's start, else the nearest to start values, or one by
    its number), motion along a line or along a log, rates, transmission, static forces, singular poses in words.
 """
@@ -42,6 +42,16 @@ from urmpipe_models.networks.parts import POSE_UNITS
 from urmpipe_models.networks.rates import Rates, compute_rates
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile, seconds
+from urmpipe_pipeline.networks.given_values import (
+    Quantity,
+    Range,
+    drive_factor,
+    parse_point,
+    parse_ranges,
+    parse_start,
+    parse_torques,
+    parse_wrench,
+)
 from urmpipe_pipeline.networks.network_motion import (
     DriveRange,
     MotionEvent,
@@ -54,13 +64,6 @@ from urmpipe_pipeline.runs.results import Run
 
 DEFAULT_STEPS = 200
 MAX_ROWS = 10_000_000  # of a motion: about 2 GB of variables and rates of a network of ten
-
-Quantity: TypeAlias = float | str
-"""A number, or a text with a unit."""
-
-Range: TypeAlias = Quantity | Sequence[Quantity]
-"""From and to; one value holds a variable."""
-
 
 @dataclass(frozen=True, slots=True)
 class DriveRequest:
@@ -160,15 +163,15 @@ def drive_network(
     parts: tuple[Callable[[], Any], ...] = (
         request.check,
         lambda: _find_driven(mechanism, names),
-        lambda: _parse_ranges(network, request.drives) if log is None else None,
-        lambda: _parse_start(network, request.start),
-        lambda: _parse_point(network, request.point),
-        lambda: [_parse_wrench(network, one) for one in request.wrenches],
-        lambda: _parse_torques(network, request.torques),
+        lambda: parse_ranges(network, request.drives) if log is None else None,
+        lambda: parse_start(network, request.start),
+        lambda: parse_point(network, request.point),
+        lambda: [parse_wrench(network, one) for one in request.wrenches],
+        lambda: parse_torques(network, request.torques),
     )
     _, driven, ranges, start, point, wrenches, torques = for_each(lambda make: make(), parts)
     t_ns = request.times_ns() if log is None else log.t_ns
-    factors = np.array([_factor(network, name) for name in driven.names])
+    factors = np.array([drive_factor(network, name) for name in driven.names])
     values, d_values, dd_values = _drive_values(driven, ranges, factors, columns, log, request, t_ns)
     _check_control_ranges(mechanism, driven, values, log)
     x = _find_assembly(mechanism, driven, values[0], start, request)
@@ -244,156 +247,6 @@ def _duration(request: DriveRequest, t_ns: Any) -> float:
 
 def _plain(value: Any) -> Any:
     return [*value] if isinstance(value, (list, tuple)) else value
-
-
-# ---------------------------------------------------------------------------------------- values with units
-
-
-def _factor(network: Network, name: str) -> float:
-    """Return how many SI units one of a drive is: of a control in deg or mm; 1 for all others."""
-    unit = network.unit_of(name)
-    return float(unit[1]) if unit and name in {one.name for one in network.controls} else 1.0
-
-
-def parse_quantity(network: Network, parameter: str, name: str, value: Quantity, unit: str, factor: Decimal) -> float:
-    """Return a value in units of which one is `factor` SI units.
-
-    Numbers are in these units; texts have a unit of their own, or the unit of the network's file.
-
-    Raises:
-        OptionError: If it is no such value.
-    """
-    if not isinstance(value, str):
-        if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(float(value)):
-            raise OptionError(Finding(parameter=parameter, found=f"{name} = {shown(value)}", allowed="a finite number"))
-        return float(value)
-    in_file = {"m": network.length_unit, "rad": network.angle_unit}.get(unit, "")
-    units = {key: si / factor for key, si in WRITTEN.get(unit, {}).items()}
-    units[""] = MEASURES[unit][in_file] / factor if unit else Decimal(1)
-    number = quantity(value, units)
-    if not math.isfinite(number):
-        allowed = f"a number, or {NAMES[unit].partition(' in ')[0]} with its unit" if unit else "a number"
-        raise OptionError(Finding(parameter=parameter, found=f"{name} = {value}", allowed=allowed))
-    return number
-
-
-def _unit_and_factor(network: Network, name: str) -> tuple[str, Decimal]:
-    """Return the unit of a drive, and how many of it one of its own units is."""
-    if name in {one.name for one in network.controls}:
-        return network.unit_of(name) or ("", Decimal(1))
-    owner, _, index = name.partition("[")
-    joint = next((one for one in network.joints if one.name in (name, owner)), None)
-    place = int(index.rstrip("]") or 1) - 1 if index.rstrip("]").isdigit() else 0
-    known = joint is not None and place < len(joint.units)
-    return (joint.units[place] if joint is not None and known else ""), Decimal(1)
-
-
-def _parse_ranges(network: Network, drives: Mapping[str, Range]) -> list[tuple[float, float]]:
-    """Return from and to of each drive in its own unit."""
-
-    def parse(pair: tuple[str, Range]) -> tuple[float, float]:
-        name, value = pair
-        unit, factor = _unit_and_factor(network, name)
-        ends = [*value] if isinstance(value, (list, tuple)) else [value]
-        if isinstance(value, str):
-            ends = value.split(":")
-        if len(ends) not in (1, 2):
-            raise OptionError(Finding(parameter="drives", found=f"{name} = {shown(value)}", allowed="FROM:TO, or one value"))
-        read = [parse_quantity(network, "drives", name, end, unit, factor) for end in ends]
-        return read[0], read[-1]
-
-    return for_each(parse, drives.items())
-
-
-def _parse_start(network: Network, start: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
-    """Return values of joints and of bodies with freedoms of their own in [rad] and [m], by name.
-
-    Values of controls, as an assembly has them, are left out: drives and controls say where these are.
-    """
-    joints = {one.name: one.units for one in network.joints if one.units}
-    mechanism = mechanism_of(network)
-    bodies = dict.fromkeys(mechanism.graph.roots[1:], POSE_UNITS)
-    units: dict[str, tuple[str, ...]] = {**bodies, **joints}
-    controls = {one.name for one in network.controls}
-
-    def parse(pair: tuple[str, Any]) -> tuple[str, tuple[float, ...]] | None:
-        name, value = pair
-        if name in controls and name not in units:
-            return None
-        if name not in units:
-            raise OptionError(Finding(f"joint {not_among(name, units)}", parameter="start"))
-        values = value.split(",") if isinstance(value, str) else value
-        values = [values] if isinstance(values, Real) else [*values]
-        if len(values) != len(units[name]):
-            allowed = f"{len(units[name])} in {', '.join(units[name])}"
-            raise OptionError(Finding(parameter="start", found=f"{name} = {shown(value)}", allowed=allowed))
-        read = [
-            parse_quantity(network, "start", name, one, unit, Decimal(1))
-            for one, unit in zip(values, units[name], strict=True)
-        ]
-        return name, tuple(read)
-
-    return dict(one for one in for_each(parse, start.items()) if one is not None)
-
-
-def _parse_vector(parameter: str, given: str, allowed: str, si: str = "m") -> list[float]:
-    values = [quantity(part, WRITTEN.get(si, {"": Decimal(1)})) for part in given.split(",")]
-    if len(values) not in (3, 6) or not all(map(math.isfinite, values)):
-        raise OptionError(Finding(parameter=parameter, found=shown(given), allowed=allowed))
-    return values
-
-
-def _parse_point(network: Network, point: Any) -> tuple[str, Vector] | None:
-    """Return the body and the place in its frame in [m] of a point to trace."""
-    if point is None:
-        return None
-    allowed = "BODY:X,Y,Z in m, or with units, such as coupler:0.45,0.2,0"
-    if isinstance(point, str):
-        body, sign, place = point.rpartition(":")
-        if not sign:
-            body, place = point, "0,0,0"
-        values = _parse_vector("point", place, allowed)
-    else:
-        body, values = point[0], [float(value) for value in point[1]]
-    if body not in network.body_names:
-        raise OptionError(Finding(f"body {not_among(str(body), network.body_names)}", parameter="point"))
-    if len(values) != 3 or not all(map(math.isfinite, values)):
-        raise OptionError(Finding(parameter="point", found=shown(point), allowed=allowed))
-    return body, (values[0], values[1], values[2])
-
-
-def _parse_wrench(network: Network, wrench: str | Wrench) -> Wrench:
-    """Return a load on a body."""
-    allowed = "BODY:X,Y,Z:FX,FY,FZ[,MX,MY,MZ] in m, N and N.m, such as coupler:0,0,0:0,-50,0"
-    if isinstance(wrench, str):
-        body, _, rest = wrench.partition(":")
-        place, sign, load = rest.partition(":")
-        if not sign:
-            raise OptionError(Finding(parameter="wrenches", found=shown(wrench), allowed=allowed))
-        at, forces = _parse_vector("wrenches", place, allowed), _parse_vector("wrenches", load, allowed, "1")
-        forces += [0.0] * (6 - len(forces))
-        wrench = Wrench(
-            body, (at[0], at[1], at[2]), (forces[0], forces[1], forces[2]), (forces[3], forces[4], forces[5])
-        )
-    if wrench.body not in network.body_names:
-        raise OptionError(Finding(f"body {not_among(wrench.body, network.body_names)}", parameter="wrenches"))
-    return wrench
-
-
-def _parse_torques(network: Network, torques: Mapping[str, float | str]) -> dict[str, float]:
-    """Return loads at joints in [N.m] or [N], by name."""
-    joints = {one.name: one for one in network.joints if one.units and one.kind != "global"}
-
-    def parse(pair: tuple[str, float | str]) -> tuple[str, float]:
-        name, value = pair
-        if name not in joints:
-            raise OptionError(Finding(f"joint {not_among(name, joints)}", parameter="torques"))
-        number = quantity(value, {"": Decimal(1), "N": Decimal(1), "N.m": Decimal(1), "Nm": Decimal(1)}) if isinstance(value, str) else value
-        if not math.isfinite(number):
-            raise OptionError(Finding(parameter="torques", found=f"{name} = {value}", allowed="a number in N.m or N"))
-        return name, float(number)
-
-    return dict(for_each(parse, torques.items()))
 
 
 def _log_columns(network: Network, request: DriveRequest, log: Run) -> dict[str, str]:
@@ -536,7 +389,7 @@ def _events(
         variable = mechanism.variables[moved.stop.variable]
         label = labels[moved.stop.variable]
         values = dict(zip(driven.names, (moved.x[driven.places, n - 1] * factors).tolist(), strict=True))
-        limit = moved.stop.limit * (_factor(mechanism.network, variable.owner) if variable.kind == "control" else 1.0)
+        limit = moved.stop.limit * (drive_factor(mechanism.network, variable.owner) if variable.kind == "control" else 1.0)
         unit = variable.unit or (mechanism.network.unit_of(variable.owner) or ("",))[0]
         message = f"{label} reaches its limit {text.in_words(limit, unit)}"
         t = float(np.interp(moved.stop.s, rows, seconds(t_ns)))

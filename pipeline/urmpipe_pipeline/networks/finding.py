@@ -3,19 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
 
 from urmpipe_models.display import number_of
 from urmpipe_models.errors import Finding, OptionError, for_each, shown
 from urmpipe_models.messages import Hint
-from urmpipe_models.networks.assembly import MOST_STARTS, RESTARTS, Assembled, assemble
+from urmpipe_models.networks.assembly import (
+    MOST_STARTS,
+    RESTARTS,
+    Assembled,
+    assemble,
+    assembled_at,
+    start_with,
+)
+from urmpipe_models.networks.driving import move_to
 from urmpipe_models.networks.findings import Assembly, Mobility
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.mobility import mobility_of, stuck_controls
+from urmpipe_models.networks.motion import Trace
 from urmpipe_models.networks.network import Network
 from urmpipe_models.networks.parts import exceeded_limits
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
+from urmpipe_pipeline.networks.given_values import parse_start
 from urmpipe_pipeline.networks.result import Command, NetworkResult
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.text import allowed, in_words
@@ -31,12 +44,15 @@ class Search:
     Attributes:
         controls: Values of controls instead of their starts, in the units of the network; texts with
             their own.
+        start: Values of joints by name to be near to instead of the network's start, in [rad] and [m]; texts with
+            their own units, or those of the file.
         every: Whether all assemblies are sought.
         restarts: Random starts in a row without anything new that end the search.
         seed: Of the random starts.
     """
 
     controls: Mapping[str, float | str]
+    start: Mapping[str, Any] = field(default_factory=dict)
     every: bool = False
     restarts: int = RESTARTS
     seed: int = 0
@@ -82,16 +98,17 @@ def find_network(
         NetworkError: If a control is not of the network, or its value out of its range.
     """
     mechanism = mechanism_of(network)
-    values = for_each(lambda pair: network.control_value(*pair), search.controls.items())
+    parts: tuple[Callable[[], Any], ...] = (
+        lambda: for_each(lambda pair: network.control_value(*pair), search.controls.items()),
+        lambda: parse_start(network, search.start),
+    )
+    values, start = for_each(lambda make: make(), parts)
     controls = dict(zip(search.controls, values, strict=True))
-    found = assemble(
-        mechanism, controls, every=search.every, restarts=search.restarts, seed=search.seed,
-        progress=progress,
-    )  # fmt: skip
+    found, unreached = _assemble(mechanism, controls, start, search, progress)
     mobility = mobility_of(mechanism, found.x_nearest) if found.assemblies else None
     graph = mechanism.graph
     options = {
-        "network": network.name, "controls": controls, "every": search.every,
+        "network": network.name, "controls": controls, "start": start or None, "every": search.every,
         "restarts": search.restarts, "seed": search.seed,
     }  # fmt: skip
     return NetworkResult(
@@ -102,6 +119,7 @@ def find_network(
         loops=graph.loops,
         clusters=graph.clusters,
         assemblies=found.assemblies,
+        distances=found.distances,
         nearest=found.nearest,
         gaps=found.gaps,
         mobility=mobility,
@@ -111,7 +129,7 @@ def find_network(
         warnings=(
             *_warnings(mechanism, found, mobility, every=search.every),
             *_limit_warnings(network, found.assemblies),
-            *(_branch_warnings(mechanism, controls) if command == "solve" and not search.every else ()),
+            *unreached,
         ),
         provenance=provenance(f"network {command}", options, inputs),
     )
@@ -156,16 +174,47 @@ def _limit_warnings(network: Network, assemblies: Sequence[Assembly]) -> Iterato
             yield LogWarning("beyond-limit", f"{words}, {allowed(limit, unit)}")
 
 
-def _branch_warnings(mechanism: Mechanism, controls: Mapping[str, float]) -> Iterator[LogWarning]:
-    """Yield that the one assembly of loops whose controls were moved may be of another branch."""
-    moved = [
-        f"{one.name} = {controls[one.name]:.6g} (start {one.start:.6g})"
-        for one in mechanism.network.controls
-        if one.name in controls and controls[one.name] != one.start
-    ]
-    if moved and mechanism.rows:
-        said = (
-            f"controls away from their start: {', '.join(moved)}: the assembly is the nearest to the start of"
-            " the network, and may be of another branch than a motion from there reaches"
-        )
-        yield LogWarning("other-branch", said, hints=(Hint("every", True, "lists the assemblies"),))
+def _assemble(
+    mechanism: Mechanism,
+    controls: Mapping[str, float],
+    start: Mapping[str, tuple[float, ...]],
+    search: Search,
+    progress: Callable[[float], None] | None,
+) -> tuple[Assembled, list[LogWarning]]:
+    """Return assemblies, and a warning if the one that is shown is of another branch than the network's start.
+
+    Controls that are away from their start are moved there by continuation, from the assembly at the start. Only
+    if no motion leads there, or with start values, the assembly nearest to the start is searched for.
+    """
+    settings: dict[str, Any] = {"restarts": search.restarts, "seed": search.seed}
+    moved = {
+        control.name: controls[control.name]
+        for control in mechanism.network.controls
+        if control.name in controls and controls[control.name] != control.start
+    }
+    x = start_with(mechanism, controls)
+    if not (moved and mechanism.rows) or search.every or start:
+        found = assemble(mechanism, controls, start=start, every=search.every, progress=progress, **settings)
+        return found, []
+    first = assemble(mechanism, progress=progress, **settings)
+    branch: Trace | None = Trace()
+    if first.assemblies and not first.continuum:
+        unlimited = np.tile((-np.inf, np.inf), (len(x), 1))
+        own = mechanism.controls
+        x, branch = move_to(mechanism, first.x_nearest, own, x[own], mechanism.free, unlimited)
+    if branch is None or branch.complete:
+        return assembled_at(mechanism, x, "a motion from the start leads there"), []
+    found = assemble(mechanism, controls, progress=progress, **settings)
+    if not found.assemblies or found.continuum:
+        return found, []
+    at = ", ".join(f"{name} = {value:.6g}" for name, value in moved.items())
+    ends = [pose for pose, _ in branch.singular if pose.passage == "turns back"]
+    why = ""
+    if ends:
+        places = [f"{name} = {ends[0].x[mechanism.places[name, 0]]:.6g}" for name in moved]
+        why = f": it turns back at {', '.join(places)}"
+    message = (
+        f"no motion from the start of the network leads to {at}{why}; the assembly is the nearest to the start, of"
+        " another branch"
+    )
+    return found, [LogWarning("other-branch", message, hints=(Hint("every", True, "lists the assemblies"),))]

@@ -40,6 +40,8 @@ class NetworkResult(Result):
         loops: Names of the joints and elements of each loop.
         clusters: Names of the bodies of each part that joints hold together.
         assemblies: Where everything closes, the nearest to the start first; none if nothing was found.
+        distances: How far all assemblies that the search came to are from the start, in [rad] and lengths of the
+            mechanism, rising, shape (k,): those of `assemblies` come first.
         nearest: The configuration that comes nearest to closing where nothing closes; else None.
         gaps: What does not close there, the largest first.
         mobility: Of the first assembly; None without.
@@ -58,6 +60,7 @@ class NetworkResult(Result):
     loops: tuple[tuple[str, ...], ...]
     clusters: tuple[tuple[str, ...], ...]
     assemblies: tuple[Assembly, ...]
+    distances: tuple[float, ...]
     nearest: Assembly | None
     gaps: tuple[Gap, ...]
     mobility: Mobility | None
@@ -145,6 +148,7 @@ class NetworkResult(Result):
             "schema": SCHEMA,
             "name": self.name,
             "assemblies": self._assemblies(),
+            "distances": list(self.distances),
             "restarts": max(self.tried - 1, 0),
             "reason": self.reason,
             "gaps": self._gaps(),

@@ -201,7 +201,7 @@ def test_a_rotation_vector_follows_three_turns_and_stays_within_half_a_turn() ->
     turn = np.linspace(0.0, 3.0 * TURN, 601, dtype=np.float64)
     found = run(make_unit("network_motion", network=parts), turn, {"turn": turn})["S"]
     assert np.linalg.norm(found, axis=1).max() <= math.pi + 1e-9
-    rotation = np.array(rotation_of(tuple(found.T)).rotation)
+    rotation: FloatArray = np.array(rotation_of((found[:, 0], found[:, 1], found[:, 2])).rotation)
     # T of S is given in m, n and m x n of its frames, which are those of the ground: x, y, z
     np.testing.assert_allclose(rotation, rotation_of(tuple(np.outer(axis, turn))).rotation, atol=1e-9)
 

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.networks.assembly import assemble
-from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.network_file import load_network, network_names
 from urmpipe_models.networks.network_tables import network_tables, with_start
 from urmpipe_models.networks.newton import (
@@ -42,17 +43,26 @@ DOOR: dict[str, Any] = {
 NETWORKS = [*map(load_network, network_names()), load_network(DOOR)]
 
 
+def residual(mechanism: Mechanism, x: FloatArray) -> FloatArray:
+    """Return the residual of a configuration."""
+    return np.array(closure_residual(mechanism, x.tolist()), dtype=np.float64)
+
+
 @pytest.mark.parametrize("network", NETWORKS, ids=lambda network: network.name)
 def test_the_jacobian_is_that_of_finite_differences_where_the_network_is_closed(network: Any) -> None:
     mechanism = mechanism_of(network)
     x = assemble(mechanism, restarts=0).x[:, 0]
-    assert np.abs(np.array(closure_residual(mechanism, x), dtype=np.float64)).max() < 1e-13  # rounding
+    assert (
+        np.abs(np.array(closure_residual(mechanism, x.tolist()), dtype=np.float64)).max() < 1e-13
+    )  # rounding
     step = 1e-6  # error of the quotient: step^2 and 1e-16 / step
-    for k, column in zip(mechanism.free, closure_jacobian(mechanism, x), strict=True):
+    for k, column in zip(mechanism.free, closure_jacobian(mechanism, x.tolist()), strict=True):
         ahead, behind = x.copy(), x.copy()
         ahead[k] += step * mechanism.column_scales[k]
         behind[k] -= step * mechanism.column_scales[k]
-        rows = [np.array(closure_residual(mechanism, one), dtype=np.float64) for one in (ahead, behind)]
+        rows = [
+            np.array(closure_residual(mechanism, one.tolist()), dtype=np.float64) for one in (ahead, behind)
+        ]
         np.testing.assert_allclose(
             np.array(column, dtype=np.float64), (rows[0] - rows[1]) / (2.0 * step), atol=1e-8
         )

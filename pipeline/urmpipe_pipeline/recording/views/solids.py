@@ -1,8 +1,8 @@
 """Solids and moving lines in the 3D view: meshes, lines and labels, an entity each.
 
-A solid that moves is sent once; its frame moves by item transform per row, at 50 Hz or less. Lines whose
-points move are sent at each of these rows. The label of a moving solid has its own entity, so it does not turn
-with the solid.
+A solid that moves is sent once; its frame moves by one transform per row, at 50 Hz or less. Lines whose
+points move are sent at each of these rows. The label of a moving solid has an entity of
+its own, so that it does not turn with the solid.
 """
 
 from __future__ import annotations
@@ -162,7 +162,7 @@ def _label(words: str, places: Sequence[FloatArray] | None = None) -> Points3D:
 def _draw_moving_label(
     stream: RecordingStream, entity: str, words: str, places: FloatArray, t_ns: IntArray
 ) -> None:
-    """Draw a label, if there is item, at places in [m], shape (n, 3), at times in [ns], shape (n,)."""
+    """Draw a label, if there is any, at places in [m], shape (n, 3), at times in [ns], shape (n,)."""
     import rerun as rr
 
     if not words:
