@@ -123,7 +123,10 @@ def _joint_table(joint: Joint) -> dict[str, Any]:
 def _element_table(element: ConstraintElement) -> dict[str, Any]:
     table: dict[str, Any]
     if element.is_pair:
-        own: dict[str, Any] = {"gear": {"teeth": _numbers(element.teeth)}, "rack": {"radius": element.radius}}
+        own: dict[str, dict[str, Any]] = {
+            "gear": {"teeth": _numbers(element.teeth)},
+            "rack": {"radius": element.radius},
+        }
         profile = {"profile": [_numbers(point) for point in element.profile]}
         table = {"kind": element.kind, "joints": list(element.joints), "offset": element.length.text}
         return table | own.get(element.kind, profile)

@@ -208,7 +208,7 @@ def test_a_second_gear_of_the_same_ratio_is_redundant_and_one_of_another_locks()
     other = {**GEARED, "elements": {"pair": gear, "other": {**gear, "teeth": [20, 30]}}}
     held = network_check(other, controls={"turn": 0})
     assert there(held.mobility).kind == "structure"
-    assert [one.kind for one in held.warnings] == ["stuck-control"]
+    assert "stuck-control" in {one.kind for one in held.warnings}
 
 
 def test_a_drive_that_repeats_a_gear_is_redundant() -> None:
