@@ -20,8 +20,9 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IndexArray
 from urmpipe_models.elementwise import Vector, cross, dot, subtract
 from urmpipe_models.networks.closure import body_twists, closure_of, wrench_carriers
-from urmpipe_models.networks.mechanism import Mechanism
+from urmpipe_models.networks.mechanism import Mechanism, Posed
 from urmpipe_models.networks.motion import iter_chunks
+from urmpipe_models.networks.parts import Joint
 from urmpipe_models.transform import Transform
 
 UNDETERMINED = 1e-7  # share of a unit multiplier that a component takes from redundant constraints
@@ -53,7 +54,9 @@ class Forces:
             of a control per its own unit.
         reactions: Of each joint by its name, on its second body: force [N] along m, n, m x n of its frame and
             moment [N.m] about them, shape (6, n); of each element its force [N], positive if it pushes its
-            bodies apart, shape (1, n). NaN where redundant constraints leave it undetermined.
+            bodies apart, of a pair its force [N] or moment [N.m] on its second variable, shape (1, n). What
+            pairs exert along the variables of their joints is no reaction of these. NaN where redundant
+            constraints leave it undetermined.
     """
 
     drives: FloatArray
@@ -155,15 +158,43 @@ class _Equilibrium:
             ground_wrenches[tie.name] = wrench
             if len(carrier) == 1:
                 reactions[tie.name] = multipliers[rows]
+        posed = self.mechanism.posed(self.x)
+        cut_names = {network.joints[cut].name for cut in self.mechanism.graph.cuts}
+        for joint, wrench in self._pair_wrenches(multipliers, posed):
+            if joint.name in cut_names:  # a cut joint, whose multipliers hold its variable, too
+                ground_wrenches[joint.name] = ground_wrenches[joint.name] - wrench
+            else:
+                on_bodies[joint.bodies[1]] += wrench
+                on_bodies[joint.bodies[0]] -= wrench
         for branch in reversed(self.mechanism.graph.branches):
             joint = network.joints[branch.joint]
             needed = -on_bodies[branch.child]  # what the joint must exert on the body beyond it
             on_bodies[branch.parent] = on_bodies[branch.parent] - needed
             ground_wrenches[joint.name] = needed * branch.sign
-        posed = self.mechanism.posed(self.x)
         for joint in network.joints:
             reactions[joint.name] = _at_frame(ground_wrenches[joint.name], posed.joints[joint.name])
         return reactions
+
+    def _pair_wrenches(self, multipliers: FloatArray, posed: Posed) -> list[tuple[Joint, FloatArray]]:
+        """Return what pairs exert along the variables of their joints, on second bodies, in the ground.
+
+        The moment about n of an angle, the force along n of a length, as wrenches, shape (6, n).
+        """
+        mechanism, wrenches = self.mechanism, []
+        joints = {joint.name: joint for joint in mechanism.network.joints}
+        controls = mechanism.control_slopes(self.x)
+        for row, element in enumerate(mechanism.network.elements, 6 * len(mechanism.graph.cuts)):
+            rates = mechanism.pair_error(element, self.x, controls)[1] if element.is_pair else {}
+            for (name, index), rate in rates.items():
+                joint, at = joints[name], posed.joints[name]
+                n = at.columns[1]
+                turns = joint.units[index] == "rad"
+                twist = (*n, 0.0, 0.0, 0.0) if turns else (*cross(at.translation, n), *n)
+                wrench = np.empty((6, self.x.shape[1]))
+                for k, component in enumerate(twist):
+                    wrench[k] = component * rate * multipliers[row]
+                wrenches.append((joint, wrench))
+        return wrenches
 
 
 def _wrenches_in_ground(

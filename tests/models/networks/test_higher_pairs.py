@@ -14,10 +14,12 @@ from scipy.interpolate import CubicSpline
 
 from asserting import refusal, there
 from random_networks import difference
-from urmpipe import load_network, network_check, network_solve
+from urmpipe import load_network, network_check, network_drive, network_solve
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import NetworkError
+from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.closure import closure_of, released
+from urmpipe_models.networks.forces import Wrench, compute_forces
 from urmpipe_models.networks.higher_pairs import transmitted
 from urmpipe_models.networks.mechanism import mechanism_of
 
@@ -228,6 +230,35 @@ def test_what_a_gear_is_off_by_is_an_angle() -> None:
     found = network_solve(blocked, controls={"turn": 20}, restarts=1)
     assert [(one.name, one.metres) for one in found.gaps] == [("pair", 0.0)]
     assert found.gaps[0].radians == pytest.approx(math.radians(20), abs=ROUNDING)
+
+
+def test_a_driven_cam_moves_its_follower_with_the_derivatives_of_its_spline() -> None:
+    motion = network_drive(CAM, {"turn": (0, 720)}, duration=1.0, torques={"S": -50.0})
+    spline, rate = oracle(UNEVEN), 4 * math.pi  # rad/s of the uniform drive
+    angle = motion.joint_motion[0][:, motion.joints.index("A")]
+    for order, values in enumerate(motion.joint_motion):
+        expected = spline(angle, order) * rate**order
+        # rounding: lifts of 0.01 m, rates of 0.3 m/s, accelerations of 10 m/s2
+        np.testing.assert_allclose(values[:, motion.joints.index("S")], expected, atol=1e-12)
+    assert angle[-1] == pytest.approx(4 * math.pi, abs=ROUNDING)
+
+
+@pytest.mark.parametrize("is_cut", [False, True])
+def test_a_load_on_a_wheel_is_held_by_the_drive_through_the_gear(is_cut: bool) -> None:
+    """By virtual work; no joint transmits a moment about the axis of the wheel that is free to turn."""
+    tables: dict[str, Any] = {**GEARED, "joints": dict(GEARED["joints"])}
+    if is_cut:  # a second hinge in line with the first closes a loop
+        tables["joints"]["C"] = shaft(("ground", "b"), 300)
+        tables["elements"] = {"pair": {**GEARED["elements"]["pair"], "joints": ["A", "C"]}}
+    mechanism = mechanism_of(load_network(tables))
+    x, driven = assemble(mechanism).x, mechanism.controls
+    free = np.setdiff1d(np.arange(len(x)), driven)
+    forces = compute_forces(mechanism, x, driven, free, [Wrench("b", moment=(0.0, 0.0, 5.0))])
+    assert forces.drives.item() == pytest.approx(2.5 * math.pi / 180, abs=ROUNDING)  # per unit of turn, 1 deg
+    assert forces.reactions["A"][4].item() == pytest.approx(2.5, abs=ROUNDING)
+    assert forces.reactions["pair"].item() == pytest.approx(-5.0, abs=ROUNDING)
+    for name in tables["joints"].keys() - {"A"}:
+        assert forces.reactions[name][4].item() == pytest.approx(0.0, abs=ROUNDING)
 
 
 # --- faults

@@ -125,6 +125,12 @@ def test_a_network_comes_back_from_its_tables_as_json_and_so_does_one_with_anoth
     assert (moved.graph.roots, moved.graph.cuts) == (mechanism.graph.roots, mechanism.graph.cuts)
 
 
+def test_an_arm_beyond_its_limits_comes_back_from_its_tables() -> None:
+    network = load_network({"chains": {"arm": {"robot": "panda", "start": [0, 0, 0, 1.0, 0, 2, 0]}}})
+    again = load_network(network_tables(network))
+    assert [joint.start for joint in again.joints] == [joint.start for joint in network.joints]
+
+
 def test_tables_keep_every_kind_of_part_in_m_and_rad() -> None:
     parts = {
         "name": "kinds", "length_unit": "mm", "angle_unit": "deg", "ground": "base",
