@@ -16,8 +16,8 @@ from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Memory, Output, Variable
 from urmpipe_models.elementwise import Element, Vector
 from urmpipe_models.errors import UnitError, shown
-from urmpipe_models.files.tables import are_numbers
-from urmpipe_models.measure_units import read_quantity
+from urmpipe_models.files.tables import are_numbers, is_number
+from urmpipe_models.measure_units import WRITTEN, quantity
 from urmpipe_models.names import not_among
 from urmpipe_models.networks.assembly import CLOSED, assemble
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
@@ -76,6 +76,10 @@ def network_motion(
     for option, value in (("controls", controls), ("start", start)):
         if value is not None and not isinstance(value, Mapping):
             raise _option_error(option, f"found {shown(value)}, allowed: a table of names and values")
+    for name, value in (controls or {}).items():
+        if not (isinstance(value, str) or is_number(value)):
+            message = f"found {name} = {shown(value)}, allowed: a number, or a text with a unit"
+            raise _option_error("controls", message)
     mechanism = mechanism_of(_at_joint_values(loaded, start or {}))
     values = {name: loaded.control_value(name, value) for name, value in (controls or {}).items()}
     assembled = assemble(mechanism, values)
@@ -294,7 +298,7 @@ def _at_joint_values(network: Network, start: Mapping[str, Any]) -> Network:
         units = joints[name].units
         values = list(value) if isinstance(value, (list, tuple)) else [value]
         read = [
-            read_quantity(entry, unit, positive=False) if isinstance(entry, str) else entry
+            quantity(entry, WRITTEN[unit]) if isinstance(entry, str) else entry
             for entry, unit in zip(values, units, strict=False)
         ]
         if len(values) == len(units) and are_numbers(read, len(units)):
