@@ -354,11 +354,11 @@ class NetworkMotion(Result):
         if self.forces is None:
             return None
         largest = np.abs(self.forces.drives).max(axis=0)
-        unknown: list[bool] = np.isnan(self.forces.reactions).any(axis=0).tolist()
+        unknown = np.flatnonzero(np.isnan(self.forces.reactions).any(axis=0)).tolist()
         return {
             "drives": {one.name: float(largest[k]) for k, one in enumerate(self.drives)},
             "reactions": {
-                name: None if unknown[k] else float(np.abs(self.forces.reactions[:, k]).max())
+                name: None if k in unknown else float(np.abs(self.forces.reactions[:, k]).max())
                 for k, name in enumerate(self.forces.names)
             },
         }
