@@ -248,7 +248,7 @@ def network_drive(
         if isinstance(log, Run)
         else ingest(log, tsp=tsp, derivative=derivative, **reading)
     )
-    named = [Path(one) for one in (network, log) if isinstance(one, (str, Path))]
+    named = [Path(path) for path in (network, log) if isinstance(path, (str, Path))]
     files = [path for path in named if path.is_file()] + map_files(reading)
     outputs: dict[OutputKind, PathLike | None] = {"drawing": draw}
     if kind is not None:

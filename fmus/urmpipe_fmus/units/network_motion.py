@@ -76,9 +76,9 @@ def network_motion(
     for option, value in (("controls", controls), ("start", start)):
         if value is not None and not isinstance(value, Mapping):
             raise _option_error(option, f"found {shown(value)}, allowed: a table of names and values")
-    for name, value in (controls or {}).items():
-        if not (isinstance(value, str) or is_number(value)):
-            message = f"found {name} = {shown(value)}, allowed: a number, or a text with a unit"
+    for name, number in (controls or {}).items():
+        if not (isinstance(number, str) or is_number(number)):
+            message = f"found {name} = {shown(number)}, allowed: a number, or a text with a unit"
             raise _option_error("controls", message)
     mechanism = mechanism_of(_at_joint_values(loaded, start or {}))
     values = {name: loaded.control_value(name, value) for name, value in (controls or {}).items()}

@@ -85,7 +85,7 @@ def find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
                 fault = f"{name} is a function of other controls, allowed: a control that can be set"
             owner, index = name, 0
         elif owner not in joints:
-            driven = [*(one for one in controls if controls[one].value is None), *joints]
+            driven = [*(control for control in controls if controls[control].value is None), *joints]
             fault = f"drive {not_among(name, driven)}"
         else:
             fault = _joint_fault(name, owner, index, joints[owner].units, joints[owner].drives)

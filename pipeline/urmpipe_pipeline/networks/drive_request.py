@@ -166,7 +166,7 @@ def drive_network(
         lambda: parse_ranges(network, request.drives) if log is None else None,
         lambda: parse_start(network, request.start),
         lambda: parse_point(network, request.point),
-        lambda: [parse_wrench(network, one) for one in request.wrenches],
+        lambda: [parse_wrench(network, wrench) for wrench in request.wrenches],
         lambda: parse_torques(network, request.torques),
     )
     _, driven, ranges, start, point, wrenches, torques = for_each(lambda make: make(), parts)
@@ -200,7 +200,7 @@ def drive_network(
         "tsp": request.tsp if log is None else None, "branch": request.branch,
         "start": {name: _plain(value) for name, value in request.start.items()} or None,
         "point": None if point is None else f"{point[0]}:{','.join(map(repr, point[1]))}",
-        "wrenches": [str(one) for one in request.wrenches] or None,
+        "wrenches": [str(wrench) for wrench in request.wrenches] or None,
         "torques": dict(request.torques) or None,
     }  # fmt: skip
     scaled = values * factors
@@ -251,20 +251,20 @@ def _plain(value: Any) -> Any:
 
 def _log_columns(network: Network, request: DriveRequest, log: Run) -> dict[str, str]:
     """Return the joint of the log that drives each variable: as given, else those of the same names."""
-    names = [one.name for one in network.controls if one.value is None] + [
-        one.name for one in network.joints if one.units
+    names = [control.name for control in network.controls if control.value is None] + [
+        joint.name for joint in network.joints if joint.units
     ]
     if request.drives:
-        wrong = [str(one) for one in request.drives.values() if one not in log.log.joints]
+        wrong = [str(drive) for drive in request.drives.values() if drive not in log.log.joints]
         if wrong:
             faults = [
-                Finding(f"column {not_among(one, log.log.joints)}", parameter="drives") for one in wrong
+                Finding(f"column {not_among(name, log.log.joints)}", parameter="drives") for name in wrong
             ]
             raise OptionError(*faults)
         return {name: str(column) for name, column in request.drives.items()}
     lowered = {column.casefold(): column for column in log.log.joints}
     same = {name: lowered[name.casefold()] for name in names if name.casefold() in lowered}
-    controls = [one.name for one in network.controls if one.value is None]
+    controls = [control.name for control in network.controls if control.value is None]
     same = {name: column for name, column in same.items() if name in controls} or same
     if same:
         return same
@@ -349,7 +349,7 @@ def _find_assembly(
     request: DriveRequest,
 ) -> FloatArray:
     """Return the assembly that the motion is to contain, shape (variables,)."""
-    own = {one.name for one in mechanism.network.controls if one.value is None}
+    own = {control.name for control in mechanism.network.controls if control.value is None}
     chosen = request.branch is not None or bool(start)
     controls = {
         name: float(value)
@@ -373,11 +373,11 @@ def _find_assembly(
 def _labels(mechanism: Mechanism) -> list[str]:
     """Return a name per variable: of its owner, numbered where that has several."""
     counts: dict[str, int] = {}
-    for one in mechanism.variables:
-        counts[one.owner] = counts.get(one.owner, 0) + 1
+    for variable in mechanism.variables:
+        counts[variable.owner] = counts.get(variable.owner, 0) + 1
     return [
-        one.owner if counts[one.owner] == 1 else f"{one.owner}[{one.index + 1}]"
-        for one in mechanism.variables
+        variable.owner if counts[variable.owner] == 1 else f"{variable.owner}[{variable.index + 1}]"
+        for variable in mechanism.variables
     ]
 
 

@@ -142,7 +142,7 @@ def _warnings(
     if found.elsewhere:
         said = "the start does not close; the assembly nearest to it was found from a random start"
         yield LogWarning("assembled-elsewhere", said)
-    if found.gaps and all(max(one.metres / mechanism.length, one.radians) < ROUNDED for one in found.gaps):
+    if found.gaps and all(max(gap.metres / mechanism.length, gap.radians) < ROUNDED for gap in found.gaps):
         said = "the gap is so small that the network may close if its lengths and directions have more digits"
         yield LogWarning("rounded-figures", said)
     if every and found.continuum:

@@ -31,7 +31,7 @@ Range: TypeAlias = Quantity | Sequence[Quantity]
 def drive_factor(network: Parts, name: str) -> float:
     """Return how many SI units one of a drive is: of a control in deg or mm; 1 for all others."""
     unit = network.unit_of(name)
-    return float(unit[1]) if unit and name in {one.name for one in network.controls} else 1.0
+    return float(unit[1]) if unit and name in {control.name for control in network.controls} else 1.0
 
 
 def parse_quantity(
@@ -62,10 +62,10 @@ def parse_quantity(
 
 def _unit_anddrive_factor(network: Network, name: str) -> tuple[str, Decimal]:
     """Return the unit of a drive, and how many of it one of its own units is."""
-    if name in {one.name for one in network.controls}:
+    if name in {control.name for control in network.controls}:
         return network.unit_of(name) or ("", Decimal(1))
     owner, _, index = name.partition("[")
-    joint = next((one for one in network.joints if one.name in (name, owner)), None)
+    joint = next((joint for joint in network.joints if joint.name in (name, owner)), None)
     place = int(index.rstrip("]") or 1) - 1 if index.rstrip("]").isdigit() else 0
     known = joint is not None and place < len(joint.units)
     return (joint.units[place] if joint is not None and known else ""), Decimal(1)
@@ -94,11 +94,11 @@ def parse_start(network: Network, start: Mapping[str, Any]) -> dict[str, tuple[f
 
     Values of controls, as an assembly has them, are left out: drives and controls say where these are.
     """
-    joints = {one.name: one.units for one in network.joints if one.units}
+    joints = {joint.name: joint.units for joint in network.joints if joint.units}
     mechanism = mechanism_of(network)
     bodies = dict.fromkeys(mechanism.graph.roots[1:], POSE_UNITS)
     units: dict[str, tuple[str, ...]] = {**bodies, **joints}
-    controls = {one.name for one in network.controls}
+    controls = {control.name for control in network.controls}
 
     def parse(pair: tuple[str, Any]) -> tuple[str, tuple[float, ...]] | None:
         name, value = pair
@@ -117,7 +117,7 @@ def parse_start(network: Network, start: Mapping[str, Any]) -> dict[str, tuple[f
         ]
         return name, tuple(read)
 
-    return dict(one for one in for_each(parse, start.items()) if one is not None)
+    return dict(pair for pair in for_each(parse, start.items()) if pair is not None)
 
 
 def _parse_vector(parameter: str, given: str, allowed: str, si: str = "m") -> list[float]:
@@ -166,7 +166,7 @@ def parse_wrench(network: Network, wrench: str | Wrench) -> Wrench:
 
 def parse_torques(network: Network, torques: Mapping[str, float | str]) -> dict[str, float]:
     """Return loads at joints in [N.m] or [N], by name."""
-    joints = {one.name: one for one in network.joints if one.units and one.kind != "global"}
+    joints = {joint.name: joint for joint in network.joints if joint.units and joint.kind != "global"}
 
     def parse(pair: tuple[str, float | str]) -> tuple[str, float]:
         name, value = pair

@@ -299,7 +299,7 @@ class NetworkMotion(Result):
     def _headline(self) -> str:
         """Return its verdict, its drives and its duration."""
         rows = f"{len(self)} of {self.requested} rows" if not self.complete else f"{len(self)} rows"
-        return line_of(self.name, self.verdict, ", ".join(one.name for one in self.drives), rows)
+        return line_of(self.name, self.verdict, ", ".join(drive.name for drive in self.drives), rows)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row per sample.
@@ -330,23 +330,23 @@ class NetworkMotion(Result):
             "schema": SCHEMA,
             "name": self.name,
             "verdict": self.verdict,
-            "drives": [asdict(one) for one in self.drives],
+            "drives": [asdict(drive) for drive in self.drives],
             "law": self.law,
             "rows": len(self),
             "requested": self.requested,
             "duration": float(self.t[-1]),
             "tsp": self.tsp,
             "joints": list(self.joints),
-            "events": [asdict(one) for one in self.events],
+            "events": [asdict(event) for event in self.events],
             "transmission": [
-                asdict(one) | {"dead_points": list(one.dead_points)} for one in self.transmission
+                asdict(ratio) | {"dead_points": list(ratio.dead_points)} for ratio in self.transmission
             ],
             "distance": {"smallest": float(self.distance[nearest]), "t": float(self.t[nearest])}
             if known
             else None,
             "point": {"body": self.body, "point": list(self.point)} if self.body else None,
             "forces": self._forces_dict(),
-            "warnings": [one.to_dict(voice) for one in self.warnings],
+            "warnings": [warning.to_dict(voice) for warning in self.warnings],
             "output": str(self.output) if self.output else None,
         }
 
@@ -442,16 +442,16 @@ def present(motion: NetworkMotion) -> Presentation:
         name=motion.name,
         headline=headline(motion),
         verdict=motion.verdict,
-        facts=tuple(one for one in _facts(motion) if one.brief),
+        facts=tuple(fact for fact in _facts(motion) if fact.brief),
         body=body,
         scene=partial(_scene, motion),
         lines=(
             {
                 "Network": Ref(body.title),
                 "Verdict": Judged(motion.verdict),
-                "Drives": ", ".join(one.name for one in motion.drives),
+                "Drives": ", ".join(drive.name for drive in motion.drives),
                 "Duration": Value(float(motion.t[-1]), "s"),
-                "Singular poses": Value(sum(one.kind != "limit" for one in motion.events)),
+                "Singular poses": Value(sum(event.kind != "limit" for event in motion.events)),
                 "Warnings": Value(len(motion.warnings)),
             },
         ),
@@ -462,8 +462,8 @@ def present(motion: NetworkMotion) -> Presentation:
 def headline(motion: NetworkMotion) -> str:
     """Return what drives the network, how far it moves, and what ends the motion."""
     ranges = ", ".join(
-        f"{one.name} {text.in_words(one.begin, one.unit)} to {text.in_words(one.end, one.unit)}"
-        for one in motion.drives[:NAMED]
+        f"{drive.name} {text.in_words(drive.begin, drive.unit)} to {text.in_words(drive.end, drive.unit)}"
+        for drive in motion.drives[:NAMED]
     )
     ranges += f" and {len(motion.drives) - NAMED} more" if len(motion.drives) > NAMED else ""
     rows, duration = text.counted(len(motion), "row"), text.seconds(float(motion.t[-1]))
@@ -476,7 +476,7 @@ def headline(motion: NetworkMotion) -> str:
 
 
 def _facts(motion: NetworkMotion) -> Iterator[Fact]:
-    yield Fact("Drives", ", ".join(one.name for one in motion.drives))
+    yield Fact("Drives", ", ".join(drive.name for drive in motion.drives))
     if not motion.complete and motion.events:
         yield Fact("Ends at", motion.events[-1].message, leads=True)
     if np.isfinite(motion.distance).any():
@@ -493,25 +493,28 @@ def _facts(motion: NetworkMotion) -> Iterator[Fact]:
 
 
 def _tables(motion: NetworkMotion) -> Iterator[Table]:
-    units = {one.name: one.unit for one in motion.drives}
+    units = {drive.name: drive.unit for drive in motion.drives}
     if motion.events:
         heads: Heads[MotionEvent] = {
-            "kind": ("What", lambda one: one.kind),
-            "t": ("t", lambda one: Value(one.t, "s")),
+            "kind": ("What", lambda event: event.kind),
+            "t": ("t", lambda event: Value(event.t, "s")),
             **{name: (name, partial(_drive_cell, name, unit)) for name, unit in [*units.items()][:NAMED]},
-            "direction": ("Becomes free", lambda one: _direction_words(one.direction)),
+            "direction": ("Becomes free", lambda event: _direction_words(event.direction)),
         }
         yield Table("Singular poses and limits", columns_of(motion.events, heads))
     if motion.transmission:
         cells: Heads[Transmission] = {
-            "variable": ("Variable", lambda one: one.variable),
-            "drive": ("Drive", lambda one: one.drive),
-            "unit": ("Unit", lambda one: one.unit),
-            "smallest": ("Smallest", lambda one: Value(float(f"{one.smallest:.6g}"), "1")),
-            "smallest_at": ("at", lambda one: Value(one.smallest_at, units[one.drive])),
-            "largest": ("Largest", lambda one: Value(float(f"{one.largest:.6g}"), "1")),
-            "largest_at": ("at ", lambda one: Value(one.largest_at, units[one.drive])),
-            "dead_points": ("Dead points at", lambda one: _values_words(one.dead_points, units[one.drive])),
+            "variable": ("Variable", lambda ratio: ratio.variable),
+            "drive": ("Drive", lambda ratio: ratio.drive),
+            "unit": ("Unit", lambda ratio: ratio.unit),
+            "smallest": ("Smallest", lambda ratio: Value(float(f"{ratio.smallest:.6g}"), "1")),
+            "smallest_at": ("at", lambda ratio: Value(ratio.smallest_at, units[ratio.drive])),
+            "largest": ("Largest", lambda ratio: Value(float(f"{ratio.largest:.6g}"), "1")),
+            "largest_at": ("at ", lambda ratio: Value(ratio.largest_at, units[ratio.drive])),
+            "dead_points": (
+                "Dead points at",
+                lambda ratio: _values_words(ratio.dead_points, units[ratio.drive]),
+            ),
         }
         note = (
             "Rate of the variable per rate of the drive. At a dead point it is 0: the variable cannot drive."
@@ -647,7 +650,7 @@ def _page(motion: NetworkMotion) -> Iterator[Block]:
 
 
 def _events(motion: NetworkMotion) -> Iterator[Event]:
-    for one in motion.events:
-        ends = one.kind in ("turns back", "limit")
-        yield Event(round(one.t * 1e9), one.message, "error" if ends else "warning")
+    for event in motion.events:
+        ends = event.kind in ("turns back", "limit")
+        yield Event(round(event.t * 1e9), event.message, "error" if ends else "warning")
     yield from (Event(None, warning, "warning") for warning in motion.warnings)
