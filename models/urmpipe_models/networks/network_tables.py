@@ -18,6 +18,8 @@ from urmpipe_models.networks.mechanism import mechanism_of
 from urmpipe_models.networks.network import Network
 from urmpipe_models.networks.parts import POSE_UNITS, Body, ConstraintElement, Control, Joint
 
+MAX = 1e300  # a limit that is not finite, of a joint whose other variables have limits: JSON has no infinity
+
 
 def network_tables(network: Network) -> dict[str, Any]:
     """Return the tables of a network, of texts, finite numbers, lists and dictionaries alone.
@@ -105,12 +107,22 @@ def _joint_table(joint: Joint) -> dict[str, Any]:
         table["value"] = texts if len(texts) > 1 else texts[0]
     if joint.kind == "helical":
         table["pitch"] = float(joint.pitch)
+    for key, side in (("lower", 0), ("upper", 1)):
+        bounds = [float(pair[side]) for pair in joint.limits]
+        if any(map(math.isfinite, bounds)):
+            bounds = [max(-MAX, min(MAX, bound)) for bound in bounds]
+            table[key] = bounds if len(bounds) > 1 else bounds[0]
     return table
 
 
 def _element_table(element: ConstraintElement) -> dict[str, Any]:
+    if element.is_pair:
+        table: dict[str, Any] = {"kind": element.kind, "joints": list(element.joints), "offset": element.length.text}
+        own = {"gear": ("teeth", _numbers(element.teeth)), "rack": ("radius", float(element.radius))}
+        key, value = own.get(element.kind, ("profile", [_numbers(row) for row in element.profile]))
+        return {**table, key: value}
     points, normals = [_numbers(point) for point in element.points], [_numbers(n) for n in element.normals]
-    table: dict[str, Any] = {"kind": element.kind, "bodies": list(element.bodies)}
+    table = {"kind": element.kind, "bodies": list(element.bodies)}
     if element.kind == "eg":
         return {**table, "a": points[1], "n": normals[0], "h": element.length.text}
     if element.kind != "gg":
