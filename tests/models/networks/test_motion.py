@@ -41,7 +41,9 @@ def planar(
 ) -> Tables:
     """Return a four-bar as shipped, with other lengths in [m], that starts at an assembly; more keys by joint."""
     theta4 = four_bar_at(a, b, c, d, crank, sign)
-    coupler = math.atan2(c * math.sin(theta4) - a * math.sin(crank), d + c * math.cos(theta4) - a * math.cos(crank))
+    coupler = math.atan2(
+        c * math.sin(theta4) - a * math.sin(crank), d + c * math.cos(theta4) - a * math.cos(crank)
+    )
     tables = tables_of("four-bar")
     tables["controls"]["crank"]["start"] = crank
     joints = tables["joints"]
@@ -129,10 +131,15 @@ def test_loops_close_by_a_product_of_matrix_exponentials(name: str) -> None:
             first, second = (matrix(frame) for frame in joint.frames)
             step = first @ motion(joint.kind, q, joint.pitch) @ np.linalg.inv(second)
             a, b = (poses[body] for body in joint.bodies)
-            np.testing.assert_allclose(a @ step, b, rtol=0, atol=1e-12)  # gap of 1e-13, products of some matrices
+            np.testing.assert_allclose(
+                a @ step, b, rtol=0, atol=1e-12
+            )  # gap of 1e-13, products of some matrices
 
 
 # ---------------------------------------------------------------------------------------- branches
+
+
+SWEEP = 3.8  # rad: through the flat pose at 0 or pi from any start
 
 
 @pytest.mark.slow
@@ -143,23 +150,25 @@ def test_perturbed_change_points_keep_the_branch_of_their_start(seed: int) -> No
     for _ in range(50):
         kind = rng.integers(3)
         short, long = rng.uniform(0.3, 0.9), rng.uniform(1.0, 1.6)
-        lengths = [(short, long, short, long), (short, short, long, long), (short, 0.7, 0.9, 1.6 - short)][kind]
+        lengths = [(short, long, short, long), (short, short, long, long), (short, 0.7, 0.9, 1.6 - short)][
+            kind
+        ]
         size = 10.0 ** rng.uniform(-6, -2)
         a, b, c, d = (one * (1.0 + size * rng.uniform(-1, 1)) for one in lengths)
         begin, sign, way = float(rng.uniform(0.6, 2.5)), int(rng.choice([-1, 1])), int(rng.choice([-1, 1]))
-        if not np.isfinite(four_bar_at(a, b, c, d, begin, sign)):
-            continue
         cosines = [(a * a + d * d - (b + other * c) ** 2) / (2 * a * d) for other in (1, -1)]
         limits = [turn * math.acos(one) for one in cosines if abs(one) < 1 for turn in (1, -1)]
-        first = min((way * (one - begin) % TURN for one in limits), default=2 * TURN)
-        moved = network_drive(planar(a, b, c, d, begin, sign), {"crank": (begin, begin + way * TURN)}, steps=40)
+        first = min((way * (one - begin) % TURN for one in limits), default=TURN)
+        moved = network_drive(
+            planar(a, b, c, d, begin, sign), {"crank": (begin, begin + way * SWEEP)}, steps=24
+        )
         case = (a, b, c, d, begin, sign, way)
-        assert moved.complete == (first > TURN), case
+        assert moved.complete == (first > SWEEP), case
         if not moved.complete:
             assert [one.kind for one in moved.events] == ["turns back"], case
             assert moved.events[0].values["crank"] == pytest.approx(begin + way * first, abs=1e-6)
-        assert len(moved) == min(1 + math.floor(first / (TURN / 40)), 41), case
-        theta4 = four_bar_at(a, b, c, d, begin + way * TURN / 40 * np.arange(len(moved)), sign)
+        assert len(moved) == min(1 + math.floor(24 * first / SWEEP), 25), case
+        theta4 = four_bar_at(a, b, c, d, begin + way * SWEEP / 24 * np.arange(len(moved)), sign)
         # near a flat pose the triangle's height falls to the root of the perturbation, 1e-3, and with it digits
         assert np.abs(apart(column(moved, "theta4"), theta4)).max() < 1e-8, case
 
@@ -218,7 +227,7 @@ def test_a_parallelogram_goes_straight_on_through_its_flat_pose(
 
 
 @pytest.mark.parametrize(
-    ("limits", "end", "limit"), [({"lower": 0.0, "upper": 2.0}, 6, 2.0), ({"lower": 1.3}, -1, 1.3)]
+    ("limits", "end", "limit"), [({"lower": 0.0, "upper": 2.0}, 6, 2.0), ({"lower": 1.45}, -1, 1.45)]
 )
 def test_a_joint_stops_the_motion_at_its_limit(limits: dict[str, float], end: float, limit: float) -> None:
     moved = network_drive(planar(0.4, 0.9, 0.7, 1.0, theta4=limits), {"crank": (0.9, end)}, steps=100)
@@ -303,7 +312,12 @@ def five_bar(left: float, right: float) -> tuple[Tables, FloatArray]:
         del joints[name]["start"]
         joints[name]["driven"] = control
     controls = {"left": {"start": left}, "right": {"start": right}}
-    return {"angle_unit": "rad", "bodies": {name: {} for name in "abcd"}, "joints": joints, "controls": controls}, found
+    return {
+        "angle_unit": "rad",
+        "bodies": {name: {} for name in "abcd"},
+        "joints": joints,
+        "controls": controls,
+    }, found
 
 
 def five_bar_at(left: FloatArray, right: FloatArray) -> FloatArray:
@@ -344,41 +358,41 @@ def test_a_log_around_singular_poses_stays_on_its_branch(center: tuple[float, fl
 # ---------------------------------------------------------------------------------------- rates
 
 FIRST, SECOND = np.array([-1, 9, -45, 0, 45, -9, 1]) / 60, np.array([2, -27, 270, -490, 270, -27, 2]) / 180
+PERIOD = 0.003  # s
 
 
-def assert_rates(parts: tuple[FloatArray, ...], h: float, rows: FloatArray) -> None:
-    """Compare rates [1/s] and accelerations [1/s2] with sixth-order differences at rows; h is the period in [s]."""
+def assert_rates(parts: tuple[FloatArray, ...], rows: FloatArray) -> None:
+    """Compare rates per [s] and second derivatives per [s2] with sixth-order differences at some rows."""
     for rates, weights, power in ((parts[1], FIRST, 1), (parts[2], SECOND, 2)):
         n = len(parts[0]) - 6
-        difference = sum(one * parts[0][k : n + k] for k, one in enumerate(weights)) / h**power
-        # rounding of 1e-14 / h^2 = 4e-10; h^6 / 140 = 1e-16 times a seventh derivative of about 1e5
+        difference = sum(one * parts[0][k : n + k] for k, one in enumerate(weights)) / PERIOD**power
+        # rounding of 1e-14 / h^2 = 1e-9; h^6 / 140 = 5e-18 times a seventh derivative of 4e8 (joint S2 of rssr)
         np.testing.assert_allclose(rates[3:-3][rows[3:-3]], difference[rows[3:-3]], rtol=0, atol=5e-9)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", ["uniform", "quintic", "trapezoid"])
 @pytest.mark.parametrize(
-    ("name", "ends", "point"),
+    ("name", "ends"),
     [
-        ("four-bar", (0, TURN), "coupler:0.45,0.2,0"),
-        ("slider-crank", (0.3, 5.0), "rod:0.4,0.1,0"),
-        ("rssr", (0, TURN), "coupler:0.1,0.2,-0.1"),
-        ("bennett", (0.5, 5.5), "t2:0.1,0.2,0.3"),
-        ("rccc", (0, TURN), "c3:0.1,0.2,0.3"),
-        ("geared-five-bar", (0, 360), "left_rod:0.35,0,0"),
+        ("four-bar", (0, TURN)), ("slider-crank", (0.3, 5.0)), ("rssr", (0, TURN)), ("bennett", (0.5, 5.5)),
+        ("rccc", (0, TURN)), ("geared-five-bar", (0, 360)), ("rack-and-pinion", (-300, 300)),
     ],
-)
-def test_rates_are_derivatives(name: str, ends: tuple[float, float], point: str, law: Any) -> None:
+)  # fmt: skip
+def test_rates_are_derivatives(name: str, ends: tuple[float, float], law: Any) -> None:
     network = load_network(name)
-    point = point if point.split(":")[0] in network.body_names else f"{network.body_names[2]}:0.1,0.2,0.3"
-    drives = {network.controls[0].name: ends}
-    moved = network_drive(network, drives, duration=9, law=law, tsp=0.005, point=point)
-    rows = np.ones(1801, dtype=bool)
-    if law == "trapezoid":  # its acceleration jumps at thirds
-        rows = np.abs(np.arange(1801)[:, np.newaxis] - [600, 1200]).min(axis=1) > 3
+    point = (network.body_names[2], (0.1, 0.2, 0.3))
+    moved = network_drive(
+        network, {network.controls[0].name: ends}, duration=9, law=law, tsp=PERIOD, point=point
+    )
+    jumps = np.flatnonzero(
+        np.abs(np.diff(moved.joint_motion[0], axis=0)).max(axis=1) > 1.0
+    )  # to -q at pi, of rssr
+    kinks = [1000, 2000] if law == "trapezoid" else []  # its acceleration jumps at thirds
+    apart_by = np.abs(np.arange(3001)[:, np.newaxis] - [*jumps, *kinks, -9]).min(axis=1)
     assert moved.point_motion is not None
-    assert_rates(moved.joint_motion, 0.005, rows)
-    assert_rates(moved.point_motion, 0.005, rows)
+    assert_rates(moved.joint_motion, apart_by > 4)
+    assert_rates(moved.point_motion, apart_by > 4)
     peak = {"uniform": 1.0, "quintic": 15 / 8, "trapezoid": 1.5}[law]
     place = [one.kind for one in moved.mechanism.variables].index("control")
     assert np.abs(moved.xd[:, place]).max() == pytest.approx(peak * (ends[1] - ends[0]) / 9, rel=1e-9)
