@@ -1,10 +1,11 @@
-"""Kinematic networks: assembly side by side and one by one, all assemblies of a platform, mobility.
+"""Kinematic networks: assembly side by side and one by one, all assemblies of a platform, mobility, motion.
 
-python benchmarks/networks.py [--rounds N] [--solves N] [--seeds N] [--box SECONDS]
+python benchmarks/networks.py [--rounds N] [--solves N] [--seeds N] [--box SECONDS] [--rows N]
 
 The peer is SciPy's least_squares (MINPACK's Levenberg-Marquardt). Of the spatial loop RCCC it gets urmpipe's
 own residual, with and without its Jacobian; of the Stewart-Gough platform the six lengths in NumPy, as a
-script has them. Both are run in turn with urmpipe in one process.
+script has them; of the motion of a hexapod row by row the same, from the solution of the row before. They are
+run in turn with urmpipe in one process.
 """
 
 from __future__ import annotations
@@ -15,17 +16,21 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from pairs import Bound, machine, rounds, timed, write_results
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+import urmpipe
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.descent import descend
+from urmpipe_models.networks.driving import drive_rows, find_driven
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.mobility import mobility_of
 from urmpipe_models.networks.network_file import load_network
@@ -47,6 +52,15 @@ COUNTED = (
     "nine-revolute-controlled", "cluster-gg", "stewart-gough",
 )  # fmt: skip
 """The networks whose mobility is counted."""
+
+
+TURNED = {
+    "four-bar": "crank", "slider-crank": "crank", "rssr": "crank", "rccc": "crank", "bennett": "turn",
+    "bricard": "turn",
+}  # fmt: skip
+"""The networks that turn fully, and the control that turns them."""
+
+TURN = "360deg"
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,6 +208,75 @@ def platforms(seeds: int, box: float) -> tuple[list[str], list[Bound]]:
     ]
 
 
+def hexapod_rows(mechanism: Mechanism, rows: int) -> tuple[FloatArray, FloatArray]:
+    """Return poses x, y, z [m] and rotation vector [rad], and leg lengths [m], 5 ms apart, shape (rows, 6).
+
+    Sums of four sines of 0.05 to 0.5 Hz, with amplitudes of 30 mm and 0.1 rad.
+    """
+    rng, t = np.random.default_rng(0), 0.005 * np.arange(rows)
+    sizes = np.repeat([0.03, 0.1], 3) / 4.0
+    frequencies, phases = rng.uniform(0.05, 0.5, (4, 6)), rng.uniform(0.0, 2.0 * np.pi, (4, 6))
+    waves = np.sin(2.0 * np.pi * frequencies * t[:, None, None] + phases) - np.sin(phases)
+    pose = assemble(mechanism).x[6:, 0] + sizes * waves.sum(axis=1)
+    base, plate = (np.array([one.points[k] for one in mechanism.network.elements]) for k in (0, 1))
+    turned = np.einsum("nij,kj->nki", Rotation.from_rotvec(pose[:, 3:]).as_matrix(), plate)
+    return pose, np.linalg.norm(pose[:, None, :3] + turned - base, axis=2)
+
+
+def motions(rows: int, few: int = 2000) -> tuple[list[str], list[Bound]]:
+    """Return the table of a hexapod that a log drives, and what is held."""
+    network = load_network("stewart-gough-driven")
+    mechanism = mechanism_of(network)
+    pose, lengths = hexapod_rows(mechanism, rows)
+    table = pd.DataFrame(lengths, columns=[f"leg{k + 1} (m)" for k in range(6)])
+    table.insert(0, "t (s)", 0.005 * np.arange(rows))
+    begun = time.perf_counter()
+    motion = urmpipe.network_drive(network, log=table)
+    whole = time.perf_counter() - begun
+    apart = float(np.abs(motion.x[:, 6:] - pose).max())
+    begun = time.perf_counter()
+    solved = drive_rows(
+        mechanism, assemble(mechanism).x[:, 0], find_driven(mechanism, motion.joints), lengths
+    )
+    alone_s = time.perf_counter() - begun
+    base, plate = (np.array([one.points[k] for one in mechanism.network.elements]) for k in (0, 1))
+    found, largest, begun = pose[0], 0.0, time.perf_counter()
+    for row in range(few):
+
+        def residual(x: FloatArray, row: int = row) -> FloatArray:
+            points = x[:3] + Rotation.from_rotvec(x[3:]).apply(plate)
+            return np.asarray(np.linalg.norm(points - base, axis=1) - lengths[row])
+
+        found = least_squares(residual, found, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14).x
+        largest = max(largest, float(np.abs(found - pose[row]).max()))
+    script = (time.perf_counter() - begun) / few
+    lines = [
+        f"Forward kinematics of `stewart-gough-driven` along {rows} rows, 5 ms apart: legs by the inverse in"
+        f" closed form of sums of sines. The script solves {few} rows, each from the one before.",
+        "",
+        "| job | s | us a row | largest error, m and rad |",
+        "|---|---|---|---|",
+        f"| `urmpipe.network_drive` of a table: reading, motion, rates, accelerations | {whole:.1f}"
+        f" | {1e6 * whole / rows:.1f} | {apart:.0e} |",
+        f"| the motion alone | {alone_s:.1f} | {1e6 * alone_s / rows:.1f}"
+        f" | {float(np.abs(solved.x[6:].T - pose).max()):.0e} |",
+        f"| SciPy's least_squares | {script * rows:.0f} (by {few} rows) | {1e6 * script:.1f}"
+        f" | {largest:.0e} |",
+        "",
+        "A full turn of the control at 1000 values, from the start of the file, with rates and accelerations:",
+        "",
+        "| network | s |",
+        "|---|---|",
+    ]
+    for name, control in TURNED.items():
+        turn = timed(partial(urmpipe.network_drive, name, {control: (0.0, TURN)}, steps=999))
+        lines.append(f"| {name} | {turn:.2f} |")
+    return lines, [
+        Bound(f"hexapod: {rows} rows of a log, s", whole, under=60.0),
+        Bound("hexapod: largest error, m and rad", apart, under=1e-9),
+    ]
+
+
 def counts(count: int) -> list[str]:
     """Return the table of mobilities."""
     lines = [
@@ -216,7 +299,10 @@ def counts(count: int) -> list[str]:
 def commands(count: int) -> list[str]:
     """Return the table of whole commands."""
     network = [sys.executable, "-m", "urmpipe", "network"]
-    told = ("list", "check four-bar", "solve four-bar --all", "solve stewart-gough --all")
+    told = (
+        "list", "check four-bar", "solve four-bar --all", "solve stewart-gough --all",
+        "drive four-bar crank=0:360deg",
+    )  # fmt: skip
     taken = rounds({one: [*network, *one.split()] for one in told}, count)
     lines = ["| urmpipe network | wall s, median (min-max) | CPU s | MB |", "|---|---|---|---|"]
     for name, usages in taken.items():
@@ -234,9 +320,11 @@ def main() -> None:
     parser.add_argument("--solves", type=int, default=1000)
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--box", type=float, default=10.0)
+    parser.add_argument("--rows", type=int, default=360_000)
     options = parser.parse_args()
     of_batches = batches(options.rounds, options.solves)
     of_platforms = platforms(options.seeds, options.box)
+    of_motions = motions(options.rows)
     lines = [
         f"# Kinematic networks: {options.rounds} rounds in turn",
         "",
@@ -245,11 +333,13 @@ def main() -> None:
         "",
         *of_platforms[0],
         "",
+        *of_motions[0],
+        "",
         *counts(options.rounds),
         "",
         *commands(options.rounds),
     ]
-    write_results("networks", lines, [*of_batches[1], *of_platforms[1]])
+    write_results("networks", lines, [*of_batches[1], *of_platforms[1], *of_motions[1]])
 
 
 main()

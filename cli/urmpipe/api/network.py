@@ -13,7 +13,7 @@ from urmpipe.api.ingest import ingest
 from urmpipe.keyword_checks import PathLike, public, public_reading, refuse_warnings
 from urmpipe.output_files import guarded_outputs, output_kind, write_drawing
 from urmpipe.reading import Reading, map_files
-from urmpipe_models.errors import Finding, OptionError, for_each
+from urmpipe_models.errors import Finding, LogError, OptionError, for_each
 from urmpipe_models.networks import network_file
 from urmpipe_models.networks.assembly import RESTARTS
 from urmpipe_models.networks.driving import Law
@@ -241,13 +241,7 @@ def network_drive(
         lambda: output_kind(written, "motion"),
     )  # fmt: skip
     loaded, request, _, kind = for_each(lambda make: make(), parts)
-    run = (
-        None
-        if log is None
-        else log
-        if isinstance(log, Run)
-        else ingest(log, tsp=tsp, derivative=derivative, **reading)
-    )
+    run = None if log is None else _read_log(log, loaded, drives or {}, tsp, derivative, reading)
     named = [Path(path) for path in (network, log) if isinstance(path, (str, Path))]
     files = [path for path in named if path.is_file()] + map_files(reading)
     outputs: dict[OutputKind, PathLike | None] = {"drawing": draw}
@@ -262,6 +256,27 @@ def network_drive(
         targets.write("motion", lambda part, path: _write_motion(motion, part, path))
         motion = targets.recorded(motion, lambda done: share(SEARCHING + (1.0 - SEARCHING) * done))
     return replace(motion, log=written) if kind == "motion" else motion
+
+
+def _read_log(
+    log: PathLike | TableLike | Run,
+    network: Network,
+    drives: Mapping[str, Range],
+    tsp: float | None,
+    derivative: Method | None,
+    reading: Mapping[str, Any],
+) -> Run:
+    """Return the run of a log: its joints are the columns that drives name, or those named like controls."""
+    if isinstance(log, Run):
+        return log
+    controls = [control.name for control in network.controls if control.value is None]
+    named = [str(column) for column in drives.values()] or controls
+    if named and reading.get("joints") is None:
+        try:
+            return ingest(log, tsp=tsp, derivative=derivative, **{**reading, "joints": named})
+        except LogError:
+            pass  # other columns are its joints: what is wrong then is told of the log as it is
+    return ingest(log, tsp=tsp, derivative=derivative, **reading)
 
 
 def _refuse_together(log: Any, steps: int | None, duration: float | None, law: str) -> None:

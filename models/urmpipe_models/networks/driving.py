@@ -178,7 +178,7 @@ def within_turns(mechanism: Mechanism, x: FloatArray, limits: FloatArray) -> Flo
     x = np.array(x)
     for k in mechanism.angles.tolist():
         lower, upper = limits[k]
-        if np.isfinite(lower + upper) and not lower <= x[k] <= upper:
+        if np.isfinite(limits[k]).all() and not lower <= x[k] <= upper:
             turned = x[k] + 2.0 * np.pi * np.ceil((lower - x[k]) / (2.0 * np.pi))
             x[k] = turned if turned <= upper else x[k]
     return x

@@ -191,7 +191,7 @@ def drive_network(
     forces = None
     if wrenches or torques:
         forces = _forces(mechanism, moved, driven, factors, wrenches, torques)
-    events = tuple(_events(mechanism, moved, driven, factors, t_ns))
+    events = tuple(_events(mechanism, moved, driven, factors, values * factors, t_ns))
     warnings = tuple(log.warnings) if log is not None else ()
     options = {
         "network": network.name,
@@ -382,9 +382,9 @@ def _labels(mechanism: Mechanism) -> list[str]:
 
 
 def _events(
-    mechanism: Mechanism, moved: Motion, driven: Driven, factors: FloatArray, t_ns: Any
+    mechanism: Mechanism, moved: Motion, driven: Driven, factors: FloatArray, scaled: FloatArray, t_ns: Any
 ) -> Iterator[MotionEvent]:
-    """Yield singular poses in words, then the limit that ends the motion."""
+    """Yield singular poses in words, then the limit that ends the motion; `scaled` are the drives in [rad] and [m]."""
     labels, rows = _labels(mechanism), np.arange(len(t_ns))
     for pose in moved.singular:
         values = dict(zip(driven.names, (pose.x[driven.places] * factors).tolist(), strict=True))
@@ -402,13 +402,20 @@ def _events(
             pose.passage, pose.s, float(np.interp(pose.s, rows, seconds(t_ns))), values, parts, message
         )
     if moved.stop is not None:
-        n = moved.x.shape[1]
         variable = mechanism.variables[moved.stop.variable]
         label = labels[moved.stop.variable]
+<<<<<<< HEAD
         values = dict(zip(driven.names, (moved.x[driven.places, n - 1] * factors).tolist(), strict=True))
         limit = moved.stop.limit * (
             drive_factor(mechanism.network, variable.owner) if variable.kind == "control" else 1.0
         )
+=======
+        values = {
+            name: float(np.interp(moved.stop.s, rows, column))
+            for name, column in zip(driven.names, scaled.T, strict=True)
+        }
+        limit = moved.stop.limit * (_factor(mechanism.network, variable.owner) if variable.kind == "control" else 1.0)
+>>>>>>> wt-tests
         unit = variable.unit or (mechanism.network.unit_of(variable.owner) or ("",))[0]
         message = f"{label} reaches its limit {text.in_words(limit, unit)}"
         t = float(np.interp(moved.stop.s, rows, seconds(t_ns)))

@@ -1,0 +1,413 @@
+"""Networks in motion: closed forms over the whole range, branches kept, singular poses, limits, logs, rates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+
+from asserting import refusal
+from random_networks import matrix, motion
+from test_shipped import Answer, Rssr, Tables, bennett, rccc, rssr, slider_crank, tables_of
+from test_shipped import four_bar as four_bar_answers
+from urmpipe import NetworkError, load_network, network_drive
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.networks.network_file import network_names
+from urmpipe_pipeline.networks.network_motion import NetworkMotion
+
+PI, TURN, Z = math.pi, 2 * math.pi, [0, 0, 1]
+
+ANSWER = 1e-9
+"""In [m] and [rad]: Newton ends at gaps of 1e-13, which mechanisms far from singular magnify by about 10."""
+
+
+def apart(found: FloatArray, expected: FloatArray) -> FloatArray:
+    """Return differences of angles within half a turn in [rad]."""
+    return np.asarray(np.remainder(found - expected + PI, TURN) - PI)
+
+
+def column(moved: NetworkMotion, name: str) -> FloatArray:
+    """Return a joint in [rad] or [m] over time, shape (n,)."""
+    return np.asarray(moved.joint_motion[0][:, moved.joints.index(name)])
+
+
+def planar(
+    a: float, b: float, c: float, d: float, crank: float = 0.9, sign: int = 1, **more: dict[str, Any]
+) -> Tables:
+    """Return a four-bar as shipped, with other lengths in [m], that starts at an assembly; more keys by joint."""
+    theta4 = four_bar_at(a, b, c, d, crank, sign)
+    coupler = math.atan2(
+        c * math.sin(theta4) - a * math.sin(crank), d + c * math.cos(theta4) - a * math.cos(crank)
+    )
+    tables = tables_of("four-bar")
+    tables["controls"]["crank"]["start"] = crank
+    joints = tables["joints"]
+    joints["A"] |= {"a": [[a, 0, 0], [0, 0, 0]], "start": coupler - crank}
+    joints["B"] |= {"a": [[b, 0, 0], [c, 0, 0]], "start": theta4 - coupler}
+    joints["theta4"] |= {"a": [[d, 0, 0], [0, 0, 0]], "start": theta4}
+    for name, keys in more.items():
+        joints[name] |= keys
+    return tables
+
+
+def four_bar_at(a: float, b: float, c: float, d: float, crank: Any, sign: int = 1) -> Any:
+    """Return theta4 in [rad]: of the diagonal from O4, and of the triangle of coupler and rocker."""
+    x, y = a * np.cos(crank) - d, a * np.sin(crank)
+    square = x * x + y * y
+    return np.arctan2(y, x) - sign * np.arccos((c * c + square - b * b) / (2 * c * np.sqrt(square)))
+
+
+# ---------------------------------------------------------------------------------------- closed forms
+
+
+def bricard(t: float) -> Answer:
+    """Return the smooth branch: with A cos f + B sin f = C of its file, A^2 + B^2 - C^2 = (2 sin(alpha) cos(t/2))^2.
+
+    That is so where tan(alpha)^2 = 3. The root changes its sign at t = pi, where both branches cross.
+    """
+    c, s = 0.5, math.sqrt(0.75)
+    A, B, C = s**2 + (1 + c**2) * math.cos(t), -2 * c * math.sin(t), -(c**2) - s**2 * math.cos(t)
+    f = math.atan2(B, A) + math.atan2(2 * s * math.cos(t / 2), C)
+    return {"t2": (f,), "t3": (t,), "t4": (f,), "t5": (t,), "t6": (f,)}
+
+
+def rccc_answer(t: float) -> Answer:
+    elements = tables_of("rccc")["dh"]["elements"].values()
+    a, alpha = np.array([(one["a"], one["alpha"]) for one in elements]).T
+    return rccc(a, alpha, 0.05, t)[1]
+
+
+def bennett_answer(t: float) -> Answer:
+    return bennett(math.asin(0.6), math.asin(0.8), t)[0]
+
+
+RSSR = Rssr(0.15, 0.05, 0.4, 0.25, 0.04, 0.4, 0.1, math.atan2(0.6, 0.8))
+
+CLOSED: dict[str, tuple[tuple[float, float], Callable[[float], Answer]]] = {
+    "four-bar": ((0, TURN), lambda t: four_bar_answers(0.4, 0.9, 0.7, 1.0, t)[0]),
+    "slider-crank": ((0, TURN), lambda t: slider_crank(0.3, 0.8, 0.1, t)[1]),
+    "rssr": ((0, TURN), lambda t: rssr(RSSR, t)[0]),
+    "bennett": ((-3, 9), bennett_answer),  # through 0 and pi, where it is flat
+    "bricard": ((-1, 5), bricard),  # through pi, where two branches cross
+    "rccc": ((0, TURN), rccc_answer),
+    "screw-jack": ((-TURN, 3 * TURN), lambda t: {"rise": (0.005 * t / TURN,), "swivel": (-t,)}),
+}
+"""Range of the control, and the answer on the branch of the network's start."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CLOSED)
+def test_networks_follow_their_closed_form(name: str) -> None:
+    ends, answer = CLOSED[name]
+    network = load_network(name)
+    moved = network_drive(network, {network.controls[0].name: ends}, steps=999)
+    assert (len(moved), moved.verdict) == (1000, "pass")
+    assert [one.kind for one in moved.events] == (["branches"] if name == "bricard" else [])
+    answers = [answer(t) for t in np.linspace(*ends, 1000)]
+    units = {one.name: one.units for one in network.joints}
+    for joint in answers[0]:
+        for k, unit in enumerate(units[joint]):
+            found = column(moved, joint if len(units[joint]) == 1 else f"{joint}_{k + 1}")
+            expected = np.array([one[joint][k] for one in answers])
+            gaps = apart(found, expected) if unit == "rad" else found - expected
+            assert np.abs(gaps).max() < ANSWER
+            assert np.abs(np.diff(found)).max() < 0.2  # no jump by a turn; t2 of bennett is fastest, 10 steps
+
+
+@pytest.mark.parametrize("name", ["rssr", "rccc", "bennett", "bricard"])
+def test_loops_close_by_a_product_of_matrix_exponentials(name: str) -> None:
+    network = load_network(name)
+    moved = network_drive(network, {network.controls[0].name: (0.7, 2.0)}, steps=8)
+    for row, x in enumerate(moved.x):
+        poses = dict(zip(network.body_names, moved.poses(slice(row, row + 1))[0], strict=True))
+        for joint in network.joints:
+            places = [k for k, one in enumerate(moved.mechanism.variables) if one.owner == joint.name]
+            q = x[places] if places else x[moved.mechanism.controls]
+            first, second = (matrix(frame) for frame in joint.frames)
+            step = first @ motion(joint.kind, q, joint.pitch) @ np.linalg.inv(second)
+            a, b = (poses[body] for body in joint.bodies)
+            np.testing.assert_allclose(
+                a @ step, b, rtol=0, atol=1e-12
+            )  # gap of 1e-13, products of some matrices
+
+
+# ---------------------------------------------------------------------------------------- branches
+
+
+SWEEP = 3.8  # rad: through the flat pose at 0 or pi from any start
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(6))
+def test_perturbed_change_points_keep_the_branch_of_their_start(seed: int) -> None:
+    """Fifty four-bars each, next to those whose branches meet where all links are in line."""
+    rng = np.random.default_rng(seed)
+    for _ in range(50):
+        kind = rng.integers(3)
+        short, long = rng.uniform(0.3, 0.9), rng.uniform(1.0, 1.6)
+        lengths = [(short, long, short, long), (short, short, long, long), (short, 0.7, 0.9, 1.6 - short)][
+            kind
+        ]
+        size = 10.0 ** rng.uniform(-6, -2)
+        a, b, c, d = (one * (1.0 + size * rng.uniform(-1, 1)) for one in lengths)
+        begin, sign, way = float(rng.uniform(0.6, 2.5)), int(rng.choice([-1, 1])), int(rng.choice([-1, 1]))
+        cosines = [(a * a + d * d - (b + other * c) ** 2) / (2 * a * d) for other in (1, -1)]
+        limits = [turn * math.acos(one) for one in cosines if abs(one) < 1 for turn in (1, -1)]
+        first = min((way * (one - begin) % TURN for one in limits), default=TURN)
+        moved = network_drive(
+            planar(a, b, c, d, begin, sign), {"crank": (begin, begin + way * SWEEP)}, steps=24
+        )
+        case = (a, b, c, d, begin, sign, way)
+        assert moved.complete == (first > SWEEP), case
+        if not moved.complete:
+            assert [one.kind for one in moved.events] == ["turns back"], case
+            assert moved.events[0].values["crank"] == pytest.approx(begin + way * first, abs=1e-6)
+        assert len(moved) == min(1 + math.floor(24 * first / SWEEP), 25), case
+        theta4 = four_bar_at(a, b, c, d, begin + way * SWEEP / 24 * np.arange(len(moved)), sign)
+        # near a flat pose the triangle's height falls to the root of the perturbation, 1e-3, and with it digits
+        assert np.abs(apart(column(moved, "theta4"), theta4)).max() < 1e-8, case
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turns", [1, 3, -3])
+def test_a_crank_rocker_turns_without_end(turns: int) -> None:
+    moved = network_drive("four-bar", {"crank": (0.9, 0.9 + turns * TURN)}, steps=100)
+    assert (moved.verdict, moved.events) == ("pass", ())
+    change = moved.joint_motion[0][-1] - moved.joint_motion[0][0]
+    expected = {"theta2": turns * TURN, "A": -turns * TURN, "B": 0.0, "theta4": 0.0}
+    assert dict(zip(moved.joints, change, strict=True)) == pytest.approx(expected, abs=ANSWER)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("end", [3.0, -3.0])
+def test_a_four_bar_that_cannot_turn_stops_at_its_limit(end: float, sign: int) -> None:
+    """Its coupler and rocker are in line where (b + c)^2 = a^2 + d^2 - 2 a d cos(crank)."""
+    moved = network_drive(planar(0.5, 0.5, 0.5, 1.2, 0.5, sign), {"crank": (0.5, end)}, steps=50)
+    limit = math.copysign(math.acos((0.5**2 + 1.2**2 - 1.0) / (2 * 0.5 * 1.2)), end)
+    assert moved.verdict == "fail"
+    assert [one.kind for one in moved.events] == ["turns back"]
+    # the extreme of s along the arc is found to 1e-13 of its tangent; s itself is flat there
+    assert moved.events[0].values["crank"] == pytest.approx(limit, abs=1e-9)
+    assert 0 < (limit - column(moved, "theta2")[-1]) / ((end - 0.5) / 50) < 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("ends", "flat"),
+    [
+        ((-1, 7), [0, PI, TURN]),
+        ((7, -1), [TURN, PI, 0]),
+        ((0, 1), [0]),  # begins flat
+        ((1, PI), [PI]),  # ends flat
+        ((PI, TURN), [PI, TURN]),
+        ((0.5, 2.5), []),
+    ],
+)
+def test_a_parallelogram_goes_straight_on_through_its_flat_pose(
+    ends: tuple[float, float], flat: list[float]
+) -> None:
+    moved = network_drive(planar(0.4, 1.0, 0.4, 1.0), {"crank": ends}, steps=200)
+    assert moved.verdict == "pass"
+    assert [one.kind for one in moved.events] == ["branches"] * len(flat)
+    assert [one.values["crank"] for one in moved.events] == pytest.approx(flat, abs=1e-9)
+    crank = np.linspace(*ends, 201)
+    for name, expected in {"theta2": crank, "theta4": crank, "A": -crank, "B": crank}.items():
+        np.testing.assert_allclose(column(moved, name), expected, rtol=0, atol=ANSWER)
+    for one in moved.events:  # the other motion there: of the antiparallelogram
+        assert set(one.direction) == {"A", "B", "theta4"}
+        assert one.t == pytest.approx((one.values["crank"] - ends[0]) / (ends[1] - ends[0]), abs=1e-9)
+
+
+# ---------------------------------------------------------------------------------------- limits and drives
+
+
+@pytest.mark.parametrize(
+    ("limits", "end", "limit"), [({"lower": 0.0, "upper": 2.0}, 6, 2.0), ({"lower": 1.45}, -1, 1.45)]
+)
+def test_a_joint_stops_the_motion_at_its_limit(limits: dict[str, float], end: float, limit: float) -> None:
+    moved = network_drive(planar(0.4, 0.9, 0.7, 1.0, theta4=limits), {"crank": (0.9, end)}, steps=100)
+    assert (moved.verdict, [one.kind for one in moved.events]) == ("fail", ["limit"])
+    last = np.array([moved.events[0].row, math.floor(moved.events[0].row)])
+    assert len(moved) == last[1] + 1
+    crank = 0.9 + last * (end - 0.9) / 100
+    assert four_bar_at(0.4, 0.9, 0.7, 1.0, crank[0]) == pytest.approx(limit, abs=ANSWER)
+    assert moved.events[0].values["crank"] == pytest.approx(crank[0], abs=ANSWER)
+
+
+def test_a_control_is_not_driven_beyond_its_range() -> None:
+    tables = planar(0.4, 0.9, 0.7, 1.0)
+    tables["controls"]["crank"] |= {"lower": 0.0, "upper": 2.0}
+    tables["joints"]["theta4"] |= {"lower": 0.0, "upper": 1.9}
+    line = refusal(NetworkError, network_drive, tables, {"crank": (1, 3)})
+    assert line == "drives: found crank = 3, allowed: 0 to 2"
+    line = refusal(NetworkError, network_drive, tables, {"theta4": (1.48, "110deg")})
+    assert line == "drives: found theta4 = 1.91986, allowed: 0 to 1.9"
+
+
+def test_a_joint_drives_by_its_name_in_place_of_the_control() -> None:
+    by_joint = network_drive("four-bar", {"theta4": ("85deg", "120deg")}, steps=50)
+    assert column(by_joint, "theta4") == pytest.approx(np.radians(np.linspace(85, 120, 51)), abs=1e-14)
+    crank = column(by_joint, "theta2")
+    log = pd.DataFrame({"t": by_joint.t, "crank [rad]": crank})
+    by_crank = network_drive("four-bar", log=log)
+    np.testing.assert_allclose(by_crank.joint_motion[0], by_joint.joint_motion[0], rtol=0, atol=ANSWER)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in network_names() if load_network(name).controls])
+def test_any_number_of_steps_gives_the_same_motion(name: str) -> None:
+    network = load_network(name)
+    drives: dict[str, Any] = {}
+    for k, one in enumerate(network.controls):
+        unit = network.unit_of(one.name)
+        size = 60.0 if unit and float(unit[1]) < 0.1 else 0.8  # degrees
+        if one.value is None:
+            drives[one.name] = (one.start, one.start + (0.03 * (k + 1) if unit and unit[0] == "m" else size))
+    few, many = (network_drive(network, drives, steps=steps) for steps in (100, 1000))
+    assert few.verdict == many.verdict == "pass"
+    gaps = np.abs(few.joint_motion[0] - many.joint_motion[0][::10])
+    assert gaps.max() < ANSWER
+
+
+# ---------------------------------------------------------------------------------------- logs
+
+
+def test_a_driven_platform_goes_where_its_legs_lead() -> None:
+    """leg = |p + R b - a| of a smooth motion of the platform; 5,000 rows."""
+    tables, rng = tables_of("stewart-gough-driven"), np.random.default_rng(3)
+    points = np.array([one["a"] for one in tables["elements"].values()])
+    t = np.arange(5000) * 0.005
+    waves = np.sin(np.outer(t, rng.uniform(0.3, 2.0, 6)) + rng.uniform(0, TURN, 6)) * rng.uniform(0.3, 1.0, 6)
+    p = np.array(tables["bodies"]["platform"]["start"][:3]) + 0.05 * waves[:, :3]
+    R = Rotation.from_rotvec(0.2 * waves[:, 3:]).as_matrix()
+    reach = p[:, np.newaxis] + points[:, 1] @ R.transpose(0, 2, 1) - points[:, 0]
+    legs = {f"leg{k + 1}": leg for k, leg in enumerate(np.linalg.norm(reach, axis=2).T)}
+    table = pd.DataFrame({"t": t, **{f"{name} [m]": leg for name, leg in legs.items()}})
+    moved = network_drive("stewart-gough-driven", log=table, joints=list(legs), point=("platform", (0, 0, 0)))
+    assert (len(moved), moved.verdict) == (5000, "pass")
+    pose = moved.poses()[:, moved.network.body_names.index("platform")]
+    np.testing.assert_allclose(pose[:, :3, :3], R, rtol=0, atol=ANSWER)
+    np.testing.assert_allclose(pose[:, :3, 3], p, rtol=0, atol=ANSWER)
+    assert moved.point_motion is not None
+    np.testing.assert_array_equal(moved.point_motion[0], pose[:, :3, 3])
+
+
+def five_bar(left: float, right: float) -> tuple[Tables, FloatArray]:
+    """Return cranks of 0.4 m at 0.6 m and rods of 0.55 m at an assembly, and its angles P, C, Q in [rad]."""
+    found = five_bar_at(np.array([left]), np.array([right]))[:, 0]
+    starts = dict(zip("PCQ", found, strict=True))
+    hinges = {"L": ("ground", "a"), "P": ("a", "b"), "C": ("b", "c"), "Q": ("d", "c"), "R": ("ground", "d")}
+    joints: Tables = {
+        name: {"kind": "revolute", "bodies": list(bodies), "n": Z, "start": starts.get(name, 0.0)}
+        for name, bodies in hinges.items()
+    }
+    joints["P"]["a"] = joints["Q"]["a"] = [[0.4, 0, 0], [0, 0, 0]]
+    joints["C"]["a"], joints["R"]["a"] = [[0.55, 0, 0], [0.55, 0, 0]], [[0.6, 0, 0], [0, 0, 0]]
+    for name, control in (("L", "left"), ("R", "right")):
+        del joints[name]["start"]
+        joints[name]["driven"] = control
+    controls = {"left": {"start": left}, "right": {"start": right}}
+    return {
+        "angle_unit": "rad",
+        "bodies": {name: {} for name in "abcd"},
+        "joints": joints,
+        "controls": controls,
+    }, found
+
+
+def five_bar_at(left: FloatArray, right: FloatArray) -> FloatArray:
+    """Return P, C and Q in [rad], continuous, shape (3, n): both rods lean by the same angle from the line P-Q."""
+    across = 0.6 + 0.4 * (np.exp(1j * right) - np.exp(1j * left))
+    lean = np.arccos(np.abs(across) / 1.1)
+    line = np.unwrap(np.angle(across))
+    return np.asarray([line + lean - left, PI - 2 * lean, line + PI - lean - right])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("center", "radius"),
+    [
+        ((PI, 0.0), 2.2),  # around cranks that the rods do not reach: lines from the start lead through them
+        ((math.acos(0.75), PI - math.acos(0.75)), 0.3),  # around P = Q: the rods turn by a whole turn
+    ],
+)
+def test_a_log_around_singular_poses_stays_on_its_branch(center: tuple[float, float], radius: float) -> None:
+    turn = np.linspace(0, TURN, 401)
+    left, right = center[0] + radius * np.cos(turn), center[1] + radius * np.sin(turn)
+    tables, found = five_bar(left[0], right[0])
+    log = pd.DataFrame({"t": 0.005 * np.arange(401), "left [rad]": left, "right [rad]": right})
+    moved = network_drive(tables, log=log)
+    assert (len(moved), moved.events) == (401, ())
+    by_names = np.array([column(moved, name) for name in "PCQ"])
+    assert np.abs(apart(by_names[:, 0], found)).max() < ANSWER
+    expected = five_bar_at(left, right)
+    np.testing.assert_allclose(by_names - by_names[:, :1], expected - expected[:, :1], rtol=0, atol=ANSWER)
+    here = {name: float(column(moved, name)[0]) for name in "PCQ"}
+    for row in range(0, 400, 25):  # one after another, each from the last configuration
+        drives = {"left": left[[row, row + 25]].tolist(), "right": right[[row, row + 25]].tolist()}
+        step = network_drive(tables, drives, steps=1, start=here)
+        here = {name: float(column(step, name)[-1]) for name in "PCQ"}
+        assert np.abs(apart(np.array([*here.values()]), by_names[:, row + 25])).max() < ANSWER
+
+
+# ---------------------------------------------------------------------------------------- rates
+
+FIRST, SECOND = np.array([-1, 9, -45, 0, 45, -9, 1]) / 60, np.array([2, -27, 270, -490, 270, -27, 2]) / 180
+PERIOD = 0.003  # s
+
+
+def assert_rates(parts: tuple[FloatArray, ...], rows: FloatArray) -> None:
+    """Compare rates per [s] and second derivatives per [s2] with sixth-order differences at some rows."""
+    for rates, weights, power in ((parts[1], FIRST, 1), (parts[2], SECOND, 2)):
+        n = len(parts[0]) - 6
+        difference = sum(one * parts[0][k : n + k] for k, one in enumerate(weights)) / PERIOD**power
+        # rounding of 1e-14 / h^2 = 1e-9; h^6 / 140 = 5e-18 times a seventh derivative of 4e8 (joint S2 of rssr)
+        np.testing.assert_allclose(rates[3:-3][rows[3:-3]], difference[rows[3:-3]], rtol=0, atol=5e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["uniform", "quintic", "trapezoid"])
+@pytest.mark.parametrize(
+    ("name", "ends"),
+    [
+        ("four-bar", (0, TURN)), ("slider-crank", (0.3, 5.0)), ("rssr", (0, TURN)), ("bennett", (0.5, 5.5)),
+        ("rccc", (0, TURN)), ("geared-five-bar", (0, 360)), ("rack-and-pinion", (-300, 300)),
+    ],
+)  # fmt: skip
+def test_rates_are_derivatives(name: str, ends: tuple[float, float], law: Any) -> None:
+    network = load_network(name)
+    point = (network.body_names[2], (0.1, 0.2, 0.3))
+    moved = network_drive(
+        network, {network.controls[0].name: ends}, duration=9, law=law, tsp=PERIOD, point=point
+    )
+    jumps = np.flatnonzero(
+        np.abs(np.diff(moved.joint_motion[0], axis=0)).max(axis=1) > 1.0
+    )  # to -q at pi, of rssr
+    kinks = [1000, 2000] if law == "trapezoid" else []  # its acceleration jumps at thirds
+    apart_by = np.abs(np.arange(3001)[:, np.newaxis] - [*jumps, *kinks, -9]).min(axis=1)
+    assert moved.point_motion is not None
+    assert_rates(moved.joint_motion, apart_by > 4)
+    assert_rates(moved.point_motion, apart_by > 4)
+    peak = {"uniform": 1.0, "quintic": 15 / 8, "trapezoid": 1.5}[law]
+    place = [one.kind for one in moved.mechanism.variables].index("control")
+    assert np.abs(moved.xd[:, place]).max() == pytest.approx(peak * (ends[1] - ends[0]) / 9, rel=1e-9)
+
+
+def test_transmission_and_dead_points_of_a_four_bar() -> None:
+    """theta4' = a sin(A) / (c sin(B)) crank': 0 where crank and coupler are in line."""
+    moved = network_drive("four-bar", {"crank": (0, TURN)}, steps=2000)
+    ratio = -0.4 * np.sin(column(moved, "A")) / (0.7 * np.sin(column(moved, "B")))
+    rates = moved.joint_motion[1][:, moved.joints.index("theta4")] / moved.xd[:, 0]
+    np.testing.assert_allclose(rates, ratio, rtol=0, atol=1e-12)  # sin(B) > 0.5
+    (own,) = (one for one in moved.transmission if one.variable == "theta4")
+    assert (own.drive, own.unit) == ("crank", "rad/rad")
+    assert (own.smallest, own.largest) == pytest.approx((ratio.min(), ratio.max()), abs=1e-12)
+    crank = column(moved, "theta2")
+    assert (own.smallest_at, own.largest_at) == (crank[ratio.argmin()], crank[ratio.argmax()])
+    dead = [math.acos((1 + 1.3**2 - 0.7**2) / 2.6), PI + math.acos(1 + 0.5**2 - 0.7**2)]  # stretched, folded
+    assert sorted(own.dead_points) == pytest.approx(sorted(dead), abs=1e-9)
