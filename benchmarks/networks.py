@@ -263,7 +263,7 @@ def motions(rows: int, few: int = 2000) -> tuple[list[str], list[Bound]]:
         f"| SciPy's least_squares | {script * rows:.0f} (by {few} rows) | {1e6 * script:.1f}"
         f" | {largest:.0e} |",
         "",
-        "A full turn of the control at 1000 values, from the start of the file, with rates and accelerations:",
+        "A full turn of the control at 1000 values, from the file's start, with rates and accelerations:",
         "",
         "| network | s |",
         "|---|---|",

@@ -11,7 +11,7 @@ from urmpipe_models.arrays import FloatArray, IndexArray
 from urmpipe_models.elementwise import Element, add, cross
 from urmpipe_models.networks.element_measures import MEASURES, measure
 from urmpipe_models.networks.joint_motion import Screws, forbidden, joint_frame, joint_screws
-from urmpipe_models.networks.mechanism import Configuration, Given, Mechanism, Pose, Posed, of_controls
+from urmpipe_models.networks.mechanism import Given, Mechanism, Pose, Posed, of_controls
 from urmpipe_models.networks.parts import ConstraintElement, Joint
 from urmpipe_models.networks.rotations import turning_of, untwisted
 from urmpipe_models.orientation import quaternions, rotation_vectors
@@ -153,46 +153,6 @@ def _equations(
         yield _Equation(slice(row, row + 1), excess, wrench, movers, length.slopes)
 
 
-<<<<<<< HEAD
-=======
-def pair_values(
-    mechanism: Mechanism, element: ConstraintElement, x: Configuration, controls: dict[str, Given]
-) -> tuple[Given, Given]:
-    """Return the variables of both joints of a gear, rack or cam, with their slopes.
-
-    Args:
-        mechanism: The network.
-        element: The pair.
-        x: The variables in [m], [rad] and as controls are given, one element each.
-        controls: The controls, as `Mechanism.control_slopes` returns them.
-    """
-    (first, j), (second, k) = mechanism.network.coupled(element)
-    return mechanism.values(first, x, controls)[j], mechanism.values(second, x, controls)[k]
-
-
-def _pair_equation(
-    mechanism: Mechanism,
-    element: ConstraintElement,
-    row: int,
-    x: FloatArray,
-    offset: Given,
-    controls: dict[str, Given],
-) -> _Equation:
-    """Return q_2 - f(q_1) - offset = 0 of a pair, see `higher_pairs`."""
-    (first, j), (second, k) = mechanism.network.coupled(element)
-    angle, follower = pair_values(mechanism, element, x, controls)
-    value, slope = transmitted(element, angle.value)
-    slopes = dict(offset.slopes)
-    for place, inner in angle.slopes.items():
-        slopes[place] = slopes.get(place, 0.0) + slope * inner
-    for place, inner in follower.slopes.items():
-        slopes[place] = slopes.get(place, 0.0) - inner
-    error = _stacked((follower.value - value - offset.value,), x.shape[1])
-    rates = {(first.name, j): -slope, (second.name, k): 1.0}
-    return _Equation(slice(row, row + 1), error, np.zeros((1, 6, x.shape[1])), {}, slopes, rates)
-
-
->>>>>>> wt-tests
 def _screws(
     mechanism: Mechanism, x: FloatArray, posed: Posed, controls: dict[str, Given]
 ) -> dict[str, tuple[IndexArray, FloatArray]]:

@@ -25,8 +25,6 @@ from urmpipe_models.networks.parts import (
     exceeded_limits,
 )
 
-MAX = 1e300  # a limit that is not finite, of a joint whose other variables have limits: JSON has no infinity
-
 
 def network_tables(network: Network) -> dict[str, Any]:
     """Return the tables of a network, of texts, finite numbers, lists and dictionaries alone.
@@ -115,36 +113,20 @@ def _joint_table(joint: Joint) -> dict[str, Any]:
         table["value"] = texts if len(texts) > 1 else texts[0]
     if joint.kind == "helical":
         table["pitch"] = float(joint.pitch)
-<<<<<<< HEAD
     starts = joint.start or (0.0,) * len(joint.units)
     if not any(exceeded_limits(joint, starts, is_coupled=False)):  # files refuse a start beyond limits
         for key, limits in zip(("lower", "upper"), zip(*joint.limits, strict=True), strict=False):
             table[key] = _numbers(limits) if len(limits) > 1 else float(limits[0])
-=======
-    for key, side in (("lower", 0), ("upper", 1)):
-        bounds = [float(pair[side]) for pair in joint.limits]
-        if any(map(math.isfinite, bounds)):
-            bounds = [max(-MAX, min(MAX, bound)) for bound in bounds]
-            table[key] = bounds if len(bounds) > 1 else bounds[0]
->>>>>>> wt-tests
     return table
 
 
 def _element_table(element: ConstraintElement) -> dict[str, Any]:
-<<<<<<< HEAD
     table: dict[str, Any]
     if element.is_pair:
         own: dict[str, Any] = {"gear": {"teeth": _numbers(element.teeth)}, "rack": {"radius": element.radius}}
         profile: dict[str, Any] = {"profile": [_numbers(point) for point in element.profile]}
         table = {"kind": element.kind, "joints": list(element.joints), "offset": element.length.text}
         return {**table, **own.get(element.kind, profile)}
-=======
-    if element.is_pair:
-        table: dict[str, Any] = {"kind": element.kind, "joints": list(element.joints), "offset": element.length.text}
-        own = {"gear": ("teeth", _numbers(element.teeth)), "rack": ("radius", float(element.radius))}
-        key, value = own.get(element.kind, ("profile", [_numbers(row) for row in element.profile]))
-        return {**table, key: value}
->>>>>>> wt-tests
     points, normals = [_numbers(point) for point in element.points], [_numbers(n) for n in element.normals]
     table = {"kind": element.kind, "bodies": list(element.bodies)}
     if element.kind == "eg":

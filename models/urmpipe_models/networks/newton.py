@@ -25,10 +25,9 @@ from typing import TypeAlias
 import numpy as np
 
 from urmpipe_models.elementwise import Element, Vector, add, cross, dot, minus, plus, scale, subtract, times
-from urmpipe_models.networks.closure import SLIDING_SCREWS, pair_values, relative_movers
+from urmpipe_models.networks.closure import SLIDING_SCREWS, relative_movers
 from urmpipe_models.networks.descent import FLOOR
 from urmpipe_models.networks.element_measures import measure
-from urmpipe_models.networks.higher_pairs import transmitted
 from urmpipe_models.networks.joint_motion import Screws, joint_frame, joint_screws
 from urmpipe_models.networks.mechanism import Given, Mechanism, Posed, of_controls
 from urmpipe_models.networks.rotations import turning_of
@@ -196,22 +195,13 @@ def _residual(mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls
         pairs = zip(first.columns, second.columns, strict=True)
         rows += scale(0.5, reduce(add, (cross(before, after) for before, after in pairs)))
     scales = mechanism.row_scales[len(rows) :].tolist()
-<<<<<<< HEAD
     for element, per_unit in zip(mechanism.network.elements, scales, strict=True):
         if element.is_pair:
             rows.append(times(per_unit, mechanism.pair_error(element, x, controls)[0].value))
             continue
         frames = (posed.bodies[name].frame for name in element.bodies)
-=======
-    for element, row_scale in zip(mechanism.network.elements, scales, strict=True):
->>>>>>> wt-tests
         length = of_controls(element.length, controls).value
-        if element.is_pair:
-            angle, follower = pair_values(mechanism, element, x, controls)
-            measured = minus(follower.value, transmitted(element, angle.value)[0])
-        else:
-            measured = measure(element, *(posed.bodies[name].frame for name in element.bodies)).distance
-        rows.append(times(row_scale, minus(measured, length)))
+        rows.append(times(per_length, minus(measure(element, *frames).distance, length)))
     return rows
 
 
@@ -233,18 +223,10 @@ def _jacobian(
                 columns[k - first_free][6 * row : 6 * row + 6] = entries
     for row, element in enumerate(mechanism.network.elements, 6 * len(cut_joints)):
         if element.is_pair:
-<<<<<<< HEAD
             error, _ = mechanism.pair_error(element, x, controls)
             for k in error.slopes.keys() & set(mechanism.free.tolist()):
                 factor = float(scales[k] * mechanism.row_scales[row])
                 columns[k - first_free][row] = times(factor, error.slopes[k])
-=======
-            angle, follower = pair_values(mechanism, element, x, controls)
-            slope = times(-1.0, transmitted(element, angle.value)[1])
-            rates = [*follower.slopes.items(), *((k, times(slope, rate)) for k, rate in angle.slopes.items())]
-            for k, rate in ((k, rate) for k, rate in rates if k >= first_free):
-                columns[k - first_free][row] = times(float(mechanism.row_scales[row] * scales[k]), rate)
->>>>>>> wt-tests
             continue
         measured = measure(element, *(posed.bodies[name].frame for name in element.bodies))
         for mover, sign in relative_movers(posed.bodies, element.bodies).items():

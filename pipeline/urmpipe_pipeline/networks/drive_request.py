@@ -384,7 +384,7 @@ def _labels(mechanism: Mechanism) -> list[str]:
 def _events(
     mechanism: Mechanism, moved: Motion, driven: Driven, factors: FloatArray, scaled: FloatArray, t_ns: Any
 ) -> Iterator[MotionEvent]:
-    """Yield singular poses in words, then the limit that ends the motion; `scaled` are the drives in [rad] and [m]."""
+    """Yield singular poses, then the limit that ends the motion; `scaled` are the drives in [rad] and [m]."""
     labels, rows = _labels(mechanism), np.arange(len(t_ns))
     for pose in moved.singular:
         values = dict(zip(driven.names, (pose.x[driven.places] * factors).tolist(), strict=True))
@@ -404,18 +404,12 @@ def _events(
     if moved.stop is not None:
         variable = mechanism.variables[moved.stop.variable]
         label = labels[moved.stop.variable]
-<<<<<<< HEAD
-        values = dict(zip(driven.names, (moved.x[driven.places, n - 1] * factors).tolist(), strict=True))
-        limit = moved.stop.limit * (
-            drive_factor(mechanism.network, variable.owner) if variable.kind == "control" else 1.0
-        )
-=======
         values = {
             name: float(np.interp(moved.stop.s, rows, column))
             for name, column in zip(driven.names, scaled.T, strict=True)
         }
-        limit = moved.stop.limit * (_factor(mechanism.network, variable.owner) if variable.kind == "control" else 1.0)
->>>>>>> wt-tests
+        is_control = variable.kind == "control"
+        limit = moved.stop.limit * (drive_factor(mechanism.network, variable.owner) if is_control else 1.0)
         unit = variable.unit or (mechanism.network.unit_of(variable.owner) or ("",))[0]
         message = f"{label} reaches its limit {text.in_words(limit, unit)}"
         t = float(np.interp(moved.stop.s, rows, seconds(t_ns)))
