@@ -120,6 +120,7 @@ CALLS = {
     "ingest ingest": "ingest log.csv --robot urm6 -o log.rrd",
     "network check": "network check four-bar",
     "network list": "network list",
+    "network drive": "network drive four-bar crank=0:90deg --steps 9",
     "network solve": "network solve four-bar",
     "plan plan": "plan cube:wall,a=0.02,r=0.001,x=1.7,y=0,z=1 --robot irb60",
     "report report": "report log.rrd",

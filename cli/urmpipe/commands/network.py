@@ -52,7 +52,8 @@ def _search_options(command: Command) -> Command:
     """Add how a network is assembled, and what is written of it."""
     return with_options(
         command,
-        click.option(
+        option(
+            Heading.SOLVING,
             "--controls",
             "--set",
             type=NamedType(control_names),
@@ -62,7 +63,8 @@ def _search_options(command: Command) -> Command:
             help="Value of a control, such as crank=40deg; a number alone is in the units of the network's"
             " file [default: its start value].",
         ),
-        click.option(
+        option(
+            Heading.SOLVING,
             "--start",
             multiple=True,
             callback=named_values,
@@ -70,17 +72,9 @@ def _search_options(command: Command) -> Command:
             help="Assemble nearest to these joint values, such as theta4=85deg [default: where a motion from"
             " the network's start leads].",
         ),
-        click.option(
-            "--restarts",
-            type=WholeType(),
-            default=2000,
-            show_default=True,
-            help="End the search after this many random starts without a new assembly.",
-        ),
-        click.option(
-            "--seed", type=WholeType(), default=0, show_default=True, help="Seed of the random starts."
-        ),
-        click.option(
+        *SEARCH,
+        option(
+            Heading.OUTPUT,
             "--draw",
             metavar="FILE.svg",
             type=DRAWING,
@@ -91,7 +85,33 @@ def _search_options(command: Command) -> Command:
     )
 
 
-@network.command(short_help="Assemble a network and compute its mobility.")
+def with_search(command: Command) -> Command:
+    """Add how assemblies are searched for."""
+    return with_options(command, *SEARCH)
+
+
+SEARCH = (
+    option(
+        Heading.SOLVING,
+        "--restarts",
+        type=WholeType(),
+        default=2000,
+        show_default=True,
+        help="End a search after this many random starts without a new assembly.",
+    ),
+    option(
+        Heading.SOLVING,
+        "--seed",
+        type=WholeType(),
+        default=0,
+        show_default=True,
+        help="Seed of the random starts.",
+    ),
+)
+"""How assemblies are searched for."""
+
+
+@network.command(cls=HeadedCommand, short_help="Assemble a network and compute its mobility.")
 @click.argument("name", metavar="NAME|FILE", type=NETWORK)
 @_search_options
 @output_options
@@ -116,9 +136,15 @@ def check(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
     return _answered(result, terminal, replaces)
 
 
-@network.command(short_help="Find configurations in which a network closes.")
+@network.command(cls=HeadedCommand, short_help="Find configurations in which a network closes.")
 @click.argument("name", metavar="NAME|FILE", type=NETWORK)
-@click.option("--every", "--all", is_flag=True, help="Find all assemblies, and record each as a ghost.")
+@option(
+    Heading.SOLVING,
+    "--every",
+    "--all",
+    is_flag=True,
+    help="Find all assemblies, and record each as a ghost.",
+)
 @_search_options
 @output_options
 def solve(name: str, output: Path | None, terminal: Terminal, **options: Any) -> int:
@@ -207,22 +233,7 @@ def solve(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
     metavar="JOINT=VALUE",
     help="Load at a joint, in N.m or N.",
 )
-@option(
-    Heading.SOLVING,
-    "--restarts",
-    type=WholeType(),
-    default=2000,
-    show_default=True,
-    help="End a search for assemblies after this many random starts without a new one.",
-)
-@option(
-    Heading.SOLVING,
-    "--seed",
-    type=WholeType(),
-    default=0,
-    show_default=True,
-    help="Seed of the random starts.",
-)
+@with_search
 @option(Heading.OUTPUT, "--draw", metavar="FILE.svg", type=DRAWING, help="Draw the motion.")
 @output_option("RUN.rrd|RUN.csv", "Recording, or log, to write.")
 @motion_log_options
@@ -237,11 +248,12 @@ def drive(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
 
     \b
     Examples:
-      urmpipe network drive four-bar crank=0:360deg --point coupler:0.45,0.2,0 -o run.rrd
-      urmpipe network drive four-bar crank=0:360deg --duration 2s --law trapezoid -o run.csv
+      urmpipe network drive four-bar crank=0:360deg -o run.rrd
+      urmpipe network drive four-bar crank=0:6 --point coupler:1,0,0 -o run.csv
+      urmpipe network drive four-bar crank=0:6 --duration 2s --law trapezoid
       urmpipe network drive four-bar theta4=85deg:120deg --json
-      urmpipe network drive stewart-gough-driven --log legs.csv --point platform:0,0,0.1 -o run.rrd
-      urmpipe network drive slider-crank crank=0:360deg --wrench slider:0,0,0:-100,0,0
+      urmpipe network drive stewart-gough-driven --log legs.csv -o run.rrd
+      urmpipe network drive slider-crank crank=0:6 --wrench slider:0,0,0:-100,0,0
 
     Exit codes: 0 the drives reach their end, 1 the motion ends before, 2 bad file or usage.
     """

@@ -17,8 +17,8 @@ FORMS = ["vector", "rpy", "zyx", "xyz", "zyz", "zxz", "quat_xyzw", "quat_wxyz", 
 """Forms of a recorded orientation (a test compares them with those of the models)."""
 
 SOURCES = (
-    "coppeliasim", "urmpipe", "ur-rtde", "libfranka", "ros", "ros2", "fri", "kuka-rsi", "abb", "plotjuggler",
-    "solidworks", "matlab", "path", "table",
+    "coppeliasim", "urmpipe", "network", "ur-rtde", "libfranka", "ros", "ros2", "fri", "kuka-rsi", "abb",
+    "plotjuggler", "solidworks", "matlab", "path", "table",
 )  # fmt: skip
 """Names of sources (a test compares them with those of the pipeline, which is slow to import)."""
 
