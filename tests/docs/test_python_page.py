@@ -118,7 +118,8 @@ def test_options_of_the_same_name_are_keywords() -> None:
     row = next(line for line in PAGE.splitlines() if line.endswith("| the same name, `_` for `-` |"))
     keywords = {one[2:].replace("-", "_") for one in re.findall(r"`(--[a-z-]+)`", row)}
     functions = (
-        "ingest", "compare", "ik", "plan", "accuracy", "report", "export", "simulate", "build_fmu", "network_drive",
+        "ingest", "compare", "ik", "plan", "accuracy", "report", "export", "simulate", "build_fmu",
+        "network_drive",
     )  # fmt: skip
     assert keywords <= {name for one in functions for name in signature(getattr(urmpipe, one)).parameters}
 
