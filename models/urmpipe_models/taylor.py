@@ -1,7 +1,7 @@
-"""Values with their first and second derivative by time, as an element: what a model computes of them is exact.
+"""Values with their first and second derivative by time, as an element: what is computed of them is exact.
 
-A `Taylor` passes through elementwise NumPy as a float or a column does, so that velocity and acceleration of a
-model's outputs come from the same lines as the outputs. Rules: (f(u))' = f' u', (f(u))'' = f'' u'^2 + f' u''.
+A `Taylor` passes through elementwise NumPy as a float or a column does, so that velocity and acceleration of
+a model's outputs come from the same lines as the outputs. Rules: (f(u))' = f' u', (f(u))'' = f'' u'^2 + f' u''.
 
 Source: Griewank and Walther 2008, Evaluating Derivatives, chapter 13.
 """
