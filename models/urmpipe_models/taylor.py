@@ -1,8 +1,7 @@
 """Values with two derivatives by time, as an element: velocity and acceleration of what a model computes.
 
-A `Taylor` passes through elementwise NumPy as a float or a column does, so that velocity and acceleration
-of a model's outputs come from the same lines as the outputs. Rules: (f(u))' = f' u', (f(u))'' = f'' u'^2 +
-f' u''.
+A `Taylor` passes through elementwise NumPy as a float or a column does, so that velocity and acceleration of
+a model's outputs come from the same lines as the outputs: (f(u))' = f' u', (f(u))'' = f'' u'^2 + f' u''.
 
 Source: Griewank and Walther 2008, Evaluating Derivatives, chapter 13.
 """
@@ -87,12 +86,12 @@ def _power(u: Taylor, v: Taylor) -> Taylor:
     """u^v, also of negative u where v is constant: then ln(u) is not computed."""
     if not (np.any(v.first) or np.any(v.second)):
         n = v.value
-        return _chain(
-            u,
-            np.power(u.value, n),
-            n * np.power(u.value, n - 1.0),
-            n * (n - 1.0) * np.power(u.value, n - 2.0),
+        factors = n, n * (n - 1.0)
+        slope, curvature = (  # of 0^0 and 0^1, too
+            factor * np.power(u.value, np.where(factor == 0.0, 0.0, n - order))
+            for order, factor in enumerate(factors, 1)
         )
+        return _chain(u, np.power(u.value, n), slope, curvature)
     return _exp(_multiply(v, _log(u)))
 
 

@@ -142,7 +142,11 @@ def split_variables(mechanism: Mechanism, x: FloatArray, driven: Driven) -> Inde
     every = np.arange(len(mechanism.variables))
     kept: list[int] = others
     if len(places) > len(mechanism.controls) - len(others):  # joints are driven in the place of controls
-        needed = mobility_nearby(mechanism, x, every) - spins - len(places)
+        mobility = mobility_nearby(mechanism, x, every) - spins
+        needed = mobility - len(places)
+        if needed < 0:
+            found = f"found {len(places)} drives, {', '.join(driven.names)}"
+            raise NetworkError(Finding(f"{found}, allowed: {mobility}, the mobility", parameter="drives"))
         if 0 < needed < len(others):
             names = ", ".join(mechanism.variables[k].owner for k in others)
             allowed = f"values of {needed} more of them, such as {mechanism.variables[others[0]].owner}=VALUE"

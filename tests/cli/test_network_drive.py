@@ -1,0 +1,265 @@
+"""`urmpipe network drive`: what it prints, writes and exits with; its logs in the other commands."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import urmpipe as api
+from urmpipe_datasets import NETWORKS
+
+Run = Callable[..., Any]
+
+LINKAGE = ("network", "drive", "four-bar")
+TURN = (*LINKAGE, "crank=0:360deg", "--point", "coupler:0.45,0.2,0")
+
+
+def test_a_motion_is_printed_in_words_and_as_json(urmpipe: Run) -> None:
+    ran = urmpipe(*TURN, "--steps", "20")
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.out.startswith("PASS  four-bar: crank 0 deg to 360 deg, 21 rows in 0.100 s\n")
+    assert "theta4    crank  rad/rad" in ran.out
+    ran = urmpipe(*TURN, "--steps", "20", "--wrench", "coupler:0.45,0.2,0:0,-50,0", "--json")
+    found = json.loads(ran.out)
+    assert set(found) == {
+        "schema", "name", "verdict", "drives", "law", "rows", "requested", "duration", "tsp", "joints",
+        "events", "transmission", "distance", "point", "forces", "warnings", "output",
+    }  # fmt: skip
+    assert found["drives"] == [{"name": "crank", "unit": "rad", "begin": 0.0, "end": 2 * math.pi}]
+    assert [found[key] for key in ("rows", "requested", "duration", "verdict", "events")] == [
+        21,
+        21,
+        0.1,
+        "pass",
+        [],
+    ]
+    assert found["point"] == {"body": "coupler", "point": [0.45, 0.2, 0.0]}
+    moved = api.network_drive(
+        "four-bar", {"crank": (0, "360deg")}, steps=20, point=("coupler", (0.45, 0.2, 0)),
+        wrenches=["coupler:0.45,0.2,0:0,-50,0"],
+    )  # fmt: skip
+    assert moved.to_dict() == found
+    assert moved.forces is not None
+    assert found["forces"]["drives"] == {"crank": np.abs(moved.forces.drives).max()}
+    reactions = found["forces"]["reactions"]
+    assert {name for name, value in reactions.items() if value is None} == {
+        name
+        for name, values in zip(moved.forces.names, moved.forces.reactions.T, strict=True)
+        if np.isnan(values).any()
+    }
+
+
+def test_a_motion_that_ends_early_exits_with_1(urmpipe: Run) -> None:
+    ran = urmpipe(*LINKAGE, "theta4=85deg:160deg", "--steps", "50")
+    assert ran.code == 1
+    # where crank and coupler are folded: 0.5^2 = 1 + 0.7^2 + 2 * 0.7 cos(theta4)
+    limit = math.acos((0.5**2 - 1 - 0.7**2) / 1.4)
+    assert ran.out.startswith("FAIL  four-bar: theta4 85 deg to 160 deg, ")
+    assert (
+        f"turns back at theta4 = {limit:.6g} rad ({math.degrees(limit):.4f} deg)" in ran.out.splitlines()[0]
+    )
+    found = json.loads(urmpipe(*LINKAGE, "theta4=85deg:160deg", "--steps", "50", "--json").out)
+    assert (found["verdict"], found["requested"], found["events"][0]["kind"]) == ("fail", 51, "turns back")
+    assert found["rows"] == 1 + math.floor((math.degrees(limit) - 85) / 1.5)
+
+
+def test_a_motion_that_ends_early_keeps_what_it_reached(urmpipe: Run, tmp_path: Path) -> None:
+    ran = urmpipe(*LINKAGE, "theta4=85deg:160deg", "--steps", "50", "-o", "run.csv")
+    assert ran.code == 1
+    assert pd.read_csv(tmp_path / "run.csv")["theta4 (rad)"].iloc[-1] == pytest.approx(
+        math.radians(151), abs=1e-14
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("four-bar", "crank=0:360deg", "--point", "coupler:0.45,0.2,0"),
+        ("slider-crank", "crank=0:5", "--point", "rod"),
+        ("stewart-gough-driven", *(f"leg{k}=0.8:0.8{k}" for k in range(1, 7)), "--point", "platform:0,0,0.1"),
+        ("cam-follower", "turn=0:360", "--point", "follower"),
+    ],
+)
+def test_a_log_of_a_motion_reads_back(urmpipe: Run, tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    """The CSV without any option; the recording has the same, and is an operand of compare and export."""
+    for file in ("run.csv", "run.rrd"):
+        ran = urmpipe("network", "drive", *arguments, "--steps", "50", "-o", file)
+        assert (ran.code, ran.err) == (0, "")
+        assert file in ran.out
+    moved = api.read_recording(tmp_path / "run.rrd")
+    read = api.ingest(tmp_path / "run.csv")
+    assert read.log.joints == moved.joints
+    np.testing.assert_array_equal(read.q, moved.joint_motion[0])
+    np.testing.assert_array_equal(read.tcp_recorded, moved.point_motion[0])
+    for operands in (("run.csv", "run.rrd"), ("run.rrd", "run.csv")):
+        ran = urmpipe("compare", *operands, "--json", "-o", "pair.rrd")
+        assert ran.code == 0
+        (pair,) = json.loads(ran.out)["runs"]
+        assert (pair["samples"], pair["delta"]["norm"]["max"], pair["angle"]["max"]) == (51, 0.0, 0.0)
+    assert urmpipe("export", "run.rrd", "-o", "out.csv").code == 0
+    table = pd.read_csv(tmp_path / "out.csv")
+    np.testing.assert_array_equal(table.iloc[:, 1 : len(moved.joints) + 1], moved.joint_motion[0])
+    np.testing.assert_array_equal(
+        table[[f"recorded_tcp_{axis} [m]" for axis in "xyz"]], moved.point_motion[0]
+    )
+
+
+@pytest.mark.slow
+def test_a_late_log_is_diagnosed_as_late(urmpipe: Run, tmp_path: Path) -> None:
+    """Each row has the values of the row before: 5 ms late."""
+    assert urmpipe(*TURN, "--duration", "2s", "--law", "quintic", "-o", "run.csv").code == 0
+    head, *rows = (tmp_path / "run.csv").read_text().splitlines()
+    late = [
+        f"{row.split(',')[0]},{before.split(',', 1)[1]}"
+        for row, before in zip(rows, [rows[0], *rows], strict=False)
+    ]
+    (tmp_path / "late.csv").write_text("\n".join([head, *late, ""]))
+    ran = urmpipe("diagnose", "run.csv", "late.csv")
+    assert ran.code == 1
+    assert ran.out.startswith("FAIL  the clocks differ by 5 ms (the log is late): ")
+    assert "--sync -0.005 sets the clocks" in ran.out
+    ran = urmpipe("compare", "run.csv", "late.csv", "--sync", "-0.005", "--json")
+    assert (ran.code, json.loads(ran.out)["runs"][0]["delta"]["norm"]["max"]) == (0, 0.0)
+
+
+def test_a_log_drives_by_the_names_of_its_columns(urmpipe: Run, tmp_path: Path) -> None:
+    t = 0.005 * np.arange(101)
+    (tmp_path / "log.csv").write_text(
+        pd.DataFrame({"t": t, "crank (rad)": 0.9 + t, "other (rad)": t}).to_csv(index=False)
+    )
+    by_log = urmpipe(*LINKAGE, "--log", "log.csv", "-o", "by-log.csv")
+    by_range = urmpipe(*LINKAGE, "crank=0.9:1.4", "--steps", "100", "-o", "by-range.csv")
+    assert (by_log.code, by_range.code) == (0, 0)
+    tables = [pd.read_csv(tmp_path / file) for file in ("by-log.csv", "by-range.csv")]
+    # Newton ends at gaps of 1e-13, from either side
+    np.testing.assert_allclose(*tables, rtol=0, atol=1e-12)
+    renamed = urmpipe(*LINKAGE, "crank=other", "--log", "log.csv", "--json")
+    assert json.loads(renamed.out)["drives"] == [{"name": "crank", "unit": "rad", "begin": 0.0, "end": 0.5}]
+
+
+def test_a_drawing_and_a_recording_are_written(urmpipe: Run, tmp_path: Path) -> None:
+    ran = urmpipe(*TURN, "--steps", "20", "-o", "run.rrd", "--draw", "run.svg")
+    assert ran.code == 0
+    assert (tmp_path / "run.svg").read_text().startswith("<!-- Generator: urmpipe ")
+    read = api.read_recording(tmp_path / "run.rrd")
+    assert isinstance(read, api.NetworkMotion)
+    moved = api.network_drive("four-bar", {"crank": (0, "360deg")}, steps=20, point="coupler:0.45,0.2,0")
+    for name in ("x", "xd", "xdd", "t_ns", "distance"):
+        np.testing.assert_array_equal(getattr(read, name), getattr(moved, name))
+    assert (read.events, read.transmission, read.network) == (moved.events, moved.transmission, moved.network)
+    frame = read.to_frame()
+    assert list(frame.columns[:6]) == ["t", "theta2", "A", "B", "theta4", "d_theta2"]
+    assert {"dd_theta4", "x", "vx", "ax", "distance"} <= set(frame.columns)
+    pd.testing.assert_frame_equal(frame, moved.to_frame())
+
+
+@pytest.mark.parametrize(
+    ("file", "share"), [("run.csv", 0.1), ("run.csv", 0.8), ("run.rrd", 0.1), ("run.rrd", 0.95)]
+)
+def test_ctrl_c_leaves_no_file(tmp_path: Path, file: str, share: float) -> None:
+    def stop(done: float) -> None:
+        if done >= share:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        api.network_drive(
+            "four-bar", {"crank": (0, 1)}, output=tmp_path / file, draw=tmp_path / "a.svg", progress=stop
+        )
+    assert list(tmp_path.iterdir()) == []
+
+
+NUMBER = "a number, or an angle with its unit"
+LOAD = "BODY:X,Y,Z:FX,FY,FZ[,MX,MY,MZ] in m, N and N.m, such as coupler:0,0,0:0,-50,0"
+ON_BRANCH = "allowed: a range on its branch, or another assembly by --branch or --start"
+
+WRONG: list[tuple[str, list[str]]] = [
+    ("four-bar", ["DRIVES: found nothing that drives four-bar, allowed: crank"]),
+    ("four-bar crank", ["[CONTROL=FROM:TO]...: found 'crank', allowed: NAME=VALUE, each name once"]),
+    ("four-bar crank=0 crank=1", [
+        "[CONTROL=FROM:TO]...: found 'crank=1', allowed: NAME=VALUE, each name once",
+    ]),
+    ("four-bar crank=0:1:2", ["DRIVES: found crank = '0:1:2', allowed: FROM:TO, or one value"]),
+    ("four-bar crank=1:nan", [f"DRIVES: found crank = nan, allowed: {NUMBER}"]),
+    ("four-bar theta2=0:1", [
+        "DRIVES: theta2 is a function of controls, allowed: the controls themselves, or a joint that is free",
+    ]),
+    ("four-bar crank=0:1 theta4=1:2", ["DRIVES: found 2 drives, crank, theta4, allowed: 1, the mobility"]),
+    ("rssr S1=0:1", ["DRIVES: S1 has 3 variables, allowed: S1[1], S1[2], S1[3]"]),
+    ("rssr S1[4]=0:1", ["DRIVES: S1[4] has 3 variables, allowed: a number from 1 to 3"]),
+    ("four-bar theta4=20deg:120deg", [
+        "DRIVES: no motion from the assembly at the start leads to theta4 = 0.349066: the motion turns back"
+        f" at theta4 = 1.42745; {ON_BRANCH}",
+    ]),
+    ("stewart-gough-driven leg1=0.8:1.1 leg2=0.6", [
+        "DRIVES: found leg1 = 1.1, allowed: 0.65 to 1",
+        "DRIVES: found leg2 = 0.6, allowed: 0.65 to 1",
+    ]),
+    ("four-bar crank=0:1 --steps 5 --duration 1s", [
+        "--duration: found together with steps, allowed: one of the two",
+    ]),
+    ("four-bar crank=0:1 --branch 3", ["--branch: found 3, allowed: 1 to 2"]),
+    ("four-bar crank=0:1 --start theta4=1,2", ["--start: found theta4 = '1,2', allowed: 1 in rad"]),
+    ("four-bar crank=0:1 --wrench bar:0,0,0:1,2,3", [
+        "--wrenches: body found 'bar', allowed: ground, input, coupler, output",
+    ]),
+    ("four-bar crank=0:1 --torque theta4=1m", [
+        "--torques: found theta4 = 1m, allowed: a number in N.m or N",
+    ]),
+    ("four-bar crank=0:1 -o run.txt", [
+        "--output: found 'run.txt', allowed: a name that ends in .csv (a motion log) or .rrd (a recording)",
+    ]),
+    ("four-bar --log log.csv --steps 5 --law quintic", [
+        f"--{name}: found together with a log, allowed: without one, which has times of its own"
+        for name in ("steps", "law")
+    ]),
+    ("four-bar --log log.csv crank=foo", ["DRIVES: column found 'foo', allowed: crank, leg1"]),
+    ("four-bar --log log.csv crank=leg1", [
+        "DRIVES: column leg1 is in m, but crank is in rad; allowed: the same",
+    ]),
+    ("four-bar --log missing.csv", ["missing.csv: found no such file"]),
+    ("four-bar crank=0:1foo x=3 --steps 0 --law quintic --branch 0 --point bar --wrench coupler --torque z=1"
+     " --start q=2", [
+        "--steps: found 0, allowed: a whole number, 1 or more",
+        "--branch: found 0, allowed: a whole number, 1 or more",
+        "--law: found without a duration, allowed: with one",
+        "--branch: found together with start, allowed: one of the two",
+        "DRIVES: drive found 'x', allowed: crank, theta2, A, B, theta4",
+        f"DRIVES: found crank = 1foo, allowed: {NUMBER}",
+        "--start: joint found 'q', allowed: theta2, A, B, theta4",
+        "--point: body found 'bar', allowed: ground, input, coupler, output",
+        f"--wrenches: found 'coupler', allowed: {LOAD}",
+        "--torques: joint found 'z', allowed: theta2, A, B, theta4",
+    ]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "lines"), WRONG)
+def test_wrong_input_is_reported_at_once(
+    urmpipe: Run, tmp_path: Path, arguments: str, lines: list[str]
+) -> None:
+    (tmp_path / "log.csv").write_text(
+        "t (s),crank (rad),leg1 (m)\n" + "".join(f"{k / 100},0.9,0.8\n" for k in range(5))
+    )
+    ran = urmpipe("network", "drive", *arguments.split())
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.splitlines() == [f"error: {line}" for line in lines]
+    assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
+
+
+def test_a_drive_that_leaves_the_motion_open_is_refused(urmpipe: Run, tmp_path: Path) -> None:
+    text = (NETWORKS / "rccc.toml").read_text(encoding="utf-8").replace('driven = "crank"', "")
+    (tmp_path / "open.toml").write_text(text.replace("[controls.crank]\nstart = 0.8", ""))
+    assert urmpipe("network", "drive", "open.toml", "r1=0:1", "--steps", "3").code == 0
+    ran = urmpipe(
+        "network", "drive", "nine-revolute", f"{api.load_network('nine-revolute').joints[0].name}=0:1"
+    )
+    assert (ran.code, len(ran.err.splitlines())) == (2, 1)
+    assert "the network still moves, with mobility 2; allowed: 2 more drives, of " in ran.err
