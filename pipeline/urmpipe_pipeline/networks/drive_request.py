@@ -292,7 +292,7 @@ def _drive_values(
         pairs = zip(driven.names, driven.units, which, strict=True)
         wrong = [(name, unit, units[k]) for name, unit, k in pairs if unit and units[k] != unit]
         faults = [
-            Finding(f"column {columns[name]} is in {other}, allowed: {unit}, as {name}", parameter="drives")
+            Finding(f"column {columns[name]} is in {other}, allowed: {unit}, the unit of {name}", parameter="drives")
             for name, unit, other in wrong
         ]
         q = log.q[:, which]
