@@ -213,7 +213,7 @@ WRONG: list[tuple[str, list[str]]] = [
         "--wrenches: body found 'bar', allowed: ground, input, coupler, output",
     ]),
     ("four-bar crank=0:1 --torque theta4=1m", [
-        "--torques: found theta4 = 1m, allowed: a number in N.m or N",
+        "--torques: found theta4 = '1m', allowed: a number in N.m",
     ]),
     ("four-bar crank=0:1 -o run.txt", [
         "--output: found 'run.txt', allowed: a name that ends in .csv (a motion log) or .rrd (a recording)",

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias, Unpack
 
 import numpy as np
 
-from urmpipe.api.ingest import ingest
 from urmpipe.keyword_checks import PathLike, public, public_reading, refuse_warnings
 from urmpipe.output_files import guarded_outputs, output_kind, write_drawing
-from urmpipe.reading import Reading, map_files
+from urmpipe.reading import Reading, map_files, resolved
 from urmpipe_models.errors import Finding, LogError, OptionError, for_each
 from urmpipe_models.networks import network_file
 from urmpipe_models.networks.assembly import RESTARTS
@@ -25,10 +25,11 @@ from urmpipe_pipeline.networks.finding import Search, find_network
 from urmpipe_pipeline.networks.given_values import Range
 from urmpipe_pipeline.networks.network_motion import NetworkMotion, motion_drawing
 from urmpipe_pipeline.networks.result import Command, NetworkResult
+from urmpipe_pipeline.operands import load_runs
 from urmpipe_pipeline.outputs import MOTION_ROW, OutputKind
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.sources import TableLike
+from urmpipe_pipeline.sources import TableLike, held_of, is_table
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.tables.joint_file import write_joint_log
 
@@ -237,7 +238,7 @@ def network_drive(
             drives or {}, steps, duration, law, 0.005 if tsp is None else tsp, branch, start or {}, point,
             wrenches, torques or {}, restarts, seed,
         ),
-        lambda: _refuse_together(log, steps, duration, law),
+        lambda: _refuse_together(log, steps, duration, law, {"derivative": derivative, **reading}),
         lambda: output_kind(written, "motion"),
     )  # fmt: skip
     loaded, request, _, kind = for_each(lambda make: make(), parts)
@@ -271,21 +272,30 @@ def _read_log(
         return log
     controls = [control.name for control in network.controls if control.value is None]
     named = [str(column) for column in drives.values()] or controls
+    operand = held_of(log, "log") if is_table(log) else Path(log)
+    load = partial(load_runs, [operand], tsp=tsp, derivative=derivative)
     if named and reading.get("joints") is None:
         try:
-            return ingest(log, tsp=tsp, derivative=derivative, **{**reading, "joints": named})
+            return load(read=resolved({**reading, "joints": named}).options)[0]
         except LogError:
-            pass  # other columns are its joints: what is wrong then is told of the log as it is
-    return ingest(log, tsp=tsp, derivative=derivative, **reading)
+            pass  # other columns are its joints: what is wrong with them is reported of the log as it is
+    return load(read=resolved(reading).options)[0]
 
 
-def _refuse_together(log: Any, steps: int | None, duration: float | None, law: str) -> None:
-    """Raise an `OptionError` for options that a log leaves without a meaning."""
+def _refuse_together(
+    log: Any, steps: int | None, duration: float | None, law: str, reading: Mapping[str, Any]
+) -> None:
+    """Raise an `OptionError` for options that a log leaves without a meaning, or that need one."""
     given = {"steps": steps, "duration": duration, "law": None if law == "uniform" else law}
     faults = [
         Finding("found together with a log, allowed: without one, which has times of its own", parameter=name)
         for name, value in given.items()
         if log is not None and value is not None
+    ]
+    faults += [
+        Finding("found without a log, allowed: with one", parameter=name)
+        for name, value in reading.items()
+        if log is None and value is not None and value is not False and value not in ({}, (), [])
     ]
     if faults:
         raise OptionError(*faults)

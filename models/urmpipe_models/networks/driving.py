@@ -4,7 +4,7 @@
 2. `split_variables`: which variables follow. Controls without a drive keep their value; if joints are
    driven in their place, controls follow.
 3. `move_to`: from an assembly along a straight line of the drives to where the motion begins.
-4. `drive_line`, `drive_rows`: the motion along a line or along the rows of a log (`motion`, `row_motion`).
+4. `drive_rows`: the motion along rows of the drives, on a line (`motion`) or not (`row_motion`).
 5. `compute_shares`: how far along the line it is over time.
 """
 
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -23,7 +23,16 @@ from urmpipe_models.names import not_among
 from urmpipe_models.networks.idle_spins import idle_spins, spinning_parts, unspun
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.mobility import mobility_nearby
-from urmpipe_models.networks.motion import SINGULAR, Drive, LimitStop, SingularPose, Trace, sample, trace
+from urmpipe_models.networks.motion import (
+    MAX_LENGTH,
+    SINGULAR,
+    Drive,
+    LimitStop,
+    SingularPose,
+    Trace,
+    sample,
+    trace,
+)
 from urmpipe_models.networks.row_motion import follow
 
 Law = Literal["uniform", "trapezoid", "quintic"]
@@ -57,7 +66,6 @@ class Motion:
         spins: The number of idle spins, which stay as at the start.
         singular: Singular poses, in their order; their s is the row, from 0, with a fraction.
         stop: The limit that ends the motion early, its s likewise; None without one.
-        complete: Whether the drives reach their end.
     """
 
     x: FloatArray
@@ -65,7 +73,6 @@ class Motion:
     spins: int
     singular: tuple[SingularPose, ...] = ()
     stop: LimitStop | None = None
-    complete: bool = True
 
 
 def find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
@@ -76,7 +83,9 @@ def find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
     """
     joints = {joint.name: joint for joint in mechanism.network.joints}
     controls = {control.name: control for control in mechanism.network.controls}
-    faults, places, units = [], [], []
+    faults: list[Finding] = []
+    places: list[int] = []
+    units: list[str] = []
     for name in names:
         owner, index = _indexed(name)
         fault = ""
@@ -96,7 +105,7 @@ def find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
             places.append(mechanism.places[owner, index or 0])
             unit = mechanism.network.unit_of(name) if name in controls else None
             units.append(unit[0] if unit else "" if name in controls else joints[owner].units[index or 0])
-    twice = sorted({name for name in names if names.count(name) > 1})
+    twice = [name for k, name in enumerate(names) if len(places) == len(names) and places[k] in places[:k]]
     faults += [Finding(f"{name} is driven twice, allowed: once", parameter="drives") for name in twice]
     if faults:
         raise NetworkError(*faults)
@@ -222,72 +231,6 @@ def move_to(
     return unspun(mechanism, idle_spins(mechanism), sample(drive, branch, np.ones(1)), x)[:, 0], branch
 
 
-def drive_line(
-    mechanism: Mechanism,
-    x: FloatArray,
-    driven: Driven,
-    begin: FloatArray,
-    end: FloatArray,
-    shares: FloatArray,
-    progress: Callable[[float], None] = lambda share: None,
-) -> Motion:
-    """Return the motion of a network whose drives go along a straight line.
-
-    Args:
-        mechanism: The network.
-        x: An assembly, shape (variables,), in [m], [rad] and as controls are given: the motion stays on its
-            branch.
-        driven: The prescribed variables.
-        begin: Their values at the begin of the line, shape (driven,), as in x.
-        end: Their values at its end.
-        shares: Places along the line, not falling, 0..1, shape (n,).
-        progress: Called with the share that is done, 0..1.
-
-    Raises:
-        NetworkError: If the drives do not determine the motion, or no motion from the assembly leads to the
-            begin.
-    """
-    limits, places = variable_limits(mechanism), driven.places
-    x = within_turns(mechanism, x, limits)
-    free = split_variables(mechanism, x, driven)
-    spins = len(spinning_parts(mechanism, x))
-    change = np.zeros(len(x))
-    change[places] = end - begin
-    if not len(free):
-        motion = np.repeat(x[:, np.newaxis], len(shares), axis=1)
-        motion[places] = begin[:, np.newaxis] + np.outer(end - begin, shares)
-        return Motion(motion, free, spins)
-    scaled = (change / mechanism.column_scales)[places]
-    begun = (x[places] - begin) / mechanism.column_scales[places]
-    at = float(begun @ scaled) / (float(scaled @ scaled) or 1.0)
-    distance = float(np.linalg.norm(begun - at * scaled))
-    if distance > SAME_PLACE:
-        x, at = _approach(mechanism, x, driven, begin, free, limits), 0.0
-    if not scaled.any():
-        return Motion(np.repeat(x[:, np.newaxis], len(shares), axis=1), free, spins)
-    base = np.array(x)
-    base[places] = begin
-    drive = Drive(mechanism, base, change, free, limits)
-    _check_start(drive, x, at, driven)
-    branch = trace(drive, at, progress)
-    first, last = branch.segments[0][0].z[-1] / drive.length, branch.segments[-1][1].z[-1] / drive.length
-    if first > SAME_PLACE:
-        _refuse_begin(mechanism, driven, begin, branch)
-    reached = shares[shares <= last + 1e-12]
-    motion = sample(drive, branch, np.minimum(reached, last))
-    motion[places] = begin[:, np.newaxis] + np.outer(end - begin, reached)
-    motion = unspun(mechanism, idle_spins(mechanism), motion, x)
-    rows = _Rows(shares)
-    return Motion(
-        motion,
-        free,
-        spins,
-        tuple(rows.place(pose) for pose, _ in branch.singular if -SAME_PLACE < pose.s < 1.0 + SAME_PLACE),
-        rows.place_stop(branch.stop),
-        len(reached) == len(shares),
-    )
-
-
 def drive_rows(
     mechanism: Mechanism,
     x: FloatArray,
@@ -296,6 +239,10 @@ def drive_rows(
     progress: Callable[[float], None] = lambda share: None,
 ) -> Motion:
     """Return the motion of a network whose drives take values row by row.
+
+    If all values are on a line, the branch is traced along it once, and rows are sampled from it. Else the
+    rows are followed (`row_motion`): then only singular poses at which a row cannot be solved from the row
+    before are found.
 
     Args:
         mechanism: The network.
@@ -306,35 +253,142 @@ def drive_rows(
         progress: Called with the share that is done, 0..1.
 
     Raises:
-        NetworkError: As `drive_line`.
+        NetworkError: If the drives do not determine the motion, or no motion from the assembly leads to the
+            first row.
     """
     limits, places = variable_limits(mechanism), driven.places
     x = within_turns(mechanism, x, limits)
+    turns = np.isin(
+        places, mechanism.angles
+    )  # a driven angle begins at the turn of its assembly that is nearest
+    x[places[turns]] += 2.0 * np.pi * np.round((values[0] - x[places])[turns] / (2.0 * np.pi))
     free = split_variables(mechanism, x, driven)
     spins = len(spinning_parts(mechanism, x))
-    if not len(free):
-        motion = np.repeat(x[:, np.newaxis], len(values), axis=1)
-        motion[places] = values.T
-        return Motion(motion, free, spins)
-    x = _approach(mechanism, x, driven, values[0], free, limits)
-    found = follow(mechanism, x, places, values, free, limits, progress)
-    return Motion(found.x, free, spins, tuple(found.singular), found.stop, found.x.shape[1] == len(values))
+    scaled = values / mechanism.column_scales[places]
+    line = _find_line(scaled)
+    if line is None:
+        x = _approach(mechanism, x, driven, values[0], free, limits)
+        moved = follow(mechanism, x, places, values, free, limits, progress)
+        motion = Motion(moved.x, free, spins, tuple(moved.singular), moved.stop)
+    elif not len(free) or not line[1].any():
+        x = _approach(mechanism, x, driven, values[0], free, limits)
+        rows = np.repeat(x[:, np.newaxis], len(values), axis=1)
+        rows[places] = values.T
+        motion = Motion(rows, free, spins)
+    else:
+        motion = _drive_along(mechanism, x, driven, values, *line, free, limits, progress)
+    return _stop_at_driven_limits(mechanism, motion)
 
 
-@dataclass(frozen=True, slots=True)
-class _Rows:
-    """Places along a line as rows, with fractions."""
+def _find_line(scaled: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return begin and change of the line through all rows, and their places on it, 0..1; None if not."""
+    offsets = scaled - scaled[0]
+    sizes = np.linalg.norm(offsets, axis=1)
+    farthest = offsets[int(np.argmax(sizes))]
+    square = float(farthest @ farthest)
+    along = offsets @ farthest / square if square > 0.0 else np.zeros(len(scaled))
+    if np.linalg.norm(offsets - np.outer(along, farthest), axis=1).max() > SAME_PLACE:
+        return None
+    low, high = float(along.min()), float(along.max())
+    shares = (along - low) / (high - low) if high > low else along
+    return scaled[0] + low * farthest, (high - low) * farthest, shares
 
-    shares: FloatArray
 
-    def row(self, s: float) -> float:
-        return float(np.interp(s, self.shares, np.arange(len(self.shares))))
+def _drive_along(
+    mechanism: Mechanism,
+    x: FloatArray,
+    driven: Driven,
+    values: FloatArray,
+    begin: FloatArray,
+    scaled: FloatArray,
+    shares: FloatArray,
+    free: IndexArray,
+    limits: FloatArray,
+    progress: Callable[[float], None],
+) -> Motion:
+    """Return a motion whose drives are on a scaled line, at places of it, shape (n,)."""
+    places, scales = driven.places, mechanism.column_scales[driven.places]
+    _check_length(driven, float(np.linalg.norm(scaled)))
+    offset = x[places] / scales - begin
+    at = float(offset @ scaled) / float(scaled @ scaled)
+    if np.linalg.norm(offset - at * scaled) > SAME_PLACE:
+        x, at = _approach(mechanism, x, driven, values[0], free, limits), float(shares[0])
+    base, change = np.array(x), np.zeros(len(x))
+    base[places], change[places] = begin * scales, scaled * scales
+    drive = Drive(mechanism, base, change, free, limits)
+    _check_start(drive, x, at, driven)
+    ways = {end: trace(drive, at, end, progress) for end in (1.0, 0.0) if (at < end if end else at > 0.0)}
+    back, forward = ways.get(0.0, Trace(complete=True)), ways.get(1.0, Trace(complete=True))
+    segments = back.segments + forward.segments
+    if not segments:
+        _refuse_begin(driven, values[0], forward if back.complete else back)
+    ends = segments[0][0].z[-1] / drive.length, segments[-1][1].z[-1] / drive.length
+    if shares[0] < ends[0] - SAME_PLACE or shares[0] > ends[1] + SAME_PLACE:
+        _refuse_begin(driven, values[0], back if shares[0] < ends[0] else forward)
+    outside = (shares < ends[0] - SAME_PLACE) | (shares > ends[1] + SAME_PLACE)
+    count = int(np.argmax(outside)) if outside.any() else len(shares)
+    branch = Trace(segments, [*back.singular, *forward.singular])
+    motion = sample(drive, branch, np.clip(shares[:count], *ends))
+    motion[places] = values[:count].T
+    motion = unspun(mechanism, idle_spins(mechanism), motion, x)
+    rows = shares[: count + 1]
+    poses = [
+        replace(pose, s=row) for pose, _ in branch.singular if (row := _find_row(rows, pose.s)) is not None
+    ]
+    stop = forward.stop if outside.any() and shares[count] > ends[1] else back.stop if outside.any() else None
+    if stop is not None:
+        stop = replace(stop, s=_find_row(rows, stop.s) or 0.0)
+    return Motion(motion, free, drive.spins, tuple(sorted(poses, key=lambda pose: pose.s)), stop)
 
-    def place(self, pose: SingularPose) -> SingularPose:
-        return SingularPose(pose.passage, self.row(pose.s), pose.x, pose.direction)
 
-    def place_stop(self, stop: LimitStop | None) -> LimitStop | None:
-        return None if stop is None else LimitStop(stop.variable, stop.limit, self.row(stop.s))
+def _check_length(driven: Driven, length: float) -> None:
+    if length > MAX_LENGTH:
+        found = f"{', '.join(driven.names)} moves by {length:.6g} rad or lengths of the mechanism"
+        message = f"{found}, allowed: {MAX_LENGTH:g}; split the motion"
+        raise NetworkError(Finding(message, parameter="drives"))
+
+
+def _find_row(shares: FloatArray, s: float) -> float | None:
+    """Return the first row, with a fraction, at which places along a line reach s; None if they do not."""
+    before, after = shares[:-1] - s, shares[1:] - s
+    rising = (before <= SAME_PLACE) & (after >= -SAME_PLACE)
+    falling = (before >= -SAME_PLACE) & (after <= SAME_PLACE)
+    reached = np.flatnonzero(rising | falling)
+    if not len(reached):
+        return None
+    k = int(reached[0])
+    step = float(shares[k + 1] - shares[k])
+    return k + (float(np.clip((s - shares[k]) / step, 0.0, 1.0)) if step else 0.0)
+
+
+def _stop_at_driven_limits(mechanism: Mechanism, motion: Motion) -> Motion:
+    """End a motion before the first row at which a joint that controls drive is beyond its limits.
+
+    Raises:
+        NetworkError: If that is the first row.
+    """
+    for joint in mechanism.network.joints:
+        for k, (drive, bounds) in enumerate(zip(joint.drives, joint.limits, strict=False)):
+            if drive is None or not motion.x.shape[1]:
+                continue
+            values = np.broadcast_to(mechanism.joint_values(joint, motion.x)[k].value, motion.x.shape[1])
+            beyond = np.flatnonzero((values < bounds[0] - SAME_PLACE) | (values > bounds[1] + SAME_PLACE))
+            if not len(beyond):
+                continue
+            row = int(beyond[0])
+            limit = bounds[int(values[row] > bounds[1])]
+            if row == 0:
+                message = (
+                    f"{joint.name} is at {values[0]:.6g}, beyond its limit {limit:.6g}, at the first row"
+                )
+                raise NetworkError(Finding(message, parameter="drives"))
+            share = float((limit - values[row - 1]) / (values[row] - values[row - 1]))
+            x = motion.x[:, row - 1] + share * (motion.x[:, row] - motion.x[:, row - 1])
+            name = joint.name if len(joint.units) == 1 else f"{joint.name}[{k + 1}]"
+            stop = LimitStop(name, joint.units[k], limit, row - 1 + share, x)
+            singular = tuple(pose for pose in motion.singular if pose.s <= stop.s)
+            motion = replace(motion, x=motion.x[:, :row], singular=singular, stop=stop)
+    return motion
 
 
 def _approach(
@@ -352,7 +406,7 @@ def _approach(
     """
     there, branch = move_to(mechanism, x, driven.places, begin, free, limits)
     if branch is not None and not branch.complete:
-        _refuse_begin(mechanism, driven, begin, branch)
+        _refuse_begin(driven, begin, branch)
     return there
 
 
@@ -363,31 +417,31 @@ def _check_start(drive: Drive, x: FloatArray, s: float, driven: Driven) -> None:
         message = f"{', '.join(driven.names)} cannot move at the start: the network has too many drives"
         raise NetworkError(Finding(message, parameter="drives"))
     if node.distance < SINGULAR:
-        values = ", ".join(
-            f"{name} = {value:.6g}" for name, value in zip(driven.names, x[driven.places], strict=True)
-        )
-        message = (
-            f"found a singular pose at the start, {values}, where branches meet or the motion turns back"
-        )
+        at = _values_words(driven, x[driven.places])
+        message = f"found a singular pose at the start, {at}, where branches meet or the motion turns back"
         allowed = "a start away from it: other start values in the file, or --start and --branch"
         raise NetworkError(Finding(f"{message}; allowed: {allowed}", parameter="drives"))
 
 
-def _refuse_begin(mechanism: Mechanism, driven: Driven, begin: FloatArray, branch: Trace) -> None:
-    """Raise a `NetworkError`: the begin of the drives is not reached from the assembly."""
-    wanted = ", ".join(f"{name} = {value:.6g}" for name, value in zip(driven.names, begin, strict=True))
+def _refuse_begin(driven: Driven, begin: FloatArray, branch: Trace) -> None:
+    """Raise a `NetworkError`: the begin of the drives is not reached from the assembly, as a trace tells."""
     why = "no step of the continuation succeeds"
     ends = [pose for pose, _ in branch.singular if pose.passage == "turns back"]
     if branch.stop is not None:
-        limited = mechanism.variables[branch.stop.variable].owner
-        why = f"{limited} reaches its limit {branch.stop.limit:.6g} before"
+        unit = f" {branch.stop.unit}" if branch.stop.unit else ""
+        why = f"{branch.stop.name} reaches its limit {branch.stop.limit:.6g}{unit} before"
     elif ends:
-        known = zip(driven.names, ends[0].x[driven.places], strict=True)
-        at = [f"{name} = {value:.6g}" for name, value in known]
-        why = f"the motion turns back at {', '.join(at)}"
-    message = f"no motion from the assembly at the start leads to {wanted}: {why}"
+        why = f"the motion turns back at {_values_words(driven, ends[0].x[driven.places])}"
+    message = f"no motion from the assembly at the start leads to {_values_words(driven, begin)}: {why}"
     allowed = "a range on its branch, or another assembly by --branch or --start"
     raise NetworkError(Finding(f"{message}; allowed: {allowed}", parameter="drives"))
+
+
+def _values_words(driven: Driven, values: FloatArray) -> str:
+    """Return the drives with values, as controls are given, in [rad] and [m] of joints."""
+    return ", ".join(
+        f"{name} = {value:.6g}" for name, value in zip(driven.names, values.tolist(), strict=True)
+    )
 
 
 def compute_shares(law: Law, shares: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -399,12 +453,17 @@ def compute_shares(law: Law, shares: FloatArray) -> tuple[FloatArray, FloatArray
 
     Args:
         law: The law.
-        shares: u, 0..1, shape (n,) [-].
+        shares: u, shape (n,) [-]; beyond 1 the drives stand still.
 
     Returns:
         s, ds/du and d2s/du2, shape (n,) each [-].
     """
-    u = shares
+    u, moves = np.minimum(shares, 1.0), np.where(shares > 1.0 + 1e-12, 0.0, 1.0)
+    s, speed, curvature = _compute_law(law, u)
+    return s, speed * moves, curvature * moves
+
+
+def _compute_law(law: Law, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     if law == "quintic":
         s = u * u * u * (10.0 - 15.0 * u + 6.0 * u * u)
         return s, 30.0 * u * u * (1.0 - u) ** 2, 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)

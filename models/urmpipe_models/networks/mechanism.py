@@ -125,6 +125,15 @@ class Mechanism:
         return {(one.owner, one.index): k for k, one in enumerate(self.variables)}
 
     @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """A name per variable: that of its owner, with its number from 1 if the owner has several."""
+        owners = [variable.owner for variable in self.variables]
+        return tuple(
+            owner if owners.count(owner) == 1 else f"{owner}[{variable.index + 1}]"
+            for owner, variable in zip(owners, self.variables, strict=True)
+        )
+
+    @cached_property
     def controls(self) -> IndexArray:
         """The numbers of the variables that are controls, shape (controls,) [-]."""
         return np.array([k for k, one in enumerate(self.variables) if one.kind == "control"], dtype=np.intp)

@@ -45,8 +45,7 @@ CROSSING = 1e-4  # determinant, as a share of that at the last node, which count
 SINGULAR = 1e-6  # smallest singular value of the scaled Jacobian that counts as 0
 STENCIL = 2e-3  # arc length between the configurations around a singular pose that interpolate it
 OVERRUN = 0.02  # arc length of the drive that is traced beyond an end near a singular pose
-MAX_NODES = 100_000  # of a trace
-COARSE = 0.05  # scaled length of the drives between the rows of a log that are solved first
+MAX_LENGTH = 2000.0  # scaled length of a drive: 300 turns of a crank, which take some minutes
 CHUNK = 4096  # configurations solved side by side: their Jacobians fit the cache
 
 Segment: TypeAlias = "tuple[Node, Node]"
@@ -70,19 +69,23 @@ class SingularPose:
     direction: FloatArray
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class LimitStop:
     """A limit of a variable that ends a motion.
 
     Attributes:
-        variable: The number of the variable.
-        limit: The limit in [m], [rad] or as the control is given.
+        name: The variable: its owner, with its number from 1 if that has several.
+        unit: m, rad, or "" of a control.
+        limit: The limit in `unit`, of a control as it is given.
         s: Where the motion ends, as in `SingularPose`.
+        x: The variables there in [m], [rad] and as controls are given, shape (variables,).
     """
 
-    variable: int
+    name: str
+    unit: str
     limit: float
     s: float
+    x: FloatArray
 
 
 class Node(NamedTuple):
@@ -234,25 +237,21 @@ def _turn(before: Node, after: Node) -> float:
 # ---------------------------------------------------------------------------------------- continuation
 
 
-def trace(drive: Drive, s: float, progress: Callable[[float], None] = lambda share: None) -> Trace:
-    """Trace the branch of `drive.x`, which closes at s, over s from 0 to 1.
+def trace(
+    drive: Drive, s: float, end: float = 1.0, progress: Callable[[float], None] = lambda share: None
+) -> Trace:
+    """Trace the branch of `drive.x`, which closes at s, to another s.
 
     Args:
         drive: The drive.
-        s: The place of `drive.x` along it; before 0 and beyond 1, the branch is traced from there.
-        progress: Called with the share of the drive that is done, 0..1.
+        s: The place of `drive.x` along it.
+        end: Where to: s increases or decreases.
+        progress: Called with the share of the way that is done, 0..1.
     """
-    first = drive.node(drive.coordinates(drive.x, s))
-    ways = [end for end in (1.0, 0.0) if (end > s if end else s > 0.0)]
-    traces = {end: _Tracer(drive, first, end, progress).run() for end in ways}
-    forward, back = traces.get(1.0, Trace(complete=True)), traces.get(0.0, Trace(complete=True))
-    reversed_segments = [(_reversed(b), _reversed(a)) for a, b in reversed(back.segments)]
-    return Trace(
-        reversed_segments + forward.segments,
-        [*reversed(back.singular), *forward.singular],
-        forward.stop or back.stop,
-        forward.complete and back.complete,
-    )
+    branch = _Tracer(drive, drive.node(drive.coordinates(drive.x, s)), end, progress).run()
+    if end < s:
+        branch.segments = [(_reversed(b), _reversed(a)) for a, b in reversed(branch.segments)]
+    return branch
 
 
 def _reversed(node: Node) -> Node:
@@ -273,7 +272,7 @@ class _Tracer:
 
     def run(self) -> Trace:
         """Trace to the end, and beyond it where a singular pose is near: poses there are interpolated."""
-        while len(self.trace.segments) < MAX_NODES:
+        while True:
             there = self._advance()
             if there is None:
                 return self.trace
@@ -288,7 +287,6 @@ class _Tracer:
             self._append(there)
             if not self.trace.complete:
                 self.progress(abs((there.z[-1] - self.begin) / (self.end - self.begin)))
-        return self.trace
 
     def _append(self, there: Node) -> None:
         """Add a segment, and go on from its end, in coordinates that are far from singular."""
@@ -429,15 +427,20 @@ class _Tracer:
     def _reach(self, there: Node) -> bool:
         """Add the node at the end of the drive, or at the first limit before it; return whether to go on."""
         drive, here = self.drive, self.here
-        share, coordinate, value = 1.0, -1, float(there.z[-1])
+        share, coordinate, value = np.inf, -1, self.end
         if self.sign * (there.z[-1] - self.end) >= 0.0:
-            share, value = _share_of(here, there, -1, self.end), self.end
-        for k, bounds in enumerate(drive.limits[drive.free] / drive.scales[:, np.newaxis]):
-            for bound in bounds[np.isfinite(bounds)].tolist():
-                if (here.z[k] - bound) * (there.z[k] - bound) < 0.0:
-                    at = _share_of(here, there, k, bound)
+            share = _share_of(here, there, -1, self.end)
+        limits = drive.limits[drive.free] / drive.scales[:, np.newaxis]
+        for k, (lower, upper) in enumerate(limits.tolist()):
+            for bound, sign in ((lower, -1.0), (upper, 1.0)):
+                if sign * (there.z[k] - bound) > 0.0:  # beyond it there; perhaps here already
+                    is_beyond = sign * (here.z[k] - bound) >= 0.0
+                    at = 0.0 if is_beyond else _share_of(here, there, k, bound)
                     if at < share:
                         share, coordinate, value = at, k, bound
+        if share == 0.0:
+            self._stop(coordinate, value, here)
+            return False
         z = _Cubic.between(here, there).at(np.array([share]))[:, 0]
         z[coordinate] = value
         solution = drive.correct(z, np.eye(len(z))[coordinate])
@@ -445,16 +448,23 @@ class _Tracer:
         self._touch(node)
         self._append(node)
         if coordinate >= 0:
-            place = float(node.z[-1]) / drive.length
-            self.trace.stop = LimitStop(
-                int(drive.free[coordinate]), value * float(drive.scales[coordinate]), place
-            )
+            self._stop(coordinate, value, node)
             return False
         if self.trace.complete or node.distance > OVERRUN:
             self.trace.complete = True
             return False
         self.trace.complete, self.end = True, self.end + self.sign * OVERRUN
         return True
+
+    def _stop(self, coordinate: int, value: float, node: Node) -> None:
+        """Note the limit that ends the trace, unless it is beyond the end of the drive."""
+        drive = self.drive
+        if self.trace.complete:
+            return
+        place, x = int(drive.free[coordinate]), drive.at(node.z[:, np.newaxis])[:, 0]
+        mechanism, limit = drive.mechanism, value * float(drive.scales[coordinate])
+        unit, s = mechanism.variables[place].unit, float(node.z[-1]) / drive.length
+        self.trace.stop = LimitStop(mechanism.labels[place], unit, limit, s, x)
 
     def _record(self, passage: Passage, node: Node, tangent: FloatArray) -> None:
         drive, direction = self.drive, np.zeros(len(self.drive.x))

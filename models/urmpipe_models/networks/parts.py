@@ -258,10 +258,14 @@ class Parts:
         """
         driven = [pair for one in self.joints for pair in zip(one.units, one.drives, strict=True)]
         driven += zip(self.element_units, (one.length for one in self.elements), strict=True)
-        alone = {control: Decimal(1)}  # as files in m and rad, in mm and in deg have it
-        alone |= {f"({control}) * 0.001": Decimal("0.001"), f"({control}) * pi / 180": DEGREE}
+        alone = spellings(control)
         found = {(unit, alone[one.text]) for unit, one in driven if one is not None and one.text in alone}
         return found.pop() if len(found) == 1 else None
+
+    def control_alone(self, text: str) -> str | None:
+        """Return the control that a function consists of, whatever the units of its file; None of others."""
+        names = (control.name for control in self.controls)
+        return next((name for name in names if text in spellings(name)), None)
 
     def control_value(self, control: str, value: float | str) -> float:
         """Return the value of a control as it is given, of a number or a text with a unit.
@@ -289,6 +293,15 @@ class Parts:
         return tuple(
             (f"controls.{one.name}.value", one.value) for one in self.controls if one.value is not None
         )
+
+
+def spellings(control: str) -> dict[str, Decimal]:
+    """Return the functions that are a control alone, in files in m and rad, mm, deg, each with its factor."""
+    return {
+        control: Decimal(1),
+        f"({control}) * 0.001": Decimal("0.001"),
+        f"({control}) * pi / 180": DEGREE,
+    }
 
 
 def frame_of(m: Vector, n: Vector, a: Vector) -> Transform:

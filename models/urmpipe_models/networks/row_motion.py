@@ -1,17 +1,17 @@
 """Motion of a network along the rows of a log: one configuration per row, on the branch of the first one.
 
-1. `follow` solves some rows first, apart by a scaled length of COARSE of the drives, side by side: each
-   from the start along a straight line of the drives.
+1. `follow` solves coarse rows first, apart by a scaled length of COARSE of the drives, side by side: each
+   along a straight line of the drives from an earlier row, at most MAX_LINE away.
 2. Such a line may end on another branch than the log does. So each pair of neighbours is verified: their
    difference must agree with the tangents at both, and the Jacobian must keep its orientation. Where a pair
    fails, the rows between are traced one after another (`motion.trace`), until both agree again.
-3. The rows between are solved side by side, from the tangents at both neighbours.
+3. The rows between are solved side by side, from the tangents at both neighbours, and verified likewise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -33,6 +33,7 @@ from urmpipe_models.networks.motion import (
     trace,
 )
 
+MAX_LINE = 3.0  # scaled length of the lines from a row along which others are solved, in steps of 2 COARSE
 COARSE = 0.05  # scaled length of the drives between rows that are solved first
 MAX_DISAGREEMENT = (
     0.1  # share of a difference by which the tangents may miss it; usual is the square of COARSE
@@ -93,44 +94,62 @@ class _Follower:
         self.start, self.spins = x, idle_spins(mechanism)
         self.motion = RowMotion(np.repeat(x[:, np.newaxis], len(rows), axis=1))
         self.motion.x[driven] = rows.T
-        scaled = rows / mechanism.column_scales[driven]
-        length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(scaled, axis=0), axis=1)))
-        marks = np.searchsorted(length, np.arange(0.0, length[-1], COARSE))
+        self.scaled = rows / mechanism.column_scales[driven]
+        steps = np.linalg.norm(np.diff(self.scaled, axis=0), axis=1)
+        self.length = np.append(0.0, np.cumsum(steps))
+        marks = np.searchsorted(self.length, np.arange(0.0, self.length[-1], COARSE))
         self.coarse = np.unique(np.append(marks, len(rows) - 1))
-        self.length = length
 
     def run(self, progress: Callable[[float], None]) -> RowMotion:
-        """Solve the coarse rows, verify them, then fill in the others."""
-        with np.errstate(all="ignore"):  # rows out of reach: their values are not finite, and verified
-            self.motion.x[:, self.coarse] = self._along_lines(self.motion.x[:, self.coarse])
-        progress(0.3)
-        last = self._verify()
-        progress(0.5)
-        for piece in iter_chunks(last + 1):
-            self._fill(np.arange(piece.start, piece.stop))
-            progress(0.5 + 0.5 * piece.stop / (last + 1))
-        self.motion.x = self.motion.x[:, : last + 1]
+        """Solve the coarse rows piece by piece and verify them, then fill in the others, and verify all."""
+        first, last = 0, 0
+        while first < len(self.coarse) - 1:
+            piece = self._piece(first)
+            with np.errstate(all="ignore"):  # rows out of reach: their values are not finite, and verified
+                self.motion.x[:, piece[1:]] = self._along_lines(int(piece[0]), piece[1:])
+            last = self._verify(piece)
+            if last < piece[-1]:
+                break
+            first += len(piece) - 1
+            progress(0.5 * first / len(self.coarse))
+        end = last
+        for chunk in iter_chunks(last + 1):
+            end = self._fill(np.arange(chunk.start, chunk.stop))
+            progress(0.5 + 0.5 * chunk.stop / (last + 1))
+            if end < chunk.stop - 1:
+                break
+        self.motion.x = self.motion.x[:, : end + 1]
         self._stop_at_limit()
+        poses = {round(pose.s, 6): pose for pose in self.motion.singular if pose.s <= self.motion.x.shape[1]}
+        self.motion.singular = [poses[s] for s in sorted(poses)]
         return self.motion
 
-    def _along_lines(self, ends: FloatArray) -> FloatArray:
-        """Return configurations at other values of the drives, each along a line from the start."""
-        begin = self.start[self.driven, np.newaxis]
+    def _piece(self, first: int) -> IndexArray:
+        """Return coarse rows from a number on whose lines to the first of them are short."""
+        coarse = self.coarse[first:]
+        away = np.linalg.norm(self.scaled[coarse] - self.scaled[coarse[0]], axis=1)
+        far = np.flatnonzero(away > MAX_LINE)
+        return coarse[: max(int(far[0]), 2)] if len(far) else coarse
+
+    def _along_lines(self, row: int, ends: IndexArray) -> FloatArray:
+        """Return configurations of rows, each along a line of the drives from one row."""
+        start, values = self.motion.x[:, row], self.rows[ends].T
+        begin = start[self.driven, np.newaxis]
         scales = self.mechanism.column_scales[self.driven, np.newaxis]
-        farthest = np.linalg.norm((ends[self.driven] - begin) / scales, axis=0).max()
+        farthest = np.linalg.norm((values - begin) / scales, axis=0).max()
         steps = max(1, int(np.ceil(farthest / (2.0 * COARSE))))
-        x = np.repeat(self.start[:, np.newaxis], ends.shape[1], axis=1)
-        for piece in iter_chunks(ends.shape[1]):
-            own = x[:, piece]
+        x = np.repeat(start[:, np.newaxis], len(ends), axis=1)
+        for chunk in iter_chunks(len(ends)):
+            own = x[:, chunk]
             for step in range(1, steps + 1):
-                own[self.driven] = begin + step / steps * (ends[self.driven, piece] - begin)
+                own[self.driven] = begin + step / steps * (values[:, chunk] - begin)
                 own = settle(self.mechanism, own, self.free, wrap=True)[0]
-            x[:, piece] = own
+            x[:, chunk] = own
         return unspun(self.mechanism, self.spins, x, self.start)
 
-    def _verify(self) -> int:
-        """Verify the coarse rows, correct those of other branches, and return the last row reached."""
-        x, coarse = self.motion.x, self.coarse
+    def _verify(self, coarse: IndexArray) -> int:
+        """Verify coarse rows, correct those of other branches, and return the last row reached."""
+        x = self.motion.x
         good = self._is_continuous(x[:, coarse[:-1]], x[:, coarse[1:]])
         synchronous = True
         for k in range(len(coarse) - 1):
@@ -145,7 +164,7 @@ class _Follower:
                     return last
             x[:, second] = end
             synchronous = bool(np.abs(self._difference(line[:, np.newaxis], end[:, np.newaxis])).max() < SAME)
-        return len(self.rows) - 1
+        return int(coarse[-1])
 
     def _step(self, x: FloatArray, row: int) -> FloatArray | None:
         """Return the configuration of a row next to that of an earlier one; None unless it is continuous."""
@@ -169,28 +188,25 @@ class _Follower:
                 branch = trace(drive, 0.0)
                 for pose, _ in branch.singular:
                     if pose.s <= 1.0:
-                        self.motion.singular.append(
-                            SingularPose(pose.passage, row + pose.s, pose.x, pose.direction)
-                        )
+                        self.motion.singular.append(replace(pose, s=row + pose.s))
                 if not branch.complete:
                     if branch.stop is not None:
-                        self.motion.stop = LimitStop(
-                            branch.stop.variable, branch.stop.limit, row + branch.stop.s
-                        )
+                        self.motion.stop = replace(branch.stop, s=row + branch.stop.s)
                     return row, x
                 x = sample(drive, branch, np.ones(1))[:, 0]
             x = unspun(self.mechanism, self.spins, x[:, np.newaxis], self.start)[:, 0]
             self.motion.x[:, row + 1] = x
         return second, x
 
-    def _fill(self, rows: IndexArray) -> None:
-        """Solve rows between the coarse ones from the tangents at both neighbours."""
+    def _fill(self, rows: IndexArray) -> int:
+        """Solve rows from the tangents at their coarse neighbours; return the last row reached."""
+        end = int(rows[-1])
         after = np.clip(np.searchsorted(self.coarse, rows), 1, len(self.coarse) - 1)
         first, second = self.coarse[after - 1], self.coarse[after]
         inner = (rows != first) & (rows != second)
         rows, first, second = rows[inner], first[inner], second[inner]
         if not len(rows):
-            return
+            return end
         known = self.motion.x
         span = self.length[second] - self.length[first]
         share = (self.length[rows] - self.length[first]) / np.where(span > 0.0, span, 1.0)
@@ -203,12 +219,16 @@ class _Follower:
             predicted.append(known[:, ends] + self._tangents(known[:, ends], change))
         near = nearest_rotations(self.mechanism, predicted[1], predicted[0])
         x[self.free] = ((1.0 - weight) * predicted[0] + weight * near)[self.free]
-        solved, first_step, last_step = settle(self.mechanism, x, self.free, wrap=True)
-        solved = unspun(self.mechanism, self.spins, solved, self.start)
-        doubtful = ~((first_step < 0.5 * COARSE) & (last_step < 1e-9))
+        with np.errstate(all="ignore"):  # rows out of reach between coarse rows that are within
+            solved = settle(self.mechanism, x, self.free, wrap=True)[0]
+            solved = unspun(self.mechanism, self.spins, solved, self.start)
+            good = self._is_continuous(known[:, first], solved)
         known[:, rows] = solved
-        for begin, end in sorted({*zip(first[doubtful].tolist(), second[doubtful].tolist(), strict=True)}):
-            self._trace_rows(begin, end)
+        for begin, stop in sorted({*zip(first[~good].tolist(), second[~good].tolist(), strict=True)}):
+            last, _ = self._trace_rows(begin, stop)
+            if last < stop:
+                return last
+        return end
 
     def _is_continuous(self, first: FloatArray, second: FloatArray) -> BoolArray:
         """Return whether configurations are neighbours on one branch, shape (n,).
@@ -217,8 +237,8 @@ class _Follower:
         another branch it is not, and the Jacobians of two branches that are near have other orientations.
         """
         good = np.zeros(first.shape[1], dtype=np.bool_)
-        for piece in iter_chunks(first.shape[1]):
-            own, other = first[:, piece], second[:, piece]
+        for chunk in iter_chunks(first.shape[1]):
+            own, other = first[:, chunk], second[:, chunk]
             difference = self._difference(own, other)
             change = np.zeros_like(difference)
             change[self.driven] = other[self.driven] - own[self.driven]
@@ -234,7 +254,7 @@ class _Follower:
                 products = np.einsum("kin,kjn->nij", *jacobians)
                 finite = np.isfinite(products).all(axis=(1, 2))
                 own_good &= finite & (np.linalg.det(np.where(finite[:, None, None], products, 0.0)) > 0.0)
-            good[piece] = own_good
+            good[chunk] = own_good
         return good
 
     def _difference(self, first: FloatArray, second: FloatArray) -> FloatArray:
@@ -255,10 +275,14 @@ class _Follower:
         lower, upper = self.limits[:, :1], self.limits[:, 1:]
         beyond = (self.motion.x < lower) | (self.motion.x > upper)
         beyond[self.driven] = False
-        if beyond.any():
-            row = int(np.argmax(beyond.any(axis=0)))
-            variable = int(np.argmax(beyond[:, row]))
-            value = self.motion.x[variable, row]
-            limit = float(self.limits[variable, int(value > self.limits[variable, 1])])
-            self.motion.stop = LimitStop(variable, limit, float(row))
-            self.motion.x = self.motion.x[:, :row]
+        row = int(np.argmax(beyond.any(axis=0)))
+        if not beyond[:, row].any() or row == 0:
+            return
+        before, after = self.motion.x[:, row - 1], self.motion.x[:, row]
+        place = int(np.argmax(beyond[:, row]))
+        limit = float(self.limits[place, int(after[place] > self.limits[place, 1])])
+        share = float((limit - before[place]) / (after[place] - before[place]))
+        labels, unit = self.mechanism.labels, self.mechanism.variables[place].unit
+        x = before + share * (after - before)
+        self.motion.stop = LimitStop(labels[place], unit, limit, row - 1 + share, x)
+        self.motion.x = self.motion.x[:, :row]

@@ -20,19 +20,20 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import Finding, NetworkError, OptionError, for_each, shown
 from urmpipe_models.names import not_among
-from urmpipe_models.networks.assembly import RESTARTS, assemble
+from urmpipe_models.networks.assembly import MOST_STARTS, RESTARTS, assemble
 from urmpipe_models.networks.driving import (
     LAWS,
     Driven,
     Law,
     Motion,
     compute_shares,
-    drive_line,
     drive_rows,
     find_driven,
+    variable_limits,
 )
 from urmpipe_models.networks.forces import Wrench, compute_forces
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.motion import LimitStop, SingularPose
 from urmpipe_models.networks.network import Network
 from urmpipe_models.networks.rates import Rates, compute_rates
 from urmpipe_pipeline import text
@@ -41,6 +42,7 @@ from urmpipe_pipeline.networks.given_values import (
     Quantity,
     Range,
     drive_factor,
+    format_wrench,
     parse_point,
     parse_ranges,
     parse_start,
@@ -118,6 +120,8 @@ class DriveRequest:
             yield Finding(not_among(str(self.law), LAWS), parameter="law")
         elif self.law != "uniform" and self.duration is None:
             yield Finding("found without a duration, allowed: with one", parameter="law")
+        if isinstance(self.restarts, Integral) and self.restarts > MOST_STARTS:
+            yield Finding(parameter="restarts", found=shown(self.restarts), allowed=f"{MOST_STARTS} at most")
         if self.branch is not None and self.start:
             yield Finding("found together with start, allowed: one of the two", parameter="branch")
 
@@ -129,7 +133,7 @@ class DriveRequest:
         """
         count = self.steps or DEFAULT_STEPS
         if self.duration is not None:
-            count = math.floor(self.duration / self.tsp + 1e-9)
+            count = math.ceil(self.duration / self.tsp - 1e-9)  # the last row is less than tsp after the end
         if not 1 <= count <= MAX_ROWS:
             allowed = f"1 to {MAX_ROWS} steps of {self.tsp:g} s"
             raise OptionError(
@@ -175,12 +179,7 @@ def drive_network(
     values, d_values, dd_values = _drive_values(driven, ranges, factors, columns, log, request, t_ns)
     _check_control_ranges(mechanism, driven, values, log)
     x = _find_assembly(mechanism, driven, values[0], start, request)
-    if log is None:
-        begin, end = values[0], values[-1]
-        shares = compute_shares(request.law, seconds(t_ns) / _duration(request, t_ns))[0]
-        moved = drive_line(mechanism, x, driven, begin, end, shares, lambda share: progress(0.6 * share))
-    else:
-        moved = drive_rows(mechanism, x, driven, values, lambda share: progress(0.6 * share))
+    moved = drive_rows(mechanism, x, driven, values, lambda share: progress(0.6 * share))
     n = moved.x.shape[1]
     if n == 0:
         raise NetworkError(Finding("the motion ends before its first row", parameter="drives"))
@@ -191,7 +190,7 @@ def drive_network(
     forces = None
     if wrenches or torques:
         forces = _forces(mechanism, moved, driven, factors, wrenches, torques)
-    events = tuple(_events(mechanism, moved, driven, factors, values * factors, t_ns))
+    events = tuple(_events(mechanism, moved, driven, factors, t_ns))
     warnings = tuple(log.warnings) if log is not None else ()
     options = {
         "network": network.name,
@@ -200,8 +199,9 @@ def drive_network(
         "tsp": request.tsp if log is None else None, "branch": request.branch,
         "start": {name: _plain(value) for name, value in request.start.items()} or None,
         "point": None if point is None else f"{point[0]}:{','.join(map(repr, point[1]))}",
-        "wrenches": [str(wrench) for wrench in request.wrenches] or None,
-        "torques": dict(request.torques) or None,
+        "wrenches": [format_wrench(wrench) for wrench in wrenches] or None,
+        "torques": dict(request.torques) or None, "restarts": request.restarts, "seed": request.seed,
+        "log": None if log is None else dict(log.provenance.options),
     }  # fmt: skip
     scaled = values * factors
     return NetworkMotion(
@@ -240,40 +240,40 @@ def _find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
     return find_driven(mechanism, names)
 
 
-def _duration(request: DriveRequest, t_ns: Any) -> float:
-    """Return the duration of the law in [s]; a last row may be earlier by less than tsp."""
-    return request.duration if request.duration is not None else float(seconds(t_ns)[-1])
-
-
 def _plain(value: Any) -> Any:
     return [*value] if isinstance(value, (list, tuple)) else value
 
 
 def _log_columns(network: Network, request: DriveRequest, log: Run) -> dict[str, str]:
-    """Return the joint of the log that drives each variable: as given, else those of the same names."""
-    names = [control.name for control in network.controls if control.value is None] + [
-        joint.name for joint in network.joints if joint.units
-    ]
+    """Return the joint of the log that drives each variable: as given, else those of the same names.
+
+    A joint that a control drives by itself stands for the control, as in the log of a motion.
+    """
+    joints = log.log.joints
     if request.drives:
-        wrong = [str(drive) for drive in request.drives.values() if drive not in log.log.joints]
+        wrong = [str(column) for column in request.drives.values() if column not in joints]
         if wrong:
-            faults = [
-                Finding(f"column {not_among(name, log.log.joints)}", parameter="drives") for name in wrong
-            ]
+            faults = [Finding(f"column {not_among(name, joints)}", parameter="drives") for name in wrong]
             raise OptionError(*faults)
         return {name: str(column) for name, column in request.drives.items()}
-    lowered = {column.casefold(): column for column in log.log.joints}
-    same = {name: lowered[name.casefold()] for name in names if name.casefold() in lowered}
+    columns = {column.casefold(): column for column in joints}
     controls = [control.name for control in network.controls if control.value is None]
-    same = {name: column for name, column in same.items() if name in controls} or same
-    if same:
-        return same
-    if len(controls) == 1 and len(log.log.joints) == 1:
-        return {controls[0]: log.log.joints[0]}
-    listed = ", ".join(log.log.joints)
-    found = f"found joints {listed} in the log, none of which is a control or joint of {network.name}"
-    allowed = f"which of them drives what, such as {(controls or names)[0]}={log.log.joints[0]}"
-    raise OptionError(Finding(f"{found}; allowed: {allowed}", parameter="drives"))
+    named = {name: columns[name.casefold()] for name in controls if name.casefold() in columns}
+    single = [joint for joint in network.joints if len(joint.units) == 1]
+    for joint in single:
+        control = network.control_alone(joint.drives[0].text) if joint.drives[0] is not None else None
+        if control is not None and joint.name.casefold() in columns:
+            named.setdefault(control, columns[joint.name.casefold()])
+    free = [joint.name for joint in single if joint.drives[0] is None]
+    named = named or {name: columns[name.casefold()] for name in free if name.casefold() in columns}
+    if named:
+        return named
+    if len(controls) == 1 and len(joints) == 1:
+        return {controls[0]: joints[0]}
+    listed = ", ".join(joints)
+    message = f"found joints {listed} in the log, none of which is a control or joint of {network.name}"
+    allowed = f"which of them drives what, such as {(controls or free or ['CONTROL'])[0]}={joints[0]}"
+    raise OptionError(Finding(f"{message}; allowed: {allowed}", parameter="drives"))
 
 
 def _drive_values(
@@ -292,7 +292,10 @@ def _drive_values(
         pairs = zip(driven.names, driven.units, which, strict=True)
         wrong = [(name, unit, units[k]) for name, unit, k in pairs if unit and units[k] != unit]
         faults = [
-            Finding(f"column {columns[name]} is in {other}, allowed: {unit}, the unit of {name}", parameter="drives")
+            Finding(
+                f"column {columns[name]} is in {other}, allowed: {unit}, the unit of {name}",
+                parameter="drives",
+            )
             for name, unit, other in wrong
         ]
         q = log.q[:, which]
@@ -306,7 +309,7 @@ def _drive_values(
         if faults:
             raise OptionError(*faults)
         return q / factors, log.qd[:, which] / factors, log.qdd[:, which] / factors
-    duration = _duration(request, t_ns)
+    duration = request.duration if request.duration is not None else float(seconds(t_ns)[-1])
     shares, speed, curvature = compute_shares(request.law, seconds(t_ns) / duration)
     begin, end = np.array(ranges, dtype=np.float64).reshape(-1, 2).T
     change = end - begin
@@ -319,8 +322,6 @@ def _drive_values(
 
 def _check_control_ranges(mechanism: Mechanism, driven: Driven, values: FloatArray, log: Run | None) -> None:
     """Raise a `NetworkError` for drives beyond the range of a control, or the limits of a driven joint."""
-    from urmpipe_models.networks.driving import variable_limits
-
     limits = variable_limits(mechanism)[driven.places]
     faults = []
     for k, name in enumerate(driven.names):
@@ -370,50 +371,35 @@ def _find_assembly(
     return found.x[:, number - 1]
 
 
-def _labels(mechanism: Mechanism) -> list[str]:
-    """Return a name per variable: of its owner, numbered where that has several."""
-    counts: dict[str, int] = {}
-    for variable in mechanism.variables:
-        counts[variable.owner] = counts.get(variable.owner, 0) + 1
-    return [
-        variable.owner if counts[variable.owner] == 1 else f"{variable.owner}[{variable.index + 1}]"
-        for variable in mechanism.variables
-    ]
-
-
 def _events(
-    mechanism: Mechanism, moved: Motion, driven: Driven, factors: FloatArray, scaled: FloatArray, t_ns: Any
+    mechanism: Mechanism, moved: Motion, driven: Driven, factors: FloatArray, t_ns: Any
 ) -> Iterator[MotionEvent]:
-    """Yield singular poses, then the limit that ends the motion; `scaled` are the drives in [rad] and [m]."""
-    labels, rows = _labels(mechanism), np.arange(len(t_ns))
-    for pose in moved.singular:
+    """Yield singular poses, then the limit that ends the motion."""
+
+    def event(
+        kind: Any, pose: SingularPose | LimitStop, parts: dict[str, float], message: str
+    ) -> MotionEvent:
+        t = float(np.interp(pose.s, np.arange(len(t_ns)), seconds(t_ns)))
         values = dict(zip(driven.names, (pose.x[driven.places] * factors).tolist(), strict=True))
-        parts = {
-            labels[k]: float(share) for k, share in enumerate(pose.direction.tolist()) if abs(share) > 0.01
-        }
+        return MotionEvent(kind, pose.s, t, values, parts, message.format(at=_at_words(driven, values)))
+
+    for pose in moved.singular:
+        shares = zip(mechanism.labels, pose.direction.tolist(), strict=True)
+        parts = {label: share for label, share in shares if abs(share) > 0.01}
         free = ", ".join(sorted(parts, key=lambda name: -abs(parts[name]))[:4])
-        at = _at_words(driven, values)
         message = {
-            "turns back": f"turns back at {at}: this branch has nothing beyond; there {free} can still move",
-            "branches": f"branches at {at}: motions cross; this one goes straight on, the other moves {free}",
-            "goes through": f"goes through a singular pose at {at}, at which {free} can move by themselves",
+            "turns back": f"turns back at {{at}}: this branch ends there; {free} can still move",
+            "branches": f"branches at {{at}}: this motion goes straight on, the other one moves {free}",
+            "goes through": f"goes through a singular pose at {{at}}; there {free} can move alone",
         }[pose.passage]
-        yield MotionEvent(
-            pose.passage, pose.s, float(np.interp(pose.s, rows, seconds(t_ns))), values, parts, message
-        )
+        yield event(pose.passage, pose, parts, message)
     if moved.stop is not None:
-        variable = mechanism.variables[moved.stop.variable]
-        label = labels[moved.stop.variable]
-        values = {
-            name: float(np.interp(moved.stop.s, rows, column))
-            for name, column in zip(driven.names, scaled.T, strict=True)
-        }
-        is_control = variable.kind == "control"
-        limit = moved.stop.limit * (drive_factor(mechanism.network, variable.owner) if is_control else 1.0)
-        unit = variable.unit or (mechanism.network.unit_of(variable.owner) or ("",))[0]
-        message = f"{label} reaches its limit {text.in_words(limit, unit)}"
-        t = float(np.interp(moved.stop.s, rows, seconds(t_ns)))
-        yield MotionEvent("limit", moved.stop.s, t, values, {}, message)
+        stop = moved.stop
+        control = stop.name if stop.name in {one.name for one in mechanism.network.controls} else ""
+        unit = (mechanism.network.unit_of(control) or ("",))[0] if control else stop.unit
+        limit = stop.limit * (drive_factor(mechanism.network, control) if control else 1.0)
+        words = f"{stop.name} reaches its limit {text.in_words(limit, unit)} at {{at}}"
+        yield event("limit", stop, {}, words)
 
 
 def _at_words(driven: Driven, values: Mapping[str, float]) -> str:
@@ -429,7 +415,7 @@ def _transmissions(
     mechanism: Mechanism, moved: Motion, driven: Driven, factors: FloatArray, values: FloatArray, rates: Rates
 ) -> Iterator[Transmission]:
     """Yield the ratio of each joint variable that follows, and of joints that are functions of the drives."""
-    labels = _labels(mechanism)
+    labels = mechanism.labels
     for k in moved.free.tolist():
         variable = mechanism.variables[k]
         if variable.kind != "joint":
@@ -438,24 +424,26 @@ def _transmissions(
             ratio, moves = rates.transmission[k, d] / factors[d], values[:, d]
             ends = [(float(ratio[row]), float(moves[row])) for row in (np.argmin(ratio), np.argmax(ratio))]
             unit = f"{variable.unit}/{driven.units[d] or '1'}"
-            yield Transmission(labels[k], name, unit, *ends[0], *ends[1], tuple(_zeros(moves, ratio)))
+            yield Transmission(labels[k], name, unit, *ends[0], *ends[1], _find_zeros(moves, ratio))
 
 
-def _zeros(x: FloatArray, y: FloatArray) -> Iterator[float]:
-    """Yield where a curve changes its sign, by a cubic polynomial through the four rows around."""
+def _find_zeros(x: FloatArray, y: FloatArray) -> tuple[float, ...]:
+    """Return where a curve changes its sign, once each, by inverse interpolation between the rows around."""
     size = float(np.abs(y).max(initial=0.0))
+    zeros: list[float] = []
     for k in np.flatnonzero((y[:-1] * y[1:] < 0.0) & (np.diff(x) != 0.0)).tolist():
         if max(abs(y[k]), abs(y[k + 1])) < 1e-9 * size:
             continue  # rounding about 0
-        first = min(max(k - 1, 0), max(len(x) - 4, 0))
-        around = slice(first, first + 4)
-        roots = np.roots(np.polyfit(x[around] - x[k], y[around], min(3, len(x[around]) - 1)))
-        inner = [
-            float(root.real)
-            for root in roots
-            if abs(root.imag) < 1e-9 and 0.0 <= root.real / (x[k + 1] - x[k]) <= 1.0
-        ]
-        yield float(x[k]) + (inner[0] if inner else float(y[k] / (y[k] - y[k + 1]) * (x[k + 1] - x[k])))
+        around = slice(max(k - 1, 0), k + 3)
+        values, steps = y[around], np.diff(y[around])
+        zero = float(x[k] + y[k] / (y[k] - y[k + 1]) * (x[k + 1] - x[k]))
+        if (steps > 0.0).all() or (steps < 0.0).all():  # x as a polynomial of y at y = 0, by Lagrange
+            others = [np.delete(values, i) for i in range(len(values))]
+            weights = [np.prod(rest / (rest - value)) for rest, value in zip(others, values, strict=True)]
+            zero = float(x[around] @ np.array(weights))
+        if not any(abs(zero - other) < 1e-6 * float(np.ptp(x)) for other in zeros):
+            zeros.append(zero)
+    return tuple(zeros)
 
 
 def _forces(

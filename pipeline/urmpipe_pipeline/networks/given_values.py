@@ -12,6 +12,8 @@ from decimal import Decimal
 from numbers import Real
 from typing import Any, TypeAlias
 
+import numpy as np
+
 from urmpipe_models.elementwise import Vector
 from urmpipe_models.errors import Finding, OptionError, for_each, shown
 from urmpipe_models.measure_units import MEASURES, NAMES, WRITTEN, quantity
@@ -60,15 +62,22 @@ def parse_quantity(
     return number
 
 
-def _unit_anddrive_factor(network: Network, name: str) -> tuple[str, Decimal]:
-    """Return the unit of a drive, and how many of it one of its own units is."""
+def _find_unit(network: Network, name: str) -> tuple[str, Decimal]:
+    """Return the unit of a drive, and how many of it one of its own units is; "" of what is no drive."""
     if name in {control.name for control in network.controls}:
         return network.unit_of(name) or ("", Decimal(1))
-    owner, _, index = name.partition("[")
-    joint = next((joint for joint in network.joints if joint.name in (name, owner)), None)
-    place = int(index.rstrip("]") or 1) - 1 if index.rstrip("]").isdigit() else 0
-    known = joint is not None and place < len(joint.units)
-    return (joint.units[place] if joint is not None and known else ""), Decimal(1)
+    for joint in network.joints:
+        for k, unit in enumerate(joint.units, 1):
+            if name in (joint.name, f"{joint.name}[{k}]"):
+                return unit, Decimal(1)
+    return "", Decimal(1)
+
+
+def _as_list(value: Any) -> list[Any]:
+    """Return the parts of a list, of an array, or of a text with commas; of all else, that alone."""
+    if isinstance(value, str):
+        return [*value.split(",")]
+    return [*value] if isinstance(value, (Sequence, np.ndarray)) else [value]
 
 
 def parse_ranges(network: Network, drives: Mapping[str, Range]) -> list[tuple[float, float]]:
@@ -76,13 +85,11 @@ def parse_ranges(network: Network, drives: Mapping[str, Range]) -> list[tuple[fl
 
     def parse(pair: tuple[str, Range]) -> tuple[float, float]:
         name, value = pair
-        unit, factor = _unit_anddrive_factor(network, name)
-        ends: list[Quantity] = [*value.split(":")] if isinstance(value, str) else []
-        ends = ends or ([*value] if isinstance(value, Sequence) else [value])
+        unit, factor = _find_unit(network, name)
+        ends = value.split(":") if isinstance(value, str) else _as_list(value)
         if len(ends) not in (1, 2):
-            raise OptionError(
-                Finding(parameter="drives", found=f"{name} = {shown(value)}", allowed="FROM:TO, or one value")
-            )
+            found, allowed = f"{name} = {shown(value)}", "FROM:TO, or one value"
+            raise OptionError(Finding(parameter="drives", found=found, allowed=allowed))
         read = [parse_quantity(network, "drives", name, end, unit, factor) for end in ends]
         return read[0], read[-1]
 
@@ -95,8 +102,7 @@ def parse_start(network: Network, start: Mapping[str, Any]) -> dict[str, tuple[f
     Values of controls, as an assembly has them, are left out: drives and controls say where these are.
     """
     joints = {joint.name: joint.units for joint in network.joints if joint.units}
-    mechanism = mechanism_of(network)
-    bodies = dict.fromkeys(mechanism.graph.roots[1:], POSE_UNITS)
+    bodies = dict.fromkeys(mechanism_of(network).graph.roots[1:], POSE_UNITS)
     units: dict[str, tuple[str, ...]] = {**bodies, **joints}
     controls = {control.name for control in network.controls}
 
@@ -106,25 +112,37 @@ def parse_start(network: Network, start: Mapping[str, Any]) -> dict[str, tuple[f
             return None
         if name not in units:
             raise OptionError(Finding(f"joint {not_among(name, units)}", parameter="start"))
-        values = value.split(",") if isinstance(value, str) else value
-        values = [values] if isinstance(values, Real) else [*values]
+        values = _as_list(value)
         if len(values) != len(units[name]):
             allowed = f"{len(units[name])} in {', '.join(units[name])}"
             raise OptionError(Finding(parameter="start", found=f"{name} = {shown(value)}", allowed=allowed))
-        read = [
-            parse_quantity(network, "start", name, one, unit, Decimal(1))
-            for one, unit in zip(values, units[name], strict=True)
-        ]
-        return name, tuple(read)
+        pairs = zip(values, units[name], strict=True)
+        return name, tuple(
+            parse_quantity(network, "start", name, one, unit, Decimal(1)) for one, unit in pairs
+        )
 
     return dict(pair for pair in for_each(parse, start.items()) if pair is not None)
 
 
-def _parse_vector(parameter: str, given: str, allowed: str, si: str = "m") -> list[float]:
-    values = [quantity(part, WRITTEN.get(si, {"": Decimal(1)})) for part in given.split(",")]
-    if len(values) not in (3, 6) or not all(map(math.isfinite, values)):
-        raise OptionError(Finding(parameter=parameter, found=shown(given), allowed=allowed))
-    return values
+def _parse_vector(parameter: str, value: Any, counts: tuple[int, ...], si: str, allowed: str) -> list[float]:
+    """Return the numbers of a text such as 1,2,3 or of a list."""
+    numbers = [
+        quantity(part, WRITTEN[si])
+        if isinstance(part, str)
+        else float(part)
+        if isinstance(part, Real)
+        else math.nan
+        for part in _as_list(value)
+    ]
+    if len(numbers) not in counts or not all(map(math.isfinite, numbers)):
+        raise OptionError(Finding(parameter=parameter, found=shown(value), allowed=allowed))
+    return numbers
+
+
+def _check_body(network: Network, parameter: str, body: Any) -> str:
+    if body not in network.body_names:
+        raise OptionError(Finding(f"body {not_among(str(body), network.body_names)}", parameter=parameter))
+    return str(body)
 
 
 def parse_point(network: Network, point: Any) -> tuple[str, Vector] | None:
@@ -132,55 +150,52 @@ def parse_point(network: Network, point: Any) -> tuple[str, Vector] | None:
     if point is None:
         return None
     allowed = "BODY:X,Y,Z in m, or with units, such as coupler:0.45,0.2,0"
-    if isinstance(point, str):
-        body, sign, place = point.rpartition(":")
-        if not sign:
-            body, place = point, "0,0,0"
-        values = _parse_vector("point", place, allowed)
-    else:
-        body, values = point[0], [float(value) for value in point[1]]
-    if body not in network.body_names:
-        raise OptionError(Finding(f"body {not_among(str(body), network.body_names)}", parameter="point"))
-    if len(values) != 3 or not all(map(math.isfinite, values)):
+    parts = _as_list(point) if not isinstance(point, str) else [*point.rpartition(":")[::2]]
+    if isinstance(point, str) and ":" not in point:
+        parts = [point, "0,0,0"]
+    if len(parts) != 2:
         raise OptionError(Finding(parameter="point", found=shown(point), allowed=allowed))
-    return body, (values[0], values[1], values[2])
+    x, y, z = _parse_vector("point", parts[1], (3,), "m", allowed)
+    return _check_body(network, "point", parts[0]), (x, y, z)
 
 
-def parse_wrench(network: Network, wrench: str | Wrench) -> Wrench:
+def parse_wrench(network: Network, wrench: Any) -> Wrench:
     """Return a load on a body."""
     allowed = "BODY:X,Y,Z:FX,FY,FZ[,MX,MY,MZ] in m, N and N.m, such as coupler:0,0,0:0,-50,0"
-    if isinstance(wrench, str):
-        body, _, rest = wrench.partition(":")
-        place, sign, load = rest.partition(":")
-        if not sign:
-            raise OptionError(Finding(parameter="wrenches", found=shown(wrench), allowed=allowed))
-        at, forces = _parse_vector("wrenches", place, allowed), _parse_vector("wrenches", load, allowed, "1")
-        forces += [0.0] * (6 - len(forces))
-        wrench = Wrench(
-            body, (at[0], at[1], at[2]), (forces[0], forces[1], forces[2]), (forces[3], forces[4], forces[5])
-        )
-    if wrench.body not in network.body_names:
-        raise OptionError(Finding(f"body {not_among(wrench.body, network.body_names)}", parameter="wrenches"))
-    return wrench
+    parts: list[Any] = wrench.split(":") if isinstance(wrench, str) else []
+    if isinstance(wrench, Wrench):
+        parts = [wrench.body, wrench.point, [*wrench.force, *wrench.moment]]
+    if len(parts) != 3:
+        raise OptionError(Finding(parameter="wrenches", found=shown(wrench), allowed=allowed))
+    x, y, z = _parse_vector("wrenches", parts[1], (3,), "m", allowed)
+    load = _parse_vector("wrenches", parts[2], (3, 6), "1", allowed) + [0.0] * 3
+    body = _check_body(network, "wrenches", parts[0])
+    return Wrench(body, (x, y, z), (load[0], load[1], load[2]), (load[3], load[4], load[5]))
 
 
-def parse_torques(network: Network, torques: Mapping[str, float | str]) -> dict[str, float]:
+def format_wrench(wrench: Wrench) -> str:
+    """Return a load as `parse_wrench` reads it."""
+    place, load = (
+        ",".join(f"{value!r}" for value in values)
+        for values in (wrench.point, (*wrench.force, *wrench.moment))
+    )
+    return f"{wrench.body}:{place}:{load}"
+
+
+def parse_torques(network: Network, torques: Mapping[str, Any]) -> dict[str, float]:
     """Return loads at joints in [N.m] or [N], by name."""
     joints = {joint.name: joint for joint in network.joints if joint.units and joint.kind != "global"}
 
-    def parse(pair: tuple[str, float | str]) -> tuple[str, float]:
+    def parse(pair: tuple[str, Any]) -> tuple[str, float]:
         name, value = pair
         if name not in joints:
             raise OptionError(Finding(f"joint {not_among(name, joints)}", parameter="torques"))
-        number = (
-            quantity(value, {"": Decimal(1), "N": Decimal(1), "N.m": Decimal(1), "Nm": Decimal(1)})
-            if isinstance(value, str)
-            else value
-        )
-        if not math.isfinite(number):
-            raise OptionError(
-                Finding(parameter="torques", found=f"{name} = {value}", allowed="a number in N.m or N")
-            )
+        units = ("N.m", "Nm") if joints[name].units[0] == "rad" else ("N",)
+        known = dict.fromkeys(("", *units), Decimal(1))
+        number = quantity(value, known) if isinstance(value, str) else value
+        if isinstance(number, bool) or not isinstance(number, Real) or not math.isfinite(float(number)):
+            found = f"{name} = {shown(value)}"
+            raise OptionError(Finding(parameter="torques", found=found, allowed=f"a number in {units[0]}"))
         return name, float(number)
 
     return dict(for_each(parse, torques.items()))

@@ -367,20 +367,17 @@ class NetworkMotion(Result):
 def _joint_columns(mechanism: Mechanism) -> Iterator[tuple[str, str, Any]]:
     """Yield name, unit and value, a function of the variables, of joint variables and controls of lengths."""
     network = mechanism.network
-    texts = {drive.text for joint in network.joints for drive in joint.drives if drive is not None}
+    drives = [drive for joint in network.joints for drive in joint.drives if drive is not None]
+    shown = {network.control_alone(drive.text) for drive in drives}
     for joint in network.joints:
         for k, unit in enumerate(joint.units):
             name = joint.name if len(joint.units) == 1 else f"{joint.name}_{k + 1}"
             yield name, unit, partial(_joint_value, mechanism, joint, k)
     for control in network.controls:
         unit_factor = network.unit_of(control.name)
-        spelled = (control.name, f"({control.name}) * 0.001", f"({control.name}) * pi / 180")
-        if unit_factor is not None and not texts & set(spelled):
-            yield (
-                control.name,
-                unit_factor[0],
-                partial(_control_value, mechanism, control.name, float(unit_factor[1])),
-            )
+        if unit_factor is not None and control.name not in shown:
+            value = partial(_control_value, mechanism, control.name, float(unit_factor[1]))
+            yield control.name, unit_factor[0], value
 
 
 def _joint_value(mechanism: Mechanism, joint: Any, k: int, x: Any) -> Any:
