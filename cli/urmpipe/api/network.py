@@ -29,7 +29,7 @@ from urmpipe_pipeline.operands import load_runs
 from urmpipe_pipeline.outputs import MOTION_ROW, OutputKind
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.sources import TableLike, held_of, is_table
+from urmpipe_pipeline.sources import TableLike, held_of
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.tables.joint_file import write_joint_log
 
@@ -272,7 +272,7 @@ def _read_log(
         return log
     controls = [control.name for control in network.controls if control.value is None]
     named = [str(column) for column in drives.values()] or controls
-    operand = held_of(log, "log") if is_table(log) else Path(log)
+    operand = Path(log) if isinstance(log, (str, Path)) else held_of(log, "log")
     load = partial(load_runs, [operand], tsp=tsp, derivative=derivative)
     if named and reading.get("joints") is None:
         try:
