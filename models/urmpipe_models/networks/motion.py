@@ -42,6 +42,7 @@ CORRECTIONS = 7  # Newton steps of a corrector; four are usual
 CONVERGED = 1e-10  # size of a Newton step after which the next one is rounding
 ROUNDING = 1e-13  # residual of a closed configuration, in lengths of the mechanism and rad
 CROSSING = 1e-4  # determinant, as a share of that at the last node, which counts as 0: rounding is 1e-5
+NOISE = 1e-6  # rounding of a tangent at most, next to a pose where branches nearly meet; 2e-10 was seen
 SINGULAR = 1e-6  # smallest singular value of the scaled Jacobian that counts as 0
 STENCIL = 2e-3  # arc length between the configurations around a singular pose that interpolate it
 OVERRUN = 0.02  # arc length of the drive that is traced beyond an end near a singular pose
@@ -382,7 +383,7 @@ class _Tracer:
                 high, at_high = middle, value
             if high - low < 1e-15:
                 break
-        return best if max(abs(at_low), abs(at_high)) < 1e3 * tolerance else None
+        return best if max(abs(at_low), abs(at_high)) < max(1e3 * tolerance, NOISE) else None
 
     def _touch(self, there: Node) -> None:
         """Record a singular pose that the motion passes without a change of its orientation."""
