@@ -98,7 +98,7 @@ def assemble(
         mechanism: The network.
         controls: Values to hold controls at instead of their starts.
         start: Values of joints, and of bodies with freedoms of their own, to be near to instead of the
-            network's start, by name, in [rad] and [m]; of variables that controls drive they count nothing.
+            network's start, by name, in [rad] and [m]; then only these count for the distance.
         every: Whether all assemblies are sought.
         restarts: Random starts in a row without anything new that end the search; 0: the own start alone.
         seed: Of the random starts.
@@ -108,12 +108,16 @@ def assemble(
         NetworkError: If a control is not of the network, or its value out of its range.
     """
     begin = start_with(mechanism, controls or {})
-    for name, values in (start or {}).items():
-        for index, value in enumerate(values):
-            if (name, index) in mechanism.places:
-                begin[mechanism.places[name, index]] = value
+    named = [
+        (mechanism.places[name, index], value)
+        for name, values in (start or {}).items()
+        for index, value in enumerate(values)
+        if (name, index) in mechanism.places
+    ]
+    for place, value in named:
+        begin[place] = value
     own = descend(mechanism, begin[:, np.newaxis], mechanism.free)
-    found = _Found(mechanism, begin)
+    found = _Found(mechanism, begin, [place for place, _ in named])
     closed = any(found.add(own))
     tried, reason = 1, "the start closes"
     rng = np.random.default_rng(seed)
@@ -121,9 +125,9 @@ def assemble(
         tried, reason = _search(found, False, restarts, rng, progress)
     continuum = _continuum(mechanism, found.kept[0]) if found.kept else 0
     if found.kept and not continuum:
-        _seek_nearer(found, min(restarts, NEARER), seed)
-        if every or start:  # the others tell how clearly the nearest one is the nearest
-            more, reason = _search(found, True, restarts if every else min(restarts, NEARER), rng, progress)
+        _seek_nearer(found, 0 if named else min(restarts, NEARER), seed)
+        if every or named:  # near in a few joints may be far in the others
+            more, reason = _search(found, True, restarts, rng, progress)
             tried += more - 1
     if continuum and every:
         reason = (
@@ -245,12 +249,13 @@ def _continuum(mechanism: Mechanism, x: FloatArray) -> int:
 class _Found:
     """The assemblies that were found, each once, and what came nearest to closing."""
 
-    def __init__(self, mechanism: Mechanism, start: FloatArray) -> None:
+    def __init__(self, mechanism: Mechanism, start: FloatArray, named: Sequence[int] = ()) -> None:
         self.mechanism, self.start = mechanism, start
         self.kept: list[FloatArray] = []
         self._places: list[FloatArray] = []
         self._spins = idle_spins(mechanism)
         self._nearest, self._gap = start, np.inf
+        self._counted = np.array(named, dtype=np.intp) if named else np.arange(len(start))
 
     def add(self, ends: Reached) -> Iterator[bool]:
         """Yield of each configuration, in turn, whether it closes and is new: then it is kept."""
@@ -286,7 +291,7 @@ class _Found:
         for some in self.mechanism.rotations:
             turn = rotation_of(tuple(start[some])).inverse() @ rotation_of(tuple(x[some]))
             apart[some] = gap_of(turn, x.shape[1])[3:]
-        return np.asarray(np.linalg.norm(apart, axis=0))
+        return np.asarray(np.linalg.norm(apart[self._counted], axis=0))
 
     def result(self, every: bool, tried: int, reason: str, *, elsewhere: bool, continuum: int) -> Assembled:
         """Return the nearest assembly, or every one, sorted by the distance from the start."""

@@ -13,6 +13,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -29,6 +30,7 @@ from urmpipe_models.networks.motion import (
     Drive,
     LimitStop,
     SingularPose,
+    Slopes,
     Trace,
     sample,
     trace,
@@ -66,6 +68,9 @@ class Motion:
         spins: The number of idle spins, which stay as at the start.
         singular: Singular poses, in their order; their s is the row, from 0, with a fraction.
         stop: The limit that ends the motion early, its s likewise; None without one.
+        change: How the prescribed variables change along the line of the drives, shape (variables,); None if
+            they are not on a line.
+        slopes: Derivatives along that line next to points where branches meet.
     """
 
     x: FloatArray
@@ -73,6 +78,8 @@ class Motion:
     spins: int
     singular: tuple[SingularPose, ...] = ()
     stop: LimitStop | None = None
+    change: FloatArray | None = None
+    slopes: tuple[Slopes, ...] = ()
 
 
 def find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
@@ -94,8 +101,11 @@ def find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
                 fault = f"{name} is a function of other controls, allowed: a control that can be set"
             owner, index = name, 0
         elif owner not in joints:
-            driven = [*(control for control in controls if controls[control].value is None), *joints]
-            fault = f"drive {not_among(name, driven)}"
+            free = [name for name, joint in joints.items() if None in joint.drives]
+            allowed = [*(name for name, control in controls.items() if control.value is None), *free]
+            fault = (
+                f"drive {not_among(name, allowed)}" if allowed else f"found {name}, but nothing can be driven"
+            )
         else:
             fault = _joint_fault(name, owner, index, joints[owner].units, joints[owner].drives)
             index = max(index or 1, 1) - 1
@@ -228,7 +238,7 @@ def move_to(
     branch = Trace() if singular else trace(drive, 0.0)
     if not branch.complete:
         return x, branch
-    return unspun(mechanism, idle_spins(mechanism), sample(drive, branch, np.ones(1)), x)[:, 0], branch
+    return unspun(mechanism, idle_spins(mechanism), sample(drive, branch, np.ones(1))[0], x)[:, 0], branch
 
 
 def drive_rows(
@@ -320,25 +330,39 @@ def _drive_along(
     ways = {end: trace(drive, at, end, progress) for end in (1.0, 0.0) if (at < end if end else at > 0.0)}
     back, forward = ways.get(0.0, Trace(complete=True)), ways.get(1.0, Trace(complete=True))
     segments = back.segments + forward.segments
-    if not segments:
-        _refuse_begin(driven, values[0], forward if back.complete else back)
-    ends = segments[0][0].z[-1] / drive.length, segments[-1][1].z[-1] / drive.length
-    if shares[0] < ends[0] - SAME_PLACE or shares[0] > ends[1] + SAME_PLACE:
-        _refuse_begin(driven, values[0], back if shares[0] < ends[0] else forward)
+    ends = _check_ends(driven, values[0], float(shares[0]), back, forward, drive.length)
     outside = (shares < ends[0] - SAME_PLACE) | (shares > ends[1] + SAME_PLACE)
     count = int(np.argmax(outside)) if outside.any() else len(shares)
     branch = Trace(segments, [*back.singular, *forward.singular])
-    motion = sample(drive, branch, np.clip(shares[:count], *ends))
+    motion, slopes = sample(drive, branch, np.clip(shares[:count], *ends))
     motion[places] = values[:count].T
     motion = unspun(mechanism, idle_spins(mechanism), motion, x)
-    rows = shares[: count + 1]
-    poses = [
-        replace(pose, s=row) for pose, _ in branch.singular if (row := _find_row(rows, pose.s)) is not None
-    ]
-    stop = forward.stop if outside.any() and shares[count] > ends[1] else back.stop if outside.any() else None
-    if stop is not None:
-        stop = replace(stop, s=_find_row(rows, stop.s) or 0.0)
-    return Motion(motion, free, drive.spins, tuple(sorted(poses, key=lambda pose: pose.s)), stop)
+    row = partial(_find_row, shares[: count + 1])
+    rows = [(pose, row(pose.s)) for pose, _ in branch.singular]
+    poses = [replace(pose, s=place) for pose, place in rows if place is not None]
+    poses.sort(key=lambda pose: pose.s)
+    stop = None
+    if outside.any():
+        stop = forward.stop if shares[count] > ends[1] else back.stop
+        stop = None if stop is None else replace(stop, s=row(stop.s) or 0.0)
+    return Motion(motion, free, drive.spins, tuple(poses), stop, change, tuple(slopes))
+
+
+def _check_ends(
+    driven: Driven, begin: FloatArray, share: float, back: Trace, forward: Trace, length: float
+) -> tuple[float, float]:
+    """Return the places on a line to which its branch reaches.
+
+    Raises:
+        NetworkError: If the first row is beyond them.
+    """
+    segments = back.segments + forward.segments
+    if not segments:
+        _refuse_begin(driven, begin, forward if back.complete else back)
+    ends = float(segments[0][0].z[-1]) / length, float(segments[-1][1].z[-1]) / length
+    if share < ends[0] - SAME_PLACE or share > ends[1] + SAME_PLACE:
+        _refuse_begin(driven, begin, back if share < ends[0] else forward)
+    return ends
 
 
 def _check_length(driven: Driven, length: float) -> None:
@@ -440,7 +464,7 @@ def _refuse_begin(driven: Driven, begin: FloatArray, branch: Trace) -> None:
 def _values_words(driven: Driven, values: FloatArray) -> str:
     """Return the drives with values, as controls are given, in [rad] and [m] of joints."""
     return ", ".join(
-        f"{name} = {value:.6g}" for name, value in zip(driven.names, values.tolist(), strict=True)
+        f"{name} = {value:.9g}" for name, value in zip(driven.names, values.tolist(), strict=True)
     )
 
 

@@ -21,7 +21,7 @@ from urmpipe_models.arrays import FloatArray, IndexArray
 from urmpipe_models.elementwise import Vector, cross, dot, subtract
 from urmpipe_models.networks.closure import body_twists, closure_of, wrench_carriers
 from urmpipe_models.networks.mechanism import Mechanism, Posed
-from urmpipe_models.networks.motion import iter_chunks
+from urmpipe_models.networks.motion import Slopes, iter_chunks
 from urmpipe_models.networks.parts import Joint
 from urmpipe_models.transform import Transform
 
@@ -70,6 +70,7 @@ def compute_forces(
     free: IndexArray,
     wrenches: Sequence[Wrench] = (),
     torques: Mapping[str, float] | None = None,
+    slopes: Sequence[Slopes] = (),
 ) -> Forces:
     """Return the forces that hold a network under loads.
 
@@ -80,6 +81,9 @@ def compute_forces(
         free: The numbers of those that follow, shape (free,) [-].
         wrenches: Loads on bodies.
         torques: Loads on the first variable of joints, by their names, in [N.m] or [N].
+        slopes: Derivatives along the line of the drives at samples where branches meet. There the force of a
+            single drive follows from virtual work along the branch; those of several drives, and the
+            reactions, are not determined.
     """
     n = x.shape[1]
     drives = np.zeros((len(driven), n))
@@ -91,6 +95,12 @@ def compute_forces(
         drives[:, rows] = own.drives
         for name, values in own.reactions().items():
             reactions[name][:, rows] = values
+    for near, first, _ in slopes:
+        own = _Equilibrium(mechanism, x[:, near], driven, free, wrenches, torques or {})
+        work = -np.einsum("vk,vk->k", own.forces, first)
+        drives[:, near] = work / first[driven] if len(driven) == 1 else np.nan
+        for values in reactions.values():
+            values[:, near] = np.nan
     return Forces(drives, reactions)
 
 
@@ -117,6 +127,7 @@ class _Equilibrium:
                 value = mechanism.joint_values(joint, x)[0]
                 for place, slope in value.slopes.items():
                     forces[place] += torques[joint.name] * slope
+        self.forces = forces
         jacobian = closure_of(mechanism, x).jacobian * mechanism.row_scales[:, np.newaxis, np.newaxis]
         followers = jacobian[:, free] * mechanism.column_scales[free, np.newaxis]
         left, values, right = np.linalg.svd(followers.transpose(2, 0, 1))

@@ -44,7 +44,7 @@ ROUNDING = 1e-13  # residual of a closed configuration, in lengths of the mechan
 CROSSING = 1e-4  # determinant, as a share of that at the last node, which counts as 0: rounding is 1e-5
 NOISE = 1e-6  # rounding of a tangent at most, next to a pose where branches nearly meet; 2e-10 was seen
 SINGULAR = 1e-6  # smallest singular value of the scaled Jacobian that counts as 0
-STENCIL = 2e-3  # arc length between the configurations around a singular pose that interpolate it
+STENCIL = 4e-3  # arc length between the configurations around a singular pose that interpolate it
 OVERRUN = 0.02  # arc length of the drive that is traced beyond an end near a singular pose
 MAX_LENGTH = 2000.0  # scaled length of a drive: 300 turns of a crank, which take some minutes
 CHUNK = 4096  # configurations solved side by side: their Jacobians fit the cache
@@ -530,8 +530,22 @@ def _share_of(here: Node, there: Node, coordinate: int, value: float) -> float:
 # ---------------------------------------------------------------------------------------- samples
 
 
-def sample(drive: Drive, branch: Trace, s: FloatArray) -> FloatArray:
-    """Return the configurations of a trace at places s, shape (variables, n).
+class Slopes(NamedTuple):
+    """Derivatives along a drive where Jacobians do not give them, next to points where branches meet.
+
+    Attributes:
+        rows: The numbers of the samples, shape (k,) [-].
+        first: dx/ds, shape (variables, k).
+        second: d2x/ds2, shape (variables, k).
+    """
+
+    rows: IndexArray
+    first: FloatArray
+    second: FloatArray
+
+
+def sample(drive: Drive, branch: Trace, s: FloatArray) -> tuple[FloatArray, list[Slopes]]:
+    """Return the configurations of a trace at places s, shape (variables, n), and slopes at branch points.
 
     Args:
         drive: The drive.
@@ -551,25 +565,28 @@ def sample(drive: Drive, branch: Trace, s: FloatArray) -> FloatArray:
         z = curve.at(curve.shares(at[rows]))
         z[-1] = at[rows]
         x[:, rows] = settle(drive.mechanism, drive.at(z), drive.free)[0]
-    for pose, node in branch.singular:
-        _interpolate(drive, pose, node, at, x)
-    return x
+    found = [_interpolate(drive, pose, node, at, x) for pose, node in branch.singular]
+    return x, [slopes for slopes in found if slopes is not None]
 
 
-def _interpolate(drive: Drive, pose: SingularPose, node: Node, at: FloatArray, x: FloatArray) -> None:
+def _interpolate(
+    drive: Drive, pose: SingularPose, node: Node, at: FloatArray, x: FloatArray
+) -> Slopes | None:
     """Replace configurations next to a singular pose, where Newton's method loses half of the digits.
 
     The branch is smooth in its arc length through the pose, where it turns back, too: a polynomial passes
     through eight configurations around it. Where s has its extreme, only the way there is of the motion.
+    Where the polynomial does not close, as at two singular poses next to each other, nothing is replaced.
     """
     places = np.array([-4.0, -3.0, -2.0, -1.0, 1.0, 2.0, 3.0, 4.0])
     around = [
         drive.correct(node.z + STENCIL * place * node.tangent, node.tangent) for place in places.tolist()
     ]
     if any(z is None for z in around):
-        return
+        return None
     terms = [np.polynomial.Polynomial.fit(places, values, 7) for values in np.array(around).T]
-    last = 0.0 if pose.passage == "turns back" else 1.0
+    turns = pose.passage == "turns back"
+    last = 0.0 if turns else 1.0
     inner = np.linspace(-1.0, last, 2001)
     s = terms[-1](inner)
     order = np.argsort(s)
@@ -583,7 +600,19 @@ def _interpolate(drive: Drive, pose: SingularPose, node: Node, at: FloatArray, x
         place = np.clip(place + step, -1.0, last)
     z = np.array([term(place) for term in terms])
     z[-1] = at[near]
+    residual = scaled_closure(drive.mechanism, drive.at(z)).residual
+    if not len(near) or np.abs(residual).max(initial=0.0) > 1e2 * ROUNDING:
+        return None
     x[:, near] = drive.at(z)
+    if turns:
+        return None
+    first, second = (np.array([term.deriv(k)(place) for term in terms]) for k in (1, 2))
+    rates = first / first[-1] * drive.length
+    curvatures = (second - first / first[-1] * second[-1]) / np.square(first[-1]) * drive.length**2
+    slopes = [np.repeat(drive.change[:, np.newaxis], len(near), axis=1), np.zeros((len(drive.x), len(near)))]
+    scales = drive.scales[:, np.newaxis]
+    slopes[0][drive.free], slopes[1][drive.free] = rates[:-1] * scales, curvatures[:-1] * scales
+    return Slopes(near, slopes[0], slopes[1])
 
 
 def settle(

@@ -26,7 +26,7 @@ from urmpipe_models.networks.closure import scaled_closure
 from urmpipe_models.networks.descent import FLOOR
 from urmpipe_models.networks.idle_spins import idle_spins, spin_angles
 from urmpipe_models.networks.mechanism import Mechanism
-from urmpipe_models.networks.motion import iter_chunks
+from urmpipe_models.networks.motion import Slopes, iter_chunks
 from urmpipe_models.networks.newton import closure_residual, cut_frames
 from urmpipe_models.taylor import Taylor
 
@@ -58,6 +58,7 @@ def compute_rates(
     driven: IndexArray,
     free: IndexArray,
     spins: int,
+    slopes: Sequence[Slopes] = (),
 ) -> Rates:
     """Return the rates of the variables that follow.
 
@@ -69,6 +70,8 @@ def compute_rates(
         driven: Their numbers, shape (driven,) [-].
         free: The numbers of the variables that follow, shape (free,) [-].
         spins: How many idle spins there are: they stay as they are.
+        slopes: Derivatives along the line of the drives at samples where branches meet: x' = x_s s' and
+            x'' = x_ss s'^2 + x_s s'' there. The transmission by each of several drives is NaN there.
     """
     velocity, acceleration = np.zeros_like(x), np.zeros_like(x)
     velocity[driven], acceleration[driven] = xd, xdd
@@ -94,6 +97,14 @@ def compute_rates(
         values = np.linalg.svd(followers.transpose(2, 0, 1), compute_uv=False)
         if (place := len(free) - spins - 1) < values.shape[1] and place >= 0:
             distance[rows] = values[:, place]
+    for near, first, second in slopes:
+        along = first[driven] / np.einsum("dk,dk->k", first[driven], first[driven])
+        speed, change = (np.einsum("dk,dk->k", along, rates[:, near]) for rates in (xd, xdd))
+        velocity[:, near], acceleration[:, near] = first * speed, second * speed**2 + first * change
+        is_single = len(driven) == 1
+        ratios = first[free] / first[driven[0]] if is_single else np.full_like(first[free], np.nan)
+        for k in range(len(driven)):
+            transmission[free[:, np.newaxis], k, near] = ratios
     return Rates(velocity, acceleration, transmission, distance)
 
 

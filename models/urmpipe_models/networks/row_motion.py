@@ -193,7 +193,7 @@ class _Follower:
                     if branch.stop is not None:
                         self.motion.stop = replace(branch.stop, s=row + branch.stop.s)
                     return row, x
-                x = sample(drive, branch, np.ones(1))[:, 0]
+                x = sample(drive, branch, np.ones(1))[0][:, 0]
             x = unspun(self.mechanism, self.spins, x[:, np.newaxis], self.start)[:, 0]
             self.motion.x[:, row + 1] = x
         return second, x

@@ -60,6 +60,8 @@ from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.runs.results import Run
 
 DEFAULT_STEPS = 200
+MAX_ZERO_STEP = 0.5  # scaled step of a drive between rows, above which zeros between them are missed
+MIN_RATIO = 1e-9  # a transmission whose size stays below is rounding
 MAX_ROWS = 10_000_000  # of a motion: about 2 GB of variables and rates of a network of ten
 
 
@@ -184,7 +186,14 @@ def drive_network(
     if n == 0:
         raise NetworkError(Finding("the motion ends before its first row", parameter="drives"))
     rates = compute_rates(
-        mechanism, moved.x, d_values[:n].T, dd_values[:n].T, driven.places, moved.free, moved.spins
+        mechanism,
+        moved.x,
+        d_values[:n].T,
+        dd_values[:n].T,
+        driven.places,
+        moved.free,
+        moved.spins,
+        moved.slopes,
     )
     progress(0.9)
     forces = None
@@ -234,7 +243,8 @@ def _find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
     if not names:
         network = mechanism.network
         controls = [control.name for control in network.controls if control.value is None]
-        listed = ", ".join(controls or [joint.name for joint in network.joints])
+        free = [joint.name for joint in network.joints if None in joint.drives]
+        listed = ", ".join(controls or free) or "a network with a control or a joint that can be driven"
         message = f"found nothing that drives {network.name}, allowed: {listed}"
         raise OptionError(Finding(message, parameter="drives"))
     return find_driven(mechanism, names)
@@ -398,13 +408,15 @@ def _events(
         control = stop.name if stop.name in {one.name for one in mechanism.network.controls} else ""
         unit = (mechanism.network.unit_of(control) or ("",))[0] if control else stop.unit
         limit = stop.limit * (drive_factor(mechanism.network, control) if control else 1.0)
-        words = f"{stop.name} reaches its limit {text.in_words(limit, unit)} at {{at}}"
+        words = text.in_words(limit, unit) if unit else f"{limit:.6g}"
+        words = f"{stop.name} reaches its limit {words} at {{at}}"
         yield event("limit", stop, {}, words)
 
 
 def _at_words(driven: Driven, values: Mapping[str, float]) -> str:
+    values = {name: round(value, 12) + 0.0 for name, value in values.items()}
     words = [
-        f"{name} = {values[name]:.6g}{f' {unit}' if unit else ''}"
+        f"{name} = {values[name]:.9g}{f' {unit}' if unit else ''}"
         + (f" ({math.degrees(values[name]):.4f} deg)" if unit == "rad" else "")
         for name, unit in zip(driven.names, driven.units, strict=True)
     ]
@@ -418,19 +430,30 @@ def _transmissions(
     labels = mechanism.labels
     for k in moved.free.tolist():
         variable = mechanism.variables[k]
-        if variable.kind != "joint":
+        unit, factor = variable.unit, 1.0
+        if variable.kind == "control":  # that follows a joint driven in its place
+            unit, decimal = mechanism.network.unit_of(variable.owner) or ("1", 1)
+            factor = float(decimal)
+        if variable.kind == "body":
             continue
         for d, name in enumerate(driven.names):
-            ratio, moves = rates.transmission[k, d] / factors[d], values[:, d]
-            ends = [(float(ratio[row]), float(moves[row])) for row in (np.argmin(ratio), np.argmax(ratio))]
-            unit = f"{variable.unit}/{driven.units[d] or '1'}"
-            yield Transmission(labels[k], name, unit, *ends[0], *ends[1], _find_zeros(moves, ratio))
+            ratio, moves = rates.transmission[k, d] * factor / factors[d], values[:, d]
+            if not np.isfinite(ratio).any():
+                continue
+            rows = (np.nanargmin(ratio), np.nanargmax(ratio))
+            ends = [(float(ratio[row]), float(moves[row])) for row in rows]
+            per = f"{unit}/{driven.units[d] or '1'}"
+            steps = np.abs(np.diff(values[:, d] / factors[d])) / mechanism.column_scales[driven.places[d]]
+            zeros = _find_zeros(moves, ratio) if steps.max(initial=0.0) < MAX_ZERO_STEP else ()
+            yield Transmission(labels[k], name, per, *ends[0], *ends[1], zeros)
 
 
 def _find_zeros(x: FloatArray, y: FloatArray) -> tuple[float, ...]:
     """Return where a curve changes its sign, once each, by inverse interpolation between the rows around."""
-    size = float(np.abs(y).max(initial=0.0))
+    size, span = float(np.nanmax(np.abs(y), initial=0.0)), float(np.ptp(x))
     zeros: list[float] = []
+    if size < MIN_RATIO:
+        return ()
     for k in np.flatnonzero((y[:-1] * y[1:] < 0.0) & (np.diff(x) != 0.0)).tolist():
         if max(abs(y[k]), abs(y[k + 1])) < 1e-9 * size:
             continue  # rounding about 0
@@ -441,7 +464,8 @@ def _find_zeros(x: FloatArray, y: FloatArray) -> tuple[float, ...]:
             others = [np.delete(values, i) for i in range(len(values))]
             weights = [np.prod(rest / (rest - value)) for rest, value in zip(others, values, strict=True)]
             zero = float(x[around] @ np.array(weights))
-        if not any(abs(zero - other) < 1e-6 * float(np.ptp(x)) for other in zeros):
+        zero = 0.0 if abs(zero) < 1e-12 * span else zero
+        if not any(abs(zero - other) < 1e-6 * span for other in zeros):
             zeros.append(zero)
     return tuple(zeros)
 
@@ -455,7 +479,7 @@ def _forces(
     torques: Mapping[str, float],
 ) -> MotionForces:
     """Return static forces as tables of columns."""
-    found = compute_forces(mechanism, moved.x, driven.places, moved.free, wrenches, torques)
+    found = compute_forces(mechanism, moved.x, driven.places, moved.free, wrenches, torques, moved.slopes)
     names: list[str] = []
     columns: list[FloatArray] = []
     for name, values in found.reactions.items():

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from urmpipe_models.networks.expressions import Expression
 from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import ConstraintElement, Control, Joint, JointKind
+from urmpipe_models.networks.parts import ConstraintElement, Control, Joint, JointKind, spellings
 
 LETTERS: dict[JointKind, str] = {
     "revolute": "R",
@@ -50,6 +50,9 @@ def drive_words(one: Tie) -> str:
     some = formulas(one)
     if not is_driven(one):
         return ""
+    alone = [name for part in some for name in part.names if part.text in spellings(name)]
+    if len(some) == 1 and alone:  # without the factor of the file's unit
+        return f"= {alone[0]}"
     if len(some) == 1 and len(some[0].text) <= SHORT:
         return f"= {some[0].text.strip()}"
     names = sorted(set().union(*(part.names for part in some)))

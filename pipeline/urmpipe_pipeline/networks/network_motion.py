@@ -353,12 +353,12 @@ class NetworkMotion(Result):
     def _forces_dict(self) -> dict[str, Any] | None:
         if self.forces is None:
             return None
-        largest = np.abs(self.forces.drives).max(axis=0)
-        unknown = np.flatnonzero(np.isnan(self.forces.reactions).any(axis=0)).tolist()
+        largest = np.nanmax(np.abs(self.forces.drives), axis=0)
+        unknown = np.flatnonzero(np.isnan(self.forces.reactions).all(axis=0)).tolist()
         return {
             "drives": {one.name: float(largest[k]) for k, one in enumerate(self.drives)},
             "reactions": {
-                name: None if k in unknown else float(np.abs(self.forces.reactions[:, k]).max())
+                name: None if k in unknown else float(np.nanmax(np.abs(self.forces.reactions[:, k])))
                 for k, name in enumerate(self.forces.names)
             },
         }
@@ -458,10 +458,7 @@ def present(motion: NetworkMotion) -> Presentation:
 
 def headline(motion: NetworkMotion) -> str:
     """Return what drives the network, how far it moves, and what ends the motion."""
-    ranges = ", ".join(
-        f"{drive.name} {text.in_words(drive.begin, drive.unit)} to {text.in_words(drive.end, drive.unit)}"
-        for drive in motion.drives[:NAMED]
-    )
+    ranges = ", ".join(_range_words(motion, drive) for drive in motion.drives[:NAMED])
     ranges += f" and {len(motion.drives) - NAMED} more" if len(motion.drives) > NAMED else ""
     rows, duration = text.counted(len(motion), "row"), text.seconds(float(motion.t[-1]))
     if motion.complete:
@@ -470,6 +467,13 @@ def headline(motion: NetworkMotion) -> str:
         return f"{motion.name}: {ranges}, {rows} in {duration} s{through}"
     why = motion.events[-1].message if motion.events else "no step of the continuation succeeds"
     return f"{motion.name}: {ranges}, {rows} of {motion.requested} in {duration} s: {why}"
+
+
+def _range_words(motion: NetworkMotion, drive: DriveRange) -> str:
+    """Return how far a drive moves; by a log not where it begins and ends, as it may swing."""
+    if motion.law == "log":
+        return f"{drive.name} by a log"
+    return f"{drive.name} {_value_words(drive.begin, drive.unit)} to {_value_words(drive.end, drive.unit)}"
 
 
 def _facts(motion: NetworkMotion) -> Iterator[Fact]:
@@ -504,9 +508,9 @@ def _tables(motion: NetworkMotion) -> Iterator[Table]:
             "variable": ("Variable", lambda ratio: ratio.variable),
             "drive": ("Drive", lambda ratio: ratio.drive),
             "unit": ("Unit", lambda ratio: ratio.unit),
-            "smallest": ("Smallest", lambda ratio: Value(float(f"{ratio.smallest:.6g}"), "1")),
+            "smallest": ("Smallest", lambda ratio: _number_words(ratio.smallest)),
             "smallest_at": ("at", lambda ratio: Value(ratio.smallest_at, units[ratio.drive])),
-            "largest": ("Largest", lambda ratio: Value(float(f"{ratio.largest:.6g}"), "1")),
+            "largest": ("Largest", lambda ratio: _number_words(ratio.largest)),
             "largest_at": ("at ", lambda ratio: Value(ratio.largest_at, units[ratio.drive])),
             "dead_points": (
                 "Dead points at",
@@ -527,8 +531,16 @@ def _drive_cell(name: str, unit: str, event: MotionEvent) -> Value:
     return Value(event.values[name], unit)
 
 
+def _number_words(value: float) -> str:
+    return f"{0.0 if abs(value) < 1e-9 else value:.4g}"
+
+
+def _value_words(value: float, unit: str) -> str:
+    return text.in_words(value, unit) if unit else f"{value:.6g}"
+
+
 def _values_words(values: tuple[float, ...], unit: str) -> str:
-    return ", ".join(text.in_words(value, unit) for value in values[:NAMED]) + (
+    return ", ".join(_value_words(value, unit) for value in values[:NAMED]) + (
         " ..." if len(values) > NAMED else ""
     )
 
@@ -544,16 +556,16 @@ def _force_tables(motion: NetworkMotion, forces: MotionForces) -> Iterator[Table
     rows: list[tuple[Any, ...]] = []
     for k, one in enumerate(motion.drives):
         unit = FORCE_UNITS.get(one.unit, "")
-        at = int(np.argmax(np.abs(forces.drives[:, k])))
+        at = int(np.nanargmax(np.abs(forces.drives[:, k])))
         rows.append((one.name, Value(float(forces.drives[at, k]), unit), Value(float(motion.t[at]), "s")))
     yield table_of("Static forces of the drives", heads, rows, brief=True)
     rows = []
     for k, name in enumerate(forces.names):
         values = forces.reactions[:, k]
-        if np.isnan(values).any():
+        if np.isnan(values).all():
             rows.append((name, "not determined: constraints are redundant", None))
         else:
-            at = int(np.argmax(np.abs(values)))
+            at = int(np.nanargmax(np.abs(values)))
             unit = "N.m" if " moment " in name else "N"
             rows.append((name, Value(float(values[at]), unit), Value(float(motion.t[at]), "s")))
     yield table_of("Reactions of joints and elements", heads, rows)

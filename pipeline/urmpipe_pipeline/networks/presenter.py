@@ -96,6 +96,11 @@ def headline(result: NetworkResult) -> str:
 def _facts(result: NetworkResult) -> Iterator[Fact]:
     """Yield what explains the headline."""
     yield from gap_facts(result)
+    if not result.every and len(result.distances) > 1:
+        others = ", ".join(f"{distance:.4g}" for distance in result.distances[1:7])
+        more = " ..." if len(result.distances) > 7 else ""
+        words = f"{result.distances[0]:.4g}; others {others}{more}"
+        yield Fact("Distance from the start", words, "In rad and lengths of the mechanism.")
     if result.mobility is not None:
         yield from mobility_facts(result.mobility)
 
