@@ -244,7 +244,7 @@ KINDS = {
     "seed": COUNT,
     "sides": Kind(_are_sides, 'two words in the names of columns, such as ("target", "actual")'),
     "step": SECONDS,
-    "steps": Kind(lambda value: _is_count(value) and value > 0, "a whole number, 1 or more"),
+    "steps": COUNT,
     "torques": Kind(lambda value: isinstance(value, Mapping), "a mapping of joints to numbers in N.m or N"),
     "strict": FLAG,
     "sync": Kind(

@@ -64,7 +64,7 @@ def test_a_motion_that_ends_early_exits_with_1(urmpipe: Run) -> None:
     limit = math.acos((0.5**2 - 1 - 0.7**2) / 1.4)
     assert ran.out.startswith("FAIL  four-bar: theta4 85 deg to 160 deg, ")
     assert (
-        f"turns back at theta4 = {limit:.6g} rad ({math.degrees(limit):.4f} deg)" in ran.out.splitlines()[0]
+        f"turns back at theta4 = {limit:.9g} rad ({math.degrees(limit):.4f} deg)" in ran.out.splitlines()[0]
     )
     found = json.loads(urmpipe(*LINKAGE, "theta4=85deg:160deg", "--steps", "50", "--json").out)
     assert (found["verdict"], found["requested"], found["events"][0]["kind"]) == ("fail", 51, "turns back")
@@ -197,8 +197,8 @@ WRONG: list[tuple[str, list[str]]] = [
     ("rssr S1=0:1", ["DRIVES: S1 has 3 variables, allowed: S1[1], S1[2], S1[3]"]),
     ("rssr S1[4]=0:1", ["DRIVES: S1[4] has 3 variables, allowed: a number from 1 to 3"]),
     ("four-bar theta4=20deg:120deg", [
-        "DRIVES: no motion from the assembly at the start leads to theta4 = 0.349066: the motion turns back"
-        f" at theta4 = 1.42745; {ON_BRANCH}",
+        "DRIVES: no motion from the assembly at the start leads to theta4 = 0.34906585: the motion turns back"
+        f" at theta4 = 1.42744876; {ON_BRANCH}",
     ]),
     ("stewart-gough-driven leg1=0.8:1.1 leg2=0.6", [
         "DRIVES: found leg1 = 1.1, allowed: 0.65 to 1",
@@ -233,7 +233,7 @@ WRONG: list[tuple[str, list[str]]] = [
         "--branch: found 0, allowed: a whole number, 1 or more",
         "--law: found without a duration, allowed: with one",
         "--branch: found together with start, allowed: one of the two",
-        "DRIVES: drive found 'x', allowed: crank, theta2, A, B, theta4",
+        "DRIVES: drive found 'x', allowed: crank, A, B, theta4",
         f"DRIVES: found crank = 1foo, allowed: {NUMBER}",
         "--start: joint found 'q', allowed: theta2, A, B, theta4",
         "--point: body found 'bar', allowed: ground, input, coupler, output",

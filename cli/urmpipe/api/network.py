@@ -22,7 +22,7 @@ from urmpipe_models.networks.network import Network
 from urmpipe_pipeline.networks.drawing import network_svg
 from urmpipe_pipeline.networks.drive_request import DriveRequest, drive_network
 from urmpipe_pipeline.networks.finding import Search, find_network
-from urmpipe_pipeline.networks.given_values import Range
+from urmpipe_pipeline.networks.given_values import Range, is_word
 from urmpipe_pipeline.networks.network_motion import NetworkMotion, motion_drawing
 from urmpipe_pipeline.networks.result import Command, NetworkResult
 from urmpipe_pipeline.operands import load_runs
@@ -271,7 +271,7 @@ def _read_log(
     if isinstance(log, Run):
         return log
     controls = [control.name for control in network.controls if control.value is None]
-    named = [str(column) for column in drives.values()] or controls
+    named = [str(column) for column in drives.values() if is_word(column)] or controls
     operand = Path(log) if isinstance(log, (str, Path)) else held_of(log, "log")
     load = partial(load_runs, [operand], tsp=tsp, derivative=derivative)
     if named and reading.get("joints") is None:

@@ -16,7 +16,7 @@ from urmpipe_models.inverse.iterative.small_systems import (
 )
 from urmpipe_models.networks.closure import scaled_closure
 from urmpipe_models.networks.mechanism import Mechanism
-from urmpipe_models.networks.rotations import wrapped
+from urmpipe_models.networks.rotations import wrap_rotation_vector
 
 STEPS = 300
 """The most steps of a start."""
@@ -75,7 +75,7 @@ def descend(mechanism: Mechanism, x: FloatArray, free: IndexArray, *, patient: b
         moved = np.array(x_now)
         moved[free] += step * mechanism.column_scales[free, np.newaxis]
         for some in mechanism.rotations:
-            moved[some] = wrapped(moved[some])
+            moved[some] = wrap_rotation_vector(tuple(moved[some]))
         new = _scaled(mechanism, moved, free)
         left = now.error + product(now.jacobian, step)
         foreseen = square - dot_product(left, left)

@@ -31,7 +31,7 @@ from urmpipe_models.networks.closure import scaled_closure
 from urmpipe_models.networks.descent import FLOOR
 from urmpipe_models.networks.idle_spins import spinning_parts
 from urmpipe_models.networks.mechanism import Mechanism
-from urmpipe_models.networks.rotations import wrapped
+from urmpipe_models.networks.rotations import wrap_rotation_vector
 
 Passage = Literal["turns back", "branches", "goes through"]
 
@@ -173,7 +173,7 @@ class Drive:
         """Return z with rotation vectors of pi at most: at two pi they are singular."""
         x = self.at(z[:, np.newaxis])
         for part in self.mechanism.rotations:
-            x[part] = wrapped(x[part])
+            x[part] = wrap_rotation_vector(tuple(x[part]))
         return self.coordinates(x[:, 0], float(z[-1]) / self.length)
 
     def correct(self, z: FloatArray, normal: FloatArray) -> FloatArray | None:
@@ -636,7 +636,7 @@ def settle(
         step = damped_step(closure.jacobian[:, free], -closure.residual, FLOOR)
         x[free] += step * scales
         for part in mechanism.rotations if wrap else ():
-            x[part] = wrapped(x[part])
+            x[part] = wrap_rotation_vector(tuple(x[part]))
         last = np.sqrt(np.einsum("kn,kn->n", step, step))
         first = first if count else last
         if not (last > 1e-13).any():

@@ -30,7 +30,7 @@ from urmpipe_models.networks.descent import FLOOR
 from urmpipe_models.networks.element_measures import measure
 from urmpipe_models.networks.joint_motion import Screws, joint_frame, joint_screws
 from urmpipe_models.networks.mechanism import Given, Mechanism, Posed, of_controls
-from urmpipe_models.networks.rotations import turning_of
+from urmpipe_models.networks.rotations import turning_of, wrap_rotation_vector
 from urmpipe_models.transform import Transform
 
 Column: TypeAlias = list[Element]
@@ -173,17 +173,6 @@ def damped_normal_step(columns: Sequence[Column], residual: Column, damping: flo
         below = [lower[i][j] for i in range(j + 1, count)]
         step[j] = minus(step[j], _product(below, step[j + 1 :]))
     return step
-
-
-def wrap_rotation_vector(vector: Vector) -> Vector:
-    """Return the rotation vector of the same rotation whose angle is pi at most, elementwise.
-
-    Args:
-        vector: In [rad], any elements.
-    """
-    angle = np.sqrt(dot(vector, vector))
-    turns = np.round(angle / (2.0 * np.pi))
-    return scale(np.where(turns > 0.0, 1.0 - 2.0 * np.pi * turns / np.maximum(angle, 1.0), 1.0), vector)
 
 
 def _residual(mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls: dict[str, Given]) -> Column:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.elementwise import Element, Vector, dot
+from urmpipe_models.elementwise import Element, Vector, dot, scale
 from urmpipe_models.transform import Transform
 
 SMALL = 1e-8
@@ -94,15 +94,12 @@ def _skew(vector: FloatArray) -> FloatArray:
     return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
 
 
-def wrapped(vector: FloatArray) -> FloatArray:
-    """Return rotation vectors of the same rotations whose angles are pi at most.
+def wrap_rotation_vector(vector: Vector) -> Vector:
+    """Return the rotation vector of the same rotation whose angle is pi at most, elementwise.
 
     Args:
-        vector: In [rad], shape (3, n).
-
-    Returns:
-        In [rad], shape (3, n).
+        vector: In [rad], any elements.
     """
-    angle = np.sqrt(np.einsum("kn,kn->n", vector, vector))
+    angle = np.sqrt(dot(vector, vector))
     turns = np.round(angle / (2.0 * np.pi))
-    return np.asarray(vector * np.where(turns > 0.0, 1.0 - 2.0 * np.pi * turns / np.maximum(angle, 1.0), 1.0))
+    return scale(np.where(turns > 0.0, 1.0 - 2.0 * np.pi * turns / np.maximum(angle, 1.0), 1.0), vector)

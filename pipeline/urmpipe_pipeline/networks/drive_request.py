@@ -43,6 +43,7 @@ from urmpipe_pipeline.networks.given_values import (
     Range,
     drive_factor,
     format_wrench,
+    is_word,
     parse_point,
     parse_ranges,
     parse_start,
@@ -165,11 +166,12 @@ def drive_network(
     """
     mechanism = mechanism_of(network)
     columns = _log_columns(network, request, log) if log is not None else {}
-    names = list(columns) if log is not None else list(request.drives)
+    holds = {name: value for name, value in request.drives.items() if log is None or not is_word(value)}
+    names = [*columns, *(name for name in holds if name not in columns)]
     parts: tuple[Callable[[], Any], ...] = (
         request.check,
         lambda: _find_driven(mechanism, names),
-        lambda: parse_ranges(network, request.drives) if log is None else None,
+        lambda: parse_ranges(network, holds),
         lambda: parse_start(network, request.start),
         lambda: parse_point(network, request.point),
         lambda: [parse_wrench(network, wrench) for wrench in request.wrenches],
@@ -203,7 +205,7 @@ def drive_network(
     warnings = tuple(log.warnings) if log is not None else ()
     options = {
         "network": network.name,
-        "drives": {name: _plain(value) for name, value in (request.drives or columns).items()},
+        "drives": {name: _plain(value) for name, value in {**columns, **request.drives}.items()},
         "steps": request.steps, "duration": request.duration, "law": request.law if log is None else None,
         "tsp": request.tsp if log is None else None, "branch": request.branch,
         "start": {name: _plain(value) for name, value in request.start.items()} or None,
@@ -260,12 +262,12 @@ def _log_columns(network: Network, request: DriveRequest, log: Run) -> dict[str,
     A joint that a control drives by itself stands for the control, as in the log of a motion.
     """
     joints = log.log.joints
-    if request.drives:
-        wrong = [str(column) for column in request.drives.values() if column not in joints]
-        if wrong:
-            faults = [Finding(f"column {not_among(name, joints)}", parameter="drives") for name in wrong]
-            raise OptionError(*faults)
-        return {name: str(column) for name, column in request.drives.items()}
+    by_name = {name: str(column) for name, column in request.drives.items() if is_word(column)}
+    if wrong := [column for column in by_name.values() if column not in joints]:
+        faults = [Finding(f"column {not_among(name, joints)}", parameter="drives") for name in wrong]
+        raise OptionError(*faults)
+    if by_name:
+        return by_name
     columns = {column.casefold(): column for column in joints}
     controls = [control.name for control in network.controls if control.value is None]
     named = {name: columns[name.casefold()] for name in controls if name.casefold() in columns}
@@ -297,9 +299,9 @@ def _drive_values(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return values of the drives in their own units with two derivatives by time, shape (n, driven) each."""
     if log is not None:
-        which = [log.log.joints.index(columns[name]) for name in driven.names]
+        which = [log.log.joints.index(column) for column in columns.values()]
         units = log.joint_units
-        pairs = zip(driven.names, driven.units, which, strict=True)
+        pairs = zip(columns, driven.units, which, strict=False)
         wrong = [(name, unit, units[k]) for name, unit, k in pairs if unit and units[k] != unit]
         faults = [
             Finding(
@@ -311,14 +313,25 @@ def _drive_values(
         q = log.q[:, which]
         if not np.isfinite(q).all():
             row = int(np.argmax(~np.isfinite(q).all(axis=1))) + 1
-            faults.append(
-                Finding(f"row {row} has no value, allowed: a value in each row", log.name, parameter="log")
+            column = log.log.joints[which[int(np.argmax(~np.isfinite(q[row - 1])))]]
+            message = (
+                f"row {row} has no value of {column} (a gap), allowed: a value in each row; split the log"
             )
+            faults.append(Finding(message, log.log.files[0].name if log.log.files else log.name))
         if not log.timed:
             faults.append(Finding("found static poses, allowed: a log with times", parameter="log"))
         if faults:
             raise OptionError(*faults)
-        return q / factors, log.qd[:, which] / factors, log.qdd[:, which] / factors
+        held = np.tile([end for _, end in ranges or ()], (len(q), 1))
+        if any(begin != end for begin, end in ranges or ()):
+            message = "found a range beside a log, allowed: one value, which holds, or a joint of the log"
+            raise OptionError(Finding(message, parameter="drives"))
+        still, own = np.zeros_like(held), factors[: len(which)]
+        parts = (q, log.qd[:, which], log.qdd[:, which])
+        values, rates, curvatures = (
+            np.hstack((part / own, rest)) for part, rest in zip(parts, (held, still, still), strict=True)
+        )
+        return values, rates, curvatures
     duration = request.duration if request.duration is not None else float(seconds(t_ns)[-1])
     shares, speed, curvature = compute_shares(request.law, seconds(t_ns) / duration)
     begin, end = np.array(ranges, dtype=np.float64).reshape(-1, 2).T

@@ -16,7 +16,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import Vector
 from urmpipe_models.errors import Finding, OptionError, for_each, shown
-from urmpipe_models.measure_units import MEASURES, NAMES, WRITTEN, quantity
+from urmpipe_models.measure_units import MEASURES, NAMES, QUANTITY, WRITTEN, quantity
 from urmpipe_models.names import not_among
 from urmpipe_models.networks.forces import Wrench
 from urmpipe_models.networks.mechanism import mechanism_of
@@ -60,6 +60,11 @@ def parse_quantity(
         allowed = f"a number, or {NAMES[unit].partition(' in ')[0]} with its unit" if unit else "a number"
         raise OptionError(Finding(parameter=parameter, found=f"{name} = {value}", allowed=allowed))
     return number
+
+
+def is_word(value: Any) -> bool:
+    """Return whether a value names something: a text that is neither a number with a unit nor a range."""
+    return isinstance(value, str) and QUANTITY.fullmatch(value.strip()) is None and ":" not in value
 
 
 def _find_unit(network: Network, name: str) -> tuple[str, Decimal]:

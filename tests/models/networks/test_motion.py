@@ -408,3 +408,64 @@ def test_transmission_and_dead_points_of_a_four_bar() -> None:
     assert (own.smallest_at, own.largest_at) == (crank[ratio.argmin()], crank[ratio.argmax()])
     dead = [math.acos((1 + 1.3**2 - 0.7**2) / 2.6), PI + math.acos(1 + 0.5**2 - 0.7**2)]  # stretched, folded
     assert sorted(own.dead_points) == pytest.approx(sorted(dead), abs=1e-9)
+
+
+# ---------------------------------------------------------------------------------------- rows
+
+
+def test_rates_and_forces_at_rows_where_branches_meet_are_those_of_the_motion() -> None:
+    """A parallelogram turns its rocker with the crank: theta4' = crank', and the torque passes through."""
+    tables = planar(0.4, 1.0, 0.4, 1.0)
+    moved = network_drive(tables, {"crank": (0.0, TURN)}, torques={"theta4": -10.0})
+    assert [event.row for event in moved.events] == pytest.approx([0, 100, 200], abs=1e-6)
+    rate, acceleration = moved.joint_motion[1], moved.joint_motion[2]
+    np.testing.assert_allclose(
+        np.abs(rate), TURN, atol=1e-7
+    )  # polynomials of 7th degree through rows 4 mm apart
+    np.testing.assert_allclose(acceleration, 0.0, atol=1e-4)  # 39 rad/s2 would be the crank's centripetal one
+    assert moved.forces is not None
+    np.testing.assert_allclose(moved.forces.drives[:, 0], 10.0, atol=1e-6)
+    for ratio in moved.transmission:
+        assert ratio.dead_points == ()
+        assert abs(ratio.smallest) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_log_that_leaves_the_branch_between_coarse_rows_ends_there() -> None:
+    """theta4 goes beyond its extreme for some rows and comes back: nothing closes there."""
+    largest = PI - math.acos((0.7**2 + 1 - (0.9 - 0.4) ** 2) / 1.4)  # crank and coupler folded
+    parts = ((1.48, largest - 2e-3, 400), (largest - 2e-3, largest + 2e-3, 12), (largest, 1.6, 400))
+    values = np.concatenate([np.linspace(*part) for part in parts])
+    log = pd.DataFrame({"t (s)": 0.005 * np.arange(len(values)), "theta4 (rad)": values})
+    moved = network_drive("four-bar", {"theta4": "theta4"}, log=log)
+    assert (moved.verdict, len(moved)) == ("fail", int(np.argmax(values > largest)))
+    assert [event.kind for event in moved.events] == ["turns back"]
+
+
+def test_the_drives_reach_their_end_if_the_duration_is_no_multiple_of_the_period() -> None:
+    moved = network_drive("four-bar", {"crank": (0, "100deg")}, duration=1.0, tsp=0.3)
+    np.testing.assert_allclose(np.degrees(column(moved, "theta2")), [0, 30, 60, 90, 100], atol=1e-12)
+    assert moved.joint_motion[1][-1, 0] == 0.0  # after the end it stands still
+
+
+def test_a_joint_that_a_control_drives_ends_the_motion_at_its_limit() -> None:
+    moved = network_drive(planar(0.4, 0.9, 0.7, 1.0, theta2={"upper": 1.2}), {"crank": (0.9, 2.0)})
+    (event,) = moved.events
+    assert event.kind == "limit"
+    assert event.values["crank"] == pytest.approx(1.2, abs=1e-12)
+    assert column(moved, "theta2").max() <= 1.2
+
+
+def test_start_values_choose_the_branch_by_the_joints_that_are_named() -> None:
+    """Of a slider-crank the slider behind the crank, although the file has the other angles of its rod."""
+    for s, sign in ((1.02, 1.0), (-0.6, -1.0)):
+        moved = network_drive("slider-crank", {"crank": (0.7, 1.0)}, start={"s": s}, steps=3)
+        # the pin of the slider is on either side: s = r cos(theta) +- sqrt(l^2 - (r sin(theta) - e)^2)
+        angle = column(moved, "theta")
+        expected = 0.3 * np.cos(angle) + sign * np.sqrt(0.64 - (0.3 * np.sin(angle) - 0.1) ** 2)
+        np.testing.assert_allclose(column(moved, "s"), expected, atol=ANSWER)
+
+
+def test_the_log_of_a_motion_drives_its_network_again() -> None:
+    first = network_drive("four-bar", {"crank": (0.5, 1.0)}, steps=20)
+    frame = first.as_run().log.to_frame()
+    np.testing.assert_allclose(network_drive("four-bar", log=frame).x, first.x, atol=ANSWER)

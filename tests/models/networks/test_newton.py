@@ -18,9 +18,8 @@ from urmpipe_models.networks.newton import (
     closure_jacobian,
     closure_residual,
     damped_normal_step,
-    wrap_rotation_vector,
 )
-from urmpipe_models.networks.rotations import rotation_of
+from urmpipe_models.networks.rotations import rotation_of, wrap_rotation_vector
 
 DOOR: dict[str, Any] = {
     "angle_unit": "deg",

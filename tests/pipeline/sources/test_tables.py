@@ -288,6 +288,7 @@ def test_source_names() -> None:
         *(
             "coppeliasim",
             "urmpipe",
+            "network",
             "ur-rtde",
             "libfranka",
             "ros",
