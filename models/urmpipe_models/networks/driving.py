@@ -115,8 +115,8 @@ def find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
             places.append(mechanism.places[owner, index or 0])
             unit = mechanism.network.unit_of(name) if name in controls else None
             units.append(unit[0] if unit else "" if name in controls else joints[owner].units[index or 0])
-    twice = [name for k, name in enumerate(names) if len(places) == len(names) and places[k] in places[:k]]
-    faults += [Finding(f"{name} is driven twice, allowed: once", parameter="drives") for name in twice]
+    repeated = [name for k, name in enumerate(names) if len(places) == len(names) and places[k] in places[:k]]
+    faults += [Finding(f"{name} is driven twice, allowed: once", parameter="drives") for name in repeated]
     if faults:
         raise NetworkError(*faults)
     return Driven(tuple(names), np.array(places, dtype=np.intp), tuple(units))
@@ -173,12 +173,12 @@ def split_variables(mechanism: Mechanism, x: FloatArray, driven: Driven) -> Inde
             raise NetworkError(Finding(message, parameter="drives"))
         kept = others if needed > 0 else []
     free = np.setdiff1d(every, [*places, *kept])
-    still = mobility_nearby(mechanism, x, free) - spins if len(free) else 0
-    if still > 0:
+    remaining = mobility_nearby(mechanism, x, free) - spins if len(free) else 0
+    if remaining > 0:
         names = ", ".join(dict.fromkeys(mechanism.variables[k].owner for k in free[:12].tolist()))
-        message = f"with {', '.join(driven.names)} driven, the network still moves, with mobility {still}"
+        message = f"with {', '.join(driven.names)} driven, the network still moves, with mobility {remaining}"
         raise NetworkError(
-            Finding(f"{message}; allowed: {still} more drives, of {names}", parameter="drives")
+            Finding(f"{message}; allowed: {remaining} more drives, of {names}", parameter="drives")
         )
     return np.asarray(free, dtype=np.intp)
 
@@ -294,14 +294,14 @@ def _find_line(scaled: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray] 
     """Return begin and change of the line through all rows, and their places on it, 0..1; None if not."""
     offsets = scaled - scaled[0]
     sizes = np.linalg.norm(offsets, axis=1)
-    farthest = offsets[int(np.argmax(sizes))]
-    square = float(farthest @ farthest)
-    along = offsets @ farthest / square if square > 0.0 else np.zeros(len(scaled))
-    if np.linalg.norm(offsets - np.outer(along, farthest), axis=1).max() > SAME_PLACE:
+    direction = offsets[int(np.argmax(sizes))]
+    square = float(direction @ direction)
+    along = offsets @ direction / square if square > 0.0 else np.zeros(len(scaled))
+    if np.linalg.norm(offsets - np.outer(along, direction), axis=1).max() > SAME_PLACE:
         return None
     low, high = float(along.min()), float(along.max())
     shares = (along - low) / (high - low) if high > low else along
-    return scaled[0] + low * farthest, (high - low) * farthest, shares
+    return scaled[0] + low * direction, (high - low) * direction, shares
 
 
 def _drive_along(

@@ -91,13 +91,13 @@ def compute_forces(
     reactions = {name: np.zeros((6, n)) for name in names}
     reactions |= {element.name: np.zeros((1, n)) for element in mechanism.network.elements}
     for rows in iter_chunks(n):
-        own = _Equilibrium(mechanism, x[:, rows], driven, free, wrenches, torques or {})
-        drives[:, rows] = own.drives
-        for name, values in own.reactions().items():
+        equilibrium = _Equilibrium(mechanism, x[:, rows], driven, free, wrenches, torques or {})
+        drives[:, rows] = equilibrium.drives
+        for name, values in equilibrium.reactions().items():
             reactions[name][:, rows] = values
     for near, first, _ in slopes:
-        own = _Equilibrium(mechanism, x[:, near], driven, free, wrenches, torques or {})
-        work = -np.einsum("vk,vk->k", own.forces, first)
+        equilibrium = _Equilibrium(mechanism, x[:, near], driven, free, wrenches, torques or {})
+        work = -np.einsum("vk,vk->k", equilibrium.forces, first)
         drives[:, near] = work / first[driven] if len(driven) == 1 else np.nan
         for values in reactions.values():
             values[:, near] = np.nan
@@ -216,7 +216,7 @@ def _wrenches_in_ground(
     loads: dict[str, FloatArray] = {}
     for wrench in wrenches:
         arm = cross(poses[wrench.body].point(wrench.point), wrench.force)
-        moment = [lever + own for lever, own in zip(arm, wrench.moment, strict=True)]
+        moment = [lever + equilibrium for lever, equilibrium in zip(arm, wrench.moment, strict=True)]
         rows = np.zeros((6, x.shape[1]))
         for k, component in enumerate((*moment, *wrench.force)):
             rows[k] = component

@@ -206,8 +206,8 @@ class Drive:
         if before is not None and tangent @ before < 0.0:
             tangent = -tangent
         values = np.zeros(columns)
-        own = np.linalg.svd(jacobian[:, :-1], compute_uv=False)
-        values[: len(own)] = own
+        local = np.linalg.svd(jacobian[:, :-1], compute_uv=False)
+        values[: len(local)] = local
         distance = float(values[columns - 2 - self.spins])
         spins = np.linalg.svd(null - np.outer(tangent, tangent @ null))[0][:, : self.spins]
         return Node(z, tangent, np.vstack((jacobian, spins.T, tangent)), distance)
@@ -224,9 +224,9 @@ def _orientation(before: Node, after: Node, spins: int) -> tuple[float, float]:
         second = np.array(second)  # the basis of the spins has either orientation: the same is taken
         second[-2] = -second[-2]
     sign, size = np.linalg.slogdet(first.T @ second)
-    own = [float(np.linalg.slogdet(matrix.T @ matrix)[1]) for matrix in (first, second)]
+    local = [float(np.linalg.slogdet(matrix.T @ matrix)[1]) for matrix in (first, second)]
     with np.errstate(under="ignore", invalid="ignore"):
-        cosine, share = np.exp(size - 0.5 * (own[0] + own[1])), np.exp(size - own[0])
+        cosine, share = np.exp(size - 0.5 * (local[0] + local[1])), np.exp(size - local[0])
     return float(np.nan_to_num(sign * cosine)), float(np.nan_to_num(sign * share))
 
 
@@ -560,13 +560,13 @@ def sample(drive: Drive, branch: Trace, s: FloatArray) -> tuple[FloatArray, list
     slopes = [chords * np.array([pair[k].tangent for pair in branch.segments]).T for k in (0, 1)]
     x = np.empty((len(drive.x), len(s)))
     for rows in iter_chunks(len(s)):
-        own = which[rows]
-        curve = _Cubic(*(part[:, own] for part in (*stacks, *slopes)))
+        local = which[rows]
+        curve = _Cubic(*(part[:, local] for part in (*stacks, *slopes)))
         z = curve.at(curve.shares(at[rows]))
         z[-1] = at[rows]
         x[:, rows] = settle(drive.mechanism, drive.at(z), drive.free)[0]
-    found = [_interpolate(drive, pose, node, at, x) for pose, node in branch.singular]
-    return x, [slopes for slopes in found if slopes is not None]
+    interpolated = [_interpolate(drive, pose, node, at, x) for pose, node in branch.singular]
+    return x, [slopes for slopes in interpolated if slopes is not None]
 
 
 def _interpolate(

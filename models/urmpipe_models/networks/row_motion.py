@@ -136,15 +136,15 @@ class _Follower:
         start, values = self.motion.x[:, row], self.rows[ends].T
         begin = start[self.driven, np.newaxis]
         scales = self.mechanism.column_scales[self.driven, np.newaxis]
-        farthest = np.linalg.norm((values - begin) / scales, axis=0).max()
-        steps = max(1, int(np.ceil(farthest / (2.0 * COARSE))))
+        distance = np.linalg.norm((values - begin) / scales, axis=0).max()
+        steps = max(1, int(np.ceil(distance / (2.0 * COARSE))))
         x = np.repeat(start[:, np.newaxis], len(ends), axis=1)
         for chunk in iter_chunks(len(ends)):
-            own = x[:, chunk]
+            local = x[:, chunk]
             for step in range(1, steps + 1):
-                own[self.driven] = begin + step / steps * (values[:, chunk] - begin)
-                own = settle(self.mechanism, own, self.free, wrap=True)[0]
-            x[:, chunk] = own
+                local[self.driven] = begin + step / steps * (values[:, chunk] - begin)
+                local = settle(self.mechanism, local, self.free, wrap=True)[0]
+            x[:, chunk] = local
         return unspun(self.mechanism, self.spins, x, self.start)
 
     def _verify(self, coarse: IndexArray) -> int:
@@ -238,23 +238,23 @@ class _Follower:
         """
         good = np.zeros(first.shape[1], dtype=np.bool_)
         for chunk in iter_chunks(first.shape[1]):
-            own, other = first[:, chunk], second[:, chunk]
-            difference = self._difference(own, other)
+            local, other = first[:, chunk], second[:, chunk]
+            difference = self._difference(local, other)
             change = np.zeros_like(difference)
-            change[self.driven] = other[self.driven] - own[self.driven]
-            mean = 0.5 * (self._tangents(own, change) + self._tangents(other, change))
+            change[self.driven] = other[self.driven] - local[self.driven]
+            mean = 0.5 * (self._tangents(local, change) + self._tangents(other, change))
             scales = self.mechanism.column_scales[:, np.newaxis]
             miss = np.linalg.norm(((difference - mean) / scales)[self.free], axis=0)
             size = np.linalg.norm((difference / scales)[self.free], axis=0)
-            closures = [scaled_closure(self.mechanism, x) for x in (own, other)]
+            closures = [scaled_closure(self.mechanism, x) for x in (local, other)]
             closed = np.abs(closures[1].residual).max(axis=0, initial=0.0) < 1e3 * ROUNDING
-            own_good = closed & (miss < MAX_DISAGREEMENT * size + SAME)
+            is_good = closed & (miss < MAX_DISAGREEMENT * size + SAME)
             if not self.spins:
                 jacobians = [closure.jacobian[:, self.free] for closure in closures]
                 products = np.einsum("kin,kjn->nij", *jacobians)
                 finite = np.isfinite(products).all(axis=(1, 2))
-                own_good &= finite & (np.linalg.det(np.where(finite[:, None, None], products, 0.0)) > 0.0)
-            good[chunk] = own_good
+                is_good &= finite & (np.linalg.det(np.where(finite[:, None, None], products, 0.0)) > 0.0)
+            good[chunk] = is_good
         return good
 
     def _difference(self, first: FloatArray, second: FloatArray) -> FloatArray:

@@ -263,8 +263,8 @@ def _log_columns(network: Network, request: DriveRequest, log: Run) -> dict[str,
     """
     joints = log.log.joints
     by_name = {name: str(column) for name, column in request.drives.items() if is_word(column)}
-    if wrong := [column for column in by_name.values() if column not in joints]:
-        faults = [Finding(f"column {not_among(name, joints)}", parameter="drives") for name in wrong]
+    if invalid := [column for column in by_name.values() if column not in joints]:
+        faults = [Finding(f"column {not_among(name, joints)}", parameter="drives") for name in invalid]
         raise OptionError(*faults)
     if by_name:
         return by_name
@@ -302,13 +302,13 @@ def _drive_values(
         which = [log.log.joints.index(column) for column in columns.values()]
         units = log.joint_units
         pairs = zip(columns, driven.units, which, strict=False)
-        wrong = [(name, unit, units[k]) for name, unit, k in pairs if unit and units[k] != unit]
+        invalid = [(name, unit, units[k]) for name, unit, k in pairs if unit and units[k] != unit]
         faults = [
             Finding(
                 f"column {columns[name]} is in {other}, allowed: {unit}, the unit of {name}",
                 parameter="drives",
             )
-            for name, unit, other in wrong
+            for name, unit, other in invalid
         ]
         q = log.q[:, which]
         if not np.isfinite(q).all():
@@ -322,14 +322,15 @@ def _drive_values(
             faults.append(Finding("found static poses, allowed: a log with times", parameter="log"))
         if faults:
             raise OptionError(*faults)
-        held = np.tile([end for _, end in ranges or ()], (len(q), 1))
+        constants = np.tile([end for _, end in ranges or ()], (len(q), 1))
         if any(begin != end for begin, end in ranges or ()):
             message = "found a range beside a log, allowed: one value, which holds, or a joint of the log"
             raise OptionError(Finding(message, parameter="drives"))
-        still, own = np.zeros_like(held), factors[: len(which)]
+        still, local = np.zeros_like(constants), factors[: len(which)]
         parts = (q, log.qd[:, which], log.qdd[:, which])
         values, rates, curvatures = (
-            np.hstack((part / own, rest)) for part, rest in zip(parts, (held, still, still), strict=True)
+            np.hstack((part / local, rest))
+            for part, rest in zip(parts, (constants, still, still), strict=True)
         )
         return values, rates, curvatures
     duration = request.duration if request.duration is not None else float(seconds(t_ns)[-1])
@@ -373,25 +374,27 @@ def _find_assembly(
     request: DriveRequest,
 ) -> FloatArray:
     """Return the assembly that the motion is to contain, shape (variables,)."""
-    own = {control.name for control in mechanism.network.controls if control.value is None}
+    local = {control.name for control in mechanism.network.controls if control.value is None}
     chosen = request.branch is not None or bool(start)
     controls = {
         name: float(value)
         for name, value in zip(driven.names, begin.tolist(), strict=True)
-        if chosen and name in own
+        if chosen and name in local
     }
-    found = assemble(
+    solution = assemble(
         mechanism, controls, start=start or None, every=request.branch is not None, restarts=request.restarts,
         seed=request.seed,
     )  # fmt: skip
-    if not found.assemblies:
-        gap = found.gaps[0] if found.gaps else None
+    if not solution.assemblies:
+        gap = solution.gaps[0] if solution.gaps else None
         what = f": {gap.name} has a gap of {gap.metres:.4g} m and {gap.radians:.4g} rad" if gap else ""
         raise NetworkError(Finding(f"the network does not close at the start{what}", parameter="drives"))
     number = request.branch or 1
-    if number > found.x.shape[1]:
-        raise OptionError(Finding(parameter="branch", found=str(number), allowed=f"1 to {found.x.shape[1]}"))
-    return found.x[:, number - 1]
+    if number > solution.x.shape[1]:
+        raise OptionError(
+            Finding(parameter="branch", found=str(number), allowed=f"1 to {solution.x.shape[1]}")
+        )
+    return solution.x[:, number - 1]
 
 
 def _events(
@@ -418,7 +421,7 @@ def _events(
         yield event(pose.passage, pose, parts, message)
     if moved.stop is not None:
         stop = moved.stop
-        control = stop.name if stop.name in {one.name for one in mechanism.network.controls} else ""
+        control = stop.name if stop.name in {item.name for item in mechanism.network.controls} else ""
         unit = (mechanism.network.unit_of(control) or ("",))[0] if control else stop.unit
         limit = stop.limit * (drive_factor(mechanism.network, control) if control else 1.0)
         words = text.in_words(limit, unit) if unit else f"{limit:.6g}"
@@ -492,15 +495,15 @@ def _forces(
     torques: Mapping[str, float],
 ) -> MotionForces:
     """Return static forces as tables of columns."""
-    found = compute_forces(mechanism, moved.x, driven.places, moved.free, wrenches, torques, moved.slopes)
+    solution = compute_forces(mechanism, moved.x, driven.places, moved.free, wrenches, torques, moved.slopes)
     names: list[str] = []
     columns: list[FloatArray] = []
-    for name, values in found.reactions.items():
+    for name, values in solution.reactions.items():
         if len(values) == 1:
             names.append(f"{name} force")
         else:
             names += [f"{name} {what} {axis}" for what in ("force", "moment") for axis in ("m", "n", "m x n")]
         columns += [*values]
     return MotionForces(
-        found.drives.T / factors, tuple(names), np.array(columns).T.reshape(moved.x.shape[1], -1)
+        solution.drives.T / factors, tuple(names), np.array(columns).T.reshape(moved.x.shape[1], -1)
     )

@@ -123,7 +123,7 @@ def parse_start(network: Network, start: Mapping[str, Any]) -> dict[str, tuple[f
             raise OptionError(Finding(parameter="start", found=f"{name} = {shown(value)}", allowed=allowed))
         pairs = zip(values, units[name], strict=True)
         return name, tuple(
-            parse_quantity(network, "start", name, one, unit, Decimal(1)) for one, unit in pairs
+            parse_quantity(network, "start", name, part, unit, Decimal(1)) for part, unit in pairs
         )
 
     return dict(pair for pair in for_each(parse, start.items()) if pair is not None)

@@ -43,6 +43,7 @@ from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.scene import Scene
 from urmpipe_pipeline.presentation.section import (
     Block,
+    Cell,
     Check,
     Event,
     Fact,
@@ -318,7 +319,7 @@ class NetworkMotion(Result):
             columns |= {f"{prefix}{axis}": values[:, k] for k, axis in enumerate("xyz")}
         columns["distance"] = self.distance
         if self.forces is not None:
-            columns |= {f"f_{one.name}": self.forces.drives[:, k] for k, one in enumerate(self.drives)}
+            columns |= {f"f_{item.name}": self.forces.drives[:, k] for k, item in enumerate(self.drives)}
             columns |= {name: self.forces.reactions[:, k] for k, name in enumerate(self.forces.names)}
         return pd.DataFrame(columns)
 
@@ -356,7 +357,7 @@ class NetworkMotion(Result):
         largest = np.nanmax(np.abs(self.forces.drives), axis=0)
         unknown = np.flatnonzero(np.isnan(self.forces.reactions).all(axis=0)).tolist()
         return {
-            "drives": {one.name: float(largest[k]) for k, one in enumerate(self.drives)},
+            "drives": {item.name: float(largest[k]) for k, item in enumerate(self.drives)},
             "reactions": {
                 name: None if k in unknown else float(np.nanmax(np.abs(self.forces.reactions[:, k])))
                 for k, name in enumerate(self.forces.names)
@@ -553,22 +554,25 @@ def _direction_words(direction: dict[str, float]) -> str:
 def _force_tables(motion: NetworkMotion, forces: MotionForces) -> Iterator[Table]:
     """Yield the largest force of each drive, and of each reaction; "not determined" where it is not."""
     heads = {"name": "Force", "value": "Largest", "t": "At t"}
-    rows: list[tuple[Any, ...]] = []
-    for k, one in enumerate(motion.drives):
-        unit = FORCE_UNITS.get(one.unit, "")
-        at = int(np.nanargmax(np.abs(forces.drives[:, k])))
-        rows.append((one.name, Value(float(forces.drives[at, k]), unit), Value(float(motion.t[at]), "s")))
-    yield table_of("Static forces of the drives", heads, rows, brief=True)
-    rows = []
-    for k, name in enumerate(forces.names):
-        values = forces.reactions[:, k]
-        if np.isnan(values).all():
-            rows.append((name, "not determined: constraints are redundant", None))
-        else:
-            at = int(np.nanargmax(np.abs(values)))
-            unit = "N.m" if " moment " in name else "N"
-            rows.append((name, Value(float(values[at]), unit), Value(float(motion.t[at]), "s")))
-    yield table_of("Reactions of joints and elements", heads, rows)
+    drives = [
+        _force_row(motion, drive.name, FORCE_UNITS.get(drive.unit, ""), forces.drives[:, k])
+        for k, drive in enumerate(motion.drives)
+    ]
+    yield table_of("Static forces of the drives", heads, drives, brief=True)
+    known = np.abs(np.nan_to_num(forces.reactions))
+    reactions = np.where(known < 1e-9 * known.max(initial=0.0), 0.0 * forces.reactions, forces.reactions)
+    rows = [
+        _force_row(motion, name, "N.m" if " moment " in name else "N", reactions[:, k])
+        for k, name in enumerate(forces.names)
+    ]
+    yield table_of("Reactions of joints and elements", heads, rows, folded=True)
+
+
+def _force_row(motion: NetworkMotion, name: str, unit: str, values: FloatArray) -> tuple[Cell, ...]:
+    if np.isnan(values).all():
+        return name, "not determined: constraints are redundant", None
+    at = int(np.nanargmax(np.abs(values)))
+    return name, Value(float(values[at]) + 0.0, unit), Value(float(motion.t[at]), "s")
 
 
 def _check(motion: NetworkMotion) -> Check:
