@@ -68,9 +68,7 @@ class Motion:
         spins: The number of idle spins, which stay as at the start.
         singular: Singular poses, in their order; their s is the row, from 0, with a fraction.
         stop: The limit that ends the motion early, its s likewise; None without one.
-        change: How the prescribed variables change along the line of the drives, shape (variables,); None if
-            they are not on a line.
-        slopes: Derivatives along that line next to points where branches meet.
+        slopes: Derivatives along the line of the drives next to points where branches meet.
     """
 
     x: FloatArray
@@ -78,7 +76,6 @@ class Motion:
     spins: int
     singular: tuple[SingularPose, ...] = ()
     stop: LimitStop | None = None
-    change: FloatArray | None = None
     slopes: tuple[Slopes, ...] = ()
 
 
@@ -268,9 +265,8 @@ def drive_rows(
     """
     limits, places = variable_limits(mechanism), driven.places
     x = within_turns(mechanism, x, limits)
-    turns = np.isin(
-        places, mechanism.angles
-    )  # a driven angle begins at the turn of its assembly that is nearest
+    # a driven angle begins at the turn that is nearest to the assembly
+    turns = np.isin(places, mechanism.angles)
     x[places[turns]] += 2.0 * np.pi * np.round((values[0] - x[places])[turns] / (2.0 * np.pi))
     free = split_variables(mechanism, x, driven)
     spins = len(spinning_parts(mechanism, x))
@@ -345,7 +341,7 @@ def _drive_along(
     if outside.any():
         stop = forward.stop if shares[count] > ends[1] else back.stop
         stop = None if stop is None else replace(stop, s=row(stop.s) or 0.0)
-    return Motion(motion, free, drive.spins, tuple(poses), stop, change, tuple(slopes))
+    return Motion(motion, free, drive.spins, tuple(poses), stop, tuple(slopes))
 
 
 def _check_ends(
@@ -367,8 +363,8 @@ def _check_ends(
 
 def _check_length(driven: Driven, length: float) -> None:
     if length > MAX_LENGTH:
-        found = f"{', '.join(driven.names)} moves by {length:.6g} rad or lengths of the mechanism"
-        message = f"{found}, allowed: {MAX_LENGTH:g}; split the motion"
+        distance = f"{', '.join(driven.names)} moves by {length:.6g} rad or lengths of the mechanism"
+        message = f"{distance}, allowed: {MAX_LENGTH:g}; split the motion"
         raise NetworkError(Finding(message, parameter="drives"))
 
 

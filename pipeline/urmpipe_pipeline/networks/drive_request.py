@@ -167,7 +167,8 @@ def drive_network(
     mechanism = mechanism_of(network)
     columns = _log_columns(network, request, log) if log is not None else {}
     holds = {name: value for name, value in request.drives.items() if log is None or not is_word(value)}
-    names = [*columns, *(name for name in holds if name not in columns)]
+    columns = {name: column for name, column in columns.items() if name not in holds}
+    names = [*columns, *holds]
     parts: tuple[Callable[[], Any], ...] = (
         request.check,
         lambda: _find_driven(mechanism, names),
