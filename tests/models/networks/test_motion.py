@@ -469,3 +469,16 @@ def test_the_log_of_a_motion_drives_its_network_again() -> None:
     first = network_drive("four-bar", {"crank": (0.5, 1.0)}, steps=20)
     frame = first.as_run().log.to_frame()
     np.testing.assert_allclose(network_drive("four-bar", log=frame).x, first.x, atol=ANSWER)
+
+
+def test_a_control_holds_its_value_beside_a_log() -> None:
+    tables = tables_of("slider-crank")
+    tables["controls"]["shift"] = {"start": 0.0}
+    tables["joints"]["lift"] = {
+        "kind": "prismatic", "bodies": ["slider", "load"], "n": [1, 0, 0], "driven": "shift",
+    }  # fmt: skip
+    tables["bodies"]["load"] = {}
+    log = pd.DataFrame({"t (s)": 0.01 * np.arange(50), "crank (rad)": 0.7 + 0.01 * np.arange(50)})
+    moved = network_drive(tables, {"shift": 0.2}, log=log)
+    assert {drive.name: drive.end for drive in moved.drives} == pytest.approx({"crank": 1.19, "shift": 0.2})
+    np.testing.assert_array_equal(column(moved, "lift"), 0.2)
