@@ -203,7 +203,9 @@ def _is_planar_joint(at: Placed, joint: Joint, normal: FloatArray) -> bool:
 
 
 def _is_planar_element(at: Placed, element: ConstraintElement, normal: FloatArray) -> bool:
-    """Return whether an element acts in the planes perpendicular to a unit vector."""
+    """Return whether an element acts in planes perpendicular to a unit vector; pairs act as their joints."""
+    if element.is_pair:
+        return True
     p, q = (at.point(body, point) for body, point in zip(element.bodies, element.points, strict=True))
     n = at.direction(element.bodies[0], element.normals[0])
     match element.kind:
