@@ -10,6 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.units.options import whole_number
 from urmpipe_fmus.values import Values
@@ -19,7 +21,8 @@ from urmpipe_models.errors import UnitError, shown
 from urmpipe_models.files.tables import are_numbers, is_number
 from urmpipe_models.measure_units import WRITTEN, quantity
 from urmpipe_models.names import not_among
-from urmpipe_models.networks.assembly import CLOSED, assemble
+from urmpipe_models.networks.assembly import CLOSED, assemble, assembled_at, start_with
+from urmpipe_models.networks.driving import move_to
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.network import Network
 from urmpipe_models.networks.network_file import load_network
@@ -61,7 +64,8 @@ def network_motion(
     Args:
         network: The network, its name, its file or its tables.
         controls: Start values of inputs, as `network check --set` takes them.
-        start: Values of joints by name, in [rad] and [m] or texts with units; a list for several variables.
+        start: Values of joints by name, in [rad] and [m] or texts with units; a list for several variables:
+            the nearest assembly to them. Default: that of the network, from which `controls` are moved.
         points: Names with {"body": name, "point": [x, y, z]} in [m] of the body; or texts "BODY:X,Y,Z",
             whose names are p1, p2, ...
         newton: Newton steps per evaluation.
@@ -82,7 +86,13 @@ def network_motion(
             raise _option_error("controls", message)
     mechanism = mechanism_of(_at_joint_values(loaded, start or {}))
     values = {name: loaded.control_value(name, value) for name, value in (controls or {}).items()}
-    assembled = assemble(mechanism, values)
+    assembled = assemble(mechanism, {} if start is None else values)
+    if start is None and values and assembled.assemblies:  # on the branch of the network's own start
+        x, own = start_with(mechanism, values), mechanism.controls
+        limits = np.tile((-np.inf, np.inf), (len(x), 1))
+        x, branch = move_to(mechanism, assembled.x_nearest, own, x[own], mechanism.free, limits)
+        is_reached = branch is None or branch.complete
+        assembled = assembled_at(mechanism, x, "") if is_reached else assemble(mechanism, values)
     if not assembled.assemblies:
         gap = assembled.gaps[0]
         raise UnitError(
