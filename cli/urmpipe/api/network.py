@@ -194,9 +194,8 @@ def network_drive(
     Args:
         network: A name, a file, the tables of one, or a `Network`.
         drives: From and to by name, such as {"crank": (0, "360deg")}; one value holds a variable. Of controls
-            numbers are in the units of the network, of joints in [rad] and [m]; texts have units. With a
-            log: the joint of the log that drives each, such as {"crank": "q1"}; default: those of the same
-                names.
+            numbers are in the units of the network, of joints in [rad] and [m]; texts have units. With a log:
+            the joint of the log that drives each, such as {"crank": "q1"}; default: those of the same names.
         steps: Equal steps, one per `tsp`; default: 200.
         duration: Duration in [s] instead of steps.
         law: How the drives move over the duration: uniform, trapezoid (a third each), quintic (from rest to

@@ -468,8 +468,7 @@ def compute_shares(law: Law, shares: FloatArray) -> tuple[FloatArray, FloatArray
     """Return how far a motion is at shares of its duration, with its first and second derivative by them.
 
     uniform: s = u. trapezoid: a third of the time accelerated, a third at the speed 3/2, a third braked.
-        quintic:
-    s = 10 u^3 - 15 u^4 + 6 u^5, whose speed and acceleration are 0 at both ends.
+    quintic: s = 10 u^3 - 15 u^4 + 6 u^5, whose speed and acceleration are 0 at both ends.
 
     Args:
         law: The law.

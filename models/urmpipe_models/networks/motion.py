@@ -10,8 +10,8 @@
    branches (two curves cross), or goes through.
 4. `sample`: configurations at values of s, by Newton from cubic curves between the nodes; about singular
    poses by polynomials through configurations around them.
-5. `follow`: the same along the rows of a log. All rows are solved side by side; the continuity of
-   neighbouring rows is verified, and where it fails they are solved one after another.
+
+Rows of a log that are not on a line: `row_motion`.
 
 Source: Allgower and Georg 2003, Introduction to Numerical Continuation Methods, chapters 2, 6 and 8.
 """

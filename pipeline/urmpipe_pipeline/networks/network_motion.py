@@ -1,9 +1,8 @@
 """The motion of a driven network: its data, what it shows, its tables and its JSON.
 
 - `NetworkMotion`: the variables over time with their rates; joints, points and poses follow from them.
-- `motion_run`: the same as a run, whose tool centre point is the traced point, for compare, diagnose and
-export. - `present`: headline, facts, tables of singular poses, transmission and forces, plots, scene and
-drawings.
+- `motion_run`: the same as a run, whose tool centre point is the traced point, for compare and export.
+- `present`: headline, facts, tables of singular poses, transmission and forces, plots, scene, drawings.
 """
 
 from __future__ import annotations
@@ -306,9 +305,8 @@ class NetworkMotion(Result):
         """Return one row per sample.
 
         Columns: t [s]; the joints in [rad] or [m], their rates (d_) and second derivatives (dd_); with a
-            traced
-        point x, y, z, vx, vy, vz, ax, ay, az; distance [-]; with loads the forces of the drives (f_NAME)
-        and the reactions.
+        traced point x, y, z, vx, vy, vz, ax, ay, az; distance [-]; with loads the forces of the drives
+        (f_NAME) and the reactions.
         """
         import pandas as pd
 
