@@ -110,6 +110,22 @@ def _is_table(value: Any) -> bool:
     return isinstance(value, LogTable) or _is_path(value)
 
 
+def _is_log(value: Any) -> bool:
+    from urmpipe_pipeline.sources import is_table
+
+    return _is_run(value) or _is_path(value) or is_table(value)
+
+
+def _is_point(value: Any) -> bool:
+    return _is_text(value) or (isinstance(value, (list, tuple)) and len(value) == 2)
+
+
+def _are_wrenches(value: Any) -> bool:
+    from urmpipe_models.networks.forces import Wrench
+
+    return isinstance(value, (list, tuple)) and all(isinstance(one, Wrench) or _is_text(one) for one in value)
+
+
 def _one_or_many(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
     """Return a check that accepts one value of a kind or a list of them; tables and mappings are no lists."""
 
@@ -228,6 +244,7 @@ KINDS = {
             'a mapping of joints to numbers or texts, such as {"theta4": "85deg"}',
         ),
     ),
+    "network_drive.log": Kind(_is_log, "a log: a file, a table with columns, or a Run"),
     "network": Kind(_is_network, "a name, a TOML file, the tables of one, or a Network"),
     "noise": KIND_OF_TOLERANCE,
     "options": Kind(lambda value: isinstance(value, Mapping), 'a mapping, such as {"joints": 6}'),
@@ -236,6 +253,7 @@ KINDS = {
     "plan.path": PLANNED,
     "planes": Kind(lambda value: _is_count(value) and value > 0, "a whole number, 1 or more"),
     "platforms": Kind(_one_or_many(_is_text), "linux64, win64 or a list of both"),
+    "point": Kind(_is_point, 'a text such as "coupler:0.45,0.2,0", or a body and three numbers'),
     "progress": PROGRESS,
     "restarts": COUNT,
     "robot": Kind(_is_robot, "a name, a TOML or URDF file, or a Chain, such as urmpipe.load_robot(NAME)"),
@@ -266,7 +284,7 @@ KINDS = {
     "velocity": Kind(_is_number, "a number, in m/s"),
     "voice": _one_of("python", "command line"),
     "within_pi": FLAG,
-    "wrenches": Kind(_one_or_many(lambda value: True), "a text or a list of texts"),
+    "wrenches": Kind(_are_wrenches, 'a list of texts such as "coupler:0.45,0,0:0,-50,0"'),
     "write_map": PATH,
     "write_map.robot": ROBOT_FILE,
 }

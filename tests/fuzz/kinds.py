@@ -240,7 +240,7 @@ KINDS: tuple[Kind, ...] = (
     Kind("urdf", corpus.urdfs, (*BYTES, *TEXT[:5], *XML, *XML, *XML), robot, 6.0),
     Kind("mesh", lambda made: corpus.meshes(), (*BYTES, *TEXT[:5], *[json_tree] * 8), mesh, 2.0),
     Kind("map", corpus.maps, TREES, log_map, 3.0),
-    Kind("system", lambda made: corpus.systems(), TREES, system, 1.5),
+    Kind("system", lambda made: corpus.systems(), TREES, system, 4.0),
     Kind("network", lambda made: corpus.networks(), TREES, network, 4.0),
     Kind("defaults", lambda made: texts({"urmpipe.toml": corpus.DEFAULTS}), TREES, defaults, 2.0),
     Kind("targets", lambda made: texts(corpus.TARGETS), (*BYTES, *TEXT, *TEXT), targets, 2.0),

@@ -114,6 +114,7 @@ def files_of_pages() -> dict[str, str]:
         "targets.csv": "x,y,z,rz,ry,rx\n0.1,0.05,0.25,0.3,0.4,0.1\n0,0,0.3,0,0,0\n",
         "contour.csv": "x,y,z,corner_r\n0.4,0.1,0.3,\n0.5,0.1,0.3,0.02\n0.5,-0.1,0.3,\n",
         "poses.csv": "x,y,z,qx,qy,qz,qw\n0.4,0.1,0.3,1,0,0,0\n",
+        "legs.csv": leg_log(),
         "other.toml": 'robot = "urm6"\n',
         "my_unit.py": text_of("docs/examples/low_pass.py"),
         "arm.urdf": "\n".join(snippets("docs/robots.md", "xml")),
@@ -122,6 +123,13 @@ def files_of_pages() -> dict[str, str]:
         **{f"{name}.toml": text for name, text in networks},
         "my-system.toml": next(one for one in systems if one.startswith("[system]")),
     }
+
+
+def leg_log() -> str:
+    """Return a log of six legs that become longer than 0.8 m one after the other."""
+    rows = [[0.005 * i, *(0.8 + 1e-4 * k * i for k in range(6))] for i in range(21)]
+    head = ",".join(["t [s]", *(f"leg{k} [m]" for k in range(1, 7))])
+    return "\n".join([head, *(",".join(f"{value:.4f}" for value in row) for row in rows), ""])
 
 
 def thinned(log: Path) -> str:

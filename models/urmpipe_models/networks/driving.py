@@ -142,7 +142,7 @@ def _joint_fault(
 
 
 def split_variables(mechanism: Mechanism, x: FloatArray, driven: Driven) -> IndexArray:
-    """Return the numbers of the variables that follow.
+    """Return the numbers of the variables that follow, shape (free,) [-].
 
     Args:
         mechanism: The network.
@@ -181,7 +181,11 @@ def split_variables(mechanism: Mechanism, x: FloatArray, driven: Driven) -> Inde
 
 
 def variable_limits(mechanism: Mechanism) -> FloatArray:
-    """Return lower and upper limits of all variables, shape (variables, 2), infinite where there is none."""
+    """Return limits of all variables in [m], [rad] and as controls are given, infinite where there is none.
+
+    Returns:
+        Lower and upper limits, shape (variables, 2).
+    """
     joints = {joint.name: joint for joint in mechanism.network.joints}
     controls = {control.name: control for control in mechanism.network.controls}
     limits = np.tile((-np.inf, np.inf), (len(mechanism.variables), 1))
@@ -194,7 +198,16 @@ def variable_limits(mechanism: Mechanism) -> FloatArray:
 
 
 def within_turns(mechanism: Mechanism, x: FloatArray, limits: FloatArray) -> FloatArray:
-    """Return an assembly with angles beyond their limits turned by whole turns, if that helps."""
+    """Return an assembly with angles beyond their limits turned by whole turns, if that helps.
+
+    Args:
+        mechanism: The network.
+        x: The assembly, shape (variables,), in [m], [rad] and as controls are given; what is returned, too.
+        limits: Lower and upper limits, likewise, shape (variables, 2).
+
+    Returns:
+        The assembly, shape (variables,), in [m], [rad] and as controls are given.
+    """
     x = np.array(x)
     for k in mechanism.angles.tolist():
         lower, upper = limits[k]
@@ -220,11 +233,12 @@ def move_to(
         places: The numbers of the prescribed variables, shape (driven,) [-].
         values: Their values, likewise.
         free: The numbers of the variables that follow, shape (free,) [-].
-        limits: Lower and upper limits of all variables, shape (variables, 2).
+        limits: Lower and upper limits of all variables in [m], [rad], shape (variables, 2).
 
     Returns:
-        The configuration, shape (variables,), and the trace that leads there; without one if it is there
-        already. If the trace is not complete, as from a singular pose, the configuration is the assembly.
+        The configuration in [m], [rad], shape (variables,), and the trace that leads there; without one if
+        it is there already. If the trace is not complete, as from a singular pose, the configuration is the
+        assembly.
     """
     change = np.zeros(len(x))
     change[places] = values - x[places]
@@ -256,7 +270,7 @@ def drive_rows(
         x: An assembly, shape (variables,), in [m], [rad] and as controls are given: the motion stays on its
             branch.
         driven: The prescribed variables.
-        values: Their values, shape (n, driven), as in x.
+        values: Their values in [m], [rad] and as controls are given, shape (n, driven).
         progress: Called with the share that is done, 0..1.
 
     Raises:

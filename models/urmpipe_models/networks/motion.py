@@ -126,9 +126,9 @@ class Drive:
         mechanism: The network.
         x: The prescribed variables where s is 0, and all others anywhere on the branch, shape (variables,),
             in [m], [rad] and as controls are given.
-        change: What s = 1 adds to the prescribed variables, shape (variables,); 0 of all others.
+        change: What s = 1 adds to the prescribed variables in [m], [rad], shape (variables,); 0 of others.
         free: The numbers of the variables that follow, shape (free,) [-].
-        limits: Lower and upper limits of all variables, shape (variables, 2); infinite without a limit.
+        limits: Lower and upper limits of all variables in [m], [rad], shape (variables, 2), or infinite.
     """
 
     mechanism: Mechanism
@@ -139,7 +139,7 @@ class Drive:
 
     @cached_property
     def scales(self) -> FloatArray:
-        """A step of each variable that follows, shape (free,)."""
+        """A step of each variable that follows in [m], [rad], shape (free,)."""
         return self.mechanism.column_scales[self.free]
 
     @cached_property
@@ -153,31 +153,34 @@ class Drive:
         return len(spinning_parts(self.mechanism, self.x))
 
     def at(self, z: FloatArray) -> FloatArray:
-        """Return the variables, shape (variables, n), of scaled coordinates, shape (free + 1, n)."""
+        """Return the variables in [m], [rad], shape (variables, n), of z [-], shape (free + 1, n)."""
         x = self.x[:, np.newaxis] + self.change[:, np.newaxis] * (z[-1:] / self.length)
         x[self.free] = z[:-1] * self.scales[:, np.newaxis]
         return x
 
     def coordinates(self, x: FloatArray, s: float) -> FloatArray:
-        """Return z of variables of shape (variables,)."""
+        """Return z [-], shape (free + 1,), of variables in [m], [rad], shape (variables,)."""
         return np.append(x[self.free] / self.scales, s * self.length)
 
     def closure(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return F and dF/dz, of shapes (rows,) and (rows, free + 1), of z of shape (free + 1,)."""
+        """Return F and dF/dz [-], shapes (rows,) and (rows, free + 1), of z of shape (free + 1,)."""
         closure = scaled_closure(self.mechanism, self.at(z[:, np.newaxis]))
         jacobian = closure.jacobian[:, :, 0]
         along = jacobian @ (self.change / self.mechanism.column_scales) / self.length
         return closure.residual[:, 0], np.column_stack((jacobian[:, self.free], along))
 
     def wrapped(self, z: FloatArray) -> FloatArray:
-        """Return z with rotation vectors of pi at most: at two pi they are singular."""
+        """Return z [-], shape (free + 1,), with rotation vectors of pi at most: two pi is singular."""
         x = self.at(z[:, np.newaxis])
         for part in self.mechanism.rotations:
             x[part] = wrap_rotation_vector(tuple(x[part]))
         return self.coordinates(x[:, 0], float(z[-1]) / self.length)
 
     def correct(self, z: FloatArray, normal: FloatArray) -> FloatArray | None:
-        """Return the solution of F = 0, normal . (z - z_start) = 0 next to z; None without convergence."""
+        """Return the solution of F = 0, normal . (z - z_start) = 0 next to z; None without convergence.
+
+        All have the shape (free + 1,) [-].
+        """
         start, size = z, np.inf
         for _ in range(CORRECTIONS):
             residual, jacobian = self.closure(z)
@@ -193,7 +196,9 @@ class Drive:
         return None
 
     def node(self, z: FloatArray, before: FloatArray | None = None) -> Node:
-        """Return the node at a solution; its tangent has the direction of `before`, else that of s.
+        """Return the node at a solution z; its tangent has the direction of `before`, else that of s.
+
+        Both have the shape (free + 1,) [-].
 
         Of the null space of dF/dz the tangent is the part at right angles to the idle spins: these leave s.
         """
@@ -535,8 +540,8 @@ class Slopes(NamedTuple):
 
     Attributes:
         rows: The numbers of the samples, shape (k,) [-].
-        first: dx/ds, shape (variables, k).
-        second: d2x/ds2, shape (variables, k).
+        first: dx/ds in [m], [rad] and as controls are given, shape (variables, k).
+        second: d2x/ds2, likewise, shape (variables, k).
     """
 
     rows: IndexArray
@@ -551,6 +556,9 @@ def sample(drive: Drive, branch: Trace, s: FloatArray) -> tuple[FloatArray, list
         drive: The drive.
         branch: Its trace, which reaches all places.
         s: The places [-], shape (n,).
+
+    Returns:
+        Configurations in [m], [rad] and as controls are given, and slopes.
     """
     at = s * drive.length
     ends = np.array([second.z[-1] for _, second in branch.segments])
@@ -647,7 +655,8 @@ def settle(
 def nearest_rotations(mechanism: Mechanism, x: FloatArray, to: FloatArray) -> FloatArray:
     """Return configurations whose rotation vectors are those of the same rotations nearest to others.
 
-    q and (1 - 2 pi / |q|) q are one rotation. All arrays have the shape (variables, n).
+    q and (1 - 2 pi / |q|) q are one rotation. All arrays have the shape (variables, n), in [m], [rad] and as
+    controls are given.
     """
     x = np.array(x)
     for part in mechanism.rotations:

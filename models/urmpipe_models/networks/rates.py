@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IndexArray
-from urmpipe_models.elementwise import Element, Vector, dot
+from urmpipe_models.elementwise import Element, dot
 from urmpipe_models.inverse.iterative.descent import damped_step
 from urmpipe_models.inverse.iterative.small_systems import product
 from urmpipe_models.networks.closure import scaled_closure
@@ -109,7 +109,12 @@ def compute_rates(
 
 
 def point_motion(
-    mechanism: Mechanism, x: FloatArray, xd: FloatArray, xdd: FloatArray, body: str, point: Vector
+    mechanism: Mechanism,
+    x: FloatArray,
+    xd: FloatArray,
+    xdd: FloatArray,
+    body: str,
+    point: tuple[float, float, float],
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return position [m], velocity [m/s] and acceleration [m/s2] of a point of a body, shape (n, 3) each.
 

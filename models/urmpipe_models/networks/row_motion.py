@@ -73,7 +73,7 @@ def follow(
         driven: The numbers of the driven variables, shape (driven,) [-].
         rows: Their values, likewise, shape (n, driven).
         free: The numbers of the variables that follow, shape (free,) [-].
-        limits: Lower and upper limits of all variables, shape (variables, 2).
+        limits: Lower and upper limits of all variables in [m], [rad], shape (variables, 2).
         progress: Called with the share that is done, 0..1.
     """
     following = _Follower(mechanism, x, driven, rows, free, limits)

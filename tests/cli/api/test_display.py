@@ -56,6 +56,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         urmpipe.plan("cube:wall,a=0.2,r=0.02,x=0.5,y=0,z=0.3", "ur5e"),
         urmpipe.accuracy(folder / "short.csv", folder / "arm.toml", velocities=[0.05], backend="python"),
         urmpipe.load_network("four-bar"), urmpipe.network_check("four-bar"),
+        urmpipe.network_drive("four-bar", {"crank": (0.9, 1.0)}, steps=2),
         urmpipe.export(run, folder / "log.csv"), urmpipe.report([run], folder / "report.html"),
     ]  # fmt: skip
     return {type(one).__name__: one for one in made}
@@ -152,7 +153,7 @@ def test_warnings_are_counted_in_the_line_and_told_in_the_notebook(tmp_path: Pat
 def test_each_result_plots_its_main_figure_and_names_those_there_are(results: dict[str, Any]) -> None:
     whole = replace(results["Diagnosis"], comparison=results["Comparison"])  # as urmpipe.diagnose returns it
     plotted = [one for one in (results | {"Diagnosis": whole}).values() if isinstance(one, Result)]
-    assert len(plotted) == 8
+    assert len(plotted) == 9
     for one in plotted:
         made = one.plot(width="column", font=7.0)
         assert isinstance(made, Figure)

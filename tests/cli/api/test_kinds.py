@@ -48,6 +48,8 @@ RIGHT = {
         "timeout",
         "restarts",
         "seed",
+        "steps",
+        "branch",
         "period",
         "time",
         "velocity",
@@ -69,9 +71,29 @@ RIGHT = {
         "measured",
         "names",
         "figure_names",
+        "wrenches",
     },
-    "a mapping": {"arguments", "controls", "network", "options", "unit", "interval"},
-    "a table": {"ingest.log", "compare.reference", "compare.logs", "diagnose.reference", "diagnose.log"},
+    "a mapping": {
+        "arguments",
+        "controls",
+        "drives",
+        "network",
+        "options",
+        "torques",
+        "unit",
+        "interval",
+        "network_check.start",
+        "network_drive.start",
+        "network_solve.start",
+    },
+    "a table": {
+        "ingest.log",
+        "compare.reference",
+        "compare.logs",
+        "diagnose.reference",
+        "diagnose.log",
+        "network_drive.log",
+    },
 }
 """Which keywords, of one function or of all, take what is odd elsewhere; each takes its default."""
 
@@ -105,6 +127,8 @@ def given(function: str, run: urmpipe.Run, folder: Path) -> dict[str, Any]:
     needed = {name: one_of_each[name] for name, one in parameters.items() if one.default is Parameter.empty}
     if function == "accuracy":
         return needed | {"robot": "irb60", "path": "cube:wall,a=0.6,r=0.03,x=1.7,y=0,z=1"}
+    if function == "network_drive":
+        return needed | {"drives": {"crank": (0.9, 1.0)}}
     return needed | ({"robot": "ur5e"} if "robot" in parameters else {})
 
 
