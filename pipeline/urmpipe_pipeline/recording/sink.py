@@ -100,6 +100,8 @@ class Sink:
                         self._file.write(data)
                 except OSError as error:
                     self._error = error
+                except ValueError as error:  # the file is closed: the command was stopped
+                    self._error = OSError(str(error))
 
 
 class _Layout:

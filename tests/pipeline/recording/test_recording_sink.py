@@ -44,6 +44,16 @@ def test_an_error_of_the_sender_is_raised(tmp_path: Path, *, piped: bool) -> Non
         write_into(tmp_path / "one.rrd", fail, piped=piped)
 
 
+def test_a_file_that_is_closed_early_is_an_error_of_the_sink(tmp_path: Path) -> None:
+    """A command that is stopped may close the file while rows are on their way."""
+    with (tmp_path / "one.rrd").open("xb") as file:
+        sink = Sink(rr.RecordingStream("closed"), file, piped=True)
+    times = [rr.TimeColumn("row", sequence=range(10))]
+    sink.stream.send_columns("/q", times, rr.Scalars.columns(scalars=range(10)))
+    with pytest.raises(OSError, match="closed file"):
+        sink.finish()
+
+
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counted in /proc")
 def test_recordings_leave_no_thread_behind(make_run: MakeRun, tmp_path: Path) -> None:
     run, counts = make_run(rows=3), []
