@@ -224,7 +224,7 @@ def hexapod_rows(mechanism: Mechanism, rows: int) -> tuple[FloatArray, FloatArra
 
 
 def motions(rows: int, few: int = 2000) -> tuple[list[str], list[Bound]]:
-    """Return the table of a hexapod that a log drives, and what is held."""
+    """Return the results for a hexapod that a log drives, and their bounds."""
     network = load_network("stewart-gough-driven")
     mechanism = mechanism_of(network)
     pose, lengths = hexapod_rows(mechanism, rows)

@@ -19,7 +19,7 @@ from urmpipe_pipeline.presentation.parts import spot_at
 from urmpipe_pipeline.presentation.scene import PlaneView, Spot, ball_sizes
 
 SIZE, LARGE = 420, 620
-"""Longest extent of what is drawn, in pixels: in one of several views, and in a view by itself."""
+"""Longest side of a drawing in pixels: of each of several views, and of a single view."""
 
 MARGIN = 50
 """Free around what is drawn in each view, in pixels: a name stands beside its point."""

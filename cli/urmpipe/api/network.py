@@ -277,7 +277,7 @@ def _read_log(
         try:
             return load(read=resolved({**reading, "joints": named}).options)[0]
         except LogError:
-            pass  # other columns are its joints: what is wrong with them is reported of the log as it is
+            pass  # the log has other joints: reading it without names reports what is wrong with it
     return load(read=resolved(reading).options)[0]
 
 

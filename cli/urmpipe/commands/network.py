@@ -208,7 +208,7 @@ def solve(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
     "--log",
     metavar="LOG.csv",
     type=ANY_FILE,
-    help="Drive by the joints of a log, by their names or as CONTROL=JOINT says.",
+    help="Log whose joints drive the controls of the same names, or those that CONTROL=JOINT assigns.",
 )
 @option(
     Heading.RUNNING,
@@ -260,39 +260,27 @@ def drive(name: str, output: Path | None, terminal: Terminal, **options: Any) ->
     replaces = output is not None and output.exists()
     with terminal.progress(f"Driving {name}") as progress:
         result = urmpipe.network_drive(name, output=output, progress=progress, **options)
-    terminal.warn(result.warnings)
-    terminal.answer(lambda: result.to_dict("command line"), lambda: _print_motion(result, replaces))
-    return 0 if result.verdict == "pass" else 1
+    return _answered(result, terminal, replaces)
 
 
-def _print_motion(result: NetworkMotion, replaces: bool) -> None:
-    """Print a motion, and what was written."""
-    from urmpipe.printing.presentation import print_presentation
-    from urmpipe.printing.terminal import print_recording, say
-    from urmpipe_models.spelling import pasted
-    from urmpipe_pipeline.results import present
-
-    print_presentation(present(result))
-    if result.recording is not None:
-        print_recording(result.recording, replaced=replaces)
-    elif result.log is not None:
-        earlier = "; it replaced an earlier one" if replaces else ""
-        say(f"Log: {result.log}  (read it: urmpipe ingest {pasted(result.log)}{earlier})")
-
-
-def _answered(result: NetworkResult, terminal: Terminal, replaces: bool) -> int:
+def _answered(result: NetworkResult | NetworkMotion, terminal: Terminal, replaces: bool) -> int:
     """Print what was found, and return the exit code."""
     terminal.warn(result.warnings)
     terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces))
     return 0 if result.verdict == "pass" else 1
 
 
-def _print(result: NetworkResult, replaces: bool) -> None:
+def _print(result: NetworkResult | NetworkMotion, replaces: bool) -> None:
     """Print what was found, and what was written."""
     from urmpipe.printing.presentation import print_presentation
-    from urmpipe.printing.terminal import print_recording
+    from urmpipe.printing.terminal import print_recording, say
+    from urmpipe_models.spelling import pasted
+    from urmpipe_pipeline.networks.network_motion import NetworkMotion
     from urmpipe_pipeline.results import present
 
     print_presentation(present(result))
     if result.recording is not None:
         print_recording(result.recording, replaced=replaces)
+    elif isinstance(result, NetworkMotion) and result.log is not None:
+        earlier = "; it replaced an earlier one" if replaces else ""
+        say(f"Log: {result.log}  (read it: urmpipe ingest {pasted(result.log)}{earlier})")

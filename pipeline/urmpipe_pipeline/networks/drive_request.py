@@ -1,7 +1,7 @@
 """From a request to drive a network to its motion: values with units, the assembly, the motion, its rates.
 
-1. `DriveRequest`: what is requested; `check` refuses what makes no sense with any network.
-2. `_parse_drives`, `_parse_values`, `parse_point`, `parse_wrench`: texts with units become SI.
+1. `DriveRequest`: the drives and their options; `check` refuses what no network can follow.
+2. `parse_ranges`, `parse_start`, `parse_point`, `parse_wrench`, `parse_torques`: texts with units become SI.
 3. `drive_network`: assembly (by default that of the file's start, else the nearest to start values, or one by
    its number), motion along a line or along a log, rates, transmission, static forces, singular poses in
    words.
@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import Vector
 from urmpipe_models.errors import Finding, NetworkError, OptionError, for_each, shown
 from urmpipe_models.names import not_among
 from urmpipe_models.networks.assembly import MOST_STARTS, RESTARTS, assemble
@@ -68,7 +69,7 @@ MAX_ROWS = 10_000_000  # of a motion: about 2 GB of variables and rates of a net
 
 @dataclass(frozen=True, slots=True)
 class DriveRequest:
-    """What drives a network, and what is wanted of its motion.
+    """The drives of a network, and the options of its motion.
 
     Attributes:
         drives: From and to of controls and joints by name; one value holds. Of controls numbers are in the
@@ -189,32 +190,11 @@ def drive_network(
     if n == 0:
         raise NetworkError(Finding("the motion ends before its first row", parameter="drives"))
     rates = compute_rates(
-        mechanism,
-        moved.x,
-        d_values[:n].T,
-        dd_values[:n].T,
-        driven.places,
-        moved.free,
-        moved.spins,
+        mechanism, moved.x, d_values[:n].T, dd_values[:n].T, driven.places, moved.free, moved.spins,
         moved.slopes,
-    )
+    )  # fmt: skip
     progress(0.9)
-    forces = None
-    if wrenches or torques:
-        forces = _forces(mechanism, moved, driven, factors, wrenches, torques)
-    events = tuple(_events(mechanism, moved, driven, factors, t_ns))
-    warnings = tuple(log.warnings) if log is not None else ()
-    options = {
-        "network": network.name,
-        "drives": {name: _plain(value) for name, value in {**columns, **request.drives}.items()},
-        "steps": request.steps, "duration": request.duration, "law": request.law if log is None else None,
-        "tsp": request.tsp if log is None else None, "branch": request.branch,
-        "start": {name: _plain(value) for name, value in request.start.items()} or None,
-        "point": None if point is None else f"{point[0]}:{','.join(map(repr, point[1]))}",
-        "wrenches": [format_wrench(wrench) for wrench in wrenches] or None,
-        "torques": dict(request.torques) or None, "restarts": request.restarts, "seed": request.seed,
-        "log": None if log is None else dict(log.provenance.options),
-    }  # fmt: skip
+    loaded = bool(wrenches or torques)
     scaled = values * factors
     return NetworkMotion(
         name=network.name,
@@ -233,12 +213,36 @@ def drive_network(
         distance=rates.distance,
         body="" if point is None else point[0],
         point=(0.0, 0.0, 0.0) if point is None else point[1],
-        events=events,
+        events=tuple(_events(mechanism, moved, driven, factors, t_ns)),
         transmission=tuple(_transmissions(mechanism, moved, driven, factors, scaled[:n], rates)),
-        forces=forces,
-        warnings=warnings,
-        provenance=provenance("network drive", options, inputs),
+        forces=_forces(mechanism, moved, driven, factors, wrenches, torques) if loaded else None,
+        warnings=() if log is None else tuple(log.warnings),
+        provenance=provenance(
+            "network drive", _options(network, request, columns, log, point, wrenches), inputs
+        ),
     )
+
+
+def _options(
+    network: Network,
+    request: DriveRequest,
+    columns: Mapping[str, str],
+    log: Run | None,
+    point: tuple[str, Vector] | None,
+    wrenches: Sequence[Wrench],
+) -> dict[str, Any]:
+    """Return how to repeat the motion: the request with points and loads in SI."""
+    return {
+        "network": network.name,
+        "drives": {name: _plain(value) for name, value in {**columns, **request.drives}.items()},
+        "steps": request.steps, "duration": request.duration, "law": request.law if log is None else None,
+        "tsp": request.tsp if log is None else None, "branch": request.branch,
+        "start": {name: _plain(value) for name, value in request.start.items()} or None,
+        "point": None if point is None else f"{point[0]}:{','.join(map(repr, point[1]))}",
+        "wrenches": [format_wrench(wrench) for wrench in wrenches] or None,
+        "torques": dict(request.torques) or None, "restarts": request.restarts, "seed": request.seed,
+        "log": None if log is None else dict(log.provenance.options),
+    }  # fmt: skip
 
 
 def _find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:

@@ -68,7 +68,7 @@ def is_word(value: Any) -> bool:
 
 
 def _find_unit(network: Network, name: str) -> tuple[str, Decimal]:
-    """Return the unit of a drive, and how many of it one of its own units is; "" of what is no drive."""
+    """Return the SI unit of a drive and its factor from the unit of the file; "" and 1 of other names."""
     if name in {control.name for control in network.controls}:
         return network.unit_of(name) or ("", Decimal(1))
     for joint in network.joints:

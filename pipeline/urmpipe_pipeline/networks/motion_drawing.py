@@ -1,8 +1,7 @@
 """A network that moves: its scene for the viewer, its drawing as SVG, and its figure in space.
 
-All three take the poses of the bodies over time, in the order of `Network.body_names`, the lengths of the
-elements over time, and the paths of traced points. Bodies and joints move as solids in the frame of a body,
-elements as lines whose points move.
+All three take a `MovingNetwork`. Bodies and joints move as solids in the frame of a body, elements as lines
+whose points move.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ from urmpipe_pipeline.networks.sketch import mechanism_pieces, part_names, sketc
 from urmpipe_pipeline.outlines import Piece
 from urmpipe_pipeline.presentation.figure import SpaceFigure
 from urmpipe_pipeline.presentation.parts import spot_at
-from urmpipe_pipeline.presentation.scene import Motion, MovingLines, PlaneView, Scene, Solid, Spot
+from urmpipe_pipeline.presentation.scene import Motion, MovingLines, Scene, Solid, Spot
 from urmpipe_pipeline.presentation.scene import Path as CurvePath
 from urmpipe_pipeline.projections import Sketch
 
@@ -53,18 +52,25 @@ FIRST_BODY_KINDS = ("revolute", "global")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _NetworkPoses:
+class MovingNetwork:
     """A network over time.
 
     Attributes:
         network: The network.
-        poses: Of the bodies [-] and [m], shape (n, bodies, 4, 4).
+        poses: Of the bodies in the order of `Network.body_names`, as matrices [-] and [m], shape
+            (n, bodies, 4, 4).
         lengths: Of the elements in [m], shape (n, elements).
+        t_ns: Times in [ns], shape (n,).
+        curves: Traced points.
+        title: Name of the view.
     """
 
     network: Network
     poses: FloatArray
     lengths: FloatArray
+    t_ns: IntArray
+    curves: Sequence[Curve] = ()
+    title: str = ""
 
     def at(self, row: int) -> Placed:
         """Return where everything is at an instant."""
@@ -84,27 +90,9 @@ class _NetworkPoses:
         return tuple(np.array(line) for line in zip(*lines, strict=True))
 
 
-def moving_scene(
-    network: Network,
-    poses: FloatArray,
-    lengths: FloatArray,
-    t_ns: IntArray,
-    curves: Sequence[Curve] = (),
-    title: str = "",
-) -> Scene:
-    """Return a network in motion for the viewer.
-
-    Args:
-        network: The network.
-        poses: Of the bodies in the order of `Network.body_names`, as matrices [-] and [m], shape
-            (n, bodies, 4, 4).
-        lengths: Of the elements in [m], shape (n, elements).
-        t_ns: Times in [ns], shape (n,).
-        curves: Traced points.
-        title: Name of the view.
-    """
-    motion = _NetworkPoses(network, np.asarray(poses), np.asarray(lengths))
-    first, owners = motion.at(0), ties(network)
+def moving_scene(motion: MovingNetwork) -> Scene:
+    """Return a network in motion for the viewer."""
+    network, first, owners = motion.network, motion.at(0), ties(motion.network)
     solids: list[Solid] = []
     lines: list[MovingLines] = []
     for solid in part_solids(first):
@@ -113,16 +101,17 @@ def moving_scene(
             strips = motion.element_lines(network.elements.index(owner))
             radius = ROD * first.extent if owner.kind == "gg" else 0.0
             lines.append(
-                MovingLines(solid.group, solid.name, solid.colour, strips, t_ns, radius, solid.label)
+                MovingLines(solid.group, solid.name, solid.colour, strips, motion.t_ns, radius, solid.label)
             )
-            solids += _moving_surface(motion, owner, solid, strips[-1][:, 0], t_ns)
+            solids += _moving_surface(motion, owner, solid, strips[-1][:, 0])
         else:
-            solids += _moving_solids(motion, owner, solid, t_ns)
+            solids += _moving_solids(motion, owner, solid)
     paths = (
-        CurvePath(name, position, t_ns, colour, label=name) for (name, position), colour in _coloured(curves)
+        CurvePath(name, position, motion.t_ns, colour, label=name)
+        for (name, position), colour in _coloured(motion.curves)
     )
     return Scene(
-        title,
+        motion.title,
         paths=tuple(paths),
         solids=tuple(solids),
         moving_lines=tuple(lines),
@@ -130,71 +119,32 @@ def moving_scene(
     )
 
 
-def motion_svg(
-    network: Network,
-    poses: FloatArray,
-    lengths: FloatArray,
-    curves: Sequence[Curve] = (),
-    title: str = "",
-) -> str:
+def motion_svg(motion: MovingNetwork) -> str:
     """Return a network in motion as SVG: a planar one in its plane, others in three projections.
 
     The first instant is drawn in full, further ones faintly; curves have their start and end marked.
-
-    Args:
-        network: The network.
-        poses: Of the bodies in the order of `Network.body_names`, as matrices [-] and [m], shape
-            (n, bodies, 4, 4).
-        lengths: Of the elements in [m], shape (n, elements).
-        curves: Traced points.
-        title: What the picture shows.
     """
-    motion = _NetworkPoses(network, np.asarray(poses), np.asarray(lengths))
-    first = motion.at(0)
+    network, first = motion.network, motion.at(0)
     first_parts = parts(first)
     pieces = [piece for row in _further_rows(motion.poses) for piece in _ghost(motion.at(row))]
     pieces += mechanism_pieces(network, first_parts)
-    pieces += [Piece(position, colour, 2.0, front=True) for (_, position), colour in _coloured(curves)]
-    ends = [spot for curve, colour in _coloured(curves) for spot in _curve_ends(*curve, colour)]
+    pieces += [Piece(position, colour, 2.0, front=True) for (_, position), colour in _coloured(motion.curves)]
+    ends = [spot for curve, colour in _coloured(motion.curves) for spot in _curve_ends(*curve, colour)]
     marks = [replace(end, words="") for end in ends]
     sketch = Sketch(pieces=pieces, spots=marks, names=[*ends, *part_names(network, first_parts)])
-    return sketch_svg(sketch, find_plane(first), title)
+    return sketch_svg(sketch, find_plane(first), motion.title)
 
 
-def motion_space_figure(
-    network: Network,
-    poses: FloatArray,
-    lengths: FloatArray,
-    curves: Sequence[Curve] = (),
-    title: str = "",
-) -> SpaceFigure:
-    """Return a network at its first instant in space, with the curves of its traced points.
-
-    Args:
-        network: The network.
-        poses: Of the bodies in the order of `Network.body_names`, as matrices [-] and [m], shape
-            (n, bodies, 4, 4).
-        lengths: Of the elements in [m], shape (n, elements).
-        curves: Traced points.
-        title: What is shown.
-    """
-    first = _NetworkPoses(network, np.asarray(poses), np.asarray(lengths)).at(0)
-    paths = tuple(CurvePath(name, position, None, colour) for (name, position), colour in _coloured(curves))
-    caption = f"{title}, at the first instant. Grey: the ground; vermilion: what controls drive."
-    alt = f"{network.name} in three dimensions, with the curves of {len(paths)} points."
+def motion_space_figure(motion: MovingNetwork) -> SpaceFigure:
+    """Return a network at its first instant in space, with the curves of its traced points."""
+    first, name = motion.at(0), motion.network.name
+    paths = tuple(
+        CurvePath(label, position, None, colour) for (label, position), colour in _coloured(motion.curves)
+    )
+    caption = f"{name}, at the first instant. Grey: the ground; vermilion: what controls drive."
+    alt = f"{name} in three dimensions, with the curves of {len(paths)} points."
     solids = joined_labels(list(part_solids(first)))
     return SpaceFigure("In space", caption, alt, paths, solids=solids, plane=find_plane(first))
-
-
-def motion_plane(network: Network, poses: FloatArray, lengths: FloatArray) -> PlaneView | None:
-    """Return how a planar network is seen along the common axis of its joints; None if it is not planar.
-
-    Args:
-        network: The network.
-        poses: Of the bodies [-] and [m], shape (n, bodies, 4, 4).
-        lengths: Of the elements in [m], shape (n, elements).
-    """
-    return find_plane(placed_at(network, np.asarray(poses)[0], np.asarray(lengths)[0]))
 
 
 def _coloured(curves: Sequence[Curve]) -> Iterator[tuple[Curve, str]]:
@@ -203,13 +153,13 @@ def _coloured(curves: Sequence[Curve]) -> Iterator[tuple[Curve, str]]:
         yield curve, CURVE_COLOURS[k % len(CURVE_COLOURS)]
 
 
-def _moving_solids(motion: _NetworkPoses, owner: Tie | None, solid: Solid, t_ns: IntArray) -> Iterator[Solid]:
+def _moving_solids(motion: MovingNetwork, owner: Tie | None, solid: Solid) -> Iterator[Solid]:
     """Yield a body, or a joint: its symbol with the body that it belongs to, its rail with the first one."""
     if not isinstance(owner, Joint):
-        yield _carried(motion, solid, solid.name, t_ns)
+        yield _carried(motion, solid, solid.name)
         return
     if owner.kind in FIRST_BODY_KINDS:
-        yield _carried(motion, solid, owner.bodies[0], t_ns)
+        yield _carried(motion, solid, owner.bodies[0])
         return
     if owner.kind in ("prismatic", "cylindrical", "helical"):
         rail = replace(
@@ -219,11 +169,11 @@ def _moving_solids(motion: _NetworkPoses, owner: Tie | None, solid: Solid, t_ns:
             lines=(_long_rail(motion, owner, solid.lines[0]),),
             label="",
         )
-        yield _carried(motion, rail, owner.bodies[0], t_ns)
-    yield _carried(motion, replace(solid, lines=solid.lines[1:]), owner.bodies[1], t_ns)
+        yield _carried(motion, rail, owner.bodies[0])
+    yield _carried(motion, replace(solid, lines=solid.lines[1:]), owner.bodies[1])
 
 
-def _long_rail(motion: _NetworkPoses, joint: Joint, rail: FloatArray) -> FloatArray:
+def _long_rail(motion: MovingNetwork, joint: Joint, rail: FloatArray) -> FloatArray:
     """Return the rail of a joint at the first instant, shape (2, 3) in [m], as long as the joint slides."""
     points = []
     for body, frame in zip(joint.bodies, joint.frames, strict=True):
@@ -236,16 +186,16 @@ def _long_rail(motion: _NetworkPoses, joint: Joint, rail: FloatArray) -> FloatAr
     return rail + np.outer((low - start, high - end), axis[0])
 
 
-def _carried(motion: _NetworkPoses, solid: Solid, body: str, t_ns: IntArray) -> Solid:
+def _carried(motion: MovingNetwork, solid: Solid, body: str) -> Solid:
     """Return a solid of the first instant as one that a body carries; the ground carries nothing away."""
     if body == motion.network.ground:
         return solid
     poses = motion.of_body(body)
-    return _in_frame(solid, Motion(poses[:, :3, 3], _quaternions(poses), t_ns), poses[0])
+    return _in_frame(solid, Motion(poses[:, :3, 3], _quaternions(poses), motion.t_ns), poses[0])
 
 
 def _moving_surface(
-    motion: _NetworkPoses, element: ConstraintElement, solid: Solid, foot: FloatArray, t_ns: IntArray
+    motion: MovingNetwork, element: ConstraintElement, solid: Solid, foot: FloatArray
 ) -> Iterator[Solid]:
     """Yield the plane or tube of an element, which follows its foot in [m], shape (n, 3)."""
     if element.kind not in ("eg", "gc"):
@@ -254,7 +204,7 @@ def _moving_surface(
     poses[:, :3, 3] = foot
     name = f"{solid.name} surface"
     surface = replace(solid, name=name, triangles=solid.triangles, lines=(), label="")
-    yield _in_frame(surface, Motion(foot, _quaternions(poses), t_ns), poses[0])
+    yield _in_frame(surface, Motion(foot, _quaternions(poses), motion.t_ns), poses[0])
 
 
 def _in_frame(solid: Solid, motion: Motion, pose: FloatArray) -> Solid:

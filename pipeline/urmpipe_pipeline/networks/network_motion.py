@@ -26,7 +26,12 @@ from urmpipe_models.spelling import Voice
 from urmpipe_models.taylor import Taylor
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import NETWORK, JointLog, LogColumn, LogWarning, seconds
-from urmpipe_pipeline.networks.motion_drawing import motion_space_figure, motion_svg, moving_scene
+from urmpipe_pipeline.networks.motion_drawing import (
+    MovingNetwork,
+    motion_space_figure,
+    motion_svg,
+    moving_scene,
+)
 from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.figure import Drawing, Figure, Line, Panel, View
@@ -625,36 +630,30 @@ def _shown_rows(motion: NetworkMotion, most: int) -> IntArray:
     return np.asarray(rows, dtype=np.int64)
 
 
-def _curves(motion: NetworkMotion, rows: IntArray) -> list[tuple[str, FloatArray]]:
-    if motion.point_motion is None:
-        return []
-    return [(f"point of {motion.body}", motion.point_motion[0][rows])]
+def _moving(motion: NetworkMotion, most: int) -> MovingNetwork:
+    """Return what is drawn of a motion at so many instants at most."""
+    rows, curves = _shown_rows(motion, most), []
+    if motion.point_motion is not None:
+        curves = [(f"point of {motion.body}", motion.point_motion[0][rows])]
+    poses, lengths, t_ns = motion.poses(rows), motion.element_lengths(rows), motion.t_ns[rows]
+    return MovingNetwork(motion.network, poses, lengths, t_ns, curves, f"{motion.name} [m]")
 
 
 def _scene(motion: NetworkMotion) -> Scene:
-    rows = _shown_rows(motion, MAX_SHOWN)
-    poses, lengths = motion.poses(rows), motion.element_lengths(rows)
-    title, curves = f"{motion.name} [m]", _curves(motion, rows)
-    return moving_scene(motion.network, poses, lengths, motion.t_ns[rows], curves, title)
+    return moving_scene(_moving(motion, MAX_SHOWN))
 
 
 def motion_drawing(motion: NetworkMotion) -> str:
     """Return the drawing of a motion as SVG."""
-    rows = _shown_rows(motion, DRAWN)
-    title = f"{motion.name} [m]"
-    return motion_svg(
-        motion.network, motion.poses(rows), motion.element_lengths(rows), _curves(motion, rows), title
-    )
+    return motion_svg(_moving(motion, DRAWN))
 
 
 def _page(motion: NetworkMotion) -> Iterator[Block]:
     """Yield what only a page shows."""
-    rows = _shown_rows(motion, DRAWN)
+    moving = _moving(motion, DRAWN)
     alt = f"{motion.name} at several instants, with the paths of its points."
-    yield Drawing("Mechanism in motion", alt, motion_drawing(motion))
-    yield motion_space_figure(
-        motion.network, motion.poses(rows), motion.element_lengths(rows), _curves(motion, rows), motion.name
-    )
+    yield Drawing("Mechanism in motion", alt, motion_svg(moving))
+    yield motion_space_figure(moving)
     if motion.provenance.inputs:
         yield inputs_table("Input files", motion.provenance.inputs)
     yield provenance_table(motion.provenance)

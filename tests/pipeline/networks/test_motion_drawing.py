@@ -25,7 +25,12 @@ from urmpipe_models.networks.network_file import load_network
 from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Joint, frame_of
 from urmpipe_models.orientation import matrices
 from urmpipe_pipeline.networks.finding import Search, find_network
-from urmpipe_pipeline.networks.motion_drawing import motion_space_figure, motion_svg, moving_scene
+from urmpipe_pipeline.networks.motion_drawing import (
+    MovingNetwork,
+    motion_space_figure,
+    motion_svg,
+    moving_scene,
+)
 from urmpipe_pipeline.networks.scene import motion_plane
 from urmpipe_pipeline.networks.sketch import mechanism_svg
 from urmpipe_pipeline.presentation.scene import PlaneView, Scene
@@ -102,14 +107,16 @@ def test_a_network_in_the_xz_plane_is_seen_along_y() -> None:
     way = (eye - target) / np.linalg.norm(eye - target)
     assert way[1] < -0.9  # from the front: z is up, and x to the right
     assert abs(way[0]) < 1e-6
-    camera = drawn_space(motion_space_figure(*still(result), (), "")).spec["layout"]["scene"]["camera"]
+    camera = drawn_space(motion_space_figure(still(result))).spec["layout"]["scene"]["camera"]
     assert camera["up"] == {"x": 0.0, "y": 0.0, "z": 1.0}
     assert camera["eye"]["y"] < -5.0 * abs(camera["eye"]["x"])
 
 
-def still(result: Any) -> tuple[Network, FloatArray, FloatArray]:
+def still(result: Any) -> MovingNetwork:
     """Return an assembly as a motion of one instant."""
-    return result.network, result.assemblies[0].poses[np.newaxis], np.empty((1, 0))
+    return MovingNetwork(
+        result.network, result.assemblies[0].poses[np.newaxis], np.empty((1, 0)), np.zeros(1, np.int64)
+    )
 
 
 @pytest.mark.parametrize("name", ["rssr", "sarrus", "screw-jack", "stewart-gough", "zoo", "bennett"])
@@ -177,7 +184,7 @@ def scene_at(name: str, body: str, point: Vector) -> tuple[DrivenNetwork, FloatA
     """Return a motion, the path of a point, and their scene."""
     moved = motion(name)
     path = moved.trace(body, point)
-    return moved, path, moving_scene(*moved, [("P", path)], name)
+    return moved, path, moving_scene(MovingNetwork(*moved, [("P", path)], name))
 
 
 @pytest.mark.parametrize(
@@ -233,7 +240,7 @@ def test_rods_keep_their_lengths_over_time(tmp_path: Path) -> None:
 def test_what_moves_is_sent_at_50_hz_at_most(tmp_path: Path) -> None:
     moved = motion("rssr")
     fast = moved._replace(t_ns=np.arange(len(moved.t_ns)) * 5_000_000)
-    file = recorded(shown(scene=moving_scene(*fast)), tmp_path)
+    file = recorded(shown(scene=moving_scene(MovingNetwork(*fast))), tmp_path)
     times = np.array(times_of(file, "/shown/scene/bodies/coupler"))
     assert np.diff(times).min() >= 20_000_000
     assert (times[0], times[-1]) == (fast.t_ns[0], fast.t_ns[-1])
@@ -275,7 +282,7 @@ def test_labels_at_one_place_are_moved_apart(tmp_path: Path) -> None:
 
 def test_the_drawing_of_a_motion_has_curves_and_further_instants() -> None:
     moved, path, _ = scene_at("four-bar", "coupler", (0.5, 0.25, 0.0))
-    svg = ET.fromstring(motion_svg(moved.network, moved.poses, moved.lengths, [("P", path)], "moving"))
+    svg = ET.fromstring(motion_svg(MovingNetwork(*moved, [("P", path)], "moving")))
     scale, origin = metres(svg)
     (curve,) = [
         one for one in svg.iter(f"{SVG}polyline") if len(there(one.get("points")).split()) == len(path)
@@ -288,19 +295,23 @@ def test_the_drawing_of_a_motion_has_curves_and_further_instants() -> None:
     np.testing.assert_allclose((place - origin) * scale, path[0, :2], atol=2.0 * PIXEL)
     faint = [one for one in svg.iter(f"{SVG}polygon") if one.get("stroke-opacity")]
     assert len(faint) == 6 * 3  # six further instants of three moving bodies
-    half = motion_svg(moved.network, moved.poses[:40], moved.lengths[:40], [("P", path[:40])], "half")
+    half = motion_svg(
+        MovingNetwork(
+            moved.network, moved.poses[:40], moved.lengths[:40], moved.t_ns[:40], [("P", path[:40])], "half"
+        )
+    )
     assert {"P start", "P end"} <= set(names(ET.fromstring(half)))
 
 
 def test_a_spatial_motion_is_drawn_in_three_projections() -> None:
     moved, path, _ = scene_at("legs", "platform", ZERO)
-    svg = ET.fromstring(motion_svg(moved.network, moved.poses, moved.lengths, [("P", path)], "legs"))
+    svg = ET.fromstring(motion_svg(MovingNetwork(*moved, [("P", path)], "legs")))
     assert len([one for one in svg.iter(f"{SVG}polyline") if one.get("stroke") == "#21c3ff"]) == 3
 
 
 def test_the_page_has_curves_and_bodies_at_the_first_instant() -> None:
     moved, path, _ = scene_at("rssr", "coupler", ZERO)
-    figure = motion_space_figure(moved.network, moved.poses, moved.lengths, [("P", path)], "rssr")
+    figure = motion_space_figure(MovingNetwork(*moved, [("P", path)]))
     data = drawn_space(figure).spec["data"]
     assert next(one["name"] for one in data if one["type"] == "scatter3d") == "P"
     assert {one["legendgroup"] for one in data if one["type"] == "mesh3d"} >= {"ground", "coupler", "driven"}
