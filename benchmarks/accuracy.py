@@ -16,7 +16,7 @@ from pairs import Bound, in_turn, machine, timed, write_results
 
 from urmpipe.api.accuracy import accuracy
 from urmpipe.systems.units import Backend
-from urmpipe_models.drives.joint_drives import DrivenJoint
+from urmpipe_models.drives import DrivenJoint
 from urmpipe_pipeline.accuracy.published import FIG7, fig7_rows
 from urmpipe_pipeline.accuracy.result import Accuracy
 

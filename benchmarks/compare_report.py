@@ -19,7 +19,7 @@ from motions import write_log
 from pairs import Bound, machine, measure, median, rounds, table, write_results
 
 from urmpipe_datasets import LOGS
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
 

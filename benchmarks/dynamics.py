@@ -24,9 +24,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "shared")
 from made_masses import with_drives, with_masses
 from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.units import make_unit
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.dynamics.over_log import terms_over_log, torque_over_log
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.dynamics.equations import terms_over_log, torque_over_log
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_writer import urdf_text
 

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.parameters import Parameter
+from urmpipe_models.arm.chain import Chain, Parameter
+from urmpipe_models.elementwise import FloatArray
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 KNOWN_BY = ("URM", "DH", "6R")  # how the sources of parameters begin that have names in data sheets

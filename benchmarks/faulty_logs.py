@@ -24,8 +24,8 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 import urmpipe
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.robots.catalogue import load_robot, parse_offset
 from urmpipe_pipeline.runs.results import Run
 

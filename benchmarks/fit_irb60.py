@@ -32,11 +32,11 @@ from urmpipe_datasets import ROBOTS
 from urmpipe_fmus.cache import cached_fmu
 from urmpipe_fmus.units.driven_arm import driven_arm
 from urmpipe_fmus.variable import Memory, Parameter, State
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.dynamics.sampled_loop import spectral_radius
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.dynamics.driven_arm import spectral_radius
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import RobotError
-from urmpipe_models.robots.robot_file import chain_from_dict
+from urmpipe_models.robots.toml import chain_from_dict
 from urmpipe_pipeline.accuracy.published import FIG7, fig7_rows
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 

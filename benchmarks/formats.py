@@ -22,7 +22,7 @@ from pyarrow import csv
 from pyarrow import parquet as pq
 from scipy.io import savemat
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 PERIOD_MS = 5
 NAMES = ["t", *(f"q{j}" for j in range(1, 7))]

@@ -15,12 +15,12 @@ from eaik.IK_HP import HPRobot
 from numpy.typing import NDArray
 from pairs import Bound, machine, timed, write_results
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form
-from urmpipe_models.inverse.solve import solve
-from urmpipe_models.inverse.targets import Targets, targets_of
-from urmpipe_models.kinematics.screws import screws
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.closed import ClosedForm, closed_form
+from urmpipe_models.ik.solutions import Targets, targets_of
+from urmpipe_models.ik.solve import solve
+from urmpipe_models.kinematics.forward import screws
 from urmpipe_models.robots.catalogue import load_robot
 
 ALONE = 500

@@ -22,12 +22,10 @@ from pathlib import Path
 import numpy as np
 from pairs import Bound, machine, write_results
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.iterative.refine import refine
-from urmpipe_models.inverse.iterative.restarts import solve_iteratively
-from urmpipe_models.inverse.search import Search
-from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.restarts import refine, solve_iteratively
+from urmpipe_models.ik.solutions import Search, Targets, misses, targets_of
 from urmpipe_models.robots.catalogue import load_robot
 
 OURS_NEAR = "near: urmpipe, 1 thread"

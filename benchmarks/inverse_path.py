@@ -22,12 +22,12 @@ from numpy.typing import NDArray
 from pairs import Bound, machine, write_results
 
 from urmpipe_datasets import LOGS
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.along_path.path import follow
-from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.path import follow
+from urmpipe_models.ik.solutions import Targets, misses, targets_of
+from urmpipe_models.math3d import Transform
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform
 
 PEER = Path(__file__).parent / "inverse_path_peer.py"
 PERIOD = 5_000_000

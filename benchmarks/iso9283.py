@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from pairs import Bound, machine, median, rounds, table, write_results
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 URMPIPE = [sys.executable, "-m", "urmpipe"]
 

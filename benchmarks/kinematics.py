@@ -14,10 +14,10 @@ import numpy as np
 import pinocchio as pin
 from pairs import Bound, machine, write_results
 
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.kinematics.forward import poses_over_log, positions_over_log
+from urmpipe_models.math3d import Transform
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform
 
 TRIES = 3
 

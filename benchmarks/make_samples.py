@@ -19,7 +19,7 @@ import numpy as np
 from samples.environments import ENVIRONMENTS, follow, urm6
 from samples.path import PERIOD, SAMPLES, TIMES, SamplePath, arc_length
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 
 SHIPPED = Path(__file__).resolve().parents[1] / "datasets" / "urmpipe_datasets" / "logs"

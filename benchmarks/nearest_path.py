@@ -19,7 +19,7 @@ import numpy as np
 from pairs import Bound, machine, ratio, rounds, table, write_results
 
 from urmpipe_datasets import LOGS
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
 
 CASES = [(1, 1), (1, 3), (1, 30), (10, 3), (10, 30), (10, 300)]

@@ -26,14 +26,13 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 import urmpipe
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.assembly import assemble
-from urmpipe_models.networks.closure import closure_of
-from urmpipe_models.networks.descent import descend
+from urmpipe_models.networks.closure import closure_of, descend
 from urmpipe_models.networks.driving import drive_rows, find_driven
+from urmpipe_models.networks.file import load_network
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.mobility import mobility_of
-from urmpipe_models.networks.network_file import load_network
 
 CLOSED = 1e-9
 """A gap of less, in lengths (of the script: in [m]) and in [rad], is closed."""

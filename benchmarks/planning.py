@@ -21,13 +21,12 @@ from pairs import Bound, machine, rounds, timed, write_results
 from toppra.algorithm import TOPPRA
 from toppra.constraint import DiscretizationType, JointAccelerationConstraint, JointVelocityConstraint
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.planning.cube import cube_rows
-from urmpipe_models.planning.fastest import JointLimits, fastest_law
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.path_joints import PathJoints, joints_along
+from urmpipe_models.planning.joints import JointLimits, PathJoints, fastest_law, joints_along
+from urmpipe_models.planning.path import cube_rows
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.robots.robot_file import robot_toml
+from urmpipe_models.robots.toml import robot_toml
 
 VELOCITY, ACCELERATION = 2.0, 5.0
 """The largest rates [rad/s] and accelerations [rad/s2] of every joint."""

@@ -18,10 +18,10 @@ from pairs import Bound, machine, write_results
 from scipy.signal import butter, lfilter
 
 from urmpipe_datasets import LOGS
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
-from urmpipe_models.repolarizer import repolarize
 from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.wraps import repolarize
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
 from urmpipe_pipeline.repolarization.audit import audit_log
 

@@ -18,8 +18,7 @@ from urmpipe_fmus.units.dc_drive import dc_drive
 from urmpipe_fmus.units.drive_controller import drive_controller
 from urmpipe_fmus.units.inertia import inertia
 from urmpipe_fmus.units.set_point import set_point
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.elementwise import Element
+from urmpipe_models.elementwise import Element, FloatArray
 
 PICTURE = Path(__file__).resolve().parent / "pictures" / "drives.svg"
 PERIOD = 5e-3

@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.iso9283.approach import settling
 from urmpipe_pipeline.iso9283.command_path import CommandCorner, CommandPath
 from urmpipe_pipeline.iso9283.corners import CornerPath, corner_path

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.planning.path import LineArcPath, PathRows
 
 PICTURE = Path(__file__).resolve().parent / "pictures" / "plan.svg"
 RADIUS = 0.12

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from samples.path import SAMPLES, TIMES, SamplePath, ease
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import jacobian_over_log, positions_over_log
-from urmpipe_models.transform import translation
+from urmpipe_models.math3d import translation
 
 # [UrmArm2021]_ Table 1 (the tilts as the errata give them) and the calibration pose of section 2.4.
 LENGTHS = (0.243215, 0.212430, 0.212430, 0.212430, 0.212430, 0.212430, 0.042215)

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 Curve: TypeAlias = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 """Radius [m], azimuth [turns] and height [m] about the arm's first axis, of a parameter 0..1."""

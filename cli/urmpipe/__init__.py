@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from urmpipe.reading import Reading as Reading
     from urmpipe.reading import TableReading as TableReading
     from urmpipe_fmus.build import BuiltFmu as BuiltFmu
-    from urmpipe_models.chains.chain import Chain as Chain
+    from urmpipe_models.arm.chain import Chain as Chain
     from urmpipe_models.errors import CosimulationError as CosimulationError
     from urmpipe_models.errors import FmuError as FmuError
     from urmpipe_models.errors import LogError as LogError
@@ -66,12 +66,12 @@ if TYPE_CHECKING:
     from urmpipe_models.errors import UnitError as UnitError
     from urmpipe_models.errors import UrmpipeError as UrmpipeError
     from urmpipe_models.errors import ViewerError as ViewerError
-    from urmpipe_models.inverse.targets import Targets as Targets
-    from urmpipe_models.networks.network import Network as Network
-    from urmpipe_models.networks.network_file import network_names as network_names
-    from urmpipe_models.planning.rows import PathRows as PathRows
+    from urmpipe_models.ik.solutions import Targets as Targets
+    from urmpipe_models.math3d import Transform as Transform
+    from urmpipe_models.networks.file import Network as Network
+    from urmpipe_models.networks.file import network_names as network_names
+    from urmpipe_models.planning.path import PathRows as PathRows
     from urmpipe_models.robots.catalogue import robot_names as robot_names
-    from urmpipe_models.transform import Transform as Transform
     from urmpipe_pipeline.accuracy.result import Accuracy as Accuracy
     from urmpipe_pipeline.comparison.comparison import Comparison as Comparison
     from urmpipe_pipeline.comparison.deviation import Deviation as Deviation
@@ -92,7 +92,7 @@ __version__ = "0.1.0"
 _HOME = {
     "Accuracy": "urmpipe_pipeline.accuracy.result",
     "BuiltFmu": "urmpipe_fmus.build",
-    "Chain": "urmpipe_models.chains.chain",
+    "Chain": "urmpipe_models.arm.chain",
     "Comparison": "urmpipe_pipeline.comparison.comparison",
     "CosimulationError": "urmpipe_models.errors",
     "Deviation": "urmpipe_pipeline.comparison.deviation",
@@ -105,7 +105,7 @@ _HOME = {
     "LogError": "urmpipe_models.errors",
     "LogReading": "urmpipe.reading",
     "LogMap": "urmpipe_pipeline.sources",
-    "Network": "urmpipe_models.networks.network",
+    "Network": "urmpipe_models.networks.file",
     "NetworkError": "urmpipe_models.errors",
     "NetworkMotion": "urmpipe_pipeline.networks.network_motion",
     "NetworkResult": "urmpipe_pipeline.networks.result",
@@ -113,7 +113,7 @@ _HOME = {
     "OutputError": "urmpipe_models.errors",
     "Reading": "urmpipe.reading",
     "PathError": "urmpipe_models.errors",
-    "PathRows": "urmpipe_models.planning.rows",
+    "PathRows": "urmpipe_models.planning.path",
     "PlannedPath": "urmpipe_pipeline.planned_paths.result",
     "ReadOptions": "urmpipe_pipeline.sources",
     "RecordingError": "urmpipe_models.errors",
@@ -122,8 +122,8 @@ _HOME = {
     "Run": "urmpipe_pipeline.runs.results",
     "Simulation": "urmpipe_pipeline.simulations.simulation",
     "TableReading": "urmpipe.reading",
-    "Targets": "urmpipe_models.inverse.targets",
-    "Transform": "urmpipe_models.transform",
+    "Targets": "urmpipe_models.ik.solutions",
+    "Transform": "urmpipe_models.math3d",
     "UnitError": "urmpipe_models.errors",
     "UrmpipeError": "urmpipe_models.errors",
     "UrmpipeWarning": "urmpipe.keyword_checks",
@@ -140,7 +140,7 @@ _HOME = {
     "load_robot": "urmpipe.api.load_robot",
     "network_check": "urmpipe.api.network",
     "network_drive": "urmpipe.api.network",
-    "network_names": "urmpipe_models.networks.network_file",
+    "network_names": "urmpipe_models.networks.file",
     "network_solve": "urmpipe.api.network",
     "plan": "urmpipe.api.plan",
     "read_map": "urmpipe.api.read_map",

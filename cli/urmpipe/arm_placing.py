@@ -9,13 +9,12 @@ from typing import Any, cast
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, OptionError, shown
-from urmpipe_models.inverse.checks import ROTATION_TOLERANCE
-from urmpipe_models.messages import Hint
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Finding, Hint, OptionError, shown
+from urmpipe_models.ik.solutions import ROTATION_TOLERANCE
+from urmpipe_models.math3d import Transform, from_offset, rpy_of
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform, from_offset, rpy_of
 
 Robot = Chain | str | Path
 Frame = Transform | Sequence[float] | FloatArray

@@ -127,7 +127,7 @@ def defaults_for(command: click.Command, path: Path, commands: Mapping[str, clic
         OptionError: With everything that is wrong with the file.
     """
     from urmpipe_models.errors import OptionError
-    from urmpipe_models.files.toml_text import parse_toml
+    from urmpipe_models.toml_tables import parse_toml
 
     data = parse_toml(path, OptionError)
     faults = list(_faults(data, path, commands))
@@ -145,8 +145,7 @@ def defaults_for(command: click.Command, path: Path, commands: Mapping[str, clic
 
 def _faults(data: Mapping[str, Any], path: Path, commands: Mapping[str, click.Command]) -> Iterator[Finding]:
     """Yield what is wrong with the keys of a file."""
-    from urmpipe_models.errors import Finding
-    from urmpipe_models.names import not_among
+    from urmpipe_models.errors import Finding, not_among
 
     every = {name: option for one in commands.values() for name, option in _options(one).items()}
     for key, value in data.items():
@@ -163,7 +162,7 @@ def _faults(data: Mapping[str, Any], path: Path, commands: Mapping[str, click.Co
 
 def _fault(name: str, value: Any, allowed: Mapping[str, click.Option]) -> str | None:
     """Return what is wrong with one key and its value; None if nothing is."""
-    from urmpipe_models.names import did_you_mean, listed
+    from urmpipe_models.errors import did_you_mean, listed
 
     if f"--{name}" in EACH_TIME:
         return f"{name}: found an option of a single call, allowed: --{name} on the command line"

@@ -59,7 +59,7 @@ def _are_sides(value: Any) -> bool:
 
 
 def _is_robot(value: Any) -> bool:
-    from urmpipe_models.chains.chain import Chain
+    from urmpipe_models.arm.chain import Chain
 
     return isinstance(value, Chain) or _is_path(value)
 
@@ -89,7 +89,7 @@ def _is_unit(value: Any) -> bool:
 
 
 def _is_network(value: Any) -> bool:
-    from urmpipe_models.networks.network import Network
+    from urmpipe_models.networks.file import Network
 
     return isinstance(value, (Network, Mapping)) or _is_path(value)
 
@@ -140,7 +140,7 @@ def _are_numbers(value: Any) -> bool:
 
 
 def _is_planned(value: Any) -> bool:
-    from urmpipe_models.planning.rows import PathRows
+    from urmpipe_models.planning.path import PathRows
 
     return isinstance(value, PathRows) or _is_path(value)
 

@@ -9,10 +9,9 @@ from typing import Any, TypedDict
 
 from urmpipe.arm_placing import Frame, Robot, place_robot
 from urmpipe.keyword_checks import PathLike
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import for_each
-from urmpipe_models.orientation import RotationForm
-from urmpipe_models.transform import from_offset
+from urmpipe_models.math3d import RotationForm, from_offset
 from urmpipe_pipeline.sources import LogMap, ReadOptions, read_map
 from urmpipe_pipeline.sources.options import GivenInterval, read_options
 

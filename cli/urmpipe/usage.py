@@ -80,8 +80,7 @@ class Group(click.Group):
         name = args[0]
         if name.startswith("-") or ctx.resilient_parsing or self.get_command(ctx, name):
             return super().resolve_command(ctx, args)
-        from urmpipe_models.errors import shown
-        from urmpipe_models.names import not_among
+        from urmpipe_models.errors import not_among, shown
 
         names = self.list_commands(ctx)
         deeper = next(self._deeper(ctx, name), None)
@@ -98,8 +97,7 @@ class Group(click.Group):
 
 def usage_finding(error: click.UsageError) -> Finding:
     """Return what is wrong with a line, or with the urmpipe.toml that speaks for it."""
-    from urmpipe_models.errors import Finding
-    from urmpipe_models.names import did_you_mean
+    from urmpipe_models.errors import Finding, did_you_mean
 
     ctx = error.ctx
     match error:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-from urmpipe_models.files.contents import keep_permissions
+from urmpipe_models.files import keep_permissions
 
 EARLIEST = (1980, 1, 1, 0, 0, 0)
 """The time of every entry: zip knows none before."""

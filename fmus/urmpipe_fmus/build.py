@@ -13,8 +13,7 @@ from urmpipe_fmus.documentation import documentation
 from urmpipe_fmus.robot_entry import robot_file
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.display import Shown, line_of
-from urmpipe_models.errors import Finding, FmuError
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, FmuError, Hint
 
 if TYPE_CHECKING:
     import pandas as pd

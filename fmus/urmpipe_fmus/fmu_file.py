@@ -14,7 +14,7 @@ from typing import Any
 from xml.parsers import expat
 
 from urmpipe_models.errors import Finding, FmuError, shown
-from urmpipe_models.files.missing import meant_by
+from urmpipe_models.files import meant_by
 
 DESCRIPTION = "modelDescription.xml"
 

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from urmpipe_fmus.fmu_file import DAMAGED
 from urmpipe_fmus.unit import Unit
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import UrmpipeError
-from urmpipe_models.robots.robot_file import chain_from_dict
+from urmpipe_models.robots.toml import chain_from_dict
 
 ROBOT_FILE = "resources/robot.toml"
 

@@ -11,8 +11,7 @@ from urmpipe_fmus.equations import named
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.variable import Variable
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.elementwise import Element
+from urmpipe_models.elementwise import Element, FloatArray
 from urmpipe_models.errors import UnitError
 
 

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_fmus.variable import LARGEST_INTEGER
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.elementwise import Element
+from urmpipe_models.elementwise import Element, FloatArray
 from urmpipe_models.errors import UnitError
 
 LAST_NS = 2**63 - 1

@@ -23,7 +23,7 @@ from urmpipe_fmus.dependencies import Dependencies
 from urmpipe_fmus.equations import Equations
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_models.errors import Finding, UnitError, UrmpipeError
-from urmpipe_models.files.contents import read_contents
+from urmpipe_models.files import read_contents
 
 
 def load_unit_file(path: str | Path) -> Unit:

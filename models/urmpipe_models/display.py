@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
-from urmpipe_models.messages import in_html, one_line
+from urmpipe_models.errors import in_html, one_line
 
 LONGEST = 120
 """Characters of the line: it fits into a terminal, and into a list of results."""

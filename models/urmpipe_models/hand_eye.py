@@ -28,8 +28,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IndexArray
-from urmpipe_models.orientation import best_rotation, matrices, quaternions
+from urmpipe_models.elementwise import FloatArray, IndexArray
+from urmpipe_models.math3d import best_rotation, matrices, quaternions
 
 TURN_LENGTH = 0.01
 """What a radian counts as in [m] where positions leave something open: so little that orientations hardly

@@ -16,10 +16,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.elementwise import Element
-from urmpipe_models.row_blocks import row_blocks
-from urmpipe_models.sine_cosine import WORK, cosine_sine_into
+from urmpipe_models.elementwise import WORK, Element, FloatArray, cosine_sine_into, row_blocks
 
 BLOCK = 12288
 """Rows in a block: some 20 arrays of 96 kB stay in a core's cache, and a call of NumPy costs a tenth."""

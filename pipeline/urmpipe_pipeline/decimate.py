@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 
 POINTS = 2000
 """Points a drawn trace has at most: about two a pixel of a wide screen."""

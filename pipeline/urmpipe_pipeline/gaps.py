@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, IntArray
+from urmpipe_models.elementwise import BoolArray, IntArray
 
 GAP = 3.0
 """Two rows further apart than this many median periods have a gap between them, in which nothing is known."""

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.continuity import continuous_quaternions, continuous_rotations
 from urmpipe_models.display import Shown, line_of, number_of
-from urmpipe_models.messages import Finding, Hint, Message
-from urmpipe_models.orientation import NAMES, RotationForm, quaternions
-from urmpipe_models.spelling import Voice
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Finding, Hint, Message, Voice
+from urmpipe_models.math3d import NAMES, RotationForm, quaternions
+from urmpipe_models.wraps import continuous_quaternions, continuous_rotations
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,10 +14,10 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.repolarizer import FULL_TURN
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.robots.catalogue import load_robot, moving_differently
+from urmpipe_models.wraps import FULL_TURN
 
 MOST_SIGNS = 7
 """Of so many joints all patterns of signs are looked at: 127; of more, two at once at most."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.inertial import GRAVITY
+from urmpipe_models.arm.chain import GRAVITY, Chain
 from urmpipe_pipeline.joint_log import LogWarning
 
 MASS_LEFT_OUT = "mass-left-out"

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from urllib.parse import unquote
 
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.visual import FILE, PACKAGE_PATH, Mesh, Visual
+from urmpipe_models.arm.chain import FILE, PACKAGE_PATH, Chain, Mesh, Visual
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.json_values import parsed_json
 

@@ -11,9 +11,10 @@ from typing import TypeAlias, TypeVar
 
 import numpy as np
 
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import (
     Finding,
+    Hint,
     LogError,
     OptionError,
     RecordingError,
@@ -21,7 +22,6 @@ from urmpipe_models.errors import (
     for_each,
     shown,
 )
-from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.unjudged import Unjudged
 from urmpipe_pipeline.networks.network_motion import NetworkMotion

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)

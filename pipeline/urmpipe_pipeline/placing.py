@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from urmpipe_models.errors import Finding, OutputError
-from urmpipe_models.files.contents import keep_permissions
+from urmpipe_models.files import keep_permissions
 
 
 @dataclass(frozen=True, slots=True)

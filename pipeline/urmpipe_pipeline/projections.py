@@ -8,10 +8,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.dynamics.over_log import mass_centres_over_log
-from urmpipe_models.messages import in_html
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.dynamics.equations import mass_centres_over_log
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import in_html
 from urmpipe_pipeline.lettering import Box, box_about, freest, width_of
 from urmpipe_pipeline.outlines import Piece, drawn_pieces, polyline
 from urmpipe_pipeline.palette import INK_COLOUR, MASS_COLOUR, REFERENCE_COLOUR

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.arrays import IntArray
+from urmpipe_models.elementwise import IntArray
+from urmpipe_models.errors import inert
 from urmpipe_models.measure_units import factor, units_of
-from urmpipe_models.messages import inert
 
 NOTHING = "–"
 """Stands where there is no value."""

@@ -13,7 +13,7 @@ import urmpipe
 from flat_arm import ARM, MASSES, drive, lay_flat_arm
 from urmpipe.driven_runs.running_speed import Within, running_speed
 from urmpipe.main import run
-from urmpipe_models.planning.cube import cube_rows
+from urmpipe_models.planning.path import cube_rows
 
 Captured = pytest.CaptureFixture[str]
 

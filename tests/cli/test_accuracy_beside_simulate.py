@@ -11,13 +11,13 @@ import urmpipe
 from driven_paths import CONTOUR, PERIOD, begun, joint_log, planned, set_points_log, written
 from flat_arm import ARM, MASSES, drive
 from urmpipe_fmus.native import native_missing
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.drives.joint_drives import DRIVE_KEYS, GAIN_KEYS, DrivenJoint
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.drives import DRIVE_KEYS, GAIN_KEYS, DrivenJoint
 from urmpipe_models.dynamics.driven_arm import at_rest
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.robots.robot_file import robot_toml
+from urmpipe_models.robots.toml import robot_toml
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 
 pytestmark = [

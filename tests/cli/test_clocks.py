@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import urmpipe as api
 from asserting import refusal
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.results import present

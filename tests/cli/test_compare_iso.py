@@ -20,10 +20,10 @@ from repeated import PLACE, along, judged, logs, overall, value, written
 from repeated import told as told_by
 from urmpipe.main import run
 from urmpipe_fmus.native import native_missing
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.math3d import quaternions
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.results import read_recording

@@ -12,7 +12,7 @@ import pytest
 from urmpipe import read_recording
 from urmpipe.main import COMMANDS, run
 from urmpipe.options.reading import FORMS
-from urmpipe_models import orientation
+from urmpipe_models import math3d as orientation
 from urmpipe_pipeline.comparison.comparison import Comparison
 
 LOG = "t [s],a,b,c,d,e,f\n" + "".join(f"{k * 0.005},{k},1,2,3,4,5\n" for k in range(20))

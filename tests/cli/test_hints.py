@@ -17,13 +17,12 @@ import urmpipe
 from make_specimens import paths
 from specimen import SPECIMENS
 from urmpipe.main import cli, run
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Hint, Message
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.messages import Hint, Message
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.math3d import from_offset, quaternions
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import from_offset
 
 ROBOTS = (None, "ur5e")
 

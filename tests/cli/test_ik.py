@@ -9,10 +9,10 @@ import pytest
 
 from ik_runs import answer, write_path
 from urmpipe.main import run
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.inverse.targets import misses, targets_of
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import pasted
+from urmpipe_models.ik.solutions import misses, targets_of
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.spelling import pasted
 from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.solved_targets.result import SolvedTargets

@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import urmpipe
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_models.inverse.targets import misses, targets_of
+from urmpipe_models.ik.solutions import misses, targets_of
 from urmpipe_models.kinematics.singularity import singularity_over_log
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.math3d import quaternions
 from urmpipe_pipeline.json_values import json_ready
 
 Q = np.array([[0.3, 0.8, -0.6, 0.5, 0.7, 0.2], [-1.0, 0.5, -0.2, 1.0, -0.8, 2.0]])

@@ -11,7 +11,7 @@ import urmpipe
 from thinned_logs import lay_thinned_logs
 from urmpipe.api.simulate import simulate
 from urmpipe_datasets import LOGS
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.simulations.simulation import Simulation

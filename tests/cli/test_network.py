@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import urmpipe as api
 from urmpipe_datasets import NETWORKS
-from urmpipe_models.networks.network_file import network_names
+from urmpipe_models.networks.file import network_names
 
 Run = Callable[..., Any]
 

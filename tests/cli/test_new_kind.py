@@ -20,8 +20,8 @@ from recorded import columns, views
 from same_results import assert_same
 from urmpipe.printing.presentation import print_presentation
 from urmpipe.printing.terminal import print_json
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.spelling import Voice
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Voice
 from urmpipe_pipeline import results
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.exports import ExportColumn, Exports, ExportTable, Rows, Times

@@ -23,7 +23,7 @@ from urmpipe.commands.report import report
 from urmpipe.commands.robot import robot
 from urmpipe.commands.simulate import simulate
 from urmpipe.commands.view import view
-from urmpipe_models.spelling import option_of
+from urmpipe_models.errors import option_of
 
 COMMANDS: dict[str, tuple[click.Command, Callable[..., Any]]] = {
     "accuracy": (accuracy, urmpipe.accuracy),

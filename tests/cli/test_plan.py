@@ -16,9 +16,9 @@ import urmpipe as package
 from asserting import refusal, there
 from plan_logs import gantry
 from urmpipe_models.errors import LogError, OptionError, PathError
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.planning.path import PathRows
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.robots.robot_file import robot_toml
+from urmpipe_models.robots.toml import robot_toml
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 from urmpipe_pipeline.results import read_recording
 

@@ -10,9 +10,9 @@ import pytest
 import urmpipe
 from asserting import refusal, there
 from plan_logs import PATHS, planned, planned_alone
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import LogError
-from urmpipe_models.robots.robot_file import robot_toml
+from urmpipe_models.robots.toml import robot_toml
 from urmpipe_pipeline.sources import LogMap, ReadOptions
 
 CATALOGUE = [name for name in PATHS if name.startswith(("ur5e", "urm6"))]

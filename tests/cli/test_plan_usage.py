@@ -9,7 +9,7 @@ import pytest
 
 from urmpipe.commands.plan import plan
 from urmpipe.main import run
-from urmpipe_models.planning.stretches import ARCS
+from urmpipe_models.planning.laws import ARCS
 from urmpipe_pipeline.planned_paths.request import LAWS
 
 Captured = pytest.CaptureFixture[str]

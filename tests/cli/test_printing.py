@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from urmpipe.printing.terminal import print_recording, progress_bar
+from urmpipe_models.errors import pasted
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.spelling import pasted
 
 
 def test_the_command_that_opens_a_recording_works_without_an_activated_environment(

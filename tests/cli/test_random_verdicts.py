@@ -20,11 +20,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import urmpipe
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.orientation import FORMS
+from urmpipe_models.math3d import FORMS
 from urmpipe_models.robots.catalogue import load_robot
 
 TOLERANCE, ANGLE = 3.5e-3, np.radians(1.0)

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.robots.robot_file import chain_from_dict
-from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.robots.toml import chain_from_dict
+from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_models.robots.urdf_writer import write_urdf
 from urmpipe_pipeline.palette import MASS_COLOUR
 from urmpipe_pipeline.projections import FRONT, SIDEWAYS, Sketch, chain_spots, projected

@@ -9,9 +9,8 @@ from typing import Any
 import pytest
 
 import urmpipe as api
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.transform import from_offset
+from urmpipe_models.arm.chain import Chain, Inertial, Joint
+from urmpipe_models.math3d import from_offset
 
 URDF = """<robot name="swing"><link name="base"/>
 <link name="rod"><inertial><origin xyz="0.5 0 0"/><mass value="2"/>

@@ -16,8 +16,7 @@ from thinned_logs import lay_thinned_logs
 from urmpipe.api.recordings import read_recording
 from urmpipe.api.simulate import simulate
 from urmpipe_datasets import LOGS
-from urmpipe_models.errors import UrmpipeError
-from urmpipe_models.spelling import pasted
+from urmpipe_models.errors import UrmpipeError, pasted
 from urmpipe_pipeline.simulations.simulation import Simulation
 
 RunCommand = Callable[..., Any]

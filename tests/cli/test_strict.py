@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import urmpipe
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES

@@ -11,7 +11,7 @@ from scipy.io import loadmat
 
 import urmpipe
 from asserting import refusal
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError, RecordingError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot

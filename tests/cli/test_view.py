@@ -17,8 +17,7 @@ from typing import Any
 import pytest
 
 from urmpipe_datasets import LOGS
-from urmpipe_models.errors import ViewerError
-from urmpipe_models.spelling import pasted
+from urmpipe_models.errors import ViewerError, pasted
 from urmpipe_pipeline.recording.viewer import refuse_without_display
 
 RunCommand = Callable[..., Any]

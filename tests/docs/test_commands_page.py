@@ -16,7 +16,7 @@ from urmpipe.main import cli
 from urmpipe_fmus.cosim import system_names
 from urmpipe_fmus.units import unit_names
 from urmpipe_models.errors import UrmpipeError
-from urmpipe_models.networks.network_file import network_names
+from urmpipe_models.networks.file import network_names
 from urmpipe_models.robots.catalogue import robot_names
 
 OF_OTHERS = {"--start-values", "--debug-logging", "--no-arr", "--truncate-length", "--dist"}

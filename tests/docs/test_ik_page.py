@@ -9,8 +9,8 @@ from typing import get_args
 import pytest
 
 from pages import indented, lay_files, text_of
-from urmpipe_models.inverse.closed.closed_form import closed_form
-from urmpipe_models.inverse.solutions import NEAREST_POINT, SingularFamily
+from urmpipe_models.ik.closed import closed_form
+from urmpipe_models.ik.solutions import NEAREST_POINT, SingularFamily
 from urmpipe_models.robots.catalogue import load_robot
 
 PAGE = text_of("docs/ik.md")

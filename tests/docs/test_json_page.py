@@ -19,7 +19,7 @@ from flat_arm import lay_flat_arm
 from pages import lay, repeated_files
 from urmpipe.main import COMMANDS, cli, run
 from urmpipe_datasets import LOGS
-from urmpipe_models.inverse.targets import targets_of
+from urmpipe_models.ik.solutions import targets_of
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.delta_verdict import delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning

@@ -14,9 +14,8 @@ from pages import lay_files, snippets, text_of
 from urmpipe.main import run
 from urmpipe_models.errors import NetworkError
 from urmpipe_models.networks.assembly import CLOSED, MANY, RESTARTS, SAME
-from urmpipe_models.networks.expressions import ALLOWED, LONGEST
 from urmpipe_models.networks.mobility import RANK
-from urmpipe_models.networks.parts import FREEDOMS, ElementKind
+from urmpipe_models.networks.parts import ALLOWED, FREEDOMS, LONGEST, ElementKind
 from urmpipe_pipeline.networks.finding import ROUNDED
 
 PAGE = text_of("docs/networks.md")

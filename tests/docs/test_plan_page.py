@@ -15,10 +15,9 @@ from scipy.spatial.transform import Rotation
 from asserting import there
 from pages import command_lines, indented, run_in_process
 from urmpipe_models.errors import LogError
-from urmpipe_models.planning.cube import PLANES
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.stretches import ARCS, Arcs
-from urmpipe_models.planning.trapezoid import trapezoid_law
+from urmpipe_models.planning.laws import ARCS, Arcs, trapezoid_law
+from urmpipe_models.planning.path import PLANES
 from urmpipe_pipeline.planned_paths.given_path import given_path
 from urmpipe_pipeline.planned_paths.path_file import GivenPath, read_path
 from urmpipe_pipeline.planned_paths.presenter import CHECKS

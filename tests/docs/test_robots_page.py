@@ -12,14 +12,13 @@ import numpy as np
 import pytest
 
 from pages import lay_files, snippets, text_of
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.visual import Box, Cylinder
-from urmpipe_models.drives.joint_drives import HeldJoint
+from urmpipe_models.arm.chain import Box, Chain, Cylinder
+from urmpipe_models.drives import HeldJoint
 from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import forward
+from urmpipe_models.math3d import rotation_y
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.robots.robot_file import read_robot_file
-from urmpipe_models.transform import rotation_y
+from urmpipe_models.robots.toml import read_robot_file
 
 PAGE = text_of("docs/robots.md")
 EXAMPLES = {re.findall(r'name = "(.*?)"|$', one)[0]: one for one in snippets("docs/robots.md", "toml")}

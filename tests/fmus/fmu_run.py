@@ -14,7 +14,7 @@ import numpy as np
 from loaded_fmu import Loaded
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.variable import Variable
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 
 class FmuRun:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from made_masses import driven, with_masses
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.drives.controller import Gains
-from urmpipe_models.drives.joint_drives import HeldJoint, ReliefSpring
-from urmpipe_models.transform import from_offset
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.drives import Gains, HeldJoint, ReliefSpring
+from urmpipe_models.math3d import from_offset
 
 
 def sliding_arm() -> Chain:

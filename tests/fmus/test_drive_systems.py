@@ -17,8 +17,8 @@ from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.drives.set_point import trapezoid
+from urmpipe_models.drives import trapezoid
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.robots.catalogue import load_robot
 

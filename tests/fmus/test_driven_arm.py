@@ -26,13 +26,8 @@ from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
 from urmpipe_fmus.units.driven_arm import starts_under
 from urmpipe_fmus.variable import Output
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.drives.controller import Gains
-from urmpipe_models.drives.drive import Drive
-from urmpipe_models.drives.joint_drives import NO_SPRING, DrivenJoint, HeldJoint, ReliefSpring
-from urmpipe_models.drives.set_point import trapezoid
+from urmpipe_models.arm.chain import Chain, Inertial, Joint
+from urmpipe_models.drives import NO_SPRING, Drive, DrivenJoint, Gains, HeldJoint, ReliefSpring, trapezoid
 from urmpipe_models.dynamics.driven_arm import (
     Actuator,
     ArmState,
@@ -45,15 +40,15 @@ from urmpipe_models.dynamics.driven_arm import (
     motor_rates,
     powers,
     shaft_torques,
+    spectral_radius,
 )
-from urmpipe_models.dynamics.inverse import inverse_dynamics
-from urmpipe_models.dynamics.links import links_of
-from urmpipe_models.dynamics.sampled_loop import spectral_radius
-from urmpipe_models.dynamics.wrench import Wrench, wrench_power
+from urmpipe_models.dynamics.equations import inverse_dynamics
+from urmpipe_models.dynamics.links import Wrench, links_of, wrench_power
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import RobotError, UnitError, UrmpipeError
 from urmpipe_models.kinematics.forward import forward, jacobian
+from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import translation
 
 PERIOD = 5e-3
 

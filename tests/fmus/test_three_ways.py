@@ -29,7 +29,7 @@ from urmpipe_fmus.unit import INTERNAL_STEP, Unit
 from urmpipe_fmus.units import make_unit, unit_names
 from urmpipe_fmus.user_unit import load_unit_file
 from urmpipe_fmus.variable import Variable
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError
 from urmpipe_models.robots.catalogue import load_robot
 

@@ -74,7 +74,7 @@ def robot(path: Path, made: Path, rng: Random) -> None:
 
     import urmpipe
     from urmpipe.printing.robot import chain_at
-    from urmpipe_models.robots.robot_file import robot_toml
+    from urmpipe_models.robots.toml import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
     from urmpipe_pipeline.masses import mass_notices
     from urmpipe_pipeline.meshes import missing_visuals

@@ -10,19 +10,18 @@ import pytest
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
-from urmpipe_models.chains.dh import DHRow
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.drives.controller import Gains
-from urmpipe_models.drives.drive import Drive
-from urmpipe_models.drives.joint_drives import (
+from urmpipe_models.arm.chain import Chain, Inertial, Joint, JointKind, Mimic
+from urmpipe_models.arm.geometric_models import DHRow
+from urmpipe_models.drives import (
     NO_SPRING,
+    Drive,
     DrivenJoint,
+    Gains,
     HeldJoint,
     JointDrive,
     ReliefSpring,
 )
-from urmpipe_models.transform import Transform, from_offset
+from urmpipe_models.math3d import Transform, from_offset
 
 lengths = st.floats(-1.0, 1.0, allow_subnormal=False)
 angles = st.floats(-math.pi, math.pi, allow_subnormal=False) | st.sampled_from(

@@ -7,15 +7,14 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.continuity import (
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import FORMS, RotationForm, from_rpy, quaternions
+from urmpipe_models.wraps import (
     continuous_euler,
     continuous_quaternions,
     continuous_rotations,
     continuous_vectors,
 )
-from urmpipe_models.orientation import FORMS, RotationForm, quaternions
-from urmpipe_models.transform import from_rpy
 
 SIZE = 1e-13
 """Angles to 20 rad are wrapped and turned back, two roundings of 4e-15, and go through sine and cosine."""

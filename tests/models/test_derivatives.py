@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from differences import assert_jacobian, assert_slope
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.drives.set_point import RAMP, STEP, TRAPEZOID, set_point
-from urmpipe_models.inverse.closed import polishing, trigonometric
-from urmpipe_models.inverse.iterative.task import Task, task_of
-from urmpipe_models.inverse.targets import Targets, targets_of
-from urmpipe_models.kinematics.forward import jacobian_over_log
-from urmpipe_models.kinematics.screws import Screws, chain_of
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.drives import RAMP, STEP, TRAPEZOID, set_point
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik import loop_equations as polishing
+from urmpipe_models.ik import trigonometric
+from urmpipe_models.ik.solutions import Targets, targets_of
+from urmpipe_models.ik.task import Task, task_of
+from urmpipe_models.kinematics.forward import Screws, chain_of, jacobian_over_log
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 
 # --- what an iterative inverse misses its targets by ---------------------------------------------------

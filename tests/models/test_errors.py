@@ -12,9 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_models.errors import Finding, shown
-from urmpipe_models.messages import in_html, in_xml, inert, one_line, shown_json
-from urmpipe_models.transform import Transform
+from urmpipe_models.errors import Finding, in_html, in_xml, inert, one_line, shown, shown_json
+from urmpipe_models.math3d import Transform
 
 
 @given(st.text(st.characters(exclude_categories=())))

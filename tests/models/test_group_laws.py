@@ -11,9 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.orientation import conjugate, matrices, product
-from urmpipe_models.transform import Transform, from_offset
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import Transform, conjugate, from_offset, matrices, quaternion_product
 
 ROUNDING = 1e-14
 """Three products of entries of up to 4, a dozen roundings each."""
@@ -44,7 +43,9 @@ class Group:
 
 
 POSES = Group(from_offset, lambda a, b: a @ b, Transform.inverse, Transform(), homogeneous)
-QUATERNIONS = Group(unit, product, conjugate, np.array([[0.0, 0.0, 0.0, 1.0]]), lambda a: matrices(a)[0])
+QUATERNIONS = Group(
+    unit, quaternion_product, conjugate, np.array([[0.0, 0.0, 0.0, 1.0]]), lambda a: matrices(a)[0]
+)
 
 elements = st.lists(st.floats(-3.0, 3.0, allow_subnormal=False), min_size=6, max_size=6)
 

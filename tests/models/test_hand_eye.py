@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.hand_eye import HARDLY, TURN_LENGTH, HandEye, hand_eye, rotation_miss
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.orientation import FORMS, RotationForm, matrices, quaternions
+from urmpipe_models.math3d import FORMS, RotationForm, matrices, quaternions
 from urmpipe_models.robots.catalogue import load_robot
 
 ROUNDING = 1e-12

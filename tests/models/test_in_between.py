@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.in_between import AROUND, FAR, PERCEPTIBLE, beside_wraps, repair
-from urmpipe_models.repolarizer import FULL_TURN, repolarize
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.wraps import AROUND, FAR, FULL_TURN, PERCEPTIBLE, beside_wraps, repair, repolarize
 
 TSP = 0.005
 MOVE = 0.01  # rad a sample, 2 rad/s

@@ -13,8 +13,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from urmpipe_models.messages import Finding, Hint, one_line
-from urmpipe_models.spelling import Voice
+from urmpipe_models.errors import Finding, Hint, Voice, one_line
 from urmpipe_pipeline.joint_log import LogWarning
 
 

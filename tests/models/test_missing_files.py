@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from urmpipe_models.files.missing import meant_by
+from urmpipe_models.files import meant_by
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from string import ascii_lowercase, digits
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from urmpipe_models.names import MOST_LISTED, did_you_mean, listed, not_among
+from urmpipe_models.errors import MOST_LISTED, did_you_mean, listed, not_among
 
 # No letter twice in a name: then what two names have in common is found without a doubt.
 LETTERS = st.lists(st.sampled_from(ascii_lowercase + digits), min_size=2, max_size=12, unique=True)

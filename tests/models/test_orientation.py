@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation, Slerp
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.orientation import (
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import (
     FORMS,
     RotationForm,
     angle_between,
     conjugate,
     matrices,
-    product,
+    quaternion_product,
     quaternions,
     slerp,
     width,
@@ -97,9 +97,9 @@ def test_matrices_are_those_of_scipy() -> None:
 
 def test_a_product_is_the_second_rotation_followed_by_the_first() -> None:
     first, second = (Rotation.random(200, rng=np.random.default_rng(seed)) for seed in (7, 8))
-    found = product(first.as_quat(), second.as_quat())
+    found = quaternion_product(first.as_quat(), second.as_quat())
     np.testing.assert_allclose(matrices(found), (first * second).as_matrix(), atol=ROUNDING)
-    undone = product(conjugate(first.as_quat()), found)
+    undone = quaternion_product(conjugate(first.as_quat()), found)
     np.testing.assert_allclose(matrices(undone), second.as_matrix(), atol=ROUNDING)
 
 

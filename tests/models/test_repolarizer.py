@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.repolarizer import FULL_TURN, State, max_step, repolarize, step
-from urmpipe_models.row_blocks import BLOCK
+from urmpipe_models.elementwise import BLOCK, FloatArray
+from urmpipe_models.wraps import FULL_TURN, State, max_step, repolarize, step
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 TSP = 0.005

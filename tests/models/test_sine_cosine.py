@@ -12,8 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.sine_cosine import cosine_sine, table
+from urmpipe_models.elementwise import FloatArray, cosine_sine, table
 
 BITS = 1200
 ONE = 1 << BITS

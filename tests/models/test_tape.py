@@ -11,13 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.elementwise import Element
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import Element, FloatArray, cosine_sine, side_by_side
 from urmpipe_models.kinematics.forward import poses_over_log, tip_pose
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.row_blocks import side_by_side
-from urmpipe_models.sine_cosine import cosine_sine
 from urmpipe_models.tape import BLOCK, LONG, aligned, fill_over_log
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_models.taylor import Taylor
+from urmpipe_models.networks.rates import Taylor
 
 FIRST = np.array([3, -32, 168, -672, 0, 672, -168, 32, -3]) / 840
 SECOND = np.array([-9, 128, -1008, 8064, -14350, 8064, -1008, 128, -9]) / 5040

@@ -9,27 +9,25 @@ import casadi
 import numpy as np
 import pytest
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.articulated_6r import articulated_6r
-from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
-from urmpipe_models.chains.dh import DHRow, dh_chain, modified_dh_chain
-from urmpipe_models.chains.urm import urm_chain
-from urmpipe_models.drives.controller import Gains, next_voltage, sample_number
-from urmpipe_models.drives.drive import (
+from urmpipe_models.arm.chain import Chain, Joint, JointKind, Mimic
+from urmpipe_models.arm.geometric_models import DHRow, articulated_6r, dh_chain, modified_dh_chain, urm_chain
+from urmpipe_models.drives import (
     Drive,
+    Gains,
+    JointMotion,
     current_rate,
     driving_torque,
     load_acceleration,
+    next_voltage,
+    sample_number,
+    set_point,
     shaft_acceleration,
     shaft_torque,
 )
-from urmpipe_models.drives.set_point import JointMotion, set_point
-from urmpipe_models.kinematics.forward import forward, jacobian
-from urmpipe_models.kinematics.frames import tip_position
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.kinematics.forward import forward, jacobian, motions, tip_position
 from urmpipe_models.kinematics.identification import Twist, sensitivities
-from urmpipe_models.kinematics.motion import motions
-from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import (
+from urmpipe_models.math3d import (
     euler_zxz,
     euler_zyx,
     from_offset,
@@ -39,6 +37,7 @@ from urmpipe_models.transform import (
     rotation_z,
     translation,
 )
+from urmpipe_models.robots.catalogue import load_robot
 
 TRACED = 1e-14
 """The same operations on values of about 1; CasADi may take another sine and simplify, each some 1e-16."""

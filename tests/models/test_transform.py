@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from urmpipe_models.transform import (
+from urmpipe_models.math3d import (
     Transform,
     euler_zxz,
     euler_zyx,

@@ -50,8 +50,7 @@ from geometric_6r import (
     model,
     vector,
 )
-from urmpipe_models.chains.articulated_6r import articulated_6r, articulated_6r_rows
-from urmpipe_models.chains.geometric_model import GeometricRow
+from urmpipe_models.arm.geometric_models import GeometricRow, articulated_6r, articulated_6r_rows
 from urmpipe_models.kinematics.forward import forward
 
 # --- the model and the chain -----------------------------------------------------------------------

@@ -34,8 +34,8 @@ from geometric_6r import (
     matrix,
     model,
 )
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.transform import euler_zxz, from_zxz
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import euler_zxz, from_zxz
 
 
 def test_eq_34_is_the_rotation_of_the_angles() -> None:

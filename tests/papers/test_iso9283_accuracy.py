@@ -21,10 +21,9 @@ from urmpipe.systems.units import Backend
 from urmpipe_datasets import ROBOTS
 from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.unit import INTERNAL_STEP
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.inertial import GRAVITY
-from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint
-from urmpipe_models.dynamics.sampled_loop import spectral_radius
+from urmpipe_models.arm.chain import GRAVITY, Chain
+from urmpipe_models.drives import DrivenJoint, HeldJoint
+from urmpipe_models.dynamics.driven_arm import spectral_radius
 from urmpipe_models.kinematics.forward import jacobian, poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.accuracy.driven_motion import Errors

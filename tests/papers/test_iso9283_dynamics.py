@@ -7,16 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.dh import DHRow, dh_chain
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
-from urmpipe_models.dynamics.inverse import inverse_dynamics
-from urmpipe_models.dynamics.mass_centres import mass_motions
-from urmpipe_models.dynamics.mass_matrix import mass_matrix
-from urmpipe_models.dynamics.terms import torque_terms
-from urmpipe_models.dynamics.wrench import Wrench
+from urmpipe_models.arm.chain import Chain, Inertial
+from urmpipe_models.arm.geometric_models import DHRow, dh_chain
+from urmpipe_models.dynamics.equations import inverse_dynamics, mass_matrix, torque_terms
+from urmpipe_models.dynamics.links import Wrench, kinetic_energy, mass_motions, potential_energy
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import jacobian
 
 ROUNDED = 1e-13

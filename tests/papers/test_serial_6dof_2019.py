@@ -13,11 +13,10 @@ import numpy as np
 import pytest
 
 from serial_6dof_rows import INVERSE, UPSIDE
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.kinematics.forward import poses_over_log, tip_pose
-from urmpipe_models.kinematics.frames import frames
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.kinematics.forward import frames, poses_over_log, tip_pose
+from urmpipe_models.math3d import Transform, euler_zyx, from_rpy
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform, euler_zyx, from_rpy
 
 ARM = load_robot("arm6")
 

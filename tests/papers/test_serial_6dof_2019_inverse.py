@@ -13,13 +13,12 @@ import pytest
 
 from asserting import there
 from serial_6dof_rows import INVERSE
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.inverse.closed.spherical_wrist import SphericalWrist, spherical_wrist
-from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.inverse.targets import Targets, misses
-from urmpipe_models.kinematics.screws import screws
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import Solutions, Targets, misses
+from urmpipe_models.ik.spherical import SphericalWrist, spherical_wrist
+from urmpipe_models.kinematics.forward import screws
+from urmpipe_models.math3d import from_rpy
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import from_rpy
 
 ARM = load_robot("arm6")
 PRINTED = 5.1e-5

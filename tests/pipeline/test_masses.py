@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.drives.joint_drives import HeldJoint
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.drives import HeldJoint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.masses import lost_in_urdf, mass_notices
 

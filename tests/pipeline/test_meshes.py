@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.visual import Box, Mesh, Visual
-from urmpipe_models.robots.robot_file import chain_from_dict, chain_to_dict
-from urmpipe_models.robots.urdf_reader import read_urdf
-from urmpipe_models.transform import translation
+from urmpipe_models.arm.chain import Box, Chain, Joint, Mesh, Visual
+from urmpipe_models.math3d import translation
+from urmpipe_models.robots.toml import chain_from_dict, chain_to_dict
+from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.meshes import drawable, missing_visuals
 from urmpipe_pipeline.runs.ingest import kinematics

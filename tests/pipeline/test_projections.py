@@ -11,9 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from asserting import there
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.inertial import Inertial
+from urmpipe_models.arm.chain import Chain, Inertial, Joint
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.palette import MASS_COLOUR
 from urmpipe_pipeline.presentation.scene import Spot
 from urmpipe_pipeline.projections import (

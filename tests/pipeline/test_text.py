@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from urmpipe_models.spelling import pasted
+from urmpipe_models.errors import pasted
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Statistics
 from urmpipe_pipeline.comparison.wording import tolerance_words, used_words

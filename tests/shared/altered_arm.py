@@ -13,10 +13,10 @@ from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
 from urmpipe_datasets import LOGS
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.repolarizer import repolarize
+from urmpipe_models.wraps import repolarize
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.arm_groups import cause_groups
 from urmpipe_pipeline.diagnosis.edits import later_edits

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from urmpipe import ingest
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.diagnosis.result import Diagnosis

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.repolarizer import repolarize
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.wraps import repolarize
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.runs.plausibility import implausible
 

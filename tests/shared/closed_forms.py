@@ -6,8 +6,8 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from asserting import there
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.kinematics.screws import Screws, screws
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.kinematics.forward import Screws, screws
 
 Form = TypeVar("Form")
 

@@ -8,9 +8,9 @@ from itertools import accumulate
 from operator import matmul
 from typing import TypeAlias
 
-from urmpipe_models.chains.geometric_model import AXES, GeometricRow
+from urmpipe_models.arm.geometric_models import AXES, GeometricRow
 from urmpipe_models.elementwise import ZERO, Element, Vector, add, scale
-from urmpipe_models.transform import Transform, euler_zxz, rotation_about
+from urmpipe_models.math3d import Transform, euler_zxz, rotation_about
 
 Rows: TypeAlias = tuple[Vector, Vector, Vector]
 """The rows of a rotation matrix [-]."""

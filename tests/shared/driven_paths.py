@@ -13,8 +13,8 @@ import urmpipe
 from fmu_run import FmuRun
 from urmpipe.driven_runs.arm_unit import ArmUnit
 from urmpipe_fmus.cache import cached_fmu
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 
 PERIOD = 5e-3

@@ -8,8 +8,8 @@ import numpy as np
 from numpy import cos, sin
 
 from direct_geometric_model import GeometricModel, geometric_model
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.articulated_6r import articulated_6r_rows
+from urmpipe_models.arm.geometric_models import articulated_6r_rows
+from urmpipe_models.elementwise import FloatArray
 
 ROUNDING = 1e-14
 """Sums of some ten products of up to 6 sines and cosines, each step rounded to 1.1e-16."""

@@ -11,9 +11,9 @@ import pytest
 
 from asserting import there
 from urmpipe.main import run
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.inverse.targets import targets_of
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import targets_of
+from urmpipe_models.math3d import quaternions
 from urmpipe_models.robots.catalogue import load_robot
 
 Captured = pytest.CaptureFixture[str]

@@ -7,11 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.drives.controller import Gains
-from urmpipe_models.drives.drive import Drive
-from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint
+from urmpipe_models.arm.chain import Chain, Inertial
+from urmpipe_models.drives import Drive, DrivenJoint, Gains, HeldJoint
 
 
 def body(joint: str | None, rng: np.random.Generator) -> Inertial:

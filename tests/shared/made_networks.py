@@ -8,11 +8,9 @@ from functools import cache
 from itertools import pairwise
 
 from urmpipe_models.elementwise import ZERO, Vector
-from urmpipe_models.networks.expressions import Expression
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.network_file import load_network
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Joint, frame_of
-from urmpipe_models.transform import Transform
+from urmpipe_models.math3d import Transform
+from urmpipe_models.networks.file import Network, load_network
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_of
 from urmpipe_pipeline.networks.finding import Search, find_network
 from urmpipe_pipeline.networks.result import NetworkResult
 

@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.planning.cube import cube_rows
-from urmpipe_models.planning.path_joints import PathJoints
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.planning.joints import PathJoints
+from urmpipe_models.planning.path import PathRows, cube_rows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.planned_paths.given_path import given_path
 from urmpipe_pipeline.planned_paths.obstacles import ObstacleKind

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import point_over_log
-from urmpipe_models.orientation import RotationForm
+from urmpipe_models.math3d import RotationForm
 from urmpipe_pipeline.joint_log import JointLog, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.derivatives import derivatives

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.networks.assembly import poses_at
-from urmpipe_models.networks.descent import descend
+from urmpipe_models.networks.closure import descend
+from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import mechanism_of
-from urmpipe_models.networks.network import Network
 
 
 class DrivenNetwork(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.diagnosis.selection import Normal
 
 

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from urmpipe.main import run
 from urmpipe_datasets import LOGS
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.robots.catalogue import load_robot
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.robots.urdf import read_urdf
 
 URDF = Path("robots", "Gepetto_example-robot-data", "panda.urdf")
 """The file in the folder `shared`."""

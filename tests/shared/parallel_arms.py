@@ -7,14 +7,13 @@ import math
 import numpy as np
 
 from closed_forms import form_by
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.inverse.closed.closed_form import ClosedForm
-from urmpipe_models.inverse.closed.parallel_axes import parallel_axes
-from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.inverse.targets import Targets, misses, targets_of
-from urmpipe_models.kinematics.screws import screws
-from urmpipe_models.transform import from_offset
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.closed import ClosedForm
+from urmpipe_models.ik.parallel import parallel_axes
+from urmpipe_models.ik.solutions import Solutions, Targets, misses, targets_of
+from urmpipe_models.kinematics.forward import screws
+from urmpipe_models.math3d import from_offset
 
 UR = ("ur3", "ur3e", "ur5", "ur5e", "ur10", "ur10e")
 WRISTS = ("meet", "parallel", "pass")

@@ -12,12 +12,12 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 import urmpipe
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.math3d import from_offset
+from urmpipe_models.planning.path import PathRows
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import from_offset
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 
 Y = (0.0, 1.0, 0.0)

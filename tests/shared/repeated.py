@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import urmpipe
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.iso9283.criteria import Criterion
 from urmpipe_pipeline.iso9283.result import IsoTest

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.ik.solutions import Solutions, Targets, targets_of
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.solved_targets.result import SolvedTargets

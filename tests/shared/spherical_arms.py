@@ -8,13 +8,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from closed_forms import form_by
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint, JointKind
-from urmpipe_models.chains.dh import DHRow, dh_chain
-from urmpipe_models.inverse.closed.spherical_wrist import SphericalWrist, spherical_wrist
-from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.inverse.targets import Targets, misses
-from urmpipe_models.transform import Transform, from_offset
+from urmpipe_models.arm.chain import Chain, Joint, JointKind
+from urmpipe_models.arm.geometric_models import DHRow, dh_chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import Solutions, Targets, misses
+from urmpipe_models.ik.spherical import SphericalWrist, spherical_wrist
+from urmpipe_models.math3d import Transform, from_offset
 
 SPECIAL: Mapping[str, Mapping[str, float]] = {
     "plain": {},

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.palette import AXIS_COLOURS
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, View
 from urmpipe_pipeline.presentation.section import Presentation, Section

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from specimen import DEG, Made, Truth, degrees, made, motion, rounding, specimen
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 Q6 = tuple(f"q{k}" for k in range(1, 7))
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from by_python import comma, writer
 from specimen import DEG, Made, Truth, degrees, lines, made, motion, rounding, specimen
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 UR = (
     "shoulder_pan_joint",

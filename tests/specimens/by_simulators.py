@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from specimen import DEG, EXACT, Made, Truth, degrees, lines, made, motion, rounding, specimen
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 
 def graph_cell(value: float) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from by_python import Q6, comma, savetxt, writer
 from by_robots import UR, krc_trace, ros2_row
 from specimen import Made, Truth, degrees, lines, made, motion, specimen
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 HEADER = ",".join(["t", *Q6])
 

@@ -10,7 +10,7 @@ import numpy as np
 from by_python import Q6, writer
 from by_robots import poses
 from specimen import DEG, Made, Truth, degrees, made, motion, rounding, specimen
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
 

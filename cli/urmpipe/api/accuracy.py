@@ -21,12 +21,12 @@ from urmpipe.reading import UntimedReading, map_files, options_of, resolved
 from urmpipe.systems.blocks import ON_PYTHON
 from urmpipe.systems.units import Backend
 from urmpipe_fmus.build import chosen_backend
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.drives.joint_drives import DrivenJoint
-from urmpipe_models.dynamics.sampled_loop import spectral_radius
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.drives import DrivenJoint
+from urmpipe_models.dynamics.driven_arm import spectral_radius
 from urmpipe_models.errors import Finding, LogError, OptionError, PathError, RobotError, for_each, shown
-from urmpipe_models.planning.rows import PathRows
-from urmpipe_models.planning.stretches import Arcs
+from urmpipe_models.planning.laws import Arcs
+from urmpipe_models.planning.path import PathRows
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
 from urmpipe_pipeline.accuracy.result import DECIDES, FASTEST, Accuracy, Decides
 from urmpipe_pipeline.joint_log import LogWarning

@@ -21,10 +21,8 @@ from urmpipe.keyword_checks import (
 )
 from urmpipe.output_files import guarded_outputs
 from urmpipe.reading import Reading, map_files, resolved
-from urmpipe_models.errors import Finding, OptionError, RecordingError, for_each
-from urmpipe_models.messages import Hint
-from urmpipe_models.spelling import Voice
-from urmpipe_models.tolerance import DEFAULT_TOLERANCE
+from urmpipe_models.delta import DEFAULT_TOLERANCE
+from urmpipe_models.errors import Finding, Hint, OptionError, RecordingError, Voice, for_each
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.clocks import CLOCKS_DIFFER
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs

@@ -8,15 +8,12 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 from urmpipe.arm_placing import Frame, Robot, place_robot
 from urmpipe.keyword_checks import PathLike, public
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import Finding, OptionError
-from urmpipe_models.lagrange.c_code import c_code
-from urmpipe_models.lagrange.equations import TERMS, TermName
-from urmpipe_models.lagrange.open_form import Cost, open_form
-from urmpipe_models.lagrange.operations import Operations, summed
-from urmpipe_models.lagrange.text import equations_text
-from urmpipe_models.robots.written import write_export
+from urmpipe_models.files import write_export
+from urmpipe_models.lagrange.derivation import TERMS, TermName
+from urmpipe_models.lagrange.formulas import Cost, Operations, c_code, equations_text, open_form, summed
 
 if TYPE_CHECKING:
     import pandas as pd

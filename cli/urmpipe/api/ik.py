@@ -13,10 +13,10 @@ from urmpipe.arm_placing import Frame, Robot
 from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_recording, refuse_warnings
 from urmpipe.output_files import output_kind
 from urmpipe.reading import Resolved, TableReading, map_files, resolved
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, for_each
-from urmpipe_models.inverse.search import USUAL_SEARCH, Search
-from urmpipe_models.inverse.solve import Method
+from urmpipe_models.ik.solutions import USUAL_SEARCH, Search
+from urmpipe_models.ik.solve import Method
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import guarded_output, refuse_output

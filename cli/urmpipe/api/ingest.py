@@ -21,7 +21,7 @@ from urmpipe.keyword_checks import (
 )
 from urmpipe.output_files import guarded_outputs
 from urmpipe.reading import Reading, map_files, resolved
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, for_each
 from urmpipe_pipeline.operands import log_files, run_of_recording
 from urmpipe_pipeline.outputs import OutputKind

@@ -9,9 +9,8 @@ from typing import TypeAlias
 import numpy as np
 
 from urmpipe.keyword_checks import refuse_recording
-from urmpipe_models.errors import Finding, LogError, OptionError
-from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError
+from urmpipe_models.math3d import quaternions
 from urmpipe_pipeline.comparison.iso_cycles import IsoOptions
 from urmpipe_pipeline.iso9283.cycles import parse_cycles
 from urmpipe_pipeline.iso9283.poses import Poses

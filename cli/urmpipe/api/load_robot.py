@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from urmpipe.keyword_checks import PathLike, public
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.robots import catalogue
 
 

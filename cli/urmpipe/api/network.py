@@ -14,11 +14,11 @@ from urmpipe.keyword_checks import PathLike, public, public_reading, refuse_warn
 from urmpipe.output_files import guarded_outputs, output_kind, write_drawing
 from urmpipe.reading import Reading, map_files, resolved
 from urmpipe_models.errors import Finding, LogError, OptionError, for_each
-from urmpipe_models.networks import network_file
+from urmpipe_models.networks import file as network_file
 from urmpipe_models.networks.assembly import RESTARTS
 from urmpipe_models.networks.driving import Law
+from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.forces import Wrench
-from urmpipe_models.networks.network import Network
 from urmpipe_pipeline.networks.drawing import network_svg
 from urmpipe_pipeline.networks.drive_request import DriveRequest, drive_network
 from urmpipe_pipeline.networks.finding import Search, find_network

@@ -13,11 +13,11 @@ from urmpipe.arm_placing import NO_ROBOT, Frame, Robot
 from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_recording, refuse_warnings
 from urmpipe.output_files import output_kind
 from urmpipe.reading import UntimedReading, map_files, options_of, resolved
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, OptionError, for_each
-from urmpipe_models.planning.rows import PathRows
-from urmpipe_models.planning.stretches import Arcs
+from urmpipe_models.planning.laws import Arcs
+from urmpipe_models.planning.path import PathRows
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import PATH_ROW, guarded_output, refuse_output
 from urmpipe_pipeline.planned_paths.given_path import given_path

@@ -14,8 +14,7 @@ from urmpipe.options.output import Terminal, output_options
 from urmpipe.options.reading import MAP_OPTION
 from urmpipe.options.types import ANY_FILE, DURATION, ROBOT, UNIT, FileType, NamesType, OneOf
 from urmpipe.usage import Group
-from urmpipe_models.errors import Finding, OptionError
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, OptionError
 
 PLATFORMS = ("linux64", "win64")
 

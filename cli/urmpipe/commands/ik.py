@@ -129,7 +129,7 @@ def _print(result: SolvedTargets, robot: str | None, replaces: bool) -> None:
     """Print what was found, and what was written: how to read it names the robot as the caller does."""
     from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
-    from urmpipe_models.spelling import pasted
+    from urmpipe_models.errors import pasted
     from urmpipe_pipeline.results import present
 
     print_presentation(present(result))

@@ -90,7 +90,7 @@ def _print(run: Run, explain: bool, replaces: bool, options: Mapping[str, Any]) 
     """Print what was found in a log, and what was written."""
     from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
-    from urmpipe_models.spelling import pasted
+    from urmpipe_models.errors import pasted
     from urmpipe_pipeline.results import present
     from urmpipe_pipeline.text import counted
 

@@ -41,7 +41,7 @@ def list_(terminal: Terminal) -> int:
       urmpipe network list --json
     """
     from urmpipe.printing.network import networks_dict, print_networks
-    from urmpipe_models.networks.network_file import load_network, network_names
+    from urmpipe_models.networks.file import load_network, network_names
 
     networks = [load_network(name) for name in network_names()]
     terminal.answer(lambda: networks_dict(networks), lambda: print_networks(networks))
@@ -274,7 +274,7 @@ def _print(result: NetworkResult | NetworkMotion, replaces: bool) -> None:
     """Print what was found, and what was written."""
     from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
-    from urmpipe_models.spelling import pasted
+    from urmpipe_models.errors import pasted
     from urmpipe_pipeline.networks.network_motion import NetworkMotion
     from urmpipe_pipeline.results import present
 

@@ -87,8 +87,8 @@ def _print(result: PlannedPath, options: Mapping[str, Any], replaces: bool) -> N
 
 def _reading(log: Path, options: Mapping[str, Any]) -> str:
     """Return the command that reads a plan: an arm of the catalogue is found by its joints and its path."""
+    from urmpipe_models.errors import option_of, pasted
     from urmpipe_models.robots.catalogue import moving_differently
-    from urmpipe_models.spelling import option_of, pasted
 
     placed = [option_of(name) for name in PLACED if options[name] is not None]
     command = f"urmpipe ingest {pasted(log)}"

@@ -12,8 +12,7 @@ from urmpipe.options.completion import folders, one_of_each, words
 from urmpipe.options.given import options_given
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.types import RECORDING, NamesType, WholeType, quantity_type
-from urmpipe_models.errors import Finding, OptionError
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, OptionError
 
 if TYPE_CHECKING:
     from urmpipe.api.report import Report

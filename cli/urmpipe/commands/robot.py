@@ -14,7 +14,7 @@ from urmpipe.options.types import DRAWING, JOINT_VALUES, ROBOT, OneOf
 from urmpipe.usage import Group
 
 if TYPE_CHECKING:
-    from urmpipe_models.chains.chain import Chain
+    from urmpipe_models.arm.chain import Chain
 
 
 @click.group(cls=Group, short_help="List, show and export robots.")
@@ -73,7 +73,7 @@ def show(
       urmpipe robot show panda.urdf --tip panda_hand_tcp --json
     """
     from urmpipe.printing.robot import chain_at, print_chain
-    from urmpipe_models.robots.written import EXPORT_MARK, write_export
+    from urmpipe_models.files import EXPORT_MARK, write_export
     from urmpipe_pipeline.masses import mass_notices
     from urmpipe_pipeline.projections import (
         FRONT,
@@ -117,9 +117,9 @@ def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -
     """
     from urmpipe.printing.terminal import say
     from urmpipe_models.errors import Finding, OptionError, shown
-    from urmpipe_models.robots.robot_file import robot_toml
+    from urmpipe_models.files import write_export
+    from urmpipe_models.robots.toml import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
-    from urmpipe_models.robots.written import write_export
     from urmpipe_pipeline.masses import lost_in_urdf
 
     target = output or Path(f"{Path(name).stem}.urdf")

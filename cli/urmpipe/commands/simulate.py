@@ -172,7 +172,7 @@ def _write(system: str, path: Path, terminal: Terminal) -> int:
     from urmpipe.api.simulate import own_logs
     from urmpipe.printing.terminal import say
     from urmpipe_fmus.cosim import system_text
-    from urmpipe_models.spelling import pasted
+    from urmpipe_models.errors import pasted
     from urmpipe_pipeline.outputs import guarded_output
 
     text = system_text(system)

@@ -17,7 +17,7 @@ from urmpipe_fmus.cosim.plan import LogColumn, prepare
 from urmpipe_fmus.cosim.simulation import simulate
 from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
 from urmpipe_fmus.instance import Instance
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import CosimulationError, UnitError
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
 from urmpipe_pipeline.planned_paths.result import PlannedPath

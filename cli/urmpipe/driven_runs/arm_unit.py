@@ -12,11 +12,11 @@ import numpy as np
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units.coordinates import kinds_of
 from urmpipe_fmus.units.driven_arm import driven_arm, starts_under
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.drives.joint_drives import DrivenJoint
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.drives import DrivenJoint
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
-from urmpipe_models.repolarizer import FULL_TURN
+from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.accuracy.driven_motion import Diverged, DrivenMotion
 from urmpipe_pipeline.planned_paths.result import PlannedPath
 

@@ -11,8 +11,8 @@ from urmpipe.headings import Heading, option
 from urmpipe.options.completion import tolerances, words
 from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.types import OneOf, ParsedType, parsed
+from urmpipe_models.delta import DEFAULT_TOLERANCE
 from urmpipe_models.measure_units import WRITTEN, quantity
-from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 
 SYNC_WORDS = ("stamps", "start", "auto")
 

@@ -11,7 +11,7 @@ from click.shell_completion import CompletionItem
 from urmpipe.options.completion import items, operands
 from urmpipe.options.types import networks, robots
 from urmpipe_models.errors import shown
-from urmpipe_models.files.toml_text import TomlError, toml_values
+from urmpipe_models.toml_tables import TomlError, toml_values
 
 
 class NamedType(click.ParamType[str]):
@@ -58,7 +58,7 @@ def option_names(ctx: click.Context) -> Iterable[str]:
 
 def control_names(ctx: click.Context) -> Iterable[str]:
     """Return the controls of the network on the line that can be set."""
-    from urmpipe_models.networks.network_file import load_network
+    from urmpipe_models.networks.file import load_network
 
     networks = [load_network(network) for network in operands(ctx)]
     return [one.name for network in networks for one in network.controls if one.value is None]

@@ -10,8 +10,7 @@ from urmpipe.headings import Heading, option
 from urmpipe.options.completion import columns, units, words
 from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.types import DURATION, ROBOT, FileType, NamesType, OffsetType, OneOf
-from urmpipe_models.errors import shown
-from urmpipe_models.spelling import pasted
+from urmpipe_models.errors import pasted, shown
 
 FORMS = ["vector", "rpy", "zyx", "xyz", "zyz", "zxz", "quat_xyzw", "quat_wxyz", "matrix"]
 """Forms of a recorded orientation (a test compares them with those of the models)."""

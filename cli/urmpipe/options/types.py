@@ -84,7 +84,7 @@ def _systems() -> Iterable[str]:
 
 def networks() -> Iterable[str]:
     """Return the names of the networks."""
-    from urmpipe_models.networks.network_file import network_names
+    from urmpipe_models.networks.file import network_names
 
     return network_names()
 
@@ -107,7 +107,7 @@ class OneOf(click.Choice[str]):
 
     def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
         """Return what was found, what may have been meant, and what is allowed."""
-        from urmpipe_models.names import not_among
+        from urmpipe_models.errors import not_among
 
         return not_among(str(value), self.choices)
 
@@ -159,7 +159,7 @@ class OffsetType(click.ParamType[Any]):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the transform."""
-        from urmpipe_models.transform import from_offset
+        from urmpipe_models.math3d import from_offset
 
         if not isinstance(value, str):
             return value

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from urmpipe.printing.terminal import lines_of
-from urmpipe_models.messages import one_line
+from urmpipe_models.errors import one_line
 from urmpipe_pipeline.text import NOTHING
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from urmpipe.printing.terminal import new_console, new_table
-from urmpipe_models.networks.network import Network
+from urmpipe_models.networks.file import Network
 
 
 def networks_dict(networks: Sequence[Network]) -> dict[str, Any]:

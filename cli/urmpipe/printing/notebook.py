@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from urmpipe_models.display import HEAD
-from urmpipe_models.messages import in_html
+from urmpipe_models.errors import in_html
 from urmpipe_pipeline.presentation.brief import brief_columns, brief_facts, brief_tables, head, rows_within
 from urmpipe_pipeline.presentation.digits import units_differ, written
 from urmpipe_pipeline.presentation.section import Fact, Section, Table

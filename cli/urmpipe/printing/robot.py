@@ -11,15 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe.printing.terminal import new_console, new_table
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.inertial import GRAVITY
-from urmpipe_models.chains.parameters import Parameter, parts_of
-from urmpipe_models.drives.joint_drives import HeldJoint
-from urmpipe_models.inverse.closed.closed_form import closed_form, method_words
+from urmpipe_models.arm.chain import GRAVITY, Chain, Joint, Parameter, parts_of
+from urmpipe_models.drives import HeldJoint
+from urmpipe_models.ik.closed import closed_form, method_words
 from urmpipe_models.kinematics.forward import forward, points_over_log
-from urmpipe_models.robots.robot_drives import drive_to_dict
-from urmpipe_models.robots.robot_file import chain_to_dict
-from urmpipe_models.transform import Transform, euler_zyx, rpy_of
+from urmpipe_models.math3d import Transform, euler_zyx, rpy_of
+from urmpipe_models.robots.toml import chain_to_dict, drive_to_dict
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from urmpipe_models.messages import one_line, shown_json
+from urmpipe_models.errors import one_line, shown_json
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -55,7 +55,7 @@ def say(line: str, *, err: bool = False) -> None:
 
 def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
     """Print where a recording is, and how to open it with the urmpipe that is running."""
-    from urmpipe_models.spelling import pasted
+    from urmpipe_models.errors import pasted
 
     command = "urmpipe"
     if shutil.which(command) is None:  # not on the path, as in an environment that was not activated

@@ -28,8 +28,8 @@ from urmpipe_pipeline.simulations.simulation import SLOW
 if TYPE_CHECKING:
     from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
     from urmpipe_fmus.unit import Unit
-    from urmpipe_models.arrays import IntArray
-    from urmpipe_models.chains.chain import Chain
+    from urmpipe_models.arm.chain import Chain
+    from urmpipe_models.elementwise import IntArray
 
 ON_PYTHON = SLOW
 """The kind of the warning that no native FMUs can be built; it is told before the first step, too."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import REGULAR
 

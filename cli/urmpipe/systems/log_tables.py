@@ -12,11 +12,9 @@ from urmpipe.keyword_checks import PathLike
 from urmpipe.log_table import LogTable, Quantity
 from urmpipe.reading import resolved
 from urmpipe_fmus.table import Table
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
-from urmpipe_models.spelling import IN_MAP, IN_NO_FILE
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import IN_MAP, IN_NO_FILE, Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.sources import LogMap, ReadOptions, read_log

@@ -14,11 +14,11 @@ from urmpipe_fmus.cosim.plan import NANOSECOND, Plan
 from urmpipe_fmus.cosim.simulation import NotFinite, Recorded
 from urmpipe_fmus.cosim.system import Block, Port, System
 from urmpipe_fmus.robot_entry import robot_in
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_models.files.toml_text import toml_text
 from urmpipe_models.measure_units import readings
+from urmpipe_models.toml_tables import toml_text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict, delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.provenance import provenance

@@ -14,12 +14,9 @@ from urmpipe.systems.log_tables import read_mapped_table
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_name, unit_options
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.drives.controller import Gains
-from urmpipe_models.drives.drive import Drive
-from urmpipe_models.drives.joint_drives import DRIVE_KEYS, GAIN_KEYS, DrivenJoint
-from urmpipe_models.errors import Finding, OptionError
-from urmpipe_models.messages import Hint
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.drives import DRIVE_KEYS, GAIN_KEYS, Drive, DrivenJoint, Gains
+from urmpipe_models.errors import Finding, Hint, OptionError
 from urmpipe_models.robots.catalogue import load_robot
 
 if TYPE_CHECKING:

@@ -7,11 +7,9 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from urmpipe_models.errors import Finding, shown
-from urmpipe_models.files.contents import is_there
+from urmpipe_models.errors import Finding, Hint, not_among, shown
+from urmpipe_models.files import is_there
 from urmpipe_models.measure_units import WRITTEN, quantity
-from urmpipe_models.messages import Hint
-from urmpipe_models.names import not_among
 
 NAMES = ("unit", "column")
 """Keys whose texts are names, also where a file beside is called so."""

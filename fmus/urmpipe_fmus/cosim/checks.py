@@ -9,9 +9,8 @@ from typing import Any
 
 from urmpipe_fmus.cosim.interface import Interface, Variable, si_base, unit_fault
 from urmpipe_fmus.cosim.system import Block, Connection, Port, System
-from urmpipe_models.errors import Finding
+from urmpipe_models.errors import Finding, not_among
 from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
-from urmpipe_models.names import not_among
 
 
 @dataclass(frozen=True, slots=True)

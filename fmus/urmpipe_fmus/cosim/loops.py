@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from urmpipe_fmus.cosim.job import LoopJob
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 ITERATIONS = 50
 """Newton's method needs a handful; what is not solved by then does not converge."""

@@ -16,9 +16,8 @@ from urmpipe_fmus.cosim.order import Exchange, Loop, Order
 from urmpipe_fmus.cosim.system import STEP, SYSTEMS, Block, LogInput, Port, System
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
-from urmpipe_models.errors import CosimulationError, Finding, UrmpipeError
-from urmpipe_models.files.places import placed
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import CosimulationError, Finding, Hint, UrmpipeError
+from urmpipe_models.files import placed
 
 Make = Callable[[Block], Unit | Path]
 

@@ -37,8 +37,7 @@ from urmpipe_fmus.cosim.system import Port
 from urmpipe_fmus.fmu_file import open_fmu
 from urmpipe_fmus.fmu_process import TIMEOUT
 from urmpipe_fmus.python_fmu.place import why_not_in
-from urmpipe_models.errors import CosimulationError
-from urmpipe_models.messages import one_line
+from urmpipe_models.errors import CosimulationError, one_line
 from urmpipe_models.processes import ending
 
 LAST_LINES = 5

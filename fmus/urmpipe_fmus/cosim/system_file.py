@@ -12,13 +12,10 @@ from typing import Any
 from urmpipe_fmus.cosim.arguments import beside, given, replaced, unknown
 from urmpipe_fmus.cosim.system import SYSTEMS, TOLERANCE, Block, Connection, LogInput, Port, System
 from urmpipe_fmus.units import unit_name
-from urmpipe_models.errors import CosimulationError, Finding, shown
-from urmpipe_models.files.contents import is_there
-from urmpipe_models.files.missing import meant_by
-from urmpipe_models.files.places import placed
-from urmpipe_models.files.toml_text import parse_toml
+from urmpipe_models.errors import CosimulationError, Finding, did_you_mean, not_among, shown
+from urmpipe_models.files import is_there, meant_by, placed
 from urmpipe_models.measure_units import WRITTEN, quantity
-from urmpipe_models.names import did_you_mean, not_among
+from urmpipe_models.toml_tables import parse_toml
 
 NOWHERE = Port("", "")
 """Stands for an end of a connection that the file does not tell rightly."""

@@ -12,8 +12,7 @@ from inspect import Parameter, signature
 from typing import Any, cast
 
 from urmpipe_fmus.unit import Unit
-from urmpipe_models.errors import UnitError
-from urmpipe_models.names import did_you_mean, not_among
+from urmpipe_models.errors import UnitError, did_you_mean, not_among
 
 _UNITS: dict[str, str] = {
     "kinematic_chain": "points of an arm, and velocities and angles of its sensors, from the joints",

@@ -22,12 +22,11 @@ from urmpipe_fmus.units.coordinates import (
 from urmpipe_fmus.units.options import an_arm
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, State, Variable
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
-from urmpipe_models.dynamics.forward import check_motion, forward_dynamics
-from urmpipe_models.dynamics.wrench import wrench_power
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.dynamics.equations import check_motion, forward_dynamics
+from urmpipe_models.dynamics.links import kinetic_energy, potential_energy, wrench_power
 from urmpipe_models.elementwise import Element
-from urmpipe_models.robots.robot_file import chain_from_dict
+from urmpipe_models.robots.toml import chain_from_dict
 
 OPTIONS: Mapping[str, str] = {
     "robot": "a robot with masses: a name of the catalogue, a .toml or a .urdf file",

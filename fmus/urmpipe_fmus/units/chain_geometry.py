@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Parameter
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.parameters import Parameter as ArmParameter
-from urmpipe_models.chains.urm import SEGMENT, TILT
-from urmpipe_models.transform import Transform, from_rpy, rpy_of
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.arm.chain import Parameter as ArmParameter
+from urmpipe_models.arm.geometric_models import SEGMENT, TILT
+from urmpipe_models.math3d import Transform, from_rpy, rpy_of
 
 
 class Geometry(NamedTuple):

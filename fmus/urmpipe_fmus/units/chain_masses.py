@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Parameter
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.drives.joint_drives import SMALLEST
-from urmpipe_models.dynamics.links import Links, links_of
-from urmpipe_models.dynamics.wrench import Wrench
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.drives import SMALLEST
+from urmpipe_models.dynamics.links import Links, Wrench, links_of
 
 
 class Arm(NamedTuple):

@@ -9,9 +9,9 @@ from typing import Any
 from urmpipe_fmus.unit import Recipe
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Output, State
-from urmpipe_models.chains.chain import Chain, JointKind
+from urmpipe_models.arm.chain import Chain, JointKind
 from urmpipe_models.elementwise import Element
-from urmpipe_models.robots.robot_file import robot_toml
+from urmpipe_models.robots.toml import robot_toml
 
 
 @dataclass(frozen=True, slots=True)

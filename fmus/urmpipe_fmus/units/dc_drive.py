@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, Parameter, State
-from urmpipe_models.drives.drive import (
+from urmpipe_models.drives import (
+    SMALLEST,
     Drive,
     current_rate,
     lost_power,
@@ -15,7 +16,6 @@ from urmpipe_models.drives.drive import (
     shaft_torque,
     stored_energy,
 )
-from urmpipe_models.drives.joint_drives import SMALLEST
 from urmpipe_models.elementwise import Element
 
 OPTIONS: Mapping[str, str] = {}

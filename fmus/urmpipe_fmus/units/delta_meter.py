@@ -7,9 +7,8 @@ from collections.abc import Mapping
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, Parameter
-from urmpipe_models.delta import delta, outside
+from urmpipe_models.delta import DEFAULT_TOLERANCE, delta, outside
 from urmpipe_models.elementwise import Element
-from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 
 OPTIONS: Mapping[str, str] = {}
 

@@ -9,9 +9,7 @@ import numpy as np
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Memory, Output, Parameter
-from urmpipe_models.drives.controller import Gains, next_voltage, sample_number, voltage_at
-from urmpipe_models.drives.joint_drives import SHORTEST_PERIOD
-from urmpipe_models.drives.set_point import JointMotion
+from urmpipe_models.drives import SHORTEST_PERIOD, Gains, JointMotion, next_voltage, sample_number, voltage_at
 from urmpipe_models.elementwise import Element
 
 OPTIONS: Mapping[str, str] = {}

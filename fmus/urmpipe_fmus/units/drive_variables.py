@@ -11,21 +11,24 @@ from urmpipe_fmus.units.coordinates import CoordinateKind, kinds_of, of_joints
 from urmpipe_fmus.units.drive_controller import NO_SAMPLE
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.drives.controller import Gains, next_voltage, sample_number, voltage_at
-from urmpipe_models.drives.drive import Drive
-from urmpipe_models.drives.joint_drives import (
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.drives import (
     DRIVE_KEYS,
     GAIN_KEYS,
     NO_SPRING,
     SHORTEST_PERIOD,
     SMALLEST,
     SPRING_KEYS,
+    Drive,
     DrivenJoint,
+    Gains,
     HeldJoint,
+    JointMotion,
     ReliefSpring,
+    next_voltage,
+    sample_number,
+    voltage_at,
 )
-from urmpipe_models.drives.set_point import JointMotion
 from urmpipe_models.dynamics.driven_arm import (
     Actuator,
     ArmState,

@@ -20,7 +20,7 @@ from urmpipe_fmus.units.drive_variables import DriveGroup, drive_groups
 from urmpipe_fmus.units.options import an_arm
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Output, State, Variable
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.dynamics.driven_arm import (
     Actuator,
     ArmState,
@@ -31,9 +31,9 @@ from urmpipe_models.dynamics.driven_arm import (
     powers,
     stable_step,
 )
-from urmpipe_models.dynamics.wrench import Wrench
+from urmpipe_models.dynamics.links import Wrench
 from urmpipe_models.elementwise import Element, Vector
-from urmpipe_models.robots.robot_file import chain_from_dict
+from urmpipe_models.robots.toml import chain_from_dict
 
 OPTIONS: Mapping[str, str] = {
     "robot": "a robot with masses and drives: a .toml file with [drives.NAME]",

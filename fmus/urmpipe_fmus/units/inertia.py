@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, Parameter, State
-from urmpipe_models.drives.drive import load_acceleration
+from urmpipe_models.drives import load_acceleration
 from urmpipe_models.elementwise import Element
 
 OPTIONS: Mapping[str, str] = {}

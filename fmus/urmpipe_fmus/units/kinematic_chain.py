@@ -12,12 +12,11 @@ from urmpipe_fmus.units.coordinates import arm_recipe, kinds_of, of_joints, valu
 from urmpipe_fmus.units.options import an_arm, some_of, yes_or_no
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, Variable
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import UnitError
-from urmpipe_models.kinematics.forward import forward
-from urmpipe_models.kinematics.motion import Motion, each_motion
-from urmpipe_models.robots.robot_file import chain_from_dict
-from urmpipe_models.transform import Transform, euler_zyx
+from urmpipe_models.kinematics.forward import Motion, each_motion, forward
+from urmpipe_models.math3d import Transform, euler_zyx
+from urmpipe_models.robots.toml import chain_from_dict
 
 OPTIONS: Mapping[str, str] = {
     "robot": "a robot: a name of the catalogue, a .toml or a .urdf file",

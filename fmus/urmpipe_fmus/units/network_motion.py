@@ -17,18 +17,16 @@ from urmpipe_fmus.units.options import whole_number
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Memory, Output, Variable
 from urmpipe_models.elementwise import Element, Vector
-from urmpipe_models.errors import UnitError, shown
-from urmpipe_models.files.tables import are_numbers, is_number
+from urmpipe_models.errors import UnitError, not_among, shown
 from urmpipe_models.measure_units import WRITTEN, quantity
-from urmpipe_models.names import not_among
 from urmpipe_models.networks.assembly import CLOSED, assemble, assembled_at, start_with
 from urmpipe_models.networks.driving import move_to
+from urmpipe_models.networks.file import Network, load_network
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.network_file import load_network
-from urmpipe_models.networks.network_tables import network_tables, with_start
-from urmpipe_models.networks.newton import changes, close_network, largest_residual, predict_variables
+from urmpipe_models.networks.mobility import network_tables, with_start
 from urmpipe_models.networks.parts import POSE_UNITS
+from urmpipe_models.networks.rates import changes, close_network, largest_residual, predict_variables
+from urmpipe_models.toml_tables import are_numbers, is_number
 
 OPTIONS: Mapping[str, str] = {
     "network": "a kinematic network: a name of the catalogue, or a .toml file",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import UnitError, shown
 
 MOST = 1000

@@ -10,7 +10,7 @@ from urmpipe_fmus.units.options import whole_number
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Memory, Output, Parameter, ValueType, Variable
 from urmpipe_models.elementwise import Element
-from urmpipe_models.repolarizer import State, step
+from urmpipe_models.wraps import State, step
 
 OPTIONS: Mapping[str, str] = {"joints": "the number of joints, such as 6"}
 
@@ -21,7 +21,7 @@ POINT = 1.0
 def repolarizer(joints: int) -> Unit:
     """Return the unit that adds whole periods to angles, so that they go on where they were.
 
-    What `urmpipe_models.repolarizer.step` gives sample by sample, the samples being the communication points
+    What `urmpipe_models.wraps.step` gives sample by sample, the samples being the communication points
     and max_step in place of a largest speed.
 
     Args:

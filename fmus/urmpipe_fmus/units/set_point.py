@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Output, Parameter
-from urmpipe_models.drives.set_point import TRAPEZOID
-from urmpipe_models.drives.set_point import set_point as set_point_at
+from urmpipe_models.drives import TRAPEZOID
+from urmpipe_models.drives import set_point as set_point_at
 from urmpipe_models.elementwise import Element
 
 OPTIONS: Mapping[str, str] = {}

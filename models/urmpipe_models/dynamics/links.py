@@ -1,16 +1,35 @@
-"""The moving parts of an arm as bodies: what is fixed to a joint's frame is one body with it."""
+"""The moving parts of an arm as bodies: what is fixed to a joint's frame is one body with it.
+
+Where the masses of an arm are, and how they move.
+
+The energies of an arm.
+
+A force and a moment on the tool of an arm.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.elementwise import ZERO, Element, Vector, add, minus, plus, scale, times
+from urmpipe_models.arm.chain import Chain, Inertial, Joint
+from urmpipe_models.elementwise import (
+    ZERO,
+    Element,
+    Vector,
+    add,
+    cross,
+    dot,
+    minus,
+    plus,
+    scale,
+    subtract,
+    times,
+)
 from urmpipe_models.errors import RobotError
-from urmpipe_models.transform import Transform
+from urmpipe_models.kinematics.forward import frames, jacobian, joint_rates
+from urmpipe_models.math3d import Transform
 
 Symmetric: TypeAlias = tuple[Vector, Vector, Vector]
 """The rows of a symmetric matrix."""
@@ -138,3 +157,152 @@ def summed(*matrices: Symmetric) -> Symmetric:
     for one in matrices:
         total = add(total[0], one[0]), add(total[1], one[1]), add(total[2], one[2])
     return total
+
+
+@dataclass(frozen=True, slots=True)
+class MassMotion:
+    """A mass of an arm and its motion.
+
+    Attributes:
+        inertial: The mass.
+        centre: r_s, its centre in the world, in [m].
+        velocity: v_s of the centre in the world, in [m/s].
+        omega: Angular velocity in the axes of the frame that carries it, in [rad/s].
+    """
+
+    inertial: Inertial
+    centre: Vector
+    velocity: Vector
+    omega: Vector
+
+
+def mass_motions(chain: Chain, q: Sequence[Element], qd: Sequence[Element]) -> list[MassMotion]:
+    """Return the motion of every mass of an arm, in the order of `chain.inertials`.
+
+    r_s = T_i r_i (eq. 8). v_s = D_i r_i with D_i = D_(i-1) A_i + T_(i-1) Q_i A_i q_i' (eq. 9-11) is here the
+    velocity of the frame's origin and omega x R r_i, frame by frame. omega_i = B_i^T omega_(i-1) + z q_i'
+    (eq. 12), for joints of either kind, z being the axis in the joint's own frame.
+
+    Args:
+        chain: The arm, with masses.
+        q: One element per coordinate, in [rad] or [m].
+        qd: Their rates, in [rad/s] or [m/s].
+
+    Raises:
+        RobotError: If the arm has no masses.
+
+    Source: [Iso9283]_ eq. 8-12.
+    """
+    check_masses(chain)
+    moving = dict(
+        zip((None, *(joint.name for joint in chain.joints)), _frame_motions(chain, q, qd), strict=True)
+    )
+    found = []
+    for one in chain.inertials:
+        frame, velocity, omega = moving[one.joint]
+        lever = frame.rotate(one.centre)
+        spin = cross(omega, lever)
+        own = Transform(frame.columns).rotate(omega)
+        found.append(MassMotion(one, add(frame.translation, lever), add(velocity, spin), own))
+    return found
+
+
+def mass_centres(chain: Chain, q: Sequence[Element]) -> list[Vector]:
+    """Return the centres of the masses of an arm in the world [m], in the order of `chain.inertials`.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+
+    Source: [Iso9283]_ eq. 8.
+    """
+    placed = dict(zip((None, *(joint.name for joint in chain.joints)), frames(chain, q), strict=True))
+    return [placed[one.joint].point(one.centre) for one in chain.inertials]
+
+
+def _frame_motions(
+    chain: Chain, q: Sequence[Element], qd: Sequence[Element]
+) -> Iterator[tuple[Transform, Vector, Vector]]:
+    """Yield pose, velocity of the origin and angular velocity in the world, of the base and every joint."""
+    base, *moved = frames(chain, q)
+    before, velocity, omega = base.translation, ZERO, ZERO
+    yield base, velocity, omega
+    for frame, joint, rate in zip(moved, chain.joints, joint_rates(chain, qd), strict=True):
+        velocity = add(velocity, cross(omega, subtract(frame.translation, before)))
+        own = scale(rate, frame.rotate(joint.axis))
+        if joint.kind == "prismatic":
+            velocity = add(velocity, own)
+        else:
+            omega = add(omega, own)  # a fixed joint's rate is 0
+        before = frame.translation
+        yield frame, velocity, omega
+
+
+def kinetic_energy(chain: Chain, q: Sequence[Element], qd: Sequence[Element]) -> Element:
+    """Return T = 1/2 sum (m v_s^2 + omega . I omega) in [J].
+
+    Args:
+        chain: The arm, with masses.
+        q: One element per coordinate, in [rad] or [m].
+        qd: Their rates, in [rad/s] or [m/s].
+
+    Raises:
+        RobotError: If the arm has no masses.
+
+    Source: [Iso9283]_ section 3, from eq. 9 and 12.
+    """
+    energy: Element = 0.0
+    for one in mass_motions(chain, q, qd):
+        spin = Transform(one.inertial.matrix).rotate(one.omega)
+        twice = plus(times(one.inertial.mass, dot(one.velocity, one.velocity)), dot(one.omega, spin))
+        energy = plus(energy, times(0.5, twice))
+    return energy
+
+
+def potential_energy(chain: Chain, q: Sequence[Element]) -> Element:
+    """Return U = -sum m g . r_s in [J], 0 with all masses at the world's origin.
+
+    Args:
+        chain: The arm, with masses.
+        q: One element per coordinate, in [rad] or [m].
+
+    Raises:
+        RobotError: If the arm has no masses.
+
+    Source: [Iso9283]_ section 3, from eq. 8.
+    """
+    check_masses(chain)
+    energy: Element = 0.0
+    for one, centre in zip(chain.inertials, mass_centres(chain, q), strict=True):
+        energy = minus(energy, times(one.mass, dot(chain.gravity, centre)))
+    return energy
+
+
+class Wrench(NamedTuple):
+    """What acts on the tool centre point from outside, along the axes of the world.
+
+    Eq. 13 of [Iso9283]_ counts the opposite: what the tool does to its surroundings.
+
+    Attributes:
+        force: In [N].
+        moment: In [N.m].
+    """
+
+    force: Vector = ZERO
+    moment: Vector = ZERO
+
+
+def wrench_power(chain: Chain, q: Sequence[Element], qd: Sequence[Element], wrench: Wrench) -> Element:
+    """Return (J^T F) . q', the power of what acts on the tool, in [W].
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+        qd: Their rates, in [rad/s] or [m/s].
+        wrench: What acts on the tool centre point from outside.
+    """
+    power: Element = 0.0
+    for column, rate in zip(jacobian(chain, q), qd, strict=True):
+        for entry, given in zip(column, (*wrench.force, *wrench.moment), strict=True):
+            power = plus(power, times(times(entry, rate), given))
+    return power

@@ -1,27 +1,214 @@
-"""Forward kinematics and Jacobian of a chain, elementwise, and its motion over a log.
+"""The frames of a chain, elementwise: the value of every joint, and what it moves.
+
+Velocities and accelerations of the points of a chain, elementwise.
+
+Forward kinematics and Jacobian of a chain, elementwise, and its motion over a log.
 
 Each function takes one element per coordinate (see `elementwise`): arrays over the samples of a log,
 floats, or CasADi symbols. `over_log` runs one of them over the rows of an (n, joints) array.
+
+The joints of a chain as screws: what its geometry is, whatever its frames and names are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.elementwise import ZERO, Element, Vector, cross, plus, subtract, times
-from urmpipe_models.kinematics.frames import frames, from_tip, joint_values, moved, tip_position
-from urmpipe_models.kinematics.motion import each_motion
-from urmpipe_models.row_blocks import row_blocks, side_by_side
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import (
+    ZERO,
+    Element,
+    FloatArray,
+    Vector,
+    add,
+    cross,
+    plus,
+    row_blocks,
+    scale,
+    side_by_side,
+    subtract,
+    times,
+)
+from urmpipe_models.math3d import Transform, euler_zyx, turned_vectors
 from urmpipe_models.tape import aligned, fill_over_log
-from urmpipe_models.transform import Transform, euler_zyx
+
+
+def joint_values(chain: Chain, q: Sequence[Element]) -> list[Element]:
+    """Return the value of every joint of the chain, mimics included, fixed ones as 0 (rad or m)."""
+    of = dict(zip(chain.coordinates, q, strict=True))
+    return [_value(joint, of) for joint in chain.joints]
+
+
+def joint_rates(chain: Chain, rates: Sequence[Element]) -> list[Element]:
+    """Return the derivative of every joint's value: as `joint_values`, but a mimic's offset drops out."""
+    of = dict(zip(chain.coordinates, rates, strict=True))
+    return [
+        times(joint.mimic.multiplier, of[joint.mimic.joint]) if joint.mimic else of.get(joint.name, 0.0)
+        for joint in chain.joints
+    ]
+
+
+def frames(chain: Chain, q: Sequence[Element]) -> Iterator[Transform]:
+    """Yield the base and the moving frame of every joint, in the world: what the links hang on.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+    """
+    frame = chain.base
+    yield frame
+    for joint, value in zip(chain.joints, joint_values(chain, q), strict=True):
+        frame = moved(frame @ joint.origin, joint, value)
+        yield frame
+
+
+def moved(at_joint: Transform, joint: Joint, value: Element) -> Transform:
+    """Return the joint's moving frame from its fixed one and its value in [rad] or [m]."""
+    if joint.kind == "revolute":
+        return at_joint.turned(joint.axis, value)
+    if joint.kind == "prismatic":
+        return Transform(at_joint.rotation, at_joint.point(scale(value, joint.axis)))
+    return at_joint
+
+
+def tip_position(chain: Chain, q: Sequence[Element]) -> Vector:
+    """Return the tool centre point in the world [m], without its orientation: that of `tip_pose`.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+    """
+    return from_tip(chain, q, chain.tip.point(chain.tool.translation))[0]
+
+
+def from_tip(chain: Chain, q: Sequence[Element], point: Vector, *directions: Vector) -> list[Vector]:
+    """Return a point [m] and directions that are given in the frame of the last joint, in the world.
+
+    Inward recursion: what is known in a link's frame becomes the same in the frame before,
+    p' = o + R Rot(axis, q) p and v' = R Rot(axis, q) v, from the tool to the base. It turns one vector for
+    each of them where `frames` turns three.
+    """
+    vectors = [point, *directions]
+    for joint, value in zip(reversed(chain.joints), reversed(joint_values(chain, q)), strict=True):
+        if joint.kind == "revolute":
+            vectors = turned_vectors(vectors, joint.axis, value)
+        elif joint.kind == "prismatic":
+            vectors[0] = add(vectors[0], scale(value, joint.axis))
+        vectors = [joint.origin.point(vectors[0]), *map(joint.origin.rotate, vectors[1:])]
+    return [chain.base.point(vectors[0]), *map(chain.base.rotate, vectors[1:])]
+
+
+def _value(joint: Joint, of: dict[str, Element]) -> Element:
+    """Return the value of a joint from those of the coordinates."""
+    if joint.kind == "fixed":
+        return 0.0
+    if joint.mimic is None:
+        return of[joint.name]
+    return plus(times(joint.mimic.multiplier, of[joint.mimic.joint]), joint.mimic.offset)
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Pose and its first two derivatives of one point, in the world.
+
+    Attributes:
+        pose: Position in [m] and rotation.
+        velocity: In [m/s].
+        acceleration: In [m/s2].
+        omega: Angular velocity in [rad/s].
+        alpha: Angular acceleration in [rad/s2].
+    """
+
+    pose: Transform
+    velocity: Vector
+    acceleration: Vector
+    omega: Vector
+    alpha: Vector
+
+
+def motions(
+    chain: Chain, q: Sequence[Element], qd: Sequence[Element], qdd: Sequence[Element]
+) -> tuple[Motion, ...]:
+    """Return pose, velocity and acceleration of the points p1..pn, from q, q' and q''.
+
+    Outward recursion over the joints, with d the way from one frame's origin to the next:
+    v' = v + omega x d, a' = a + alpha x d + omega x (omega x d); a revolute joint adds z q' to omega and
+    z q'' + omega x z q' to alpha, a prismatic one z q' to v and z q'' + 2 omega x z q' to a.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+        qd: Their rates, in [rad/s] or [m/s].
+        qdd: Their second derivatives, in [rad/s2] or [m/s2].
+
+    Source: [UrmArm2021]_ section 3, Figure 10 b and c (v7 of q', a7 of q'' and q'^2).
+    """
+    return tuple(each_motion(chain, q, qd, qdd))
+
+
+def each_motion(
+    chain: Chain, q: Sequence[Element], qd: Sequence[Element], qdd: Sequence[Element]
+) -> Iterator[Motion]:
+    """Yield the motions of p1..pn; who wants one of them need not keep the arrays of all.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+        qd: Their rates, in [rad/s] or [m/s].
+        qdd: Their second derivatives, in [rad/s2] or [m/s2].
+    """
+    values, rates, second = joint_values(chain, q), joint_rates(chain, qd), joint_rates(chain, qdd)
+    body = Motion(chain.base, ZERO, ZERO, ZERO, ZERO)
+    for k, joint in enumerate(chain.joints):
+        at_joint = _carried(body, joint.origin)
+        if k > 0:
+            end = Transform(body.pose.rotation, at_joint.pose.translation)
+            yield replace(at_joint, pose=end)
+        body = _driven(at_joint, joint, values[k], rates[k], second[k])
+    yield _carried(body, chain.tip @ chain.tool)
+
+
+def _carried(state: Motion, origin: Transform) -> Motion:
+    """Return the motion of a frame fixed to a moving body."""
+    d = state.pose.rotate(origin.translation)
+    spin = cross(state.omega, d)
+    turned = Transform(state.pose.rotation) @ Transform(origin.rotation)
+    return Motion(
+        Transform(turned.rotation, add(state.pose.translation, d)),
+        add(state.velocity, spin),
+        add(state.acceleration, add(cross(state.alpha, d), cross(state.omega, spin))),
+        state.omega,
+        state.alpha,
+    )
+
+
+def _driven(state: Motion, joint: Joint, value: Element, rate: Element, second: Element) -> Motion:
+    """Return the motion of the joint's moving frame from that of its fixed one; a fixed joint slides by 0."""
+    pose = moved(state.pose, joint, value)
+    axis = state.pose.rotate(joint.axis)
+    own, own_second = scale(rate, axis), scale(second, axis)
+    coupling = cross(state.omega, own)
+    if joint.kind == "revolute":
+        omega = add(state.omega, own)
+        alpha = add(state.alpha, add(own_second, coupling))
+        return Motion(pose, state.velocity, state.acceleration, omega, alpha)
+    slide = scale(value, axis)
+    spin = cross(state.omega, slide)
+    acceleration = add(cross(state.alpha, slide), cross(state.omega, spin))
+    acceleration = add(acceleration, add(scale(2.0, coupling), own_second))
+    return Motion(
+        pose,
+        add(state.velocity, add(spin, own)),
+        add(state.acceleration, acceleration),
+        state.omega,
+        state.alpha,
+    )
 
 
 def forward(chain: Chain, q: Sequence[Element]) -> tuple[Transform, ...]:
@@ -290,3 +477,86 @@ def _fill(target: FloatArray, elements: Sequence[Element]) -> None:
     """Write one element a row into target, shape (k, m); constants spread over the columns."""
     for i, element in enumerate(elements):
         target[i] = element
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Screws:
+    """The moving joints of a chain at q = 0, in the world, and the pose of its tip there.
+
+    With the twist xi_i of a joint's axis the tip is at T(q) = exp(xi_1 q_1) ... exp(xi_n q_n) T(0), the
+    product of exponentials: two descriptions of one arm have the same screws.
+
+    Attributes:
+        direction: Unit vector along each axis [-], shape (n, 3).
+        point: A point of each axis in [m], shape (n, 3).
+        revolute: True of a revolute, false of a prismatic joint, shape (n,).
+        rotation: Of the tool centre point at q = 0 [-], shape (3, 3).
+        position: Of the tool centre point at q = 0 in [m], shape (3,).
+
+    Source: [Brockett1984]_.
+    """
+
+    direction: FloatArray
+    point: FloatArray
+    revolute: NDArray[np.bool_]
+    rotation: FloatArray
+    position: FloatArray
+
+    @property
+    def size(self) -> float:
+        """A length of the arm in [m], to hold distances against: from axis to axis to the tip."""
+        points = np.vstack((self.point, self.position))
+        return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) or 1.0
+
+
+def screws(chain: Chain) -> Screws | None:
+    """Return the screws of a chain, base and tool included; None if a joint follows another (mimic).
+
+    Such a joint turns about a line that moves with the joint it follows, and is no screw of its own.
+    """
+    if any(joint.mimic is not None for joint in chain.joints):
+        return None
+    zero = [0.0] * len(chain.coordinates)
+    placed = [
+        (frame.rotate(joint.axis), frame.translation, joint.kind == "revolute")
+        for joint, frame in zip(chain.joints, list(frames(chain, zero))[1:], strict=True)
+        if joint.kind != "fixed"
+    ]
+    direction, point, revolute = zip(*placed, strict=True)
+    tip = tip_pose(chain, zero)
+    return Screws(
+        np.array(direction, dtype=float),
+        np.array(point, dtype=float),
+        np.array(revolute),
+        np.array(tip.rotation, dtype=float),
+        np.array(tip.translation, dtype=float),
+    )
+
+
+def chain_of(screws: Screws, names: tuple[str, ...]) -> Chain:
+    """Return a chain that has these screws: each joint's frame on a point of its axis, turned as the world.
+
+    Args:
+        screws: Of its joints.
+        names: Of its joints.
+    """
+    offsets = np.diff(np.vstack((np.zeros(3), screws.point)), axis=0)
+    joints = tuple(
+        Joint(
+            name,
+            "revolute" if revolute else "prismatic",
+            Transform(translation=_vector(offset)),
+            _vector(direction),
+        )
+        for name, revolute, offset, direction in zip(
+            names, screws.revolute, offsets, screws.direction, strict=True
+        )
+    )
+    x, y, z = (_vector(row) for row in screws.rotation)
+    return Chain("screws", joints, Transform((x, y, z), _vector(screws.position - screws.point[-1])))
+
+
+def _vector(values: FloatArray) -> tuple[float, float, float]:
+    """Return three numbers as a tuple."""
+    x, y, z = (float(one) for one in values)
+    return x, y, z

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import ZERO, Element, Vector, cross, scale, subtract
-from urmpipe_models.kinematics.frames import frames
-from urmpipe_models.transform import Transform, rotation_about, translation
+from urmpipe_models.kinematics.forward import frames
+from urmpipe_models.math3d import Transform, rotation_about, translation
 
 BASE = 0
 """The place of the base; joint k (from 1) sits at place k, the tip at n + 1, the tool at n + 2."""

@@ -10,10 +10,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.kinematics.forward import jacobian_over_log
-from urmpipe_models.kinematics.screws import screws
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.kinematics.forward import jacobian_over_log, screws
 
 PARALLEL = 0.1
 """Sine of the angle between two axes below which they count as parallel.

@@ -8,18 +8,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.errors import Finding, NetworkError
-from urmpipe_models.names import not_among
-from urmpipe_models.networks.closure import closure_of, gap_of
-from urmpipe_models.networks.descent import Reached, descend
-from urmpipe_models.networks.findings import Assembly, Gap
-from urmpipe_models.networks.idle_spins import idle_spins, spinning_parts, unspun
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Finding, NetworkError, not_among
+from urmpipe_models.networks.closure import (
+    Reached,
+    closure_of,
+    descend,
+    gap_of,
+    idle_spins,
+    spinning_parts,
+    unspun,
+)
+from urmpipe_models.networks.faults import value_faults
+from urmpipe_models.networks.joint_motion import rotation_of
 from urmpipe_models.networks.mechanism import Mechanism
-from urmpipe_models.networks.mobility import mobility_at, mobility_nearby
+from urmpipe_models.networks.mobility import Assembly, Gap, mobility_at, mobility_nearby
 from urmpipe_models.networks.parts import POSE_UNITS
-from urmpipe_models.networks.rotations import rotation_of
-from urmpipe_models.networks.value_faults import value_faults
 
 CLOSED = 1e-9
 """A gap of less, in lengths of the mechanism and in [rad], is rounding."""

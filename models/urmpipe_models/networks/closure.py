@@ -1,21 +1,56 @@
-"""What does not close of a network whose loops are cut, and its Jacobian by twists and wrenches."""
+"""What does not close of a network whose loops are cut, and its Jacobian by twists and wrenches.
+
+From rough configurations to such that close: Levenberg-Marquardt on many at once.
+
+Idle spins: a part that only two global joints hold spins about the line through their centres.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IndexArray
-from urmpipe_models.elementwise import Element, add, cross
-from urmpipe_models.networks.element_measures import MEASURES, measure
-from urmpipe_models.networks.joint_motion import Screws, forbidden, joint_frame, joint_screws
-from urmpipe_models.networks.mechanism import Given, Mechanism, Pose, Posed, of_controls
+from urmpipe_models.elementwise import (
+    BoolArray,
+    Element,
+    FloatArray,
+    IndexArray,
+    Vector,
+    add,
+    cross,
+    dot,
+    scale,
+    subtract,
+)
+from urmpipe_models.ik.numeric import FIRST_GAIN, GAINS, LEAST_RATIO, STATIONARY, damped_step
+from urmpipe_models.ik.task import column_squares, dot_product, product, transposed_product
+from urmpipe_models.math3d import Transform, quaternions, rotation_vectors
+from urmpipe_models.networks.joint_motion import (
+    MEASURES,
+    SMALL,
+    Screws,
+    forbidden,
+    joint_frame,
+    joint_screws,
+    measure,
+    rotation_of,
+    turning_of,
+    untwisted,
+    wrap_rotation_vector,
+)
+from urmpipe_models.networks.mechanism import (
+    Configuration,
+    Given,
+    Mechanism,
+    Pose,
+    Posed,
+    of_controls,
+    parts_without,
+)
 from urmpipe_models.networks.parts import ConstraintElement, Joint
-from urmpipe_models.networks.rotations import turning_of, untwisted
-from urmpipe_models.orientation import quaternions, rotation_vectors
-from urmpipe_models.transform import Transform
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -280,3 +315,261 @@ def wrench_carriers(
     equations = _equations(mechanism, x, mechanism.posed(x), mechanism.control_slopes(x))
     for tie, equation in zip(ties, equations, strict=True):
         yield tie, equation.rows, equation.carrier
+
+
+STEPS = 300
+"""The most steps of a start."""
+
+ENOUGH = 1e-14
+"""The length of the residual, in lengths of the mechanism and [rad], from which on it is rounding."""
+
+STUCK = 1e-3
+"""Where the cosine between e and what each variable can change of it is less than this times the root of |e|,
+e cannot be made 0 near by: on the way to a singular assembly, where |e| falls as the square of the distance,
+the cosine falls as the distance."""
+
+FLOOR = 1e-13
+"""The least damping: singular directions, as of redundant constraints, must not amplify rounding."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reached:
+    """Where starts have come to.
+
+    Attributes:
+        x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
+        gap: The largest entry of the residual, in lengths of the mechanism and [rad], shape (n,); NaN where x
+            is no configuration.
+    """
+
+    x: FloatArray
+    gap: FloatArray
+
+
+def descend(mechanism: Mechanism, x: FloatArray, free: IndexArray, *, patient: bool = True) -> Reached:
+    """Return the configurations nearby that close, or come nearest to it.
+
+    Each step is the least of (J^T J + mu I) dx = -J^T e, in lengths of the mechanism and [rad], with mu in
+    proportion to |e|^2: so it ends in steps of Gauss and Newton, and moves nothing that need not move.
+
+    Args:
+        mechanism: The network.
+        x: The starts, shape (variables, n), in [m], [rad] and as controls are given.
+        free: The numbers of the variables that may change, shape (free,) [-].
+        patient: Whether the least gap is sought where nothing closes; else a start is given up there.
+    """
+    found = np.array(x, dtype=np.float64)
+    rows = np.arange(found.shape[1])
+    gain = np.full(len(rows), FIRST_GAIN)
+    now = _scaled(mechanism, found, free)
+    error = np.array(now.error)
+    for _ in range(STEPS):
+        going = _going(now, gain, patient)
+        if not going.any():
+            break
+        rows, gain, now = rows[going], gain[going], now.kept(going)
+        x_now = found[:, rows]
+        square = dot_product(now.error, now.error)
+        step = damped_step(now.jacobian, -now.error, gain * square + FLOOR)
+        moved = np.array(x_now)
+        moved[free] += step * mechanism.column_scales[free, np.newaxis]
+        for some in mechanism.rotations:
+            moved[some] = wrap_rotation_vector(tuple(moved[some]))
+        new = _scaled(mechanism, moved, free)
+        left = now.error + product(now.jacobian, step)
+        foreseen = square - dot_product(left, left)
+        gained = square - dot_product(new.error, new.error)
+        taken = (gained > LEAST_RATIO * foreseen) & (gained > 0.0)
+        good, poor = taken & (gained > 0.75 * foreseen), ~taken | (gained < 0.25 * foreseen)
+        gain = np.clip(gain * np.where(good, 0.125, np.where(poor, 4.0, 1.0)), *GAINS)
+        found[:, rows[taken]], error[:, rows[taken]] = moved[:, taken], new.error[:, taken]
+        now = new.or_else(taken, now)
+    return Reached(found, np.abs(error).max(axis=0, initial=0.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Scaled:
+    """Residual and Jacobian in lengths of the mechanism and [rad], shape (rows, n) and (rows, free, n)."""
+
+    error: FloatArray
+    jacobian: FloatArray
+
+    def kept(self, which: BoolArray) -> _Scaled:
+        """Return those of some starts."""
+        return _Scaled(self.error[:, which], self.jacobian[:, :, which])
+
+    def or_else(self, taken: BoolArray, other: _Scaled) -> _Scaled:
+        """Return these where they are taken, else those of another."""
+        return _Scaled(
+            np.where(taken, self.error, other.error), np.where(taken, self.jacobian, other.jacobian)
+        )
+
+
+def _scaled(mechanism: Mechanism, x: FloatArray, free: IndexArray) -> _Scaled:
+    """Return residual and Jacobian at configurations, scaled."""
+    closure = scaled_closure(mechanism, x)
+    return _Scaled(closure.residual, closure.jacobian[:, free])
+
+
+def _going(now: _Scaled, gain: FloatArray, patient: bool) -> BoolArray:
+    """Return which starts go on: those that are finite, not closed, and not at a least residual."""
+    square = dot_product(now.error, now.error)
+    slope = transposed_product(now.jacobian, now.error)
+    least = np.maximum(STATIONARY, 0.0 if patient else STUCK * square**0.25)
+    moves = slope * slope > least**2 * square * column_squares(now.jacobian)
+    under_way = (square > ENOUGH**2) & (square < np.inf) & (gain < GAINS[1])
+    return np.asarray(under_way & moves.any(axis=0))
+
+
+COAXIAL = 1e-7
+"""Share of the mechanism's length by which points may be beside an axis that they are on: see `RANK`."""
+
+
+@dataclass(frozen=True, slots=True)
+class IdleSpin:
+    """A part that spins and moves nothing else.
+
+    Attributes:
+        joints: The two global joints.
+        bodies: Its bodies, in the order of the network.
+    """
+
+    joints: tuple[Joint, Joint]
+    bodies: tuple[str, ...]
+
+
+def idle_spins(mechanism: Mechanism) -> tuple[IdleSpin, ...]:
+    """Return the idle spins of a network; a part within which another spins is none itself."""
+    network = mechanism.network
+    free = [one for one in network.joints if one.kind == "global" and not any(one.drives)]
+    found: list[IdleSpin] = []
+    for pair in combinations(free, 2):
+        for part in parts_without(network, [one.name for one in pair]):
+            hangs = all(len(part & set(one.bodies)) == 1 for one in pair)
+            if hangs and network.ground not in part:
+                found.append(IdleSpin(pair, tuple(name for name in network.body_names if name in part)))
+    return tuple(one for one in found if not any(set(other.bodies) < set(one.bodies) for other in found))
+
+
+def spinning_parts(mechanism: Mechanism, x: FloatArray) -> tuple[str, ...]:
+    """Return the names of the bodies that spin together, joined, of each idle spin at a configuration.
+
+    Bodies of a part spin apart where the joint between them lets them turn about the line.
+
+    Args:
+        mechanism: The network.
+        x: The variables, shape (variables,), in [m], [rad] and as controls are given.
+    """
+    frames = mechanism.poses([float(value) for value in x])
+    joints, found = mechanism.network.joints, []
+    for spin in idle_spins(mechanism):
+        ends = [_part_frame(joint, spin, frames).translation for joint in spin.joints]
+        loose = (one for one in joints if one.name not in mechanism.network.coupled_joints)
+        apart = [one.name for one in loose if _turns_about(one, frames, ends, mechanism.length)]
+        pieces = parts_without(mechanism.network, [one.name for one in spin.joints] + apart)
+        inner = (piece for piece in pieces if piece <= set(spin.bodies))
+        found += [" + ".join(name for name in spin.bodies if name in piece) for piece in inner]
+    return tuple(found)
+
+
+def _turns_about(joint: Joint, frames: dict[str, Transform], ends: Sequence[Vector], length: float) -> bool:
+    """Return whether a joint turns freely about the line through two points [m].
+
+    Args:
+        joint: The joint.
+        frames: The bodies in the ground.
+        ends: The points.
+        length: That of the mechanism in [m].
+    """
+    if joint.kind not in ("revolute", "cylindrical") or joint.drives[0] is not None:
+        return False
+    at = frames[joint.bodies[0]] @ joint.frames[0]
+    off = [np.linalg.norm(cross(subtract(end, at.translation), at.columns[1])) for end in ends]
+    return bool(max(off) <= COAXIAL * length)
+
+
+def unspun(mechanism: Mechanism, spins: Sequence[IdleSpin], x: FloatArray, start: FloatArray) -> FloatArray:
+    """Return the same configurations with their idle spins as they are at the start.
+
+    The part turns about the line u until the twist of its first joint about u is that of the start; both
+    joints take that up: T' = T exp(phi [u]x), u in the frame a of the part.
+
+    Args:
+        mechanism: The network.
+        spins: Its idle spins.
+        x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
+        start: Those of the start, shape (variables,), likewise.
+
+    Returns:
+        The variables in [m], [rad] and as controls are given, shape (variables, n).
+    """
+    x = np.array(x)
+    for spin in spins:
+        frames = mechanism.poses(x)
+        centres = [_part_frame(joint, spin, frames) for joint in spin.joints]
+        apart = subtract(centres[1].translation, centres[0].translation)
+        length = np.sqrt(sum(np.square(entry) for entry in apart))
+        line: Vector = scale(1.0 / np.maximum(length, 1e-300), apart)
+        turn: FloatArray | None = None
+        for joint, frame in zip(spin.joints, centres, strict=True):
+            first = mechanism.places[joint.name, 0]
+            inverted = joint.bodies[0] in spin.bodies
+            own = _turned(joint, x[first : first + 3], inverted)
+            along = Transform(frame.columns).rotate(line)
+            if turn is None:
+                before = _turned(joint, start[first : first + 3, np.newaxis], inverted)
+                turn = _twist(before, along, x.shape[1]) - _twist(own, along, x.shape[1])
+            held = own @ rotation_of(scale(turn, along))
+            x[first : first + 3] = gap_of(held.inverse() if inverted else held, x.shape[1])[3:]
+    return x
+
+
+def spin_angles(mechanism: Mechanism, spins: Sequence[IdleSpin], x: Configuration) -> list[Element]:
+    """Return the angles of idle spins in [rad], which `unspun` keeps: twists of first joints about the lines.
+
+    phi = 2 atan2(q . u sin(a / 2) / a, cos(a / 2)), a = |q|: q is the rotation vector of the joint, u the
+    line.
+
+    Args:
+        mechanism: The network.
+        spins: Its idle spins.
+        x: The variables, one element each.
+    """
+    angles: list[Element] = []
+    frames = mechanism.poses(x)
+    for spin in spins:
+        first, second = (_part_frame(joint, spin, frames) for joint in spin.joints)
+        joint, distance = spin.joints[0], subtract(second.translation, first.translation)
+        line = scale(1.0 / np.maximum(np.sqrt(dot(distance, distance)), 1e-300), distance)
+        place = mechanism.places[joint.name, 0]
+        q: Vector = (x[place], x[place + 1], x[place + 2])
+        square = dot(q, q)
+        angle = np.sqrt(np.where(square < SMALL, 1.0, square))
+        sine = np.where(square < SMALL, 0.5 - square / 48.0, np.sin(0.5 * angle) / angle)
+        cosine = np.where(square < SMALL, 1.0 - square / 8.0, np.cos(0.5 * angle))
+        along = dot(q, Transform(first.columns).rotate(line))
+        sign = -1.0 if joint.bodies[0] in spin.bodies else 1.0
+        angles.append(2.0 * np.arctan2(sign * sine * along, cosine))
+    return angles
+
+
+def _part_frame(joint: Joint, spin: IdleSpin, frames: dict[str, Transform]) -> Transform:
+    """Return the frame a of the part at a joint, in the ground."""
+    side = 0 if joint.bodies[0] in spin.bodies else 1
+    return frames[joint.bodies[side]] @ joint.frames[side]
+
+
+def _turned(joint: Joint, q: FloatArray, inverted: bool) -> Transform:
+    """Return how the part is turned at a joint against what it hangs on: T, or its inverse."""
+    frame = joint_frame(joint, list(q))
+    return frame.inverse() if inverted else frame
+
+
+def _twist(turned: Transform, axis: Vector, n: int) -> FloatArray:
+    """Return by which angles rotations turn about axes, 2 atan2(v . axis, w), in [rad], shape (n,)."""
+    rows = np.empty((9, n))
+    for k, entry in enumerate(entry for row in turned.rotation for entry in row):
+        rows[k] = entry
+    quat = quaternions(rows.T, "matrix")
+    along = sum(quat[:, k] * axis[k] for k in range(3))
+    return np.asarray(2.0 * np.arctan2(along, quat[:, 3]))

@@ -18,10 +18,9 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IndexArray
-from urmpipe_models.errors import Finding, NetworkError
-from urmpipe_models.names import not_among
-from urmpipe_models.networks.idle_spins import idle_spins, spinning_parts, unspun
+from urmpipe_models.elementwise import FloatArray, IndexArray
+from urmpipe_models.errors import Finding, NetworkError, not_among
+from urmpipe_models.networks.closure import idle_spins, spinning_parts, unspun
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.mobility import mobility_nearby
 from urmpipe_models.networks.motion import (

@@ -8,12 +8,10 @@ from typing import Any, Literal, TypeAlias
 
 from urmpipe_models.elementwise import ZERO, Vector, dot, scale, subtract
 from urmpipe_models.errors import shown
-from urmpipe_models.files.tables import Table, are_numbers, is_number
-from urmpipe_models.networks.control_faults import is_name
-from urmpipe_models.networks.expressions import Expression
-from urmpipe_models.networks.parts import ORTHONORMAL, frame_of
-from urmpipe_models.robots.robot_frames import Units
-from urmpipe_models.transform import Transform
+from urmpipe_models.math3d import Transform
+from urmpipe_models.networks.parts import ORTHONORMAL, Expression, frame_of, is_name
+from urmpipe_models.robots.toml import Units
+from urmpipe_models.toml_tables import Table, are_numbers, is_number
 
 Form: TypeAlias = Literal["one", "two", "one or two"]
 """Whether a key holds a vector, one for each body, or either."""

@@ -17,13 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IndexArray
-from urmpipe_models.elementwise import Vector, cross, dot, subtract
+from urmpipe_models.elementwise import FloatArray, IndexArray, Vector, cross, dot, subtract
+from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.closure import body_twists, closure_of, wrench_carriers
 from urmpipe_models.networks.mechanism import Mechanism, Posed
 from urmpipe_models.networks.motion import Slopes, iter_chunks
 from urmpipe_models.networks.parts import Joint
-from urmpipe_models.transform import Transform
 
 UNDETERMINED = 1e-7  # share of a unit multiplier that a component takes from redundant constraints
 

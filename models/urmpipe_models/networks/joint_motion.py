@@ -1,14 +1,117 @@
-"""What each kind of joint does: its matrix T, and the twists of its variables. Elementwise."""
+"""Rotation vectors: the rotation of one, what a change of one turns, and the way back. Elementwise.
+
+What each kind of joint does: its matrix T, and the twists of its variables. Elementwise.
+
+What a constraint element measures between its two bodies, and the wrench along which. Elementwise.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
-from urmpipe_models.elementwise import ZERO, Element, Vector, add, cross, scale
-from urmpipe_models.networks.parts import Joint, frame_of
-from urmpipe_models.networks.rotations import rotation_of, turning_of
-from urmpipe_models.transform import Transform, rotation_y, translation
+import numpy as np
+
+from urmpipe_models.elementwise import ZERO, Element, FloatArray, Vector, add, cross, dot, scale, subtract
+from urmpipe_models.math3d import Transform, rotation_y, translation
+from urmpipe_models.networks.parts import ConstraintElement, Joint, frame_of
+
+SMALL = 1e-8
+"""Below this square of an angle in [rad^2] series stand for quotients of which both parts vanish."""
+
+
+def rotation_of(q: Vector) -> Transform:
+    """Return exp([q]x) = cos(a) I + (sin(a) / a) [q]x + ((1 - cos(a)) / a^2) q q^T, a = |q|.
+
+    Args:
+        q: Rotation vector in [rad], any elements; at 0 the series are used.
+
+    Source: [KinematicSystems]_ section 3.2.2, the global joint, with u1 u1 in T(1,1) (errata).
+    """
+    x, y, z = q
+    cosine, sinc, versed = _quotients(dot(q, q))[:3]
+    return Transform(
+        (
+            (cosine + versed * x * x, versed * x * y - sinc * z, versed * x * z + sinc * y),
+            (versed * x * y + sinc * z, cosine + versed * y * y, versed * y * z - sinc * x),
+            (versed * x * z - sinc * y, versed * y * z + sinc * x, cosine + versed * z * z),
+        )
+    )
+
+
+def turning_of(q: Vector) -> tuple[Vector, Vector, Vector]:
+    """Return the angular velocities in the outer frame with which exp([q]x) turns as q_1, q_2, q_3 change.
+
+    The columns of I + ((1 - cos(a)) / a^2) [q]x + ((a - sin(a)) / a^3) [q]x^2, a = |q|.
+
+    Args:
+        q: Rotation vector in [rad], any elements.
+
+    Source: the left Jacobian of SO(3), e.g. Barfoot 2017, State Estimation for Robotics, eq. 7.77.
+    """
+    x, y, z = q
+    square = dot(q, q)
+    _, _, v, w = _quotients(square)
+    d = 1.0 - w * square
+    return (
+        (d + w * x * x, v * z + w * x * y, w * x * z - v * y),
+        (w * x * y - v * z, d + w * y * y, v * x + w * y * z),
+        (v * y + w * x * z, w * y * z - v * x, d + w * z * z),
+    )
+
+
+def _quotients(square: Element) -> tuple[Element, Element, Element, Element]:
+    """Return cos(a), sin(a) / a, (1 - cos(a)) / a^2 and (a - sin(a)) / a^3 of a^2 in [rad^2]."""
+    small = square < SMALL
+    safe = np.where(small, 1.0, square)
+    a = np.sqrt(safe)
+    c, s = np.cos(a), np.sin(a)
+    half = np.sin(0.5 * a)
+    return (
+        np.where(small, 1.0 - square / 2.0, c),
+        np.where(small, 1.0 - square / 6.0, s / a),
+        np.where(small, 0.5 - square / 24.0, 2.0 * half * half / safe),
+        np.where(small, 1.0 / 6.0 - square / 120.0, (1.0 - s / a) / safe),
+    )
+
+
+def untwisted(vector: FloatArray) -> FloatArray:
+    """Return what makes the rate of a rotation vector of an angular velocity in the outer frame.
+
+    I - [v]x / 2 + ((1 - (a / 2) cot(a / 2)) / a^2) [v]x^2, a = |v|: the inverse of `turning_of`.
+
+    Args:
+        vector: v in [rad], shape (3, n).
+
+    Returns:
+        [-], shape (3, 3, n).
+    """
+    square = np.einsum("kn,kn->n", vector, vector)
+    small = square < SMALL
+    a = np.sqrt(np.where(small, 1.0, square))
+    factor = np.where(small, 1.0 / 12.0 + square / 720.0, (1.0 - 0.5 * a / np.tan(0.5 * a)) / (a * a))
+    skew = _skew(vector)
+    twice = np.einsum("ijn,jkn->ikn", skew, skew)
+    return np.asarray(np.eye(3)[:, :, np.newaxis] - 0.5 * skew + factor * twice)
+
+
+def _skew(vector: FloatArray) -> FloatArray:
+    """Return [v]x, shape (3, 3, n), of v in any unit, shape (3, n)."""
+    x, y, z = vector
+    zero = np.zeros_like(x)
+    return np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]])
+
+
+def wrap_rotation_vector(vector: Vector) -> Vector:
+    """Return the rotation vector of the same rotation whose angle is pi at most, elementwise.
+
+    Args:
+        vector: In [rad], any elements.
+    """
+    angle = np.sqrt(dot(vector, vector))
+    turns = np.round(angle / (2.0 * np.pi))
+    return scale(np.where(turns > 0.0, 1.0 - 2.0 * np.pi * turns / np.maximum(angle, 1.0), 1.0), vector)
+
 
 Screws: TypeAlias = list[tuple[Vector, Vector]]
 """Angular velocity [rad] and velocity [m] of the point at the ground's origin, a unit of each value."""
@@ -121,3 +224,81 @@ _AXES: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 
 
 def _three(values: Sequence[Element], first: int) -> Vector:
     return values[first], values[first + 1], values[first + 2]
+
+
+MEASURES = {
+    "gg": "length",
+    "eg": "height",
+    "crc": "distance",
+    "gc": "radius",
+    "gear": "mesh",
+    "rack": "mesh",
+    "cam": "contact",
+}
+"""What an element of a kind holds."""
+
+
+PARALLEL = 1e-12
+"""Below this sine of their angle two lines have no common normal: their distance is none then."""
+
+
+class Measured(NamedTuple):
+    """What an element measures between its bodies.
+
+    Attributes:
+        distance: In [m].
+        moment: Moment about the ground's origin in [m] of the unit force along the element. The product of
+            this wrench and the twist of the second body against the first is the distance's rate.
+        force: The unit force [-].
+    """
+
+    distance: Element
+    moment: Vector
+    force: Vector
+
+
+def measure(element: ConstraintElement, first: Transform, second: Transform) -> Measured:
+    """Return what an element measures: a distance of points, of a point from a plane or a line, or of lines.
+
+    gg: |p_2 - p_1|. eg: n . (p_2 - g_1). crc: |(p_2 - p_1) . u|, u the unit vector of n_1 x n_2. gc: the
+    length of what p_2 - p_1 has across n_1. Of crc whose length is the constant 0 the sign stays.
+
+    Args:
+        element: The element, no pair.
+        first: Its first body in the ground.
+        second: Its second.
+
+    Source: [KinematicSystems]_ section 3.2.3, with its errata.
+    """
+    p, q = first.point(element.points[0]), second.point(element.points[1])
+    apart = subtract(q, p)
+    n = first.rotate(element.normals[0])
+    if element.kind == "eg":
+        return Measured(dot(n, subtract(q, first.translation)), cross(q, n), n)
+    if element.kind == "gg":
+        distance, u = _length_and_unit(apart)
+        return Measured(distance, cross(p, u), u)
+    if element.kind == "gc":
+        distance, u = _length_and_unit(subtract(apart, scale(dot(apart, n), n)))
+        return Measured(distance, cross(q, u), u)
+    return _between_lines(element, p, apart, n, second.rotate(element.normals[1]))
+
+
+def _between_lines(
+    element: ConstraintElement, p: Vector, apart: Vector, n: Vector, other: Vector
+) -> Measured:
+    """Return the distance of two lines: p + n a, and the line through p + apart along other."""
+    sine, u = _length_and_unit(cross(n, other))
+    distance = dot(apart, u)
+    # where on the first line the second is nearest: nowhere in particular if they are parallel
+    along = np.where(sine > PARALLEL, dot(cross(apart, other), u) / np.maximum(sine, PARALLEL), 0.0)
+    if not element.meeting:
+        sign = np.where(distance < 0.0, -1.0, 1.0)
+        distance, u = sign * distance, scale(sign, u)
+    return Measured(distance, cross(add(p, scale(along, n)), u), u)
+
+
+def _length_and_unit(vector: Vector) -> tuple[Element, Vector]:
+    """Return the length of a vector and its direction; of a vector of length 0 none in particular."""
+    length = np.sqrt(dot(vector, vector))
+    return length, scale(1.0 / np.maximum(length, 1e-300), vector)

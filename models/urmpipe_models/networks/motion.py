@@ -25,13 +25,11 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IndexArray
-from urmpipe_models.inverse.iterative.descent import damped_step
-from urmpipe_models.networks.closure import scaled_closure
-from urmpipe_models.networks.descent import FLOOR
-from urmpipe_models.networks.idle_spins import spinning_parts
+from urmpipe_models.elementwise import FloatArray, IndexArray
+from urmpipe_models.ik.numeric import damped_step
+from urmpipe_models.networks.closure import FLOOR, scaled_closure, spinning_parts
+from urmpipe_models.networks.joint_motion import wrap_rotation_vector
 from urmpipe_models.networks.mechanism import Mechanism
-from urmpipe_models.networks.rotations import wrap_rotation_vector
 
 Passage = Literal["turns back", "branches", "goes through"]
 

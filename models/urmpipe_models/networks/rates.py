@@ -1,4 +1,28 @@
-"""Rates along a motion of a network: velocities, accelerations, transmission, distance to a singular pose.
+"""Values with two derivatives by time, as an element: velocity and acceleration of what a model computes.
+
+A `Taylor` passes through elementwise NumPy as a float or a column does, so that velocity and acceleration of
+a model's outputs come from the same lines as the outputs: (f(u))' = f' u', (f(u))'' = f'' u'^2 + f' u''.
+
+Source: Griewank and Walther 2008, Evaluating Derivatives, chapter 13.
+
+Newton steps that keep a network closed, element by element: floats, columns and symbols pass alike.
+
+`closure.py` and `descent.py` solve many configurations by arrays and stop where each is closed. Here the
+number of steps is fixed and nothing branches on a value, so that the steps can be traced to C:
+
+1. `closure_residual`: e, what does not close. Of a cut joint, whose frames are R_1, p_1 and R_2, p_2 from its
+   two sides, p_2 - p_1 and the skew part of R_2 R_1^T; of an element what it is too long by.
+2. `closure_jacobian`: J = de/dx of the free variables, by the twists of joints and the wrenches of elements.
+   It is exact where the network is closed, which is enough for steps that converge quadratically.
+3. `damped_normal_step`: (J^T J + mu I) dx = -J^T e by an L D L^T factor without pivots. Redundant rows add
+   up; along an idle spin, which no row determines, mu keeps dx small.
+4. `close_network`: a number of such steps; rotation vectors are kept within half a turn.
+5. `predict_variables`: where steps begin: on the line through the last two configurations, so that a motion
+   goes straight on through a special configuration, where several branches meet.
+
+Rows are in lengths of the mechanism and [rad], and so are columns: J is a list of columns.
+
+Rates along a motion of a network: velocities, accelerations, transmission, distance to a singular pose.
 
 With the prescribed variables d and those that follow y, the closure F(y, d) = 0 gives
 
@@ -13,22 +37,439 @@ place.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from urmpipe_models.arrays import FloatArray, IndexArray
-from urmpipe_models.elementwise import Element, dot
-from urmpipe_models.inverse.iterative.descent import damped_step
-from urmpipe_models.inverse.iterative.small_systems import product
-from urmpipe_models.networks.closure import scaled_closure
-from urmpipe_models.networks.descent import FLOOR
-from urmpipe_models.networks.idle_spins import idle_spins, spin_angles
-from urmpipe_models.networks.mechanism import Mechanism
+from urmpipe_models.elementwise import (
+    Element,
+    FloatArray,
+    IndexArray,
+    Vector,
+    add,
+    cross,
+    dot,
+    minus,
+    plus,
+    scale,
+    subtract,
+    times,
+)
+from urmpipe_models.ik.numeric import damped_step
+from urmpipe_models.ik.task import product
+from urmpipe_models.math3d import Transform
+from urmpipe_models.networks.closure import (
+    FLOOR,
+    SLIDING_SCREWS,
+    idle_spins,
+    relative_movers,
+    scaled_closure,
+    spin_angles,
+)
+from urmpipe_models.networks.joint_motion import (
+    Screws,
+    joint_frame,
+    joint_screws,
+    measure,
+    turning_of,
+    wrap_rotation_vector,
+)
+from urmpipe_models.networks.mechanism import Given, Mechanism, Posed, of_controls
 from urmpipe_models.networks.motion import Slopes, iter_chunks
-from urmpipe_models.networks.newton import closure_residual, cut_frames
-from urmpipe_models.taylor import Taylor
+
+
+class Taylor(NDArrayOperatorsMixin):
+    """A value and its derivatives.
+
+    Attributes:
+        value: In its unit, a float or an array of shape (n,).
+        first: Its derivative by time, likewise.
+        second: Its second derivative by time, likewise.
+    """
+
+    __slots__ = ("first", "second", "value")
+
+    def __init__(self, value: Element, first: Element = 0.0, second: Element = 0.0) -> None:
+        self.value, self.first, self.second = value, first, second
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        """Apply one of NumPy's functions; comparisons are of the values."""
+        if method != "__call__" or options:
+            return NotImplemented
+        terms = [term if isinstance(term, Taylor) else Taylor(term) for term in inputs]
+        if ufunc.__name__ in _COMPARISONS:
+            return ufunc(*(term.value for term in terms))
+        rule = _RULES.get(ufunc.__name__)
+        return NotImplemented if rule is None else rule(*terms)
+
+    def __array_function__(self, function: Any, types: Any, arguments: Any, options: Any) -> Any:
+        """Apply `np.where`."""
+        if function is not np.where or options:
+            return NotImplemented
+        condition, *choices = arguments
+        return _where(condition, *(term if isinstance(term, Taylor) else Taylor(term) for term in choices))
+
+
+_COMPARISONS = {"less", "less_equal", "greater", "greater_equal", "equal", "not_equal"}
+
+
+def _where(condition: Any, u: Taylor, v: Taylor) -> Taylor:
+    pairs = ((u.value, v.value), (u.first, v.first), (u.second, v.second))
+    return Taylor(*(np.where(condition, *pair) for pair in pairs))
+
+
+def _chain(u: Taylor, value: Element, slope: Element, curvature: Element) -> Taylor:
+    return Taylor(value, slope * u.first, curvature * u.first * u.first + slope * u.second)
+
+
+def _add(u: Taylor, v: Taylor) -> Taylor:
+    return Taylor(u.value + v.value, u.first + v.first, u.second + v.second)
+
+
+def _negative(u: Taylor) -> Taylor:
+    return Taylor(-u.value, -u.first, -u.second)
+
+
+def _multiply(u: Taylor, v: Taylor) -> Taylor:
+    return Taylor(
+        u.value * v.value,
+        u.first * v.value + u.value * v.first,
+        u.second * v.value + 2.0 * u.first * v.first + u.value * v.second,
+    )
+
+
+def _reciprocal(u: Taylor) -> Taylor:
+    inverse = np.divide(1.0, u.value)
+    return _chain(u, inverse, -inverse * inverse, 2.0 * inverse * inverse * inverse)
+
+
+def _power(u: Taylor, v: Taylor) -> Taylor:
+    """u^v, also of negative u where v is constant: then ln(u) is not computed."""
+    if not (np.any(v.first) or np.any(v.second)):
+        n = v.value
+        factors = n, n * (n - 1.0)
+        slope, curvature = (  # of 0^0 and 0^1, too
+            factor * np.power(u.value, np.where(factor == 0.0, 0.0, n - order))
+            for order, factor in enumerate(factors, 1)
+        )
+        return _chain(u, np.power(u.value, n), slope, curvature)
+    return _exp(_multiply(v, _log(u)))
+
+
+def _sin(u: Taylor) -> Taylor:
+    sine = np.sin(u.value)
+    return _chain(u, sine, np.cos(u.value), -sine)
+
+
+def _cos(u: Taylor) -> Taylor:
+    cosine = np.cos(u.value)
+    return _chain(u, cosine, -np.sin(u.value), -cosine)
+
+
+def _tan(u: Taylor) -> Taylor:
+    tangent = np.tan(u.value)
+    slope = 1.0 + tangent * tangent
+    return _chain(u, tangent, slope, 2.0 * tangent * slope)
+
+
+def _exp(u: Taylor) -> Taylor:
+    value = np.exp(u.value)
+    return _chain(u, value, value, value)
+
+
+def _log(u: Taylor) -> Taylor:
+    inverse = np.divide(1.0, u.value)
+    return _chain(u, np.log(u.value), inverse, -inverse * inverse)
+
+
+def _sqrt(u: Taylor) -> Taylor:
+    root = np.sqrt(u.value)
+    inverse = np.divide(0.5, root)
+    return _chain(u, root, inverse, -np.divide(inverse, 2.0 * u.value))
+
+
+def _arctan2(y: Taylor, x: Taylor) -> Taylor:
+    """The angle of (x, y): its rate is (x y' - y x') / (x^2 + y^2), differentiated as a product."""
+    rate = Taylor(x.value * y.first - y.value * x.first, x.value * y.second - y.value * x.second)
+    square = _add(_multiply(x, x), _multiply(y, y))
+    first = rate.value / square.value
+    second = (rate.first - first * square.first) / square.value
+    return Taylor(np.arctan2(y.value, x.value), first, second)
+
+
+def _choose(larger: bool) -> Callable[[Taylor, Taylor], Taylor]:
+    def rule(u: Taylor, v: Taylor) -> Taylor:
+        condition = u.value >= v.value if larger else u.value <= v.value
+        return _where(condition, u, v)
+
+    return rule
+
+
+_RULES: dict[str, Callable[..., Taylor]] = {
+    "add": _add,
+    "subtract": lambda u, v: _add(u, _negative(v)),
+    "negative": _negative,
+    "multiply": _multiply,
+    "divide": lambda u, v: _multiply(u, _reciprocal(v)),
+    "square": lambda u: _multiply(u, u),
+    "power": _power,
+    "sin": _sin,
+    "cos": _cos,
+    "tan": _tan,
+    "exp": _exp,
+    "log": _log,
+    "sqrt": _sqrt,
+    "arctan2": _arctan2,
+    "floor": lambda u: Taylor(np.floor(u.value)),
+    "remainder": lambda u, period: Taylor(np.remainder(u.value, period.value), u.first, u.second),
+    "absolute": lambda u: _where(u.value < 0.0, _negative(u), u),
+    "maximum": _choose(larger=True),
+    "minimum": _choose(larger=False),
+}
+
+
+Column: TypeAlias = list[Element]
+"""One element per row."""
+
+MAX_STEP = 0.5  # rad or lengths that a Newton step changes a variable by: beyond, the tangent leads astray
+MAX_RATIO = 2.0  # steps ahead in steps of the past: farther on, a line is no better than Newton's tangent
+MIN_SQUARE = 1e-24  # of a past step in rad or lengths: a shorter one is rounding and has no direction
+
+
+def close_network(mechanism: Mechanism, x: Sequence[Element], steps: int) -> list[Element]:
+    """Return the variables after Newton steps with the controls held.
+
+    From a distance h to the closed configuration, in rad or lengths of the mechanism, a step leads to one of
+    the order of h^2. Where nothing closes nearby, it is where the steps ended: see `largest_residual`.
+
+    Args:
+        mechanism: The network.
+        x: The variables in [m], [rad] and as controls are given, one element each: floats, arrays of shape
+            (n,), or symbols.
+        steps: How many.
+    """
+    closed = list(x)
+    scales = mechanism.column_scales
+    for _ in range(steps if len(mechanism.free) else 0):
+        posed, controls = mechanism.posed(closed), mechanism.control_slopes(closed)
+        residual = _residual(mechanism, closed, posed, controls)
+        columns = _jacobian(mechanism, closed, posed, controls)
+        step = damped_normal_step(columns, residual)
+        longest = reduce(np.maximum, (np.abs(change) for change in step))
+        part_taken = MAX_STEP / np.maximum(longest, MAX_STEP)
+        for k, change in zip(mechanism.free, step, strict=True):
+            closed[k] = plus(closed[k], times(float(scales[k]), times(part_taken, change)))
+        for part in mechanism.rotations:
+            closed[part] = wrap_rotation_vector(_vector(closed, part))
+    return closed
+
+
+def predict_variables(
+    mechanism: Mechanism, x: Sequence[Element], change: Sequence[Element], ahead: Sequence[Element]
+) -> list[Element]:
+    """Return the variables on the line through the last two configurations, at other values of the controls.
+
+    The change of the free variables counts as often as the step of the controls projected on the step before
+    has the length of that, at most MAX_RATIO times; not at all if the controls stood still.
+
+    Args:
+        mechanism: The network.
+        x: The variables at the last configuration in [m], [rad] and as controls are given, one element each.
+        change: How they have changed from the configuration before, see `changes`.
+        ahead: The controls that can be set, as they are given.
+    """
+    scales = mechanism.column_scales
+    past = [change[k] / float(scales[k]) for k in mechanism.controls]
+    step = [(value - x[k]) / float(scales[k]) for k, value in zip(mechanism.controls, ahead, strict=True)]
+    square = _product(past, past)
+    ratio = _product(past, step) / np.maximum(square, MIN_SQUARE)
+    ratio = np.maximum(np.minimum(ratio, MAX_RATIO), -MAX_RATIO)
+    predicted = [*ahead, *(x[k] + ratio * change[k] for k in mechanism.free)]
+    for part in mechanism.rotations:
+        predicted[part] = wrap_rotation_vector(_vector(predicted, part))
+    return predicted
+
+
+def changes(mechanism: Mechanism, before: Sequence[Element], x: Sequence[Element]) -> list[Element]:
+    """Return how variables have changed: of a rotation vector as if it had not been wrapped on the way.
+
+    Args:
+        mechanism: The network.
+        before: The variables of the configuration before in [m], [rad] and as controls are given.
+        x: Those of a configuration.
+    """
+    start = list(before)
+    for part in mechanism.rotations:
+        vector = _vector(start, part)
+        difference = subtract(_vector(x, part), vector)
+        angle = np.sqrt(dot(vector, vector))
+        other = 1.0 - 2.0 * np.pi / np.maximum(angle, 1.0)  # the same rotation, the other way round
+        start[part] = scale(np.where(dot(difference, difference) > np.pi**2, other, 1.0), vector)
+    return [now - then for now, then in zip(x, start, strict=True)]
+
+
+def closure_residual(mechanism: Mechanism, x: Sequence[Element]) -> Column:
+    """Return what does not close, in lengths of the mechanism and [rad].
+
+    Rows: of each cut joint its gap along x, y, z of the ground and the skew part of its rotation about them,
+    which is sin(a) u of a rotation by a about u; then of each element its error, of a pair in its own unit.
+
+    Args:
+        mechanism: The network.
+        x: The variables in [m], [rad] and as controls are given, one element each.
+    """
+    return _residual(mechanism, x, mechanism.posed(x), mechanism.control_slopes(x))
+
+
+def largest_residual(mechanism: Mechanism, x: Sequence[Element]) -> Element:
+    """Return the largest absolute entry of `closure_residual`; 0 of a network without loops."""
+    sizes = [np.abs(row) for row in closure_residual(mechanism, x)]
+    return reduce(np.maximum, sizes) if sizes else 0.0
+
+
+def closure_jacobian(mechanism: Mechanism, x: Sequence[Element]) -> list[Column]:
+    """Return the derivatives of `closure_residual` by each free variable, exact where the network is closed.
+
+    Args:
+        mechanism: The network.
+        x: The variables in [m], [rad] and as controls are given, one element each.
+    """
+    return _jacobian(mechanism, x, mechanism.posed(x), mechanism.control_slopes(x))
+
+
+def damped_normal_step(columns: Sequence[Column], residual: Column, damping: float = FLOOR) -> Column:
+    """Return dx of (J^T J + mu I) dx = -J^T e.
+
+    As J^T J is positive semidefinite, no pivot is less than mu; rounding may not make it
+    so.
+
+    Args:
+        columns: J, a list of columns.
+        residual: e.
+        damping: mu, above 0.
+    """
+    count = len(columns)
+    lower: list[Column] = [[] for _ in columns]  # L below its diagonal of ones, row by row
+    scaled: list[Column] = [[] for _ in columns]  # L D
+    inverse: Column = []
+    for j in range(count):
+        pivot = minus(_product(columns[j], columns[j]), _product(lower[j], scaled[j]))
+        inverse.append(1.0 / np.maximum(plus(pivot, damping), damping))
+        for i in range(j + 1, count):
+            entry = minus(_product(columns[i], columns[j]), _product(lower[i][:j], scaled[j]))
+            scaled[i].append(entry)
+            lower[i].append(times(entry, inverse[j]))
+    step: Column = []
+    for j in range(count):
+        right = times(-1.0, _product(columns[j], residual))
+        step.append(minus(right, _product(lower[j], step)))
+    step = [times(entry, factor) for entry, factor in zip(step, inverse, strict=True)]
+    for j in range(count - 1, -1, -1):
+        below = [lower[i][j] for i in range(j + 1, count)]
+        step[j] = minus(step[j], _product(below, step[j + 1 :]))
+    return step
+
+
+def _residual(mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls: dict[str, Given]) -> Column:
+    per_length = 1.0 / mechanism.length
+    rows: Column = []
+    for first, second in cut_frames(mechanism, x, posed, controls):
+        rows += scale(per_length, subtract(second.translation, first.translation))
+        # of small turns d the sum over the axes c of c x (c + d x c) is 2 d
+        pairs = zip(first.columns, second.columns, strict=True)
+        rows += scale(0.5, reduce(add, (cross(before, after) for before, after in pairs)))
+    scales = mechanism.row_scales[len(rows) :].tolist()
+    for element, per_unit in zip(mechanism.network.elements, scales, strict=True):
+        if element.is_pair:
+            rows.append(times(per_unit, mechanism.pair_error(element, x, controls)[0].value))
+            continue
+        frames = (posed.bodies[name].frame for name in element.bodies)
+        length = of_controls(element.length, controls).value
+        rows.append(times(per_length, minus(measure(element, *frames).distance, length)))
+    return rows
+
+
+def _jacobian(
+    mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls: dict[str, Given]
+) -> list[Column]:
+    per_length, scales = 1.0 / mechanism.length, mechanism.column_scales
+    screws = _free_screws(mechanism, x, posed, controls)
+    first_free = len(mechanism.controls)
+    columns: list[Column] = [[0.0] * mechanism.rows for _ in mechanism.free]
+    cut_joints = [mechanism.network.joints[cut] for cut in mechanism.graph.cuts]
+    frames = cut_frames(mechanism, x, posed, controls)
+    for row, (joint, (here, _)) in enumerate(zip(cut_joints, frames, strict=True)):
+        for mover, sign in relative_movers(posed.bodies, joint.bodies, joint.name).items():
+            for k, w, v in screws[mover]:
+                factor = sign * float(scales[k])
+                velocity = add(v, cross(w, here.translation))
+                entries = (*scale(factor * per_length, velocity), *scale(factor, w))
+                columns[k - first_free][6 * row : 6 * row + 6] = entries
+    for row, element in enumerate(mechanism.network.elements, 6 * len(cut_joints)):
+        if element.is_pair:
+            error, _ = mechanism.pair_error(element, x, controls)
+            for k in error.slopes.keys() & set(mechanism.free.tolist()):
+                factor = float(scales[k] * mechanism.row_scales[row])
+                columns[k - first_free][row] = times(factor, error.slopes[k])
+            continue
+        measured = measure(element, *(posed.bodies[name].frame for name in element.bodies))
+        for mover, sign in relative_movers(posed.bodies, element.bodies).items():
+            for k, w, v in screws[mover]:
+                rate = plus(dot(measured.moment, w), dot(measured.force, v))
+                columns[k - first_free][row] = times(sign * float(scales[k]) * per_length, rate)
+    return columns
+
+
+def cut_frames(
+    mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls: dict[str, Given]
+) -> Iterator[tuple[Transform, Transform]]:
+    """Yield the frame of each cut joint in the ground, once from each of its two bodies."""
+    for cut in mechanism.graph.cuts:
+        joint = mechanism.network.joints[cut]
+        moved = joint_frame(joint, [value.value for value in mechanism.values(joint, x, controls)])
+        yield posed.joints[joint.name] @ moved, posed.bodies[joint.bodies[1]].frame @ joint.frames[1]
+
+
+def _free_screws(
+    mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls: dict[str, Given]
+) -> dict[str, list[tuple[int, Vector, Vector]]]:
+    """Return the free variables of each mover by number, with the twist in the ground of one unit of each."""
+    twists: dict[str, list[tuple[int, Vector, Vector]]] = {}
+    for joint in mechanism.network.joints:
+        drives = joint.drives
+        screws: Screws = []
+        if any(drive is None for drive in drives):
+            values = [value.value for value in mechanism.values(joint, x, controls)]
+            screws = joint_screws(joint, values, posed.joints[joint.name])
+        twists[joint.name] = [
+            (mechanism.places[joint.name, index], *screw)
+            for index, (drive, screw) in enumerate(zip(drives, screws, strict=False))
+            if drive is None
+        ]
+    for name in mechanism.graph.roots[1:]:
+        first = mechanism.places[name, 0]
+        p = posed.bodies[name].frame.translation
+        axes = turning_of((x[first + 3], x[first + 4], x[first + 5]))
+        screws = [*SLIDING_SCREWS, *((axis, cross(p, axis)) for axis in axes)]
+        twists[name] = [(first + index, *screw) for index, screw in enumerate(screws)]
+    return twists
+
+
+def _vector(x: Sequence[Element], part: slice) -> Vector:
+    """Return the three variables that are a rotation vector in [rad]."""
+    return x[part.start], x[part.start + 1], x[part.start + 2]
+
+
+def _product(first: Sequence[Element], second: Sequence[Element]) -> Element:
+    """Return the scalar product of two lists; constants that are 0 cost nothing."""
+    total: Element = 0.0
+    for a, b in zip(first, second, strict=True):
+        total = plus(total, times(a, b))
+    return total
 
 
 @dataclass(frozen=True, slots=True, eq=False)

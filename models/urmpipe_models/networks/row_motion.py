@@ -15,11 +15,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray
-from urmpipe_models.inverse.iterative.descent import damped_step
-from urmpipe_models.networks.closure import scaled_closure
-from urmpipe_models.networks.descent import FLOOR
-from urmpipe_models.networks.idle_spins import idle_spins, unspun
+from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray
+from urmpipe_models.ik.numeric import damped_step
+from urmpipe_models.networks.closure import FLOOR, idle_spins, scaled_closure, unspun
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.motion import (
     ROUNDING,

@@ -8,12 +8,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, PathError
-from urmpipe_models.planning.arcs import Arc, arc_at_corner, arc_from, largest_radius, towards, unit
-from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.rows import PathRows
-from urmpipe_models.planning.turning import turning_of
+from urmpipe_models.planning.path import (
+    Arc,
+    LineArcPath,
+    PathRows,
+    arc_at_corner,
+    arc_from,
+    largest_radius,
+    towards,
+    turning_of,
+    unit,
+)
 
 SHORTEST = 1e-12
 """Shorter than this is rounding: in [m], or of coordinates beyond 1 m as a share of the largest.

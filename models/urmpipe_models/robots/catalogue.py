@@ -8,12 +8,11 @@ from functools import cache
 from pathlib import Path
 
 from urmpipe_datasets import ROBOTS
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import OptionError, RobotError, shown
-from urmpipe_models.names import did_you_mean
-from urmpipe_models.robots.robot_file import read_robot_file
-from urmpipe_models.robots.urdf_reader import read_urdf
-from urmpipe_models.transform import Transform, from_offset
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.errors import OptionError, RobotError, did_you_mean, shown
+from urmpipe_models.math3d import Transform, from_offset
+from urmpipe_models.robots.toml import read_robot_file
+from urmpipe_models.robots.urdf import read_urdf
 
 
 def robot_names() -> tuple[str, ...]:

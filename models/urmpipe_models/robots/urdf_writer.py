@@ -8,13 +8,23 @@ from dataclasses import replace
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.chains.solids import solids_of
-from urmpipe_models.chains.visual import Box, Capsule, Cylinder, Mesh, Shape, Sphere, Visual
-from urmpipe_models.errors import RobotError
-from urmpipe_models.messages import in_xml
-from urmpipe_models.robots.urdf_inertials import MOMENTS
+from urmpipe_models.arm.chain import (
+    Box,
+    Capsule,
+    Chain,
+    Cylinder,
+    Inertial,
+    Joint,
+    Mesh,
+    Shape,
+    Sphere,
+    Visual,
+)
+from urmpipe_models.arm.solids import solids_of
+from urmpipe_models.errors import RobotError, in_xml
+from urmpipe_models.files import EXPORT_MARK, replace_text
+from urmpipe_models.math3d import rpy_of, translation
+from urmpipe_models.robots.urdf import MOMENTS
 from urmpipe_models.robots.urdf_tree import (
     BASE_JOINT,
     MASS_JOINT,
@@ -23,8 +33,6 @@ from urmpipe_models.robots.urdf_tree import (
     TOOL_JOINT,
     UNLIMITED,
 )
-from urmpipe_models.robots.written import EXPORT_MARK, replace_text
-from urmpipe_models.transform import rpy_of, translation
 
 
 def write_urdf(chain: Chain, path: str | Path) -> None:

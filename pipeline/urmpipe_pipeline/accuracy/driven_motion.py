@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.delta import delta
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
 from urmpipe_pipeline.joint_log import seconds
 

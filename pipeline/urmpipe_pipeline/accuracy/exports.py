@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.accuracy.result import Accuracy
 from urmpipe_pipeline.presentation.exports import (
     ExportColumn,

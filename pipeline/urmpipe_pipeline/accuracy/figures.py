@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
 from urmpipe_pipeline.accuracy.parts import MEANT, at_velocity

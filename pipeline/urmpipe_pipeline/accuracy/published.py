@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from urmpipe_models.planning.cube import cube_rows
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.planning.path import PathRows, cube_rows
 
 
 class Point(NamedTuple):

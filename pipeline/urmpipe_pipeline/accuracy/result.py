@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import line_of
+from urmpipe_models.errors import Voice
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.rows import PathRows
-from urmpipe_models.spelling import Voice
+from urmpipe_models.planning.path import LineArcPath, PathRows
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion, Errors
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning

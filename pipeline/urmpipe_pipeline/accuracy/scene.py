@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion

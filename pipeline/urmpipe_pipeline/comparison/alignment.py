@@ -7,13 +7,20 @@ from typing import cast
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.elementwise import Vector
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, Vector
 from urmpipe_models.errors import LogError
 from urmpipe_models.hand_eye import hand_eye
-from urmpipe_models.orientation import angle_between, best_rotation, conjugate, matrices, product, quaternions
-from urmpipe_models.transform import Transform, rpy_of
+from urmpipe_models.math3d import (
+    Transform,
+    angle_between,
+    best_rotation,
+    conjugate,
+    matrices,
+    quaternion_product,
+    quaternions,
+    rpy_of,
+)
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, lacking
 from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
@@ -90,7 +97,9 @@ def _start(matched: Matched) -> Alignment:
         there = np.isfinite(matched.reference_quat).all(axis=1) & np.isfinite(matched.actual_quat).all(axis=1)
         if there.any():
             first = int(np.argmax(there))
-            turn = product(matched.reference_quat[[first]], conjugate(matched.actual_quat[[first]]))
+            turn = quaternion_product(
+                matched.reference_quat[[first]], conjugate(matched.actual_quat[[first]])
+            )
     rotation = matrices(turn)[0]
     return _alignment("start", rotation, matched.reference[first] - rotation @ matched.actual[first])
 
@@ -144,7 +153,7 @@ def _moved(matched: Matched, alignment: Alignment) -> Matched:
     done = matched.actual @ rotation.T + np.array(alignment.translation)
     quat = matched.actual_quat
     if quat is not None:
-        quat = product(quaternions(rotation.reshape(1, 9), "matrix"), quat)
+        quat = quaternion_product(quaternions(rotation.reshape(1, 9), "matrix"), quat)
     return replace(matched, actual=done, actual_quat=quat, alignment=alignment)
 
 
@@ -178,7 +187,7 @@ def _with_base_and_tool(matched: Matched, run: Run) -> Matched:
     with_tool = replace(
         posed,
         actual=posed.actual + rotation @ found.tool_position,
-        actual_quat=product(quat, quaternions(tool, "matrix")),
+        actual_quat=quaternion_product(quat, quaternions(tool, "matrix")),
     )
     return _moved(with_tool, alignment)
 

@@ -7,9 +7,9 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, OptionError
-from urmpipe_models.transform import Transform, rpy_of
+from urmpipe_models.math3d import Transform, rpy_of
 from urmpipe_pipeline.comparison.change import (
     Absent,
     BaselineComparison,

@@ -10,8 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from urmpipe_models.errors import LogError
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Hint, LogError
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import align
 from urmpipe_pipeline.comparison.deviation import Deviation

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.display import line_of, number_of
-from urmpipe_models.errors import Finding
-from urmpipe_models.spelling import Voice
+from urmpipe_models.errors import Finding, Voice
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics, Verdict
 from urmpipe_pipeline.comparison.trajectory import Trajectory

@@ -26,9 +26,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
-from urmpipe_models.orientation import angle_between, slerp
-from urmpipe_models.tolerance import DEFAULT_TOLERANCE
+from urmpipe_models.delta import DEFAULT_TOLERANCE
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
+from urmpipe_models.math3d import angle_between, slerp
 from urmpipe_pipeline.comparison.deviation import Share, ShareKind, Stretch, Verdict
 from urmpipe_pipeline.comparison.matching import Matched, joint_order
 from urmpipe_pipeline.comparison.tolerance import LEAST_SHARES, allowed_for

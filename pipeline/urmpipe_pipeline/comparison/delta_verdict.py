@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS, Kind, Verdict
 from urmpipe_pipeline.comparison.tolerance import allowed_for

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.display import Shown, line_of, number_of
-from urmpipe_models.spelling import Voice
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Voice
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 from urmpipe_pipeline.joint_log import seconds

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_models.errors import Hint
 from urmpipe_models.kinematics.identification import Twist, changed_frames
-from urmpipe_models.messages import Hint
-from urmpipe_models.transform import Transform
+from urmpipe_models.math3d import Transform
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import as_option, placed
 from urmpipe_pipeline.comparison.comparison import Comparison

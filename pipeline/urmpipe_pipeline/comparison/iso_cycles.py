@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.coverage import measure_shares

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.continuity import continuous_quaternions
-from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_models.kinematics.forward import point_over_log
-from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import quaternions, slerp
+from urmpipe_models.math3d import quaternions, slerp
+from urmpipe_models.wraps import continuous_quaternions
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
 from urmpipe_pipeline.diagnosis.sides import Side
 from urmpipe_pipeline.joint_log import NETWORK

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
 from urmpipe_models.delta import delta
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
-from urmpipe_models.orientation import angle_between
-from urmpipe_models.repolarizer import FULL_TURN
+from urmpipe_models.math3d import angle_between
+from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.comparison.coverage import measure_shares
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS, Deviation
 from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, joints_apart, lacking

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.wording import SYMBOLS

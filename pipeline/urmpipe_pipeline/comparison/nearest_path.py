@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IndexArray
-from urmpipe_models.row_blocks import THREADS, row_blocks, side_by_side
+from urmpipe_models.elementwise import THREADS, FloatArray, IndexArray, row_blocks, side_by_side
 
 ACCURACY = (1e-9, 1e-6)
 """What a distance may be too large by: in [m], and as a share of itself. A nanometre beside the path; a log

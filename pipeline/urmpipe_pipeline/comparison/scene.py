@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_pipeline.comparison.alignment import placed
 from urmpipe_pipeline.comparison.comparison import Comparison, by_tolerance

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.comparison.deviation import Kind, Share, Statistics, Verdict
 from urmpipe_pipeline.comparison.tolerance import allowed_for
 from urmpipe_pipeline.iso9283.criteria import overall_verdict

@@ -6,8 +6,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from urmpipe_models.errors import Finding, LogError, OptionError
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.sync_coarse import FLOOR, mean_rates, peaks
 from urmpipe_pipeline.comparison.sync_fine import Estimate, refine

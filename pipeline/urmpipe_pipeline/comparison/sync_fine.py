@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.orientation import best_rotation
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import best_rotation
 from urmpipe_pipeline.comparison.sync_coarse import Peak, Rates, rates, similarity
 from urmpipe_pipeline.comparison.sync_views import View
 from urmpipe_pipeline.runs.grid import interpolate

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.orientation import matrices
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.math3d import matrices
 from urmpipe_pipeline.comparison.matching import joint_order
 from urmpipe_pipeline.comparison.trajectory import AlignMode, Trajectory
 

@@ -7,10 +7,9 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from numbers import Real
 
-from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.delta import DEFAULT_TOLERANCE
+from urmpipe_models.errors import Finding, Hint, OptionError, shown
 from urmpipe_models.measure_units import WRITTEN, quantity, readings
-from urmpipe_models.messages import Hint
-from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.iso9283.criteria import UNITS as CRITERIA
 
 DEVIATIONS = ("axis", "x", "y", "z", "norm", "path", "angle", "joint")

@@ -7,9 +7,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.hand_eye import Untold
-from urmpipe_models.orientation import angle_between, quaternions
+from urmpipe_models.math3d import angle_between, quaternions
 from urmpipe_pipeline.joint_log import SourceFile, seconds
 
 SyncMode = Literal["start", "stamps", "given", "auto"]

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
+from urmpipe_models.errors import Hint
 from urmpipe_models.hand_eye import OPEN, Part, Untold
 from urmpipe_models.measure_units import USUAL_UNITS
-from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Share
 from urmpipe_pipeline.comparison.matching import joint_order

@@ -8,14 +8,12 @@ from functools import cached_property
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.elementwise import Element, Vector, scale
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import BoolArray, Element, FloatArray, IntArray, Vector, scale, spread_rows
 from urmpipe_models.hand_eye import hand_eye
 from urmpipe_models.kinematics.forward import jacobian, poses_over_log, tip_pose
 from urmpipe_models.kinematics.identification import Twist, changed, sensitivities
-from urmpipe_models.row_blocks import spread_rows
-from urmpipe_models.transform import Transform
+from urmpipe_models.math3d import Transform
 from urmpipe_pipeline.diagnosis.arm_groups import cause_groups
 from urmpipe_pipeline.diagnosis.fit import Positions
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero

@@ -18,11 +18,10 @@ from typing import Literal
 
 import numpy as np
 
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.parameters import Parameter
+from urmpipe_models.arm.chain import Chain, Joint, Parameter
 from urmpipe_models.elementwise import ZERO, Vector, cross, subtract
 from urmpipe_models.kinematics.identification import BASE, Twist
-from urmpipe_models.transform import Transform
+from urmpipe_models.math3d import Transform
 from urmpipe_pipeline.diagnosis.hypotheses import Axis, Group
 from urmpipe_pipeline.diagnosis.motion import has_masses
 from urmpipe_pipeline.diagnosis.result import Kind

@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.fit import OUTLIER, Model, Rows, inliers
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State

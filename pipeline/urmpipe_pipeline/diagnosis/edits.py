@@ -7,9 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.repolarizer import FULL_TURN
-from urmpipe_models.row_blocks import spread_rows
+from urmpipe_models.elementwise import FloatArray, IntArray, spread_rows
+from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.diagnosis.fit import Model
 from urmpipe_pipeline.diagnosis.hypotheses import State
 from urmpipe_pipeline.log_edits import Edit, EditKind, Edits

@@ -15,8 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.row_blocks import row_blocks, side_by_side
+from urmpipe_models.elementwise import FloatArray, IntArray, row_blocks, side_by_side
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.cause_texts import short_name
 from urmpipe_pipeline.diagnosis.deciding import deciding_joint

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.row_blocks import spread_rows
+from urmpipe_models.elementwise import FloatArray, IntArray, spread_rows
 from urmpipe_pipeline.diagnosis.candidates import (
     residual_after_fit,
 )

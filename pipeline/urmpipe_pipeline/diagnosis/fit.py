@@ -8,9 +8,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_blocks, side_by_side
 from urmpipe_models.errors import UrmpipeError
-from urmpipe_models.row_blocks import row_blocks, side_by_side
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.diagnosis.selection import Normal
 from urmpipe_pipeline.log_edits import Edits

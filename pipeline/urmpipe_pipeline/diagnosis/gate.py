@@ -18,7 +18,7 @@ from typing import Protocol
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, cost
 from urmpipe_pipeline.diagnosis.formatting import CANCELLING, CLOCKS, TOO_LARGE
 from urmpipe_pipeline.diagnosis.hypotheses import State

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.identification import Twist
 from urmpipe_pipeline.diagnosis.result import Kind
 from urmpipe_pipeline.log_edits import Edits

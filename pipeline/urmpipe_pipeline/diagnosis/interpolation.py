@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_pipeline.diagnosis.motion import STENCIL, Motion, five_point_rates
 from urmpipe_pipeline.gaps import gaps_behind
 from urmpipe_pipeline.runs.grid import ROUNDING_NS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 BATCH = 5.0  # autocorrelation times a batch lasts: its sum is then short of 10 % of the variance
 FEWEST, MOST = 20, 400  # batches: fewer have no variance to speak of, more are not needed

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.diagnosis.arm import edited
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State, zero

@@ -13,10 +13,9 @@ from functools import cache, partial
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.dynamics.inverse import inverse_dynamics
-from urmpipe_models.elementwise import Element, dot, scale
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.dynamics.equations import inverse_dynamics
+from urmpipe_models.elementwise import BoolArray, Element, FloatArray, IntArray, dot, scale
 from urmpipe_models.kinematics.forward import jacobian
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.log_edits import Edits

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.diagnosis.fit import Model, Rows, fitted
 from urmpipe_pipeline.diagnosis.hypotheses import State, zero
 from urmpipe_pipeline.diagnosis.result import Alternative, Cause, Kind, rms

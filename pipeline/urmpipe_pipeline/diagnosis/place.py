@@ -8,10 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
-from urmpipe_models.elementwise import Vector, add, cross
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, Vector, add, cross
 from urmpipe_models.kinematics.identification import changed_frames, columns_of
-from urmpipe_models.transform import Transform
+from urmpipe_models.math3d import Transform
 from urmpipe_pipeline.diagnosis.arm import (
     add_columns,
     as_read,

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.spelling import Voice
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Voice
 from urmpipe_pipeline.diagnosis.formatting import format_summary
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result

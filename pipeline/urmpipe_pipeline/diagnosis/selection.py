@@ -22,7 +22,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 
 Subset: TypeAlias = frozenset[int]
 """The groups that are taken, by their index."""

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray, spread_rows
 from urmpipe_models.kinematics.forward import jacobian, positions_over_log
-from urmpipe_models.orientation import matrices
-from urmpipe_models.row_blocks import spread_rows
-from urmpipe_models.transform import Transform
+from urmpipe_models.math3d import Transform, matrices
 from urmpipe_pipeline import text
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.arm_groups import (

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, fontManager, get_font
 from matplotlib.text import Text
 
-from urmpipe_models.messages import inert
+from urmpipe_models.errors import inert
 from urmpipe_pipeline.text import encodable
 
 FONT = "DejaVu Sans"

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
-from urmpipe_models.errors import Finding, OptionError
-from urmpipe_models.names import not_among
+from urmpipe_models.errors import Finding, OptionError, not_among
 from urmpipe_pipeline.presentation.curves import Span, axis_of, by_axis, panels_of, span_of
 from urmpipe_pipeline.presentation.figure import Drawing, Figure, Panel, SpaceFigure
 from urmpipe_pipeline.presentation.section import Presentation, Section

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.decimate import decimate, points_for
 from urmpipe_pipeline.figures.letters import drawable
 from urmpipe_pipeline.figures.sheet import BAND, FAULT, INK, MUTED

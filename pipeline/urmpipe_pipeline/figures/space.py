@@ -18,7 +18,7 @@ from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from mpl_toolkits.mplot3d.proj3d import proj_transform
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.decimate import decimate, points_for
 from urmpipe_pipeline.figures.letters import drawable

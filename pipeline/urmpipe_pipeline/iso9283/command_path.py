@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_pipeline.iso9283.motion import ROUNDING, Motion, apart_rows
 
 CORNER = np.radians(30.0)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.iso9283.command_path import Stations
 from urmpipe_pipeline.iso9283.in_order import Stage, in_order
 from urmpipe_pipeline.iso9283.motion import Motion

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_pipeline.iso9283.likeness import ALIKE, apart, outline, path_length
 from urmpipe_pipeline.iso9283.motion import Motion

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.messages import in_html
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import in_html
 from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.iso9283.corners import CornerPath
 from urmpipe_pipeline.iso9283.result import AttainedPoses, CutPath, IsoTest

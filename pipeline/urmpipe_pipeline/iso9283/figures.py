@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.iso9283.result import AttainedPoses, CutPath, IsoTest

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 
 Stage: TypeAlias = tuple[FloatArray, FloatArray]
 """Times of the candidates, rising, and what each costs, shape (n,) both."""

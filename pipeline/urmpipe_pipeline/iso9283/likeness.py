@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_pipeline.gaps import GAP
 from urmpipe_pipeline.iso9283.motion import Motion, apart_rows
 

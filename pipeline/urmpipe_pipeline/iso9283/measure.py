@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.iso9283.approach import settling
 from urmpipe_pipeline.iso9283.command_path import Bend, CommandPath, Stations, Stop
 from urmpipe_pipeline.iso9283.corners import CornerPath, corner_path, mean_path

@@ -7,8 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
-from urmpipe_models.orientation import slerp
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
+from urmpipe_models.math3d import slerp
 
 STILL = (1e-3, 1e-3)
 """What is slower than this in [m/s] and [rad/s] rests."""

@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.iso9283.command_path import CORNER
 from urmpipe_pipeline.iso9283.criteria import ANGLES
 from urmpipe_pipeline.iso9283.poses import Poses

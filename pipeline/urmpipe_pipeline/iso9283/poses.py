@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.orientation import angle_between
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import angle_between
 from urmpipe_pipeline.iso9283.command_path import Stop
 from urmpipe_pipeline.iso9283.in_order import in_order
 from urmpipe_pipeline.iso9283.motion import Motion, Rest

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.iso9283.corners import CornerPath
 from urmpipe_pipeline.iso9283.criteria import Criterion, overall_verdict

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.iso9283.command_path import CommandLeg
 from urmpipe_pipeline.iso9283.motion import Motion
 

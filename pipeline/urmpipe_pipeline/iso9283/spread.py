@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.orientation import matrices
-from urmpipe_models.transform import euler_zyx
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import euler_zyx, matrices
 
 
 def accuracy(attained: FloatArray, command: FloatArray) -> FloatArray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.iso9283.criteria import ANGLES, UNITS, Criterion
 from urmpipe_pipeline.iso9283.result import CutPath, Cycle, FailedCycle, IsoTest
 from urmpipe_pipeline.iso9283.wording import meaning, names_of, tolerance_of, value_of, where, worst_first

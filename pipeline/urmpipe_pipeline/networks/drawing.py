@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from urmpipe_models.messages import in_html
+from urmpipe_models.errors import in_html
 from urmpipe_pipeline.networks.gallery import gallery_svg
 from urmpipe_pipeline.networks.graph_drawing import graph_svg
 from urmpipe_pipeline.networks.result import NetworkResult

@@ -17,10 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.elementwise import Vector
-from urmpipe_models.errors import Finding, NetworkError, OptionError, for_each, shown
-from urmpipe_models.names import not_among
+from urmpipe_models.elementwise import FloatArray, Vector
+from urmpipe_models.errors import Finding, NetworkError, OptionError, for_each, not_among, shown
 from urmpipe_models.networks.assembly import MOST_STARTS, RESTARTS, assemble
 from urmpipe_models.networks.driving import (
     LAWS,
@@ -32,10 +30,10 @@ from urmpipe_models.networks.driving import (
     find_driven,
     variable_limits,
 )
+from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.forces import Wrench, compute_forces
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.motion import LimitStop, SingularPose
-from urmpipe_models.networks.network import Network
 from urmpipe_models.networks.rates import Rates, compute_rates
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import SourceFile, seconds

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TypeAlias
 
-from urmpipe_models.networks.expressions import Expression
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import ConstraintElement, Control, Joint, JointKind, spellings
+from urmpipe_models.networks.file import Network
+from urmpipe_models.networks.parts import ConstraintElement, Control, Expression, Joint, JointKind, spellings
 
 LETTERS: dict[JointKind, str] = {
     "revolute": "R",

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from urmpipe_models.display import number_of
-from urmpipe_models.errors import Finding, OptionError, for_each, shown
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, OptionError, for_each, shown
 from urmpipe_models.networks.assembly import (
     MOST_STARTS,
     RESTARTS,
@@ -21,11 +20,10 @@ from urmpipe_models.networks.assembly import (
     start_with,
 )
 from urmpipe_models.networks.driving import move_to
-from urmpipe_models.networks.findings import Assembly, Mobility
+from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
-from urmpipe_models.networks.mobility import mobility_of, stuck_controls
+from urmpipe_models.networks.mobility import Assembly, Mobility, mobility_of, stuck_controls
 from urmpipe_models.networks.motion import Trace
-from urmpipe_models.networks.network import Network
 from urmpipe_models.networks.parts import exceeded_limits
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.networks.given_values import parse_start

@@ -15,12 +15,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from urmpipe_models.elementwise import Vector
-from urmpipe_models.errors import Finding, OptionError, for_each, shown
+from urmpipe_models.errors import Finding, OptionError, for_each, not_among, shown
 from urmpipe_models.measure_units import MEASURES, NAMES, QUANTITY, WRITTEN, quantity
-from urmpipe_models.names import not_among
+from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.forces import Wrench
 from urmpipe_models.networks.mechanism import mechanism_of
-from urmpipe_models.networks.network import Network
 from urmpipe_models.networks.parts import POSE_UNITS, Parts
 
 Quantity: TypeAlias = float | str

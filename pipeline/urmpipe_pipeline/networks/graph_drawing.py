@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.messages import in_html
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import in_html
 from urmpipe_models.networks.parts import ConstraintElement, Control
 from urmpipe_pipeline.lettering import Box, width_of
 from urmpipe_pipeline.networks.drives import Tie, caption, controlled, is_driven, ties

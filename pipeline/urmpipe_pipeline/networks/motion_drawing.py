@@ -12,10 +12,10 @@ from typing import TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.networks.network import Network
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.math3d import quaternions
+from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.parts import ConstraintElement, Joint
-from urmpipe_models.orientation import quaternions
 from urmpipe_pipeline.networks.drives import Tie, ties
 from urmpipe_pipeline.networks.parts_in_space import (
     BODY_COLOURS,

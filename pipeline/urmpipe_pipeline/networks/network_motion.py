@@ -15,15 +15,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.display import line_of
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Voice
+from urmpipe_models.math3d import quaternions
+from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.motion import Passage, iter_chunks
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.rates import point_motion
-from urmpipe_models.orientation import quaternions
-from urmpipe_models.spelling import Voice
-from urmpipe_models.taylor import Taylor
+from urmpipe_models.networks.rates import Taylor, point_motion
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import NETWORK, JointLog, LogColumn, LogWarning, seconds
 from urmpipe_pipeline.networks.motion_drawing import (

@@ -7,13 +7,12 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.elementwise import Vector
-from urmpipe_models.networks.findings import Assembly
+from urmpipe_models.elementwise import FloatArray, Vector
+from urmpipe_models.math3d import Transform
+from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import mechanism_of
-from urmpipe_models.networks.network import Network
+from urmpipe_models.networks.mobility import Assembly
 from urmpipe_models.networks.parts import ConstraintElement, Joint
-from urmpipe_models.transform import Transform
 from urmpipe_pipeline.networks.drives import is_driven
 from urmpipe_pipeline.networks.shapes import (
     SIDES,

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
 from urmpipe_models.display import line_of, number_of
-from urmpipe_models.networks.findings import Assembly, Gap, Mobility
-from urmpipe_models.networks.graph import Structure
-from urmpipe_models.networks.mechanism import mechanism_of
-from urmpipe_models.networks.network import Network
-from urmpipe_models.orientation import quaternions
-from urmpipe_models.spelling import Voice
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Voice
+from urmpipe_models.math3d import quaternions
+from urmpipe_models.networks.file import Network
+from urmpipe_models.networks.mechanism import Structure, mechanism_of
+from urmpipe_models.networks.mobility import Assembly, Gap, Mobility
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance

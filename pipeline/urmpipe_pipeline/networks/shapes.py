@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 SIDES = 20
 """Sides of what is round."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from urmpipe_models.networks.network import Network
+from urmpipe_models.networks.file import Network
 from urmpipe_pipeline.networks.drives import Tie, drive_words, is_driven, ties
 from urmpipe_pipeline.networks.parts_in_space import (
     CONTROL_COLOUR,

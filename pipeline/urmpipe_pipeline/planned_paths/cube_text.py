@@ -8,13 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Finding, OptionError, not_among
+from urmpipe_models.math3d import matrices, quaternions
 from urmpipe_models.measure_units import WRITTEN, quantity
-from urmpipe_models.names import not_among
-from urmpipe_models.orientation import matrices, quaternions
-from urmpipe_models.planning.cube import PLANES, cube_faults, cube_rows
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.planning.path import PLANES, PathRows, cube_faults, cube_rows
 from urmpipe_pipeline.planned_paths.row_checks import FARTHEST
 
 CUBE = "cube:"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TypeAlias
 
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.planning.path import PathRows
 from urmpipe_pipeline.planned_paths.cube_text import CUBE, read_cube
 from urmpipe_pipeline.planned_paths.path_file import GivenPath, read_path
 from urmpipe_pipeline.planned_paths.row_checks import checked_rows

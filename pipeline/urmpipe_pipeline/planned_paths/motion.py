@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.orientation import NAMES
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.math3d import NAMES
 from urmpipe_pipeline.joint_log import SOLVED, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints
 from urmpipe_pipeline.provenance import Provenance

@@ -8,12 +8,11 @@ from typing import Literal
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray
-from urmpipe_models.inverse.along_path.joint_path import JointPath
-from urmpipe_models.inverse.along_path.stretches import stretches
-from urmpipe_models.planning.joint_limits import Usage
-from urmpipe_models.planning.path_joints import PathJoints
-from urmpipe_models.planning.time_law import TimeLaw
+from urmpipe_models.elementwise import BoolArray
+from urmpipe_models.ik.branch_walk import stretches
+from urmpipe_models.ik.path import JointPath
+from urmpipe_models.planning.joints import PathJoints, Usage
+from urmpipe_models.planning.laws import TimeLaw
 from urmpipe_pipeline.text import in_words
 
 SINGULAR = 1e-7

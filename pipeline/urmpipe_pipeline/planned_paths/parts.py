@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.planned_paths.obstacles import Obstacle
 from urmpipe_pipeline.planned_paths.planned_joints import FOLLOWED, PlannedJoints

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
-from urmpipe_models.planning.rows import PROPER, PathRows
+from urmpipe_models.errors import Finding, Hint, LogError
+from urmpipe_models.planning.path import PROPER, PathRows
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.planned_paths.row_checks import are_radii, are_variants, curve_faults
 from urmpipe_pipeline.sources.clocks.clock_columns import time_columns

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.planning.line_arc import LineArcPath
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.planning.path import LineArcPath
 
 FLAT = 1e-6
 """Points this near to a plane, as a share of their extent, are in it: that is thinner than any line."""

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import BoolArray, FloatArray
 from urmpipe_models.kinematics.singularity import SingularityLog, singularity_over_log
 from urmpipe_pipeline.runs.torques import torques_of_log
 

@@ -8,20 +8,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, OptionError, PathError
-from urmpipe_models.inverse.search import Search
-from urmpipe_models.inverse.solve import solve
+from urmpipe_models.ik.solutions import Search
+from urmpipe_models.ik.solve import solve
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.jerk import jerk_law
-from urmpipe_models.planning.joint_limits import largest_usage, law_of_limits
-from urmpipe_models.planning.joint_motion import targets_at
-from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.path_joints import PathJoints, joints_along
-from urmpipe_models.planning.time_law import PathMotion, TimeLaw
-from urmpipe_models.planning.trapezoid import trapezoid_law
-from urmpipe_models.planning.turning import UNEVEN
+from urmpipe_models.planning.joints import PathJoints, joints_along, largest_usage, law_of_limits, targets_at
+from urmpipe_models.planning.laws import PathMotion, TimeLaw, jerk_law, trapezoid_law
+from urmpipe_models.planning.path import UNEVEN, LineArcPath
 from urmpipe_pipeline.joint_log import LogWarning, seconds
 from urmpipe_pipeline.planned_paths.obstacles import WORTH_MOVING, Obstacle, obstacles_of, too_slow
 from urmpipe_pipeline.planned_paths.path_file import GivenPath

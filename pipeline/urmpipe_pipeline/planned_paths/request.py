@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import Any, Literal
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, OptionError, shown
-from urmpipe_models.planning.stretches import ARCS, Arcs
+from urmpipe_models.planning.laws import ARCS, Arcs
 
 Law = Literal["trapezoid", "jerk", "limits"]
 LAWS: tuple[Law, ...] = ("trapezoid", "jerk", "limits")

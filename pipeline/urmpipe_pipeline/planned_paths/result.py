@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import line_of
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
+from urmpipe_models.errors import Voice
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.rows import PathRows
-from urmpipe_models.planning.stretches import Arcs
-from urmpipe_models.planning.time_law import PathMotion
-from urmpipe_models.spelling import Voice
+from urmpipe_models.planning.laws import Arcs, PathMotion
+from urmpipe_models.planning.path import LineArcPath, PathRows
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
 from urmpipe_pipeline.planned_paths.motion import run_of_plan

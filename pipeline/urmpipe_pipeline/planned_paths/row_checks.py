@@ -7,12 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, OptionError, PathError
-from urmpipe_models.inverse.checks import checked
-from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.ik.solutions import Targets, checked
 from urmpipe_models.planning.from_rows import end_faults, path_faults
-from urmpipe_models.planning.rows import VARIANTS, PathRows
+from urmpipe_models.planning.path import VARIANTS, PathRows
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.text import counted
 

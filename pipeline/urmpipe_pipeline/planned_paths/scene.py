@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IndexArray
+from urmpipe_models.elementwise import FloatArray, IndexArray
 from urmpipe_models.kinematics.forward import points_over_log, poses_over_log
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.math3d import quaternions
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import DEVIATION_COLOUR, INK_COLOUR, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.planned_paths.planes import outlines

@@ -8,7 +8,7 @@ from itertools import groupby
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.presentation.figure import Figure, Line, Over, Panel

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from urmpipe_models.messages import hint_words
-from urmpipe_models.spelling import Voice
+from urmpipe_models.errors import Voice, hint_words
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Value
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.presentation.scene import Arrows, BoolArray, Path, PlaneView, Sheets, Solid, Spot
 
 Shape: TypeAlias = Literal["up", "down", "cross", "diamond"]

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.palette import BEYOND_SCALE, WITHIN_SCALE
 from urmpipe_pipeline.presentation.figure import Computed, Line, Panel
 

@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeAlias, TypeVar, overload
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.json_values import plain

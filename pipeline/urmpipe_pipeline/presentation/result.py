@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from urmpipe_models.display import Shown
-from urmpipe_models.spelling import Voice
+from urmpipe_models.errors import Voice
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -10,10 +10,9 @@ import numpy as np
 from numpy import bool_
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.elementwise import Element, Vector
-from urmpipe_models.orientation import matrices
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import Element, FloatArray, IntArray, Vector
+from urmpipe_models.math3d import matrices
 
 BoolArray: TypeAlias = NDArray[bool_]
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
-from urmpipe_models.messages import Finding, Hint
+from urmpipe_models.errors import Finding, Hint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.figure import Drawing, Figure, SpaceFigure, Text
 from urmpipe_pipeline.presentation.scene import Scene

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.errors import shown
-from urmpipe_models.spelling import pasted
+from urmpipe_models.errors import pasted, shown
 from urmpipe_pipeline.recording.array_form import ArrayOf, CodecError, In
 from urmpipe_pipeline.recording.codec import decode
 from urmpipe_pipeline.recording.forms import form_of

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import IntArray
-from urmpipe_models.errors import Finding, RecordingError
-from urmpipe_models.files.missing import meant_by
-from urmpipe_models.spelling import pasted
+from urmpipe_models.elementwise import IntArray
+from urmpipe_models.errors import Finding, RecordingError, pasted
+from urmpipe_models.files import meant_by
 from urmpipe_pipeline.recording.identity import APPLICATION_ID, is_recording, open_reader, our_entries
 from urmpipe_pipeline.recording.trial import recording_abort
 

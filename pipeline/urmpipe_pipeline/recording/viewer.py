@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urmpipe_models.errors import ViewerError, for_each
-from urmpipe_models.spelling import pasted
+from urmpipe_models.errors import ViewerError, for_each, pasted
 from urmpipe_pipeline.recording.store import TIME, Opening, Store
 
 if TYPE_CHECKING:

@@ -9,11 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.in_between import beside_wraps, off_line, repair
-from urmpipe_models.messages import Hint
-from urmpipe_models.repolarizer import FULL_TURN, Repolarized, repolarize
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Hint
+from urmpipe_models.wraps import FULL_TURN, Repolarized, beside_wraps, off_line, repair, repolarize
 from urmpipe_pipeline import text
 from urmpipe_pipeline.gaps import MISSED_SAMPLE
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogWarning, seconds

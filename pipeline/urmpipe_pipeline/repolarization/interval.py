@@ -11,11 +11,10 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError
 from urmpipe_models.measure_units import quantity, units_of
-from urmpipe_models.messages import Hint
-from urmpipe_models.repolarizer import FULL_TURN, Repolarized
+from urmpipe_models.wraps import FULL_TURN, Repolarized
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.repolarization.joint_motion import over_rows
 from urmpipe_pipeline.sources.options import GivenInterval

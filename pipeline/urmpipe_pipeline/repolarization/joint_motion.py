@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.row_blocks import row_blocks
+from urmpipe_models.elementwise import FloatArray, IntArray, row_blocks
 from urmpipe_pipeline.joint_log import JointLog
 
 COARSEST = 0.02

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import IntArray
+from urmpipe_models.elementwise import IntArray
 from urmpipe_pipeline.presentation.curves import Span, axis_of, by_axis, panels_of, place_of, span_of
 from urmpipe_pipeline.presentation.figure import Figure, Over, Panel, View
 from urmpipe_pipeline.presentation.layout import small_multiples, two_scales

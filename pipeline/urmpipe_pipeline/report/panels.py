@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.decimate import decimate, points_for
 from urmpipe_pipeline.palette import rgb
 from urmpipe_pipeline.presentation.curves import (

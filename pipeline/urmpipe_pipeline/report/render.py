@@ -16,7 +16,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from urmpipe_models.messages import inert
+from urmpipe_models.errors import inert
 from urmpipe_pipeline.figures.files import FigureFile, FigureOptions, figure_stem, write_figures
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.presentation.section import Presentation

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.decimate import decimate, points_for
 from urmpipe_pipeline.joint_log import seconds

@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.messages import inert
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import inert
 from urmpipe_pipeline import text
 from urmpipe_pipeline.decimate import POINTS, decimate
 from urmpipe_pipeline.presentation.curves import stretches

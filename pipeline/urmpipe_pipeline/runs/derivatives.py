@@ -6,8 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.row_blocks import row_blocks
+from urmpipe_models.elementwise import FloatArray, IntArray, row_blocks
 from urmpipe_pipeline.runs.grid import inside_spans
 
 Method = Literal["central", "savgol"]

@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.continuity import continuous_quaternions
-from urmpipe_models.errors import Finding, RecordingError
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Finding, Hint, RecordingError
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.messages import Hint
+from urmpipe_models.wraps import continuous_quaternions
 from urmpipe_pipeline.joint_log import ROW_NS
 from urmpipe_pipeline.presentation.exports import (
     ExportColumn,

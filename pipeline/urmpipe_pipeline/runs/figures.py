@@ -8,10 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
-from urmpipe_models.continuity import continuous_euler
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, norms
 from urmpipe_models.kinematics.forward import PointLog
-from urmpipe_models.row_blocks import norms
+from urmpipe_models.wraps import continuous_euler
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.figure import Computed, Figure, Line, Mark, Panel, Shape, View

@@ -7,9 +7,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.errors import Finding, RecordingError
-from urmpipe_models.messages import Hint
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Finding, Hint, RecordingError
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, Role
 from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, ExportColumn, ExportTable, Times
 from urmpipe_pipeline.runs.originals import originals

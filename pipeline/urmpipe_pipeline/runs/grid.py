@@ -12,9 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.gaps import inside_gaps
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.sources.clocks.quantised import Regular, behind_rounded

@@ -10,11 +10,10 @@ from typing import get_args
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError
 from urmpipe_models.kinematics.forward import PointLog, point_over_log
-from urmpipe_models.messages import Hint
 from urmpipe_pipeline.choices import check_choice
 from urmpipe_pipeline.joint_log import SOLVED, JointLog, LogWarning
 from urmpipe_pipeline.masses import mass_notices

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.masses import MASS_LEFT_OUT

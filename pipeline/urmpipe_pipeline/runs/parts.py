@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogColumn
 from urmpipe_pipeline.presentation.parts import (

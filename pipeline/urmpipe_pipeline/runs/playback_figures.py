@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR

@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.elementwise import Vector
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, Vector
 from urmpipe_models.kinematics.forward import poses_over_log, positions_over_log
-from urmpipe_models.orientation import best_rotation, matrices, quaternions
-from urmpipe_models.transform import Transform, rpy_of
+from urmpipe_models.math3d import Transform, best_rotation, matrices, quaternions, rpy_of
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.runs.recorded_start import outlying_start

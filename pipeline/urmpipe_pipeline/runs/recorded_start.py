@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import OWN, JointLog, LogWarning

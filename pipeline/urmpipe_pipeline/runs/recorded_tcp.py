@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Hint
 from urmpipe_models.kinematics.forward import poses_over_log, positions_over_log
-from urmpipe_models.messages import Hint
+from urmpipe_models.math3d import Transform, from_offset
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.transform import Transform, from_offset
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.log_edits import Edit, robot_edits, sign_edits, swap_edits

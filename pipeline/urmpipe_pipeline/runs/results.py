@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import line_of, number_of
-from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Finding, LogError, Voice
 from urmpipe_models.kinematics.forward import PointLog
-from urmpipe_models.orientation import NAMES, angles
-from urmpipe_models.spelling import Voice
+from urmpipe_models.math3d import NAMES, angles
 from urmpipe_pipeline.joint_log import OWN, JointLog, LogWarning, seconds
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance

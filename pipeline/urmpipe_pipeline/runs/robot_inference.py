@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.messages import Hint
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.errors import Hint
 from urmpipe_models.robots.catalogue import load_robot, moving_differently
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.units.evidence import Fit, single_out

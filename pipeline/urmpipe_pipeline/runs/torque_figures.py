@@ -8,9 +8,9 @@ from functools import cache, partial
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.dynamics.over_log import energies_over_log, terms_over_log
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.dynamics.equations import energies_over_log, terms_over_log
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.figure import Computed, Figure, Line, Panel, View

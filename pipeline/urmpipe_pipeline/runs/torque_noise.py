@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.messages import Hint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import SOLVED, LogWarning
 from urmpipe_pipeline.runs.derivatives import WINDOW, derivatives

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.dynamics.over_log import torque_over_log
-from urmpipe_models.messages import Hint
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.dynamics.equations import torque_over_log
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 ENERGIES = ("energy_in", "energy_lost", "energy_stored")
 """Variables in [J] of which a balance is made, whatever block has them."""

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.errors import Finding, RecordingError
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, RecordingError
 from urmpipe_pipeline.presentation.exports import ExportColumn, Exports, ExportTable, Poses, Rows, Times
 from urmpipe_pipeline.runs.exports import poses_by_kinematics, provenance_of
 from urmpipe_pipeline.simulations.simulation import Simulation

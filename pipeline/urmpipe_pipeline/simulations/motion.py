@@ -13,10 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError, OptionError, shown
-from urmpipe_models.messages import Hint
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, shown
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, Role
 from urmpipe_pipeline.runs.ingest import run_of
 from urmpipe_pipeline.runs.results import Run

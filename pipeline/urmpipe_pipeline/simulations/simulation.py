@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import line_of, number_of
-from urmpipe_models.errors import CosimulationError
-from urmpipe_models.spelling import Voice
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import CosimulationError, Voice
 from urmpipe_pipeline.assumptions import assumed
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import Verdict

@@ -10,7 +10,7 @@ from typing import overload
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.wording import SYMBOLS
 from urmpipe_pipeline.presentation.parts import Heads, columns_of, table_of

@@ -12,10 +12,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, OptionError, shown
-from urmpipe_models.inverse.checks import ROTATION_TOLERANCE
-from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.ik.solutions import ROTATION_TOLERANCE, Targets
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.solved_targets.target_file import read_targets
 from urmpipe_pipeline.sources import ReadOptions

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.joint_log import ROW_NS, SOLVED, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.ingest import run_of

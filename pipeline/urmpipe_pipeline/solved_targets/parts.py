@@ -9,11 +9,9 @@ from itertools import groupby
 
 import numpy as np
 
-from urmpipe_models.inverse.along_path.joint_path import JointPath
-from urmpipe_models.inverse.along_path.joint_speeds import TooFast
-from urmpipe_models.inverse.along_path.jumps import Jump
-from urmpipe_models.inverse.closed.closed_form import method_words
-from urmpipe_models.inverse.limits import TURN, periods
+from urmpipe_models.ik.closed import method_words
+from urmpipe_models.ik.path import JointPath, Jump, TooFast
+from urmpipe_models.ik.solutions import TURN, periods
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import colour_word, ghost_colour, run_colour
 from urmpipe_pipeline.presentation.parts import columns_of, recording_fact, spot_at, table_of

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
-from urmpipe_models.inverse.closed.closed_form import method_words
+from urmpipe_models.ik.closed import method_words
 from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.figure import Figure
 from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table

@@ -10,14 +10,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.errors import Finding, OptionError, for_each, shown
-from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, exact_form
-from urmpipe_models.inverse.search import Search
-from urmpipe_models.inverse.solve import METHODS, Method
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Finding, Hint, OptionError, for_each, shown
+from urmpipe_models.ik.closed import ClosedForm, closed_form, exact_form
+from urmpipe_models.ik.solutions import Search
+from urmpipe_models.ik.solve import METHODS, Method
 from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
-from urmpipe_models.messages import Hint
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets
 
 TYPED = 1e-3

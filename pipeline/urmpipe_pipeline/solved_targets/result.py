@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray, IntArray, TextArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import line_of, number_of
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.inverse.along_path.joint_path import JointPath
-from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.inverse.targets import Targets, misses
-from urmpipe_models.spelling import Voice
+from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray, IntArray, TextArray
+from urmpipe_models.errors import Finding, LogError, Voice
+from urmpipe_models.ik.path import JointPath
+from urmpipe_models.ik.solutions import Solutions, Targets, misses
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
 from urmpipe_pipeline.presentation.result import Result

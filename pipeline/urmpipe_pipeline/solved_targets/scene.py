@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import quaternions
 from urmpipe_pipeline.palette import ghost_colour, run_colour
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene, Targets
 from urmpipe_pipeline.solved_targets.result import SolvedTargets

@@ -6,14 +6,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.along_path.joint_path import JointPath
-from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, norms
+from urmpipe_models.errors import Hint
+from urmpipe_models.ik.path import JointPath
+from urmpipe_models.ik.solutions import Solutions, Targets
 from urmpipe_models.kinematics.singularity import NEAR_SINGULAR, singularity_over_log
-from urmpipe_models.messages import Hint
-from urmpipe_models.row_blocks import norms
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.text import counted, in_words, rows_text
 

@@ -7,13 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, IndexArray, IntArray, TextArray
-from urmpipe_models.inverse.along_path.joint_path import JointPath
-from urmpipe_models.inverse.along_path.path import follow
-from urmpipe_models.inverse.limits import periods, within_pi
-from urmpipe_models.inverse.solutions import Singular, Solutions, joined
-from urmpipe_models.inverse.solve import solve
-from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.elementwise import BoolArray, IndexArray, IntArray, TextArray
+from urmpipe_models.ik.path import JointPath, follow
+from urmpipe_models.ik.solutions import Singular, Solutions, Targets, joined, periods, within_pi
+from urmpipe_models.ik.solve import solve
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.solved_targets.request import Request

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.ik.solutions import Targets
 from urmpipe_pipeline.joint_log import Inference, LogWarning, SourceFile
 from urmpipe_pipeline.sources.clocks.clock import even_clock, unused_period
 from urmpipe_pipeline.sources.columns.columns import listed

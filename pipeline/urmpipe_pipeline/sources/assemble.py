@@ -8,11 +8,10 @@ from itertools import chain
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import OptionError
-from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import RotationForm
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Hint, OptionError
+from urmpipe_models.math3d import RotationForm
 from urmpipe_pipeline.joint_log import (
     ASSUMED_PERIOD,
     ROLES,

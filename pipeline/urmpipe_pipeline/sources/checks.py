@@ -7,9 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
+from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.gaps import GAP, gaps_behind
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL

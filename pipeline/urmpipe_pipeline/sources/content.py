@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.errors import Finding, LogError, for_each
-from urmpipe_models.messages import Hint
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Finding, Hint, LogError, for_each
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.checks import (
     MOST_SKIPPED,

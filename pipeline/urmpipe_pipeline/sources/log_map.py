@@ -11,11 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from urmpipe_models.errors import Finding, OptionError, shown
-from urmpipe_models.files.tables import Table
-from urmpipe_models.files.toml_text import parse_toml, toml_lines, toml_text
-from urmpipe_models.messages import one_line
-from urmpipe_models.orientation import FORMS
+from urmpipe_models.errors import Finding, OptionError, one_line, shown
+from urmpipe_models.math3d import FORMS
+from urmpipe_models.toml_tables import Table, parse_toml, toml_lines, toml_text
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, Role
 from urmpipe_pipeline.outputs import MAP_HEADER
 from urmpipe_pipeline.sources.clocks.time_file import TIME_FILE, named_file

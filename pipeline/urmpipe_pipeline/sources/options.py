@@ -10,8 +10,8 @@ from numbers import Real
 from typing import Any, TypeAlias
 
 from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.math3d import FORMS, RotationForm
 from urmpipe_models.measure_units import quantity, units_of
-from urmpipe_models.orientation import FORMS, RotationForm
 
 COLUMNS = "columns by name or number, such as ['q1', 'q2'] or [2, 3]"
 UNITS = "a unit of every angle, such as 'deg', or a mapping, such as {'q1': 'deg'}"

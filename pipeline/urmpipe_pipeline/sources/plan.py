@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError, OptionError
-from urmpipe_models.messages import Hint
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.clock import Clock, find_clocks
 from urmpipe_pipeline.sources.clocks.time_file import clocks_apart, time_file, with_time_file

@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.messages import Hint
-from urmpipe_models.repolarizer import FULL_TURN
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Hint
+from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.clocks.clock import PAPER_PERIOD
 from urmpipe_pipeline.sources.clocks.clock_columns import GIVEN

@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_pipeline.joint_log import JointLog, SourceFile
 from urmpipe_pipeline.sources.assemble import assemble, recorded
 from urmpipe_pipeline.sources.clocks.time_file import named_file

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, for_each
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.clock import even_clock, find_clocks

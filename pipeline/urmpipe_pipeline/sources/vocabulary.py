@@ -10,7 +10,7 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import Any, Literal, NamedTuple
 
-from urmpipe_models.orientation import RotationForm
+from urmpipe_models.math3d import RotationForm
 
 Quantity = Literal["angle", "length", "time", "date", "ratio"]
 Patterns = tuple[re.Pattern[str], ...]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.outputs import TARGET_ROW
 from urmpipe_pipeline.presentation.exports import Times

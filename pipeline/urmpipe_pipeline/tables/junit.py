@@ -24,9 +24,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Literal
 
-from urmpipe_models.errors import Finding, OutputError, UrmpipeError
-from urmpipe_models.messages import HIDDEN
-from urmpipe_models.spelling import Voice
+from urmpipe_models.errors import HIDDEN, Finding, OutputError, UrmpipeError, Voice
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import JUNIT_HEADER, guarded_output

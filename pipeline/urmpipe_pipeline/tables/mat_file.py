@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.errors import Finding, OutputError
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, OutputError
 from urmpipe_pipeline.isolated import believe
 from urmpipe_pipeline.outputs import EXPORT_HEADER
 

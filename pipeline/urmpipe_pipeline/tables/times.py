@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.arrays import IntArray
+from urmpipe_models.elementwise import IntArray
 from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, Times
 
 EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}

@@ -11,8 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.display import Shown, line_of, number_of
-from urmpipe_models.errors import Finding, OutputError, for_each
-from urmpipe_models.spelling import Voice
+from urmpipe_models.errors import Finding, OutputError, Voice, for_each
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.json_values import json_ready
 from urmpipe_pipeline.outputs import EXPORT_HEADER, guarded_output, know_own, refuse_output

@@ -15,8 +15,7 @@ import urmpipe
 from diagnoses import diagnosis_of
 from flat_arm import lay_flat_arm
 from urmpipe_datasets import LOGS
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.inertial import Inertial
+from urmpipe_models.arm.chain import Chain, Inertial, Joint
 from urmpipe_models.display import Shown
 from urmpipe_pipeline.comparison.change import Absent, BaselineComparison
 from urmpipe_pipeline.presentation.result import Result

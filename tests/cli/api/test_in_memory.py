@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import urmpipe
 from asserting import refusal, there
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 

@@ -14,9 +14,9 @@ import urmpipe
 from urmpipe.api.equations import FormName
 from urmpipe.kinds import KINDS, kind_of
 from urmpipe.systems.units import Backend
-from urmpipe_models.inverse.solve import METHODS
-from urmpipe_models.lagrange.equations import TERMS
-from urmpipe_models.planning.stretches import ARCS
+from urmpipe_models.ik.solve import METHODS
+from urmpipe_models.lagrange.derivation import TERMS
+from urmpipe_models.planning.laws import ARCS
 from urmpipe_pipeline.accuracy.result import DECIDES
 from urmpipe_pipeline.comparison.compare import Tcp
 from urmpipe_pipeline.comparison.trajectory import AlignMode

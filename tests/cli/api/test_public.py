@@ -15,7 +15,7 @@ import pytest
 
 import urmpipe
 from urmpipe.arm_placing import frame_of
-from urmpipe_models.transform import Transform, from_offset
+from urmpipe_models.math3d import Transform, from_offset
 
 COMMANDS = ("ingest", "compare", "ik", "report", "export", "simulate", "build_fmu", "view")
 

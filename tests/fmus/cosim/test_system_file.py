@@ -8,8 +8,7 @@ import pytest
 
 from asserting import refusal
 from urmpipe_fmus.cosim import LogInput, Port, System, load_system, system_names, system_text
-from urmpipe_models.errors import CosimulationError
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import CosimulationError, Hint
 
 WHOLE = """
 [system]

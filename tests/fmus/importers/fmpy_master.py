@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from shipped_units import sample_times
 from systems import System, Trace
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 
 def run_fmpy(system: System, step: float, steps: int) -> Trace:

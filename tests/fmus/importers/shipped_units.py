@@ -11,7 +11,7 @@ from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_names
 from urmpipe_fmus.variable import Input
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 
 STEP = 0.005

@@ -15,7 +15,7 @@ import numpy as np
 
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.variable import Variable
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

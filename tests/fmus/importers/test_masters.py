@@ -17,7 +17,7 @@ from shipped_units import STEP, columns, drawn_inputs, sample_times, shipped, sh
 from systems import System, Trace, alone
 from urmpipe_fmus.run import run
 from urmpipe_fmus.unit import Unit
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 STEPS, FEW = 61, 9
 """Steps, and those of an arm with masses, which takes Python some tenths of a second each."""

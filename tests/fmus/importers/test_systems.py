@@ -18,7 +18,7 @@ from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import this_platform
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.units import make_unit
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
 

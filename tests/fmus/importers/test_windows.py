@@ -19,7 +19,7 @@ import pytest
 from shipped_units import CROSS_BUILT, STEP, columns, drawn_inputs, sample_times, shipped_unit
 from urmpipe_fmus.run import run
 from urmpipe_fmus.unit import Unit
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 STEPS = 41
 DECIMALS = 6

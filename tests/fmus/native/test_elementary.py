@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 EXACT = np.longdouble if np.finfo(np.longdouble).nmant > 60 else np.float64
 MOST_ULPS = 3 if EXACT is np.longdouble else 4

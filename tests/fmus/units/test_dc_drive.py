@@ -17,7 +17,7 @@ from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import State
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError
 
 K, DAMPING, RATIO, C, R, L, I1 = 2500.0, 5.0, 100.0, 0.05, 0.5, 1e-3, 0.5

@@ -14,13 +14,12 @@ from urmpipe_fmus.run import run
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
 from urmpipe_fmus.units.kinematic_chain import kinematic_chain
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.urm import urm_chain
-from urmpipe_models.chains.visual import Sphere, Visual
+from urmpipe_models.arm.chain import Chain, Sphere, Visual
+from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import point_over_log, points_over_log, positions_over_log
+from urmpipe_models.math3d import Transform, from_offset, from_rpy
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.transform import Transform, from_offset, from_rpy
 
 ROUNDING = 1e-13
 """Some hundred operations on values of up to 20, in another order: each errs by 1e-16 of them."""

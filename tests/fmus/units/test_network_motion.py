@@ -15,12 +15,12 @@ from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.run import run
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError, UrmpipeError
-from urmpipe_models.networks.descent import descend
+from urmpipe_models.networks.closure import descend
+from urmpipe_models.networks.file import load_network
+from urmpipe_models.networks.joint_motion import rotation_of
 from urmpipe_models.networks.mechanism import mechanism_of
-from urmpipe_models.networks.network_file import load_network
-from urmpipe_models.networks.rotations import rotation_of
 
 Backend = Literal["native", "python"]
 

@@ -13,8 +13,8 @@ from random_units import PATIENT
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.run import run
 from urmpipe_fmus.units.repolarizer import repolarizer
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.repolarizer import repolarize
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.wraps import repolarize
 
 
 def over(raw: FloatArray, **start: float) -> dict[str, FloatArray]:

@@ -9,7 +9,7 @@ from urmpipe_fmus.dependencies import TIME, Dependencies
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.run import run
 from urmpipe_fmus.units import make_unit
-from urmpipe_models.drives.set_point import ramp, step, trapezoid
+from urmpipe_models.drives import ramp, step, trapezoid
 from urmpipe_models.errors import UnitError
 
 T = np.linspace(0.0, 2.0, 81)

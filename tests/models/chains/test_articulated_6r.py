@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from urmpipe_models.chains.articulated_6r import articulated_6r
+from urmpipe_models.arm.geometric_models import articulated_6r
 
 LENGTHS = (0.3, 0.1, 0.45, 0.4, 0.15)
 

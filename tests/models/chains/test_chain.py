@@ -6,10 +6,10 @@ import math
 
 import pytest
 
-from urmpipe_models.chains.chain import AXIS_TOLERANCE, Chain, Joint, Mimic
-from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.arm.chain import AXIS_TOLERANCE, Chain, Joint, Mimic
+from urmpipe_models.arm.geometric_models import urm_chain
 from urmpipe_models.errors import RobotError
-from urmpipe_models.transform import Transform, translation
+from urmpipe_models.math3d import Transform, translation
 
 
 def test_coordinates_are_the_joints_that_move_by_themselves() -> None:

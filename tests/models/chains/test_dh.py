@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.dh import DHRow, dh_chain, modified_dh_chain
+from urmpipe_models.arm.geometric_models import DHRow, dh_chain, modified_dh_chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import forward
-from urmpipe_models.transform import Transform, from_offset
+from urmpipe_models.math3d import Transform, from_offset
 
 ROUNDING = 2e-14  # up to seven products of 4x4 matrices with entries of up to 14 m
 

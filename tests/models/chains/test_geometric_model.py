@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from direct_geometric_model import geometric_model
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.geometric_model import GeometricRow, geometric_chain
+from urmpipe_models.arm.geometric_models import GeometricRow, geometric_chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import forward
 

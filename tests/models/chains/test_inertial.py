@@ -9,11 +9,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from asserting import refusal
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.chains.inertial import GRAVITY, Inertial
-from urmpipe_models.drives.controller import Gains
-from urmpipe_models.drives.drive import Drive
-from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint
+from urmpipe_models.arm.chain import GRAVITY, Chain, Inertial, Joint, Mimic
+from urmpipe_models.drives import Drive, DrivenJoint, Gains, HeldJoint
 from urmpipe_models.errors import RobotError
 
 BALL = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)

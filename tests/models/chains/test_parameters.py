@@ -12,16 +12,21 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.articulated_6r import articulated_6r
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.dh import DHRow, dh_chain, modified_dh_chain
-from urmpipe_models.chains.geometric_model import GeometricRow, geometric_chain
-from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.arm.geometric_models import (
+    DHRow,
+    GeometricRow,
+    articulated_6r,
+    dh_chain,
+    geometric_chain,
+    modified_dh_chain,
+    urm_chain,
+)
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import forward
+from urmpipe_models.math3d import Step, Transform, from_offset, rotation_x
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.transform import Step, Transform, from_offset, rotation_x
 
 BASE = ["base.x", "base.y", "base.z", "base.rz", "base.ry", "base.rx"]
 TOOL = ["tool.x", "tool.y", "tool.z", "tool.rz", "tool.ry", "tool.rx"]

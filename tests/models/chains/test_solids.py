@@ -13,15 +13,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint, JointKind
-from urmpipe_models.chains.dh import DHRow, dh_chain, modified_dh_chain
-from urmpipe_models.chains.solids import solids_of
-from urmpipe_models.chains.visual import Box, Capsule, Cylinder, Mesh, Sphere, Visual
-from urmpipe_models.elementwise import Vector
+from urmpipe_models.arm.chain import Box, Capsule, Chain, Cylinder, Joint, JointKind, Mesh, Sphere, Visual
+from urmpipe_models.arm.geometric_models import DHRow, dh_chain, modified_dh_chain
+from urmpipe_models.arm.solids import solids_of
+from urmpipe_models.elementwise import FloatArray, Vector
 from urmpipe_models.kinematics.forward import frames_over_log, positions_over_log
+from urmpipe_models.math3d import Transform, from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.transform import Transform, from_offset, translation
 
 QUARTER = math.pi / 2.0
 ROUNDING = 1e-9

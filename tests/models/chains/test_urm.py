@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.arm.geometric_models import urm_chain
 
 
 def test_name_start_and_words_go_into_the_chain() -> None:

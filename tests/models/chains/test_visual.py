@@ -15,15 +15,25 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
 from asserting import refusal
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.visual import Box, Capsule, Cylinder, Mesh, Shape, Sphere, Visual, mesh_file
+from urmpipe_models.arm.chain import (
+    Box,
+    Capsule,
+    Chain,
+    Cylinder,
+    Joint,
+    Mesh,
+    Shape,
+    Sphere,
+    Visual,
+    mesh_file,
+)
 from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import frames_over_log
+from urmpipe_models.math3d import Transform, from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.robots.robot_file import chain_from_dict, chain_to_dict, read_robot_file, robot_toml
-from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.robots.toml import chain_from_dict, chain_to_dict, read_robot_file, robot_toml
+from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_models.robots.urdf_writer import urdf_text, write_urdf
-from urmpipe_models.transform import Transform, from_offset, translation
 
 SAME = 1e-12
 """A frame that passes through angles and back errs by 1e-15."""

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.drives.drive import (
+from urmpipe_models.drives import (
     Drive,
     current_rate,
     driving_torque,
@@ -17,6 +16,7 @@ from urmpipe_models.drives.drive import (
     shaft_acceleration,
     shaft_torque,
 )
+from urmpipe_models.elementwise import FloatArray
 
 DRIVE = Drive(
     stiffness=2500.0, damping=5.0, ratio=100.0, constant=0.05, resistance=0.5, inductance=1e-3, inertia=0.5

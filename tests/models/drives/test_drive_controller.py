@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_models.drives.controller import Gains, next_voltage, sample_number
-from urmpipe_models.drives.set_point import JointMotion
+from urmpipe_models.drives import Gains, JointMotion, next_voltage, sample_number
 
 GAINS = Gains(position=7.5, velocity=0.75, acceleration=0.01)
 REST = JointMotion(0.0, 0.0, 0.0)

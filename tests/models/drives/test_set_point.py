@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from urmpipe_models.drives.set_point import (
+from urmpipe_models.drives import (
     CORNER_SLACK,
     RAMP,
     STEP,

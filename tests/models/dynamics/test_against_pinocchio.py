@@ -11,18 +11,19 @@ import pinocchio
 import pytest
 
 from made_masses import with_masses
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
-from urmpipe_models.dynamics.forward import forward_dynamics
-from urmpipe_models.dynamics.inverse import inverse_dynamics
-from urmpipe_models.dynamics.mass_matrix import mass_matrix
-from urmpipe_models.dynamics.over_log import mass_centres_over_log
-from urmpipe_models.dynamics.terms import torque_terms
-from urmpipe_models.dynamics.wrench import Wrench
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.dynamics.equations import (
+    forward_dynamics,
+    inverse_dynamics,
+    mass_centres_over_log,
+    mass_matrix,
+    torque_terms,
+)
+from urmpipe_models.dynamics.links import Wrench, kinetic_energy, potential_energy
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import Transform, from_offset
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.robots.urdf_reader import read_urdf
-from urmpipe_models.transform import Transform, from_offset
+from urmpipe_models.robots.urdf import read_urdf
 
 SAME = 1e-10
 """Relative to the largest value of a state: what is required; found are 1e-13."""

@@ -12,9 +12,8 @@ import pytest
 
 from made_masses import DRIVE, with_drives, with_masses
 from sliding_arm import sliding_arm
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.drives.controller import voltage_at
-from urmpipe_models.drives.drive import Drive
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.drives import Drive, voltage_at
 from urmpipe_models.dynamics.driven_arm import (
     ArmState,
     Motor,
@@ -24,13 +23,21 @@ from urmpipe_models.dynamics.driven_arm import (
     motor_rates,
     powers,
 )
-from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
-from urmpipe_models.dynamics.forward import forward_dynamics
-from urmpipe_models.dynamics.inverse import inverse_dynamics
-from urmpipe_models.dynamics.mass_centres import mass_centres, mass_motions
-from urmpipe_models.dynamics.mass_matrix import coordinate_sizes, mass_matrix
-from urmpipe_models.dynamics.terms import torque_terms
-from urmpipe_models.dynamics.wrench import Wrench, wrench_power
+from urmpipe_models.dynamics.equations import (
+    coordinate_sizes,
+    forward_dynamics,
+    inverse_dynamics,
+    mass_matrix,
+    torque_terms,
+)
+from urmpipe_models.dynamics.links import (
+    Wrench,
+    kinetic_energy,
+    mass_centres,
+    mass_motions,
+    potential_energy,
+    wrench_power,
+)
 from urmpipe_models.robots.catalogue import load_robot
 
 SAME = 1e-12

@@ -12,22 +12,33 @@ from scipy.integrate import solve_ivp
 
 from made_masses import body, with_masses
 from sliding_arm import sliding_arm
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.dynamics.energy import kinetic_energy, potential_energy
-from urmpipe_models.dynamics.forward import check_motion, factors, forward_dynamics, solved
-from urmpipe_models.dynamics.inverse import inverse_dynamics
-from urmpipe_models.dynamics.links import links_of
-from urmpipe_models.dynamics.mass_centres import mass_centres, mass_motions
-from urmpipe_models.dynamics.mass_matrix import mass_matrix
-from urmpipe_models.dynamics.over_log import energies_over_log, terms_over_log, torque_over_log
-from urmpipe_models.dynamics.terms import torque_terms
-from urmpipe_models.dynamics.wrench import Wrench, wrench_power
+from urmpipe_models.arm.chain import Chain, Inertial, Joint, JointKind, Mimic
+from urmpipe_models.dynamics.equations import (
+    check_motion,
+    energies_over_log,
+    factors,
+    forward_dynamics,
+    inverse_dynamics,
+    mass_matrix,
+    solved,
+    terms_over_log,
+    torque_over_log,
+    torque_terms,
+)
+from urmpipe_models.dynamics.links import (
+    Wrench,
+    kinetic_energy,
+    links_of,
+    mass_centres,
+    mass_motions,
+    potential_energy,
+    wrench_power,
+)
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import RobotError
-from urmpipe_models.kinematics.motion import motions
+from urmpipe_models.kinematics.forward import motions
+from urmpipe_models.math3d import from_offset
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import from_offset
 
 ROUNDED = 1e-11
 """Sums of some thousand products, of values up to some hundred."""

@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from made_masses import driven
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.drives.controller import Gains
-from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint, ReliefSpring
-from urmpipe_models.dynamics.sampled_loop import spectral_radius
+from urmpipe_models.arm.chain import Chain, Inertial, Joint
+from urmpipe_models.drives import DrivenJoint, Gains, HeldJoint, ReliefSpring
+from urmpipe_models.dynamics.driven_arm import spectral_radius
 
 PERIOD = 5e-3
 MASS, RADIUS = 2.0, 0.5

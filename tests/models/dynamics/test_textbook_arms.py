@@ -10,14 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.dynamics.forward import forward_dynamics
-from urmpipe_models.dynamics.inverse import inverse_dynamics
-from urmpipe_models.dynamics.terms import torque_terms
+from urmpipe_models.arm.chain import Chain, Inertial, Joint, Mimic
+from urmpipe_models.dynamics.equations import forward_dynamics, inverse_dynamics, torque_terms
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import forward
-from urmpipe_models.transform import translation
+from urmpipe_models.math3d import translation
 
 ROUNDED = 1e-12
 """Some ten products of values up to some hundred."""

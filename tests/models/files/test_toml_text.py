@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from asserting import refusal
 from urmpipe_models.errors import OptionError
-from urmpipe_models.files.toml_text import parse_toml, toml_lines, toml_text
+from urmpipe_models.toml_tables import parse_toml, toml_lines, toml_text
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 leaves = st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | texts

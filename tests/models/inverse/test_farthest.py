@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.inverse.farthest import farthest, too_far
-from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.ik.solutions import Targets, targets_of
+from urmpipe_models.ik.solve import farthest, too_far
+from urmpipe_models.math3d import Transform, translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform, translation
 
 
 @pytest.mark.parametrize("robot", ["urm6", "panda", "iiwa14", "ur5e", "arm6"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from urmpipe_models.inverse.figures import figures
+from urmpipe_models.ik.solutions import figures
 
 
 def test_four_digits_are_given_where_they_tell_the_numbers_apart() -> None:

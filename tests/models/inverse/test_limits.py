@@ -8,9 +8,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
-from urmpipe_models.inverse.limits import LIMIT_ROUNDING, nearest_to_limits, periods, within_limits, within_pi
-from urmpipe_models.inverse.solutions import Singular, Solutions
+from urmpipe_models.arm.chain import Chain, Joint, JointKind, Mimic
+from urmpipe_models.ik.solutions import (
+    LIMIT_ROUNDING,
+    Singular,
+    Solutions,
+    nearest_to_limits,
+    periods,
+    within_limits,
+    within_pi,
+)
 from urmpipe_models.robots.catalogue import load_robot
 
 TURN = 2.0 * math.pi

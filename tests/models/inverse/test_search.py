@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_models.inverse.search import USUAL_SEARCH, Search
+from urmpipe_models.ik.solutions import USUAL_SEARCH, Search
 
 
 def test_the_usual_search_makes_sense() -> None:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from urmpipe_models.inverse.solutions import Singular, Solutions, no_solutions
+from urmpipe_models.ik.solutions import Singular, Solutions, no_solutions
 
 TURN = 2.0 * math.pi
 

@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 from asserting import refusal, there
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
-from urmpipe_models.inverse.search import Search
-from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.inverse.solve import Method, solve
-from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.ik.solutions import Search, Solutions, Targets, misses, targets_of
+from urmpipe_models.ik.solve import Method, solve
 from urmpipe_models.robots.catalogue import load_robot
 
 MET = 1e-9

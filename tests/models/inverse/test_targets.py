@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.ik.solutions import Targets, misses, targets_of
 from urmpipe_models.robots.catalogue import load_robot
 
 ARM = load_robot("arm6")

@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.kinematics.frames import frames, joint_values
-from urmpipe_models.transform import Transform, translation
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.kinematics.forward import frames, joint_values
+from urmpipe_models.math3d import Transform, translation
 
 ARM = Chain(
     "arm",

@@ -11,12 +11,12 @@ import pytest
 from differences import assert_slope
 from rail_arm import rail_arm
 from sliding_arm import sliding_arm
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.kinematics.identification import BASE, Twist, changed, sensitivities
+from urmpipe_models.math3d import Transform, from_offset
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform, from_offset
 
 ARMS = (load_robot("urm6"), load_robot("ur5e"), load_robot("panda"), rail_arm(), sliding_arm())
 SKEW = from_offset((0.3, -0.2, 0.1, 0.4, -0.7, 1.1))

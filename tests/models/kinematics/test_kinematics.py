@@ -15,27 +15,26 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from differences import assert_slope
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.chains.dh import DHRow, modified_dh_chain
-from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.arm.geometric_models import DHRow, modified_dh_chain, urm_chain
+from urmpipe_models.elementwise import BLOCK, FloatArray, row_blocks
 from urmpipe_models.kinematics.forward import (
     forward,
     jacobian,
     jacobian_over_log,
+    joint_values,
+    motions,
     point_over_log,
     points_over_log,
     poses_over_log,
     positions_over_log,
     tip_pose,
+    tip_position,
 )
-from urmpipe_models.kinematics.frames import joint_values, tip_position
-from urmpipe_models.kinematics.motion import motions
+from urmpipe_models.math3d import Transform, euler_zyx, from_offset, from_rpy, translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_models.robots.urdf_writer import write_urdf
-from urmpipe_models.row_blocks import BLOCK, row_blocks
-from urmpipe_models.transform import Transform, euler_zyx, from_offset, from_rpy, translation
 
 LENGTHS = (0.243215, 0.21243, 0.21243, 0.21243, 0.21243, 0.21243, 0.042215)
 TILT = math.radians(52.0)

@@ -11,12 +11,11 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from asserting import there
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.kinematics.screws import Screws, chain_of, screws
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.kinematics.forward import Screws, chain_of, poses_over_log, screws
+from urmpipe_models.math3d import from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.transform import from_offset, translation
 
 AGREES = 1e-12
 """Levers of up to 10 m, some hundred roundings."""

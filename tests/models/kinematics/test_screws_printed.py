@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from asserting import there
-from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
-from urmpipe_models.kinematics.forward import tip_pose
-from urmpipe_models.kinematics.screws import chain_of, screws
-from urmpipe_models.transform import Transform, from_offset, rotation_x, rotation_z, translation
+from urmpipe_models.arm.chain import Chain, Joint, JointKind, Mimic
+from urmpipe_models.kinematics.forward import chain_of, screws, tip_pose
+from urmpipe_models.math3d import Transform, from_offset, rotation_x, rotation_z, translation
 
 ARM = Chain(
     "arm",

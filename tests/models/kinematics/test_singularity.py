@@ -13,14 +13,13 @@ from hypothesis import strategies as st
 
 from arm6 import Arm6Lengths, arm6_determinant
 from asserting import there
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.chains.dh import DHRow, dh_chain
-from urmpipe_models.chains.geometric_model import GeometricRow, geometric_chain
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.arm.geometric_models import DHRow, GeometricRow, dh_chain, geometric_chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.kinematics.singularity import PARALLEL, characteristic_length, singularity_over_log
+from urmpipe_models.math3d import Transform, from_offset, rotation_z, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.transform import Transform, from_offset, rotation_z, translation
 
 ARM6 = load_robot("arm6")
 

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from made_masses import body
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
-from urmpipe_models.lagrange.c_code import ARGUMENTS, c_name
-from urmpipe_models.transform import Transform, from_xyz_rpy
+from urmpipe_models.arm.chain import Chain, Joint, JointKind, Mimic
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.lagrange.formulas import ARGUMENTS, c_name
+from urmpipe_models.math3d import Transform, from_xyz_rpy
 
 Motion = tuple[FloatArray, FloatArray, FloatArray]
 """q, q', q'' of each coordinate."""

@@ -12,19 +12,14 @@ import numpy as np
 import pytest
 
 from random_arms import Motion, c_terms, compiled, random_arm, random_motion, text_terms
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.dynamics.inverse import inverse_dynamics
-from urmpipe_models.dynamics.mass_matrix import mass_matrix
-from urmpipe_models.dynamics.terms import torque_terms
-from urmpipe_models.dynamics.wrench import Wrench
+from urmpipe_models.arm.chain import Chain, Inertial, Joint, Mimic
+from urmpipe_models.dynamics.equations import inverse_dynamics, mass_matrix, torque_terms
+from urmpipe_models.dynamics.links import Wrench
 from urmpipe_models.errors import OptionError, RobotError
-from urmpipe_models.kinematics.frames import frames
-from urmpipe_models.lagrange.c_code import c_code
-from urmpipe_models.lagrange.equations import TERMS
-from urmpipe_models.lagrange.open_form import OpenForm, open_form
-from urmpipe_models.lagrange.text import equations_text
-from urmpipe_models.transform import from_offset
+from urmpipe_models.kinematics.forward import frames
+from urmpipe_models.lagrange.derivation import TERMS
+from urmpipe_models.lagrange.formulas import OpenForm, c_code, equations_text, open_form
+from urmpipe_models.math3d import from_offset
 
 QUICK = {1: (2, 11, 14), 2: (2, 8), 3: (2, 8, 19), 4: (19,)}
 """Seeds of arms by their number of coordinates."""

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import sympy
 
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.lagrange.equations import TERMS
-from urmpipe_models.lagrange.open_form import open_form
-from urmpipe_models.lagrange.text import equations_text
-from urmpipe_models.transform import from_offset
+from urmpipe_models.arm.chain import Chain, Inertial, Joint, Mimic
+from urmpipe_models.lagrange.derivation import TERMS
+from urmpipe_models.lagrange.formulas import equations_text, open_form
+from urmpipe_models.math3d import from_offset
 
 L1, L2, M1, M2, I1, I2, G = 0.75, 0.5, 3.0, 2.0, 0.25, 0.125, 10.0
 """Sums and products of these are exact in floats: formulas are compared as they are."""

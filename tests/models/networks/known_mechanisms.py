@@ -7,10 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from random_networks import Vec, axis_frame, transform, unit, vec
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.networks.expressions import Expression
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Joint, JointKind
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.networks.file import Network
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, JointKind
 
 X, Y, Z, ORIGIN = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
 

@@ -9,13 +9,20 @@ import numpy as np
 from scipy.linalg import expm, logm
 from scipy.spatial.transform import Rotation
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.closure import closure_of
-from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Mechanism
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import FREEDOMS, Body, ConstraintElement, ElementKind, Joint, JointKind
-from urmpipe_models.transform import Transform
+from urmpipe_models.networks.parts import (
+    FREEDOMS,
+    Body,
+    ConstraintElement,
+    ElementKind,
+    Expression,
+    Joint,
+    JointKind,
+)
 
 Poses = dict[str, FloatArray]
 Vec = tuple[float, float, float]

@@ -34,20 +34,18 @@ from known_mechanisms import (
 )
 from random_networks import matrix, transform, unit, vec
 from spherical_arms import random_arm
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import NetworkError
-from urmpipe_models.inverse.solve import solve
-from urmpipe_models.inverse.targets import targets_of
+from urmpipe_models.ik.solutions import targets_of
+from urmpipe_models.ik.solve import solve
 from urmpipe_models.kinematics.forward import jacobian_over_log
+from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.assembly import Assembled, assemble
 from urmpipe_models.networks.closure import closure_of
-from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.networks.file import Network, load_network
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
 from urmpipe_models.networks.mobility import mobility_of
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.network_file import load_network
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Joint, frame_of
-from urmpipe_models.transform import Transform
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_of
 
 CLOSED = 1e-9
 """The largest gap of an assembly in [m] and [rad], of mechanisms of some metres."""

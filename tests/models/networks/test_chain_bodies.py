@@ -11,17 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.strategies import DataObject, SearchStrategy
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.kinematics.frames import frames
-from urmpipe_models.networks.chain_bodies import chain_parts, control_name
-from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.kinematics.forward import frames
+from urmpipe_models.math3d import Transform
+from urmpipe_models.networks.elements import chain_parts, control_name
+from urmpipe_models.networks.file import Network, load_network
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.network_file import load_network
-from urmpipe_models.networks.parts import Body, Control
+from urmpipe_models.networks.parts import Body, Control, Expression
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.transform import Transform
 
 EXACT = 1e-12
 """Some twenty products of matrices, of lengths of 2 m at most, each rounded to 1e-16."""

@@ -10,17 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.dh import DHRow, modified_dh_chain
-from urmpipe_models.elementwise import cross
-from urmpipe_models.kinematics.frames import frames
-from urmpipe_models.networks.dh_elements import DHElement, element_frame, joint_of
+from urmpipe_models.arm.geometric_models import DHRow, modified_dh_chain
+from urmpipe_models.elementwise import FloatArray, cross
+from urmpipe_models.kinematics.forward import frames
+from urmpipe_models.math3d import Transform
+from urmpipe_models.networks.elements import DHElement, element_frame, joint_of
+from urmpipe_models.networks.file import Network, load_network
 from urmpipe_models.networks.joint_motion import joint_frame
 from urmpipe_models.networks.mechanism import mechanism_of
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.network_file import load_network
 from urmpipe_models.networks.parts import Body, Joint
-from urmpipe_models.transform import Transform
 
 EXACT = 1e-14
 """Products of a few matrices whose entries are 5 at most, each rounded to 1e-16."""

@@ -25,14 +25,13 @@ from random_networks import (
     unit,
     vec,
 )
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.closure import closure_of
-from urmpipe_models.networks.element_measures import measure
-from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.networks.file import Network
+from urmpipe_models.networks.joint_motion import measure
 from urmpipe_models.networks.mechanism import mechanism_of
 from urmpipe_models.networks.mobility import mobility_of
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, ElementKind, Joint
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, ElementKind, Expression, Joint
 
 CLOSES = 1e-12
 """Residuals in [m] and [rad]: products of some ten matrices with entries up to 10."""

@@ -12,7 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from asserting import refusal
-from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.networks.parts import Expression
 
 STEP = 1e-30
 """An imaginary step: f'(x) = Im f(x + ih) / h without a difference, exact to rounding."""

@@ -9,10 +9,9 @@ import pytest
 
 from asserting import refusal
 from urmpipe_models.errors import NetworkError
-from urmpipe_models.networks.expressions import Expression
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Joint, frame_of
-from urmpipe_models.transform import Transform, translation
+from urmpipe_models.math3d import Transform, translation
+from urmpipe_models.networks.file import Network
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_of
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 A = Joint("A", "revolute", ("ground", "b"))

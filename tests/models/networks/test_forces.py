@@ -10,7 +10,7 @@ import pytest
 from random_networks import matrix
 from test_shipped import tables_of
 from urmpipe import load_network, network_drive
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.forces import Wrench
 from urmpipe_models.networks.rates import point_motion
 from urmpipe_pipeline.networks.network_motion import NetworkMotion

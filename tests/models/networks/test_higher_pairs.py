@@ -15,12 +15,12 @@ from scipy.interpolate import CubicSpline
 from asserting import refusal, there
 from random_networks import difference
 from urmpipe import load_network, network_check, network_drive, network_solve
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import NetworkError
 from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.closure import closure_of, released
+from urmpipe_models.networks.elements import transmitted
 from urmpipe_models.networks.forces import Wrench, compute_forces
-from urmpipe_models.networks.higher_pairs import transmitted
 from urmpipe_models.networks.mechanism import mechanism_of
 
 ROUNDING = 1e-12  # [m], [rad]: relations of numbers near 1, solved by Newton steps

@@ -18,12 +18,11 @@ from random_networks import (
     random_values,
 )
 from test_joint_motion import user_motion
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.closure import closure_of
-from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import Body, Control, Joint
+from urmpipe_models.networks.parts import Body, Control, Expression, Joint
 
 RELATIVE = 1e-8
 """Of the largest entry: differences of step 1e-3 round to 1e-12 and neglect 1e-18 times the seventh

@@ -22,13 +22,12 @@ from random_networks import (
     random_values,
     transform,
 )
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.closure import closure_of
-from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.joint_motion import forbidden, joint_frame, joint_screws
 from urmpipe_models.networks.mechanism import mechanism_of
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import FREEDOMS, Body, Control, Joint, JointKind
+from urmpipe_models.networks.parts import FREEDOMS, Body, Control, Expression, Joint, JointKind
 
 ROUNDING = 1e-13
 """Products of some ten matrices with entries near 1, and scipy's expm."""

@@ -11,7 +11,7 @@ import pytest
 from asserting import refusal
 from urmpipe import load_network, network_check, network_solve
 from urmpipe_models.errors import NetworkError
-from urmpipe_models.networks.network import Network
+from urmpipe_models.networks.file import Network
 from urmpipe_models.robots.catalogue import load_robot
 
 

@@ -43,15 +43,14 @@ from random_networks import (
     unit,
     vec,
 )
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.closure import closure_of
-from urmpipe_models.networks.expressions import Expression
+from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import mechanism_of
 from urmpipe_models.networks.mobility import mobility_of, stuck_controls
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Joint, JointKind
-from urmpipe_models.transform import Transform
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, JointKind
 
 SAME_POSES = 1e-8
 """In lengths of the mechanism and [rad]: descent ends at gaps below 1e-14, times conditions below 1e5."""

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from known_mechanisms import bennett, coupled_loops, four_bar, nine_revolutes, ring, sarrus
 from random_networks import assert_same_space, matrix, null_space, random_network, reframed, unit
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import mechanism_of
 from urmpipe_models.networks.mobility import mobility_of
-from urmpipe_models.networks.network import Network
 from urmpipe_models.networks.parts import Joint, JointKind
 
 pin = pytest.importorskip("pinocchio")

@@ -16,8 +16,8 @@ from random_networks import matrix, motion
 from test_shipped import Answer, Rssr, Tables, bennett, rccc, rssr, slider_crank, tables_of
 from test_shipped import four_bar as four_bar_answers
 from urmpipe import NetworkError, load_network, network_drive
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.networks.network_file import network_names
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.networks.file import network_names
 from urmpipe_pipeline.networks.network_motion import NetworkMotion
 
 PI, TURN, Z = math.pi, 2 * math.pi, [0, 0, 1]

@@ -12,10 +12,8 @@ import pytest
 
 from asserting import refusal
 from urmpipe_models.errors import NetworkError
-from urmpipe_models.networks.expressions import Expression
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.network_file import load_network, network_names
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Joint, frame_of
+from urmpipe_models.networks.file import Network, load_network, network_names
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_of
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.robots.urdf_writer import urdf_text
 

@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.assembly import assemble
+from urmpipe_models.networks.file import load_network, network_names
+from urmpipe_models.networks.joint_motion import rotation_of, wrap_rotation_vector
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
-from urmpipe_models.networks.network_file import load_network, network_names
-from urmpipe_models.networks.network_tables import network_tables, with_start
-from urmpipe_models.networks.newton import (
+from urmpipe_models.networks.mobility import network_tables, with_start
+from urmpipe_models.networks.rates import (
     close_network,
     closure_jacobian,
     closure_residual,
     damped_normal_step,
 )
-from urmpipe_models.networks.rotations import rotation_of, wrap_rotation_vector
 
 DOOR: dict[str, Any] = {
     "angle_unit": "deg",

@@ -19,12 +19,18 @@ from random_networks import (
     skew,
     transform,
 )
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.networks.joint_motion import joint_frame
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.networks.file import Network
+from urmpipe_models.networks.joint_motion import (
+    SMALL,
+    joint_frame,
+    rotation_of,
+    turning_of,
+    untwisted,
+    wrap_rotation_vector,
+)
 from urmpipe_models.networks.mechanism import mechanism_of
-from urmpipe_models.networks.network import Network
 from urmpipe_models.networks.parts import Body, Joint
-from urmpipe_models.networks.rotations import SMALL, rotation_of, turning_of, untwisted, wrap_rotation_vector
 
 ROUNDING = 1e-14
 """Entries of rotations are sums of a few products of rounded numbers up to pi^2."""

@@ -12,12 +12,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from urmpipe_datasets import NETWORKS
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.assembly import Assembled, assemble
-from urmpipe_models.networks.findings import Assembly
+from urmpipe_models.networks.file import load_network
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
-from urmpipe_models.networks.mobility import mobility_of
-from urmpipe_models.networks.network_file import load_network
+from urmpipe_models.networks.mobility import Assembly, mobility_of
 
 CLOSED = 1e-9
 """The largest gap in [m] and [rad] that assembly lets pass."""

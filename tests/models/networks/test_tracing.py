@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from urmpipe_models.networks.assembly import assemble
+from urmpipe_models.networks.file import Network, load_network, network_names
 from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.network_file import load_network, network_names
-from urmpipe_models.networks.newton import (
+from urmpipe_models.networks.rates import (
     changes,
     close_network,
     closure_jacobian,

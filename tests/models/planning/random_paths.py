@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn
 
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.planning.path import PathRows
 
 legs = st.integers(50, 500).map(lambda mm: mm / 1000.0)
 """What an arc takes from a line, and what is left of it, in [m]."""

@@ -10,10 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
-from urmpipe_models.planning.cube import PLANES, cube_rows
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.planning.path import PLANES, PathRows, cube_rows
 
 CENTRE = np.array([1.7, 0.0, 1.0])
 SECTIONS = [(kind, plane) for kind, planes in PLANES.items() for plane in planes]

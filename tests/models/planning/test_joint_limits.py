@@ -10,19 +10,23 @@ import pytest
 from toppra.algorithm import TOPPRA
 from toppra.constraint import DiscretizationType, JointAccelerationConstraint, JointVelocityConstraint
 
-from urmpipe_models.arrays import FloatArray, IndexArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.targets import misses
-from urmpipe_models.planning import path_joints
-from urmpipe_models.planning.fastest import JointLimits, fastest_law
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray, IndexArray
+from urmpipe_models.ik.solutions import misses
+from urmpipe_models.planning import joints as path_joints
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.joint_limits import largest_usage, law_of_limits
-from urmpipe_models.planning.joint_motion import JointSlopes, targets_at
-from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.path_joints import PathJoints, joints_along
-from urmpipe_models.planning.rows import PathRows
-from urmpipe_models.planning.time_law import TimeLaw
-from urmpipe_models.planning.trapezoid import trapezoid_law
+from urmpipe_models.planning.joints import (
+    JointLimits,
+    JointSlopes,
+    PathJoints,
+    fastest_law,
+    joints_along,
+    largest_usage,
+    law_of_limits,
+    targets_at,
+)
+from urmpipe_models.planning.laws import TimeLaw, trapezoid_law
+from urmpipe_models.planning.path import LineArcPath, PathRows
 from urmpipe_models.robots.catalogue import load_robot
 
 DOWN = np.diag([1.0, -1.0, -1.0])

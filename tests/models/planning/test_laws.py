@@ -13,15 +13,21 @@ from ruckig import InputParameter, Ruckig, Trajectory
 
 from random_paths import corner_rows
 from test_line_arc import CONTOUR
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.drives.set_point import trapezoid
+from urmpipe_models.drives import trapezoid
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.jerk import jerk_law
-from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.rows import PathRows
-from urmpipe_models.planning.stretches import ARCS, Arcs, Piece
-from urmpipe_models.planning.time_law import Phase, TimeLaw, swing_at
-from urmpipe_models.planning.trapezoid import piece_phases, trapezoid_law
+from urmpipe_models.planning.laws import (
+    ARCS,
+    Arcs,
+    Phase,
+    Piece,
+    TimeLaw,
+    jerk_law,
+    piece_phases,
+    swing_at,
+    trapezoid_law,
+)
+from urmpipe_models.planning.path import LineArcPath, PathRows
 
 KEPT = 1.0 + 1e-9
 """So much of a limit may be used: rounding."""

@@ -11,13 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from random_paths import by_first_points, corner_rows
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import PathError
-from urmpipe_models.orientation import angle_between, matrices, quaternions
+from urmpipe_models.math3d import angle_between, from_offset, matrices, quaternions
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.line_arc import LineArcPath
-from urmpipe_models.planning.rows import PathRows
-from urmpipe_models.transform import from_offset
+from urmpipe_models.planning.path import LineArcPath, PathRows
 
 some = settings(max_examples=40)
 

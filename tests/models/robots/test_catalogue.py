@@ -10,10 +10,10 @@ import pytest
 
 from urmpipe_models.errors import OptionError, RobotError
 from urmpipe_models.kinematics.forward import forward, poses_over_log
+from urmpipe_models.math3d import from_offset
 from urmpipe_models.robots.catalogue import load_robot, parse_offset, robot_names
-from urmpipe_models.robots.robot_file import chain_from_dict, chain_to_dict
+from urmpipe_models.robots.toml import chain_from_dict, chain_to_dict
 from urmpipe_models.robots.urdf_writer import write_urdf
-from urmpipe_models.transform import from_offset
 
 NAMES = (
     "arm6",

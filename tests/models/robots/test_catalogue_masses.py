@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from urmpipe_models.dynamics.inverse import inverse_dynamics
-from urmpipe_models.dynamics.mass_matrix import mass_matrix
+from urmpipe_models.dynamics.equations import inverse_dynamics, mass_matrix
+from urmpipe_models.math3d import Transform, rotation_z
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.robots.urdf_reader import read_urdf
-from urmpipe_models.transform import Transform, rotation_z
+from urmpipe_models.robots.urdf import read_urdf
 
 SAME = 1e-9
 """In [kg.m2] and [N.m]: right angles of the URDFs of Universal Robots' arms have twelve digits."""

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from asserting import there
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.inverse.along_path.path import follow
-from urmpipe_models.inverse.solve import solve
-from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.path import follow
+from urmpipe_models.ik.solutions import Targets
+from urmpipe_models.ik.solve import solve
 from urmpipe_models.kinematics.forward import jacobian_over_log, poses_over_log, positions_over_log
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.robots.catalogue import load_robot

@@ -9,14 +9,12 @@ from typing import Any
 import pytest
 
 from asserting import refusal
-from urmpipe_models.chains.articulated_6r import articulated_6r
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.chains.dh import DHRow, dh_chain, modified_dh_chain
-from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.arm.geometric_models import DHRow, articulated_6r, dh_chain, modified_dh_chain, urm_chain
 from urmpipe_models.errors import RobotError
-from urmpipe_models.robots.robot_file import read_robot_file
+from urmpipe_models.math3d import from_offset, from_rpy, translation
+from urmpipe_models.robots.toml import read_robot_file
 from urmpipe_models.robots.urdf_writer import write_urdf
-from urmpipe_models.transform import from_offset, from_rpy, translation
 
 
 @pytest.fixture

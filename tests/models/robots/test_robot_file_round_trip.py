@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from asserting import refusal
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
 from urmpipe_models.errors import RobotError
+from urmpipe_models.math3d import Transform, rotation_x, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.robots.robot_file import chain_from_dict, chain_to_dict, read_robot_file, robot_toml
-from urmpipe_models.transform import Transform, rotation_x, translation
+from urmpipe_models.robots.toml import chain_from_dict, chain_to_dict, read_robot_file, robot_toml
 
 
 def bits(chain: Chain) -> bytes:

@@ -14,13 +14,10 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from asserting import refusal
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.drives.controller import Gains
-from urmpipe_models.drives.drive import Drive
-from urmpipe_models.drives.joint_drives import NO_SPRING, DrivenJoint, HeldJoint, ReliefSpring
+from urmpipe_models.arm.chain import Chain, Inertial, Joint
+from urmpipe_models.drives import NO_SPRING, Drive, DrivenJoint, Gains, HeldJoint, ReliefSpring
 from urmpipe_models.errors import RobotError
-from urmpipe_models.robots.robot_file import chain_from_dict, chain_to_dict, read_robot_file, robot_toml
+from urmpipe_models.robots.toml import chain_from_dict, chain_to_dict, read_robot_file, robot_toml
 from urmpipe_models.robots.urdf_writer import urdf_text
 
 Read = Callable[[str], Chain]

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from asserting import refusal
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.errors import RobotError
-from urmpipe_models.robots.robot_file import read_robot_file
+from urmpipe_models.robots.toml import read_robot_file
 from urmpipe_models.robots.urdf_writer import write_urdf
 
 Read = Callable[[str], Chain]

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from asserting import refusal
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
 from urmpipe_models.errors import RobotError
-from urmpipe_models.kinematics.frames import joint_values
-from urmpipe_models.robots.urdf_reader import read_urdf
-from urmpipe_models.transform import translation
+from urmpipe_models.kinematics.forward import joint_values
+from urmpipe_models.math3d import translation
+from urmpipe_models.robots.urdf import read_urdf
 
 ARM = """<robot name="arm">
   <link name="root"/> <link name="a"/> <link name="b"/> <link name="c"/> <link name="flange"/>

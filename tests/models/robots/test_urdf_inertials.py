@@ -14,14 +14,13 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from asserting import refusal
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.inertial import Inertial
+from urmpipe_models.arm.chain import Chain, Inertial, Joint
 from urmpipe_models.dynamics.links import check_masses, links_of
 from urmpipe_models.errors import RobotError
-from urmpipe_models.robots.robot_file import chain_from_dict, chain_to_dict
-from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.math3d import translation
+from urmpipe_models.robots.toml import chain_from_dict, chain_to_dict
+from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_models.robots.urdf_writer import urdf_text, write_urdf
-from urmpipe_models.transform import translation
 
 Read = Callable[..., Chain]
 

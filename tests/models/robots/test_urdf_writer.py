@@ -12,17 +12,15 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.dh import DHRow, dh_chain
-from urmpipe_models.chains.solids import solids_of
-from urmpipe_models.chains.visual import Capsule, Cylinder, Sphere
+from urmpipe_models.arm.chain import Capsule, Chain, Cylinder, Joint, Sphere
+from urmpipe_models.arm.geometric_models import DHRow, dh_chain
+from urmpipe_models.arm.solids import solids_of
 from urmpipe_models.errors import OutputError, RobotError
-from urmpipe_models.kinematics.forward import forward
-from urmpipe_models.kinematics.frames import joint_values
+from urmpipe_models.kinematics.forward import forward, joint_values
+from urmpipe_models.math3d import from_offset
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_models.robots.urdf_writer import urdf_text, write_urdf
-from urmpipe_models.transform import from_offset
 
 SAME = 1e-12
 """What the issue asks for; four frames that pass through angles and back err by 1e-15 each."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from urmpipe_models.errors import OutputError
-from urmpipe_models.robots.written import EXPORT_MARK, is_export, replace_text, write_export
+from urmpipe_models.files import EXPORT_MARK, is_export, replace_text, write_export
 
 NO_EXPORT = (
     "found a file that is not a robot export of urmpipe, allowed: a new name, or such an export to replace"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from made_runs import TSP, path_run, run_of
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 

@@ -14,11 +14,11 @@ from scipy.spatial.transform import Rotation
 
 from asserting import refusal, there
 from made_runs import path_run, run_of
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.math3d import Transform, from_offset, from_rpy
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform, from_offset, from_rpy
 from urmpipe_pipeline.comparison.alignment import RESOLVED, as_option, placed
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation

@@ -15,9 +15,9 @@ from hypothesis.extra import numpy as hnp
 
 from asserting import refusal, there
 from made_runs import off
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
-from urmpipe_models.transform import translation
+from urmpipe_models.math3d import translation
 from urmpipe_pipeline.comparison.baseline import DEFAULT_NOISE, against_baseline, complete_noise, parse_noise
 from urmpipe_pipeline.comparison.baseline_section import worse_words
 from urmpipe_pipeline.comparison.change import Absent, Difference

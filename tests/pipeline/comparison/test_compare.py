@@ -10,11 +10,11 @@ import pytest
 
 from asserting import refusal, there
 from made_runs import TSP, URM6, path_run, run_of
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.visual import Mesh, Visual
+from urmpipe_models.arm.chain import Mesh, Visual
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics.forward import points_over_log, positions_over_log
-from urmpipe_models.transform import translation
+from urmpipe_models.math3d import translation
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.joint_log import LogColumn, LogWarning
 from urmpipe_pipeline.meshes import missing_visuals

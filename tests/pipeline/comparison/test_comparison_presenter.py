@@ -12,7 +12,7 @@ import pytest
 from asserting import there
 from made_runs import off
 from presented import Untouched, cells, every_section, facts, figures, scene_of
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.comparison import Comparison

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 import urmpipe
 from urmpipe.main import run
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.orientation import angle_between, quaternions
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import angle_between, quaternions
 from urmpipe_pipeline.comparison.compare import compare_runs
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.provenance import provenance

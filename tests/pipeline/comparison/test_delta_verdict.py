@@ -10,8 +10,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from asserting import refusal, there
-from urmpipe_models.arrays import FloatArray
 from urmpipe_models.delta import delta as model_delta
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison.delta_verdict import delta_verdict
 from urmpipe_pipeline.comparison.deviation import AXES, KINDS

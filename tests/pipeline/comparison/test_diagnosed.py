@@ -11,8 +11,7 @@ from asserting import refusal, there
 from diagnoses import LENGTH, SIGN, diagnosis_of
 from made_runs import off, path_run, run_of
 from presented import cells, facts, figures, scene_of
-from urmpipe_models.errors import OptionError
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Hint, OptionError
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.facts import decisive_facts

@@ -17,7 +17,7 @@ from asserting import there
 from exported import export_result
 from made_runs import path_run
 from thinned_logs import lay_thinned_logs
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation

@@ -13,12 +13,11 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from asserting import refusal, there
 from made_runs import path_run, run_of
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
-from urmpipe_models.orientation import RotationForm
+from urmpipe_models.math3d import RotationForm, translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import translation
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation

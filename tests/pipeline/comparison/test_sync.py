@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from asserting import refusal, there
 from urmpipe_datasets import LOGS
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison import sync_coarse

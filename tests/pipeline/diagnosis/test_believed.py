@@ -10,8 +10,8 @@ import pytest
 from scipy.signal import lfilter
 
 import urmpipe
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import FARTHEST, Chain
+from urmpipe_models.arm.chain import FARTHEST, Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.diagnosis.result import Cause, Diagnosis

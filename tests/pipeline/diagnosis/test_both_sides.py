@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import urmpipe
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.math3d import Transform
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform
 from urmpipe_pipeline.comparison.facts import remedy_hints
 from urmpipe_pipeline.diagnosis.result import Diagnosis
 

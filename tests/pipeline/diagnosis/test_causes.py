@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 from altered_arm import called, nominal, poses, rich_motion, state_of, times
 from rail_arm import rail_arm
 from sliding_arm import sliding_arm
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.dynamics.energy import potential_energy
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.dynamics.links import potential_energy
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.math3d import Transform, from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.transform import Transform, from_offset, translation
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.arm_groups import base_groups, cause_groups, joint_groups, tool_groups
 from urmpipe_pipeline.diagnosis.hypotheses import Group, numbered, zero

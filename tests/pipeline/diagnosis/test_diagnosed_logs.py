@@ -10,7 +10,7 @@ import pytest
 from altered_arm import DURATION, demo_motion, poses, rich_motion, times, uniform
 from altered_log import POSES, TRACKER, diagnosed, diagnosed_record, drawn, tracked
 from made_runs import path_run, run_of
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.diagnosis.result import Diagnosis

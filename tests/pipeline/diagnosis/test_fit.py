@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from altered_arm import altered, arm_model, called, nominal, rich_motion, spoilt, state_of, times, uniform
 from normal_equations import normal_of
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.fit import Rows, cost, fitted, inliers, normal_equations, residual

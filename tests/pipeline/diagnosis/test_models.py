@@ -24,10 +24,10 @@ from altered_arm import (
 from differences import assert_slope
 from rail_arm import rail_arm
 from sliding_arm import sliding_arm
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import Transform
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.arm_groups import base_groups, joint_groups, time_groups, tool_groups
 from urmpipe_pipeline.diagnosis.fit import Model

@@ -27,8 +27,8 @@ from altered_arm import (
     uniform,
 )
 from rail_arm import rail_arm
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.diagnosis.explain import ExplanationBuilder
 from urmpipe_pipeline.diagnosis.explanations import SearchResult

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 import urmpipe
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.diagnosis.result import Cause, Diagnosis
 
 D, A = (0.3, 0.0, 0.0, 0.35, 0.0, 0.09), (0.05, 0.4, 0.03, 0.0, 0.0, 0.0)  # [m]

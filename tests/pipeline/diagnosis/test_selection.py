@@ -10,7 +10,7 @@ import pytest
 
 from altered_arm import called, nominal, rich_motion, times
 from normal_equations import normal_of
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.diagnosis.fit import Rows, normal_equations
 from urmpipe_pipeline.diagnosis.hypotheses import State

@@ -15,7 +15,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 
 from toys import figure, shown
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.figures.plot import plot
 from urmpipe_pipeline.figures.sheet import BAND, FAULT, MUTED, Sheet

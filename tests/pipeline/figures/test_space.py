@@ -10,7 +10,7 @@ from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
 from toys import shown
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.figures.plot import plot
 from urmpipe_pipeline.figures.sheet import Sheet
 from urmpipe_pipeline.palette import BEYOND_SCALE, VALUE_SCALE, WITHIN_SCALE

@@ -13,7 +13,7 @@ import urmpipe
 from asserting import refusal
 from repeated import along, curve, eight, judged, logs, repeated, still, told, value, written
 from urmpipe.main import run as command_line
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.comparison.comparison import Comparison
 

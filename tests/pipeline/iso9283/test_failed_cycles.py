@@ -17,7 +17,7 @@ from asserting import there
 from made_runs import path_run
 from repeated import along, logs, written
 from urmpipe.main import run
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.iso_cycles import IsoOptions

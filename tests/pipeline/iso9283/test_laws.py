@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from repeated import PLACE, along, logs, overall, still, told, value, values_of, written
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.orientation import matrices, quaternions
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import matrices, quaternions
 from urmpipe_pipeline.iso9283.criteria import UNITS
 from urmpipe_pipeline.iso9283.result import IsoTest
 from urmpipe_pipeline.iso9283.spread import repeatability

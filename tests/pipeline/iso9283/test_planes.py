@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from repeated import Drawn, along, curve, eight, logs, overall, told, value, written
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.iso9283.result import CutPath, IsoTest
 
 EXACT = 1e-12

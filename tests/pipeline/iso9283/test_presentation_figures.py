@@ -16,7 +16,7 @@ from made_runs import URM6, path_run, run_of
 from presented import scene_of
 from recorded import entities, static, times_of
 from repeated import along
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.iso_cycles import IsoOptions

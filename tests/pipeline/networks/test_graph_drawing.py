@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from made_networks import NAMES, found
-from urmpipe_models.networks.graph import graph_of
+from urmpipe_models.networks.mechanism import graph_of
 from urmpipe_models.networks.parts import Body
 from urmpipe_pipeline.networks.drives import caption, is_driven, ties
 from urmpipe_pipeline.networks.graph_drawing import graph_svg

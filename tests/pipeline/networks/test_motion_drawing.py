@@ -17,13 +17,10 @@ from network_motions import DrivenNetwork, drive
 from presented import scene_of
 from recorded import entities, rows_of, static, times_of, views
 from toys import eye_of, recorded, shown
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.elementwise import ZERO, Vector
-from urmpipe_models.networks.expressions import Expression
-from urmpipe_models.networks.network import Network
-from urmpipe_models.networks.network_file import load_network
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Joint, frame_of
-from urmpipe_models.orientation import matrices
+from urmpipe_models.elementwise import ZERO, FloatArray, Vector
+from urmpipe_models.math3d import matrices
+from urmpipe_models.networks.file import Network, load_network
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_of
 from urmpipe_pipeline.networks.finding import Search, find_network
 from urmpipe_pipeline.networks.motion_drawing import (
     MovingNetwork,

@@ -13,7 +13,7 @@ from made_networks import NAMES, found
 from presented import scene_of
 from recorded import entities, static, views
 from same_results import assert_same
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.networks.parts_in_space import Part, Placed, parts, placed
 from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.networks.scene import FEW, MANY, shown_assembly

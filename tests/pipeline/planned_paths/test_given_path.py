@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from asserting import there
 from urmpipe_models.errors import LogError, OptionError, PathError, UrmpipeError
-from urmpipe_models.planning.cube import PLANES, cube_rows
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.planning.path import PLANES, PathRows, cube_rows
 from urmpipe_pipeline.planned_paths.given_path import PathLike, given_path
 from urmpipe_pipeline.sources import ReadOptions
 

@@ -10,9 +10,9 @@ import pytest
 from asserting import there
 from made_plans import FAILED, SMALL, limited, over_its_axis, planned
 from presented import figures
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.planning.path import PathRows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.planned_paths.figures import MARKED
 from urmpipe_pipeline.planned_paths.planned_joints import FOLLOWED

@@ -10,11 +10,10 @@ import pytest
 from asserting import there
 from made_plans import CONTOUR, DOWN, FAILED, over_its_axis, planned
 from presented import scene_of
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import points_over_log
-from urmpipe_models.orientation import matrices
-from urmpipe_models.planning.cube import cube_rows
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.math3d import matrices
+from urmpipe_models.planning.path import PathRows, cube_rows
 from urmpipe_pipeline.planned_paths.obstacles import ObstacleKind
 from urmpipe_pipeline.planned_paths.planes import outlines
 from urmpipe_pipeline.planned_paths.result import PlannedPath

@@ -19,14 +19,13 @@ from made_plans import (
     over_its_axis,
     planned,
 )
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError, PathError
-from urmpipe_models.inverse.targets import Targets, misses
-from urmpipe_models.orientation import matrices, quaternions
-from urmpipe_models.planning.cube import cube_rows
+from urmpipe_models.ik.solutions import Targets, misses
+from urmpipe_models.math3d import matrices, quaternions
 from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.planning.path import PathRows, cube_rows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.planned_paths.given_path import given_path
 from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints

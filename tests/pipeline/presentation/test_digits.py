@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Hint
 from urmpipe_pipeline.presentation.digits import unit_of, written
 from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Value
 from urmpipe_pipeline.text import NOTHING

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from solved import solved
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.urm import urm_chain
-from urmpipe_models.inverse.targets import targets_of
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import targets_of
 from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs

@@ -17,14 +17,12 @@ from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
 
 from same_results import assert_same
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray, TextArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.drives.controller import Gains
-from urmpipe_models.drives.drive import Drive
-from urmpipe_models.drives.joint_drives import DrivenJoint, HeldJoint
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.drives import Drive, DrivenJoint, Gains, HeldJoint
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, TextArray
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.robots.robot_file import robot_toml
+from urmpipe_models.robots.toml import robot_toml
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording.array_form import CodecError
 from urmpipe_pipeline.recording.codec import decode, encode

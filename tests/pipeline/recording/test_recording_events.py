@@ -6,7 +6,7 @@ from pathlib import Path
 
 from recorded import columns, rows_of
 from toys import figure, panel, recorded, shown, toy
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Hint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.section import Event
 

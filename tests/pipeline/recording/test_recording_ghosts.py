@@ -17,13 +17,13 @@ from rerun.chunk import RrdReader
 from recorded import rows_of, static
 from same_results import assert_same
 from solved import solved
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import Targets
 from urmpipe_models.kinematics.forward import points_over_log
-from urmpipe_models.orientation import matrices
+from urmpipe_models.math3d import matrices
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_pipeline.palette import GHOST_COLOURS, rgb, run_colour
 from urmpipe_pipeline.presentation.figure import Figure
 from urmpipe_pipeline.presentation.scene import Arm

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from recorded import times_of
 from same_results import assert_same
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray, TextArray
-from urmpipe_models.spelling import Voice
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, TextArray
+from urmpipe_models.errors import Voice
 from urmpipe_pipeline import results
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Presentation, Section

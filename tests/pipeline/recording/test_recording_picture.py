@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from made_plans import FAILED, SMALL, limited, planned
 from toys import eye_of
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.solids import solids_of
-from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.arm.solids import solids_of
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import Targets
 from urmpipe_models.kinematics.forward import frames_over_log
-from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import (
     AXIS_COLOURS,

@@ -13,17 +13,14 @@ import pytest
 
 from recorded import columns, entities, static, times_of, views
 from toys import STEP_NS, eye_of, recorded, shown, toy
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.chains.solids import solids_of
-from urmpipe_models.chains.visual import Box, Mesh, Sphere, Visual
-from urmpipe_models.dynamics.over_log import mass_centres_over_log
+from urmpipe_models.arm.chain import Box, Chain, Inertial, Joint, Mesh, Sphere, Visual
+from urmpipe_models.arm.solids import solids_of
+from urmpipe_models.dynamics.equations import mass_centres_over_log
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.math3d import from_offset, quaternions
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.robots.urdf_reader import read_urdf
-from urmpipe_models.transform import from_offset
+from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import JOINT_COLOURS, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.scene import ArmMark, Balls, Scene, Spot

@@ -11,8 +11,8 @@ from rerun.chunk import RrdReader
 
 from recorded import static
 from solved import solved
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import Targets
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.palette import AXIS_COLOURS, rgb
 from urmpipe_pipeline.presentation import scene as presentation

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_models.repolarizer import FULL_TURN
-from urmpipe_models.transform import translation
+from urmpipe_models.math3d import translation
+from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
 from urmpipe_pipeline.repolarization.audit import Audited, audit_log
 from urmpipe_pipeline.results import read_recording, write_recording

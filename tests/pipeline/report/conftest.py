@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import point_over_log
-from urmpipe_models.repolarizer import repolarize
+from urmpipe_models.wraps import repolarize
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.report.spec import Panel, stacked, time_axis, typed
 from urmpipe_pipeline.report.traces import line, pointer_digits, precision, shaded, told
 

@@ -13,13 +13,12 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_np
 
 from asserting import refusal, there
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.errors import LogError, OptionError
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Hint, LogError, OptionError
 from urmpipe_models.kinematics.forward import positions_over_log
-from urmpipe_models.messages import Hint
+from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import translation
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.sources import ReadOptions
 

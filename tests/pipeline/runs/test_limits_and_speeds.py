@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from arm_motion import arm, clock, found, swing
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_pipeline.joint_log import LogWarning
 
 

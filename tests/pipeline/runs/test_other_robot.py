@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from asserting import there
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.arm.geometric_models import urm_chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
+from urmpipe_models.math3d import Transform
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.other_robot import on_robot

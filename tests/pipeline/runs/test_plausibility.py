@@ -10,8 +10,8 @@ import pytest
 
 from arm_motion import KINDS, arm, clock, found, log_of, swing
 from urmpipe_datasets import LOGS
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.messages import Hint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Hint
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.repolarization.joint_motion import format_steps, largest_steps

@@ -9,7 +9,7 @@ import pytest
 
 from asserting import there
 from urmpipe_datasets import LOGS
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import jacobian_over_log, positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry

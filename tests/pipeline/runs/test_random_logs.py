@@ -21,10 +21,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.repolarizer import FULL_TURN
-from urmpipe_models.transform import translation
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.math3d import translation
+from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
 from urmpipe_pipeline.repolarization.audit import Audited, audit_log
 

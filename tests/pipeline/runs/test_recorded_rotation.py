@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from asserting import there
 from exported import export_result
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.orientation import NAMES, RotationForm, width
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.math3d import NAMES, RotationForm, width
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from asserting import there
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log, positions_over_log
+from urmpipe_models.math3d import from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.transform import from_offset, translation
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.recorded_start import outlying_start

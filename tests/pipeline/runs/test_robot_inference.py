@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
+from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot, moving_differently
-from urmpipe_models.transform import translation
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
 

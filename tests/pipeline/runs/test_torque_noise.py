@@ -12,9 +12,9 @@ import pytest
 from arm_motion import clock
 from asserting import there
 from presented import cells, figures
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.dynamics.over_log import torque_over_log
-from urmpipe_models.messages import Hint
+from urmpipe_models.dynamics.equations import torque_over_log
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Hint
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.section import Table

@@ -19,11 +19,10 @@ from made_plans import DOWN, SMALL, limited, planned
 from panda_log import URDF, motion, panda, panda_csv
 from presented import cells, figures, scene_of
 from recorded import rows_of
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.chains.inertial import Inertial
-from urmpipe_models.dynamics.over_log import energies_over_log, torque_over_log
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.arm.chain import Chain, Inertial, Joint
+from urmpipe_models.dynamics.equations import energies_over_log, torque_over_log
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.planning.path import PathRows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.json_values import json_ready
 from urmpipe_pipeline.presentation.figure import Drawing, Figure

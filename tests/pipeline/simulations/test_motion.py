@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from asserting import refusal
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.simulations.motion import moving_blocks, run_of_block

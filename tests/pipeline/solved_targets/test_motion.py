@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from solved import FILE, solved
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_models.inverse.targets import targets_of
+from urmpipe_models.ik.solutions import targets_of
 from urmpipe_models.kinematics.forward import points_over_log, positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs

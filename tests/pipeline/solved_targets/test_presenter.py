@@ -10,11 +10,10 @@ import pytest
 
 import urmpipe
 from solved import solved
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.inverse.search import USUAL_SEARCH
-from urmpipe_models.inverse.targets import misses, targets_of
-from urmpipe_models.orientation import matrices
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import USUAL_SEARCH, misses, targets_of
+from urmpipe_models.math3d import matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.presentation.figure import Figure
 from urmpipe_pipeline.presentation.section import Presentation, Table, Value

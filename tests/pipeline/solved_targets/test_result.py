@@ -10,7 +10,7 @@ import pytest
 import urmpipe
 from solved import solved
 from urmpipe_models.errors import LogError
-from urmpipe_models.inverse.targets import targets_of
+from urmpipe_models.ik.solutions import targets_of
 from urmpipe_models.robots.catalogue import load_robot
 
 UR5E = load_robot("ur5e")

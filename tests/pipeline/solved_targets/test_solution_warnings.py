@@ -9,9 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_models.inverse.closed.closed_form import method_words
-from urmpipe_models.inverse.solutions import Singular, Solutions
-from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.ik.closed import method_words
+from urmpipe_models.ik.solutions import Singular, Solutions, Targets, targets_of
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning

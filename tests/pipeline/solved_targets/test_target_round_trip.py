@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.solved_targets.target_file import TargetFile, read_targets
 
 STYLES = ((",", "."), (";", ","), (";", "."), ("\t", "."), ("\t", ","), (" ", "."), ("|", "."))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from asserting import INCREASE, OTHER_TIME
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import read_log

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from asserting import refusal
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import ReadOptions, read_log

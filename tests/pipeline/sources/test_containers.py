@@ -32,8 +32,7 @@ from rosbags.rosbag2 import Writer as Ros2Writer
 from rosbags.typesys import Stores, get_typestore
 
 from asserting import refusal
-from urmpipe_models.errors import LogError
-from urmpipe_models.spelling import python_command
+from urmpipe_models.errors import LogError, python_command
 from urmpipe_pipeline.sources import ReadOptions, read_log
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 

@@ -9,10 +9,10 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
+from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import translation
 from urmpipe_pipeline.joint_log import JointLog
 
 Read = Callable[..., JointLog]

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import urmpipe
 from asserting import refusal
 from urmpipe.main import run
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import PASSED_OVER
 from urmpipe_pipeline.sources import ReadOptions, read_log

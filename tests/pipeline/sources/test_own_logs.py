@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 

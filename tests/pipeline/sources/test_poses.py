@@ -12,10 +12,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from asserting import INCREASE
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.orientation import RotationForm, quaternions
+from urmpipe_models.math3d import RotationForm, quaternions
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import ROW_NS, JointLog
 from urmpipe_pipeline.sources import ReadOptions, map_of, read_log, read_map

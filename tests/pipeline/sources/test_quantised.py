@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from urmpipe_models.arrays import IntArray
+from urmpipe_models.elementwise import IntArray
 from urmpipe_pipeline.sources.clocks.quantised import behind_repeated, behind_rounded
 
 MS = 1_000_000

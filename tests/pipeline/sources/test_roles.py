@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.math3d import quaternions
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources.cells.cell import grouped_number
 

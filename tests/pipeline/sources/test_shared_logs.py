@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import urmpipe
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import PASSED_OVER

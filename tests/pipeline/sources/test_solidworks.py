@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from asserting import refusal
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.sources import ReadOptions, read_log
 

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from make_specimens import paths
 from specimen import SPECIMENS, Truth
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog

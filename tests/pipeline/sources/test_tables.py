@@ -11,7 +11,7 @@ import pandas as pd
 import pyarrow.csv
 import pytest
 
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import read_log, source_names

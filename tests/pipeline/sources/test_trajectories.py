@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import ReadOptions, read_log
 

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError
 from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import translation
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.repolarization.audit import turning
 from urmpipe_pipeline.runs.ingest import ingest_log

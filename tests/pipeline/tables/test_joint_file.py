@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import LogError, OutputError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.outputs import guarded_output

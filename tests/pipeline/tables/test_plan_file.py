@@ -12,7 +12,7 @@ import urmpipe
 from asserting import there
 from plan_logs import PATHS, planned, planned_alone, written_plan
 from urmpipe_models.errors import OutputError
-from urmpipe_models.planning.rows import PathRows
+from urmpipe_models.planning.path import PathRows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.outputs import PATH_ROW, TARGET_ROW, guarded_output
 from urmpipe_pipeline.runs.ingest import ingest_log

@@ -9,12 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.visual import Box, Mesh
-from urmpipe_models.dynamics.over_log import mass_centres_over_log
+from urmpipe_models.arm.chain import Box, Chain, Mesh
+from urmpipe_models.dynamics.equations import mass_centres_over_log
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
-from urmpipe_models.orientation import matrices
+from urmpipe_models.math3d import matrices
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, rgb
 from urmpipe_pipeline.presentation.scene import (
     Arm,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.recording.views.camera import in_the_picture
 
 NAME_SIZE = (0.3, 0.035)

@@ -10,7 +10,7 @@ from uuid import UUID
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, REFERENCE_COLOUR, rgb
 from urmpipe_pipeline.presentation.figure import Computed, Line, Mark, Panel, Shape, View

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.solids import solids_of
-from urmpipe_models.chains.visual import Box, Capsule, Colour, Cylinder, Mesh, Visual
+from urmpipe_models.arm.chain import Box, Capsule, Chain, Colour, Cylinder, Mesh, Visual
+from urmpipe_models.arm.solids import solids_of
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import frames_over_log
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.math3d import quaternions
 from urmpipe_pipeline.meshes import MEDIA_TYPES, drawable
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, rgb
 from urmpipe_pipeline.recording.sending import keys, shown_path

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import IntArray
+from urmpipe_models.elementwise import IntArray
 
 Bytes = NDArray[np.uint8]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import IntArray
+from urmpipe_models.elementwise import IntArray
 from urmpipe_pipeline.sources.cells.cell import DECIMALS, LONGEST_NS, is_number
 from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
 from urmpipe_pipeline.sources.vocabulary import vocabulary

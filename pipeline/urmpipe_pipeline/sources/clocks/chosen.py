@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Hint
 from urmpipe_pipeline.sources.cells.text_clock import Form
 from urmpipe_pipeline.sources.columns.columns import Column
 

@@ -9,9 +9,8 @@ from decimal import Decimal
 
 import numpy as np
 
-from urmpipe_models.arrays import IntArray
-from urmpipe_models.errors import Finding, OptionError, shown
-from urmpipe_models.messages import Hint
+from urmpipe_models.elementwise import IntArray
+from urmpipe_models.errors import Finding, Hint, OptionError, shown
 from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import LONGEST_NS
 from urmpipe_pipeline.sources.cells.text_cells import TextCells

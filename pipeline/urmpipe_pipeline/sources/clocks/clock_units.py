@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from urmpipe_models.errors import Finding, LogError, OptionError, shown
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, shown
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.chosen import EVEN, EXPONENTS, OTHER_TIME
 from urmpipe_pipeline.sources.clocks.halves import EPOCH

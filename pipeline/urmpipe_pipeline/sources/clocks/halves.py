@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.sources.clocks.chosen import EXPONENTS, Chosen
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.tables.sniff import Layout

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.errors import Finding, LogError, shown
-from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import width
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Finding, Hint, LogError, shown
+from urmpipe_models.math3d import width
 from urmpipe_pipeline.sources.clocks.chosen import EXPONENTS, Chosen
 from urmpipe_pipeline.sources.clocks.digits import dates_in_digits
 from urmpipe_pipeline.sources.clocks.halves import EPOCH, PERIODS, halves_beside

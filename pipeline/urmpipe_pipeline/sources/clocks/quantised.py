@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import IntArray
+from urmpipe_models.elementwise import IntArray
 
 LEAST_SHARE = 0.1
 """Steps of the rarer kind are at least this share of all where a single lost or doubled sample could make

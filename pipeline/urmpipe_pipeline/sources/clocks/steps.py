@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 Steps = Literal["even", "rough", "smooth", "rounded"]
 """How numbers increase: "rounded" have few digits, and may be a joint or a clock."""

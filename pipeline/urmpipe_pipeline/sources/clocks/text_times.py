@@ -11,9 +11,8 @@ from itertools import product
 
 import numpy as np
 
-from urmpipe_models.arrays import IntArray
-from urmpipe_models.errors import LogError, shown
-from urmpipe_models.messages import Hint
+from urmpipe_models.elementwise import IntArray
+from urmpipe_models.errors import Hint, LogError, shown
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import is_missing, is_number
 from urmpipe_pipeline.sources.cells.text_cells import Bytes, TextCells

@@ -10,8 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from urmpipe_models.errors import Finding, LogError, OptionError, shown
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, shown
 from urmpipe_pipeline.sources.clocks.chosen import Chosen
 from urmpipe_pipeline.sources.clocks.clock import Clock, clock_of
 from urmpipe_pipeline.sources.clocks.clock_columns import given_time, time_columns

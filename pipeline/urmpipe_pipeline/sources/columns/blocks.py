@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray
+from urmpipe_models.elementwise import BoolArray, FloatArray
 
 CORRELATED = 0.9
 """Steps and rates of one joint correlate so: of measured rates 0.97 was seen, of torques and speeds less."""

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
-from urmpipe_models.errors import Finding, LogError, OptionError, shown
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, shown
 from urmpipe_pipeline.sources.cells.cell import count_numbers, is_missing
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.limits import refuse_wide

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import NoReturn
 
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.sources.columns.blocks import period_of
 from urmpipe_pipeline.sources.columns.columns import Column, Kind, listed
 from urmpipe_pipeline.sources.columns.families import (

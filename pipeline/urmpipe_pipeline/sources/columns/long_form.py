@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
-from urmpipe_models.spelling import python_command
+from urmpipe_models.errors import Finding, Hint, LogError, python_command
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.tables.sniff import Layout
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.orientation import FORMS, NAMES, width
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.math3d import FORMS, NAMES, width
 from urmpipe_pipeline.joint_log import ROLES, Inference
 from urmpipe_pipeline.outputs import MOTION_ROW, PATH_ROW, TARGET_ROW
 from urmpipe_pipeline.sources.columns.columns import Column

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError, shown
-from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import width
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.errors import Finding, Hint, LogError, shown
+from urmpipe_models.math3d import width
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, chosen_columns, listed
 from urmpipe_pipeline.sources.columns.pose import (

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, OptionError
-from urmpipe_models.orientation import FORMS, RotationForm, width
+from urmpipe_models.math3d import FORMS, RotationForm, width
 from urmpipe_pipeline.sources.cells.cell import to_float
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.families import Family, drop_unknown, find_families, prefer_measured

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.sources.columns.columns import Column
 
 RECORD = Hint("", does="record the missing one")

@@ -7,10 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import RotationForm
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.errors import Finding, Hint, LogError
+from urmpipe_models.math3d import RotationForm
 from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import grouped_number
 from urmpipe_pipeline.sources.columns.blocks import MOST_JOINTS

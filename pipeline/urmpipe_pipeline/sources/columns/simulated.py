@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.columns.questions import which_joints
 from urmpipe_pipeline.sources.columns.roles import Roles, check_count, joint_inference, not_used

@@ -11,8 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import RotationForm
+from urmpipe_models.errors import Hint
+from urmpipe_models.math3d import RotationForm
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, listed
 from urmpipe_pipeline.sources.columns.pose import Pose, have_length_1, transform_pose, with_form

@@ -8,9 +8,9 @@ from itertools import groupby
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.messages import Hint
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import BoolArray, FloatArray
+from urmpipe_models.errors import Hint
 from urmpipe_pipeline.sources.columns.blocks import SURE, proved_blocks
 from urmpipe_pipeline.sources.columns.columns import Column, listed
 from urmpipe_pipeline.sources.columns.questions import UNKNOWN, which_joints

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pyarrow as pa
 
-from urmpipe_models.arrays import IntArray
+from urmpipe_models.elementwise import IntArray
 from urmpipe_pipeline.sources.cells.text_cells import Bytes
 from urmpipe_pipeline.sources.tables.column_facts import UNIT
 

@@ -9,8 +9,8 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, OptionError, for_each, shown
 from urmpipe_pipeline.sources.tables import numpy_columns
 from urmpipe_pipeline.sources.tables.column_facts import ROLE, UNIT
@@ -115,7 +115,7 @@ def _poses(given: Any) -> FloatArray | None:
         return array
     if array.ndim != 3 or not len(array) or array.shape[1:] != (4, 4):
         raise _unfit("recorded_tcp", given, POSES)
-    from urmpipe_models.orientation import quaternions
+    from urmpipe_models.math3d import quaternions
 
     turned = quaternions(array[:, :3, :3].reshape(-1, 9), "matrix")
     return np.column_stack([array[:, :3, 3], turned])

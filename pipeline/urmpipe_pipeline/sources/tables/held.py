@@ -12,7 +12,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, shown
 from urmpipe_pipeline.joint_log import Inference, SourceFile
 from urmpipe_pipeline.sources.cells.cell import LONGEST_NS, is_text, to_float, to_nanoseconds

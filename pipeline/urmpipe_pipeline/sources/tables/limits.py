@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, LogError
 
 MOST_COLUMNS = 10_000
 """Columns of a table: a hundred times those of the widest recorders of robots."""

@@ -14,8 +14,7 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline import mat_variables
 from urmpipe_pipeline.isolated import AbortError, read_apart
 from urmpipe_pipeline.outputs import EXPORT_HEADER

@@ -17,9 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
-from urmpipe_models.spelling import python_command
+from urmpipe_models.errors import Finding, Hint, LogError, python_command
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.tables.held import Held
 from urmpipe_pipeline.sources.tables.limits import refuse_unpacked, refuse_wide

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-from urmpipe_models.errors import Finding, OptionError, for_each, shown
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, OptionError, for_each, shown
 from urmpipe_pipeline.joint_log import OWN, Inference
 from urmpipe_pipeline.sources.cells.cell import is_number
 from urmpipe_pipeline.sources.options import ReadOptions

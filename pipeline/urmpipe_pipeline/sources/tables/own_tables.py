@@ -9,7 +9,7 @@ from typing import Any, cast, get_args
 
 import pyarrow as pa
 
-from urmpipe_models.orientation import NAMES
+from urmpipe_models.math3d import NAMES
 from urmpipe_pipeline.joint_log import Role
 from urmpipe_pipeline.sources.tables.column_facts import ROLE, UNIT
 from urmpipe_pipeline.sources.tables.sniff import Layout

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.cells.cell import to_float
 from urmpipe_pipeline.sources.tables.numbers import Numbers

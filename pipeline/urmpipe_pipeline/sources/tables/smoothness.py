@@ -15,8 +15,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.repolarizer import FULL_TURN
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.wraps import FULL_TURN
 
 ROUGH = 0.1
 """What goes on as a motion has at most this share of the squared differences of what does not: swings with 14

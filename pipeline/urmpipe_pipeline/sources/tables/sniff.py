@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
 
-from urmpipe_models.errors import Finding, LogError, OptionError, shown
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, shown
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import (
     DECIMALS,

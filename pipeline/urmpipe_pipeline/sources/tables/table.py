@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import IntArray
+from urmpipe_models.elementwise import IntArray
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.tables.block_parser import Scales, clock_scales, parse_block
 from urmpipe_pipeline.sources.tables.blocks import byte_encoding, end_of_rows, row_blocks

@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.files.missing import meant_by
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, LogError
+from urmpipe_models.files import meant_by
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.sources.tables.limits import LONGEST_LINE, long_line
 from urmpipe_pipeline.sources.vocabulary import Container, vocabulary

@@ -13,9 +13,8 @@ from itertools import chain, islice
 import numpy as np
 import pyarrow as pa
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import is_missing, is_number, is_text, plain, split_line, to_float
 from urmpipe_pipeline.sources.tables.held import Held, layout_of

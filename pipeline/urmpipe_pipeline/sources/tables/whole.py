@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray
+from urmpipe_models.elementwise import BoolArray, FloatArray
 from urmpipe_pipeline.sources.cells.cell import count_numbers, is_missing
 from urmpipe_pipeline.sources.tables.numbers import ClockColumn, Numbers
 from urmpipe_pipeline.sources.tables.padding import end_rows

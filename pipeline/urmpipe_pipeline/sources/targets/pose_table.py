@@ -9,10 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.errors import Finding, LogError, OptionError, shown
-from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import FORMS, RotationForm, width
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, shown
+from urmpipe_models.math3d import FORMS, RotationForm, width
 from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.sources.clocks.time_file import named_file
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of, listed

@@ -6,10 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import RotationForm, angles, matrices, quaternions
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Finding, Hint, LogError
+from urmpipe_models.math3d import RotationForm, angles, matrices, quaternions
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, listed
 from urmpipe_pipeline.sources.columns.pose import ORTHOGONAL

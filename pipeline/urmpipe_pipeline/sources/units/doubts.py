@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_pipeline.joint_log import LogWarning, Role
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.units.unit_evidence import (

@@ -13,8 +13,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray
-from urmpipe_models.orientation import angle_between, conjugate, product
+from urmpipe_models.elementwise import BoolArray, FloatArray
+from urmpipe_models.math3d import angle_between, conjugate, quaternion_product
 
 Key = TypeVar("Key", bound=Hashable)
 
@@ -128,7 +128,7 @@ def turned_apart(computed: FloatArray, recorded: FloatArray, *, tool: bool) -> f
     """
     if not tool:
         return float(np.sqrt(np.mean(angle_between(computed, recorded) ** 2)))
-    relative = product(conjugate(computed), recorded)
+    relative = quaternion_product(conjugate(computed), recorded)
     mean = np.broadcast_to(mean_turn(computed, recorded), relative.shape)
     return float(np.sqrt(np.mean(angle_between(mean, relative) ** 2)))
 
@@ -140,5 +140,5 @@ def mean_turn(computed: FloatArray, recorded: FloatArray) -> FloatArray:
     (Markley et al. 2007, "Averaging quaternions", eq. 12). Computed and recorded orientations are unit
     quaternions x, y, z, w [-], shape (n, 4).
     """
-    relative = product(conjugate(computed), recorded)
+    relative = quaternion_product(conjugate(computed), recorded)
     return np.asarray(np.linalg.eigh(relative.T @ relative)[1][:, -1])

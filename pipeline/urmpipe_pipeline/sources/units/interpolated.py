@@ -16,11 +16,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.orientation import RotationForm, angle_between, conjugate, product, quaternions
-from urmpipe_models.repolarizer import FULL_TURN
+from urmpipe_models.math3d import RotationForm, angle_between, conjugate, quaternion_product, quaternions
+from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.units.evidence import mean_turn, spread
 from urmpipe_pipeline.sources.units.unit_evidence import ONE_TURN, peak
@@ -168,7 +168,7 @@ def _misses(
         return quaternions(computed.reshape(-1, 9), "matrix"), quaternions(rotation[at], form)
 
     def apart(pair: tuple[FloatArray, FloatArray], turn: FloatArray) -> FloatArray:
-        relative = product(conjugate(pair[0]), pair[1])
+        relative = quaternion_product(conjugate(pair[0]), pair[1])
         return angle_between(np.broadcast_to(turn, relative.shape), relative)
 
     own = both(usual)

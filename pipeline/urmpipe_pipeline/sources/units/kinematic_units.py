@@ -10,8 +10,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_pipeline.sources.units.evidence import Fit, clearly_worse, has_both, single_out, spread, tool_fit
 from urmpipe_pipeline.sources.units.unit_hints import OTHER_UNIT

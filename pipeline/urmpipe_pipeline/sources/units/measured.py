@@ -6,8 +6,8 @@ changes distances, and a tool only by its length: the measured points spread as 
 
 from __future__ import annotations
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.sources.units.evidence import extent, has_both, spread
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary

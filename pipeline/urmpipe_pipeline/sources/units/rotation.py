@@ -8,12 +8,12 @@ from functools import partial
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Hint
 from urmpipe_models.hand_eye import hand_eye, rotation_miss
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import FORMS, RotationForm, angles, matrices, quaternions, width
+from urmpipe_models.math3d import FORMS, RotationForm, angles, matrices, quaternions, width
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.units.evidence import spread, turned_apart

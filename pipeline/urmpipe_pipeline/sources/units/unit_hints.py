@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Hint
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.columns.columns import Column
 

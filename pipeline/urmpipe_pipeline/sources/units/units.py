@@ -11,11 +11,10 @@ import math
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain, JointKind
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
-from urmpipe_models.orientation import RotationForm, angles
+from urmpipe_models.arm.chain import Chain, JointKind
+from urmpipe_models.elementwise import FloatArray, IntArray
+from urmpipe_models.errors import Finding, Hint, LogError
+from urmpipe_models.math3d import RotationForm, angles
 from urmpipe_pipeline.joint_log import Inference, LogWarning, Role
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.inverse.along_path.nearest_turns import in_nearest_turns
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.ik.path_numeric import in_nearest_turns
 
 TURN = 2.0 * math.pi
 

@@ -11,14 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
-from urmpipe_models.inverse.along_path.jumps import jump_samples
-from urmpipe_models.inverse.along_path.path import follow
-from urmpipe_models.inverse.search import Search
-from urmpipe_models.inverse.solve import solve
-from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.ik.path import follow, jump_samples
+from urmpipe_models.ik.solutions import Search, Targets, targets_of
+from urmpipe_models.ik.solve import solve
 from urmpipe_models.robots.catalogue import load_robot
 
 ROUNDING = 1e-9

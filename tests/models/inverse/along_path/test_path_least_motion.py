@@ -9,19 +9,16 @@ import pytest
 from numpy.typing import NDArray
 
 from urmpipe_datasets import LOGS
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.inverse.along_path import sliding_window
-from urmpipe_models.inverse.along_path.joint_path import JointPath
-from urmpipe_models.inverse.along_path.least_motion_path import LeastMotionPath
-from urmpipe_models.inverse.along_path.path import follow
-from urmpipe_models.inverse.along_path.sliding_window import SlidingWindow
-from urmpipe_models.inverse.search import Search
-from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik import path_numeric as sliding_window
+from urmpipe_models.ik.path import JointPath, follow
+from urmpipe_models.ik.path_numeric import LeastMotionPath, SlidingWindow
+from urmpipe_models.ik.solutions import Search, Targets, misses, targets_of
 from urmpipe_models.kinematics.forward import jacobian_over_log
-from urmpipe_models.repolarizer import repolarize
+from urmpipe_models.math3d import Transform, translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform, translation
+from urmpipe_models.wraps import repolarize
 
 NANOMETRE = 1e-9
 """What the solver promises: targets are met within it."""

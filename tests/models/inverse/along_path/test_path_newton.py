@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from urmpipe_models.inverse.along_path.path_newton import DAMPING, recurrence, sweep
-from urmpipe_models.inverse.iterative.task import task_of
-from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.ik.path_numeric import DAMPING, recurrence, sweep
+from urmpipe_models.ik.solutions import Targets, targets_of
+from urmpipe_models.ik.task import task_of
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.robots.catalogue import load_robot
 

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 
 from asserting import there
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.chains.dh import DHRow, dh_chain, modified_dh_chain
-from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, exact_form
-from urmpipe_models.inverse.targets import targets_of
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.arm.geometric_models import DHRow, dh_chain, modified_dh_chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.closed import ClosedForm, closed_form, exact_form
+from urmpipe_models.ik.solutions import targets_of
 from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.math3d import Transform, from_offset
 from urmpipe_models.robots.catalogue import load_robot, robot_names
-from urmpipe_models.robots.robot_file import read_robot_file, robot_toml
-from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.robots.toml import read_robot_file, robot_toml
+from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_models.robots.urdf_writer import urdf_text
-from urmpipe_models.transform import Transform, from_offset
 
 FORMS = {
     **dict.fromkeys(("ur3", "ur3e", "ur5", "ur5e", "ur10", "ur10e"), "three parallel axes"),

@@ -12,23 +12,28 @@ import pytest
 
 from asserting import there
 from spherical_arms import KINDS, assert_reached, away_from, random_arm, random_joints
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.closed.closed_form import closed_form, exact_form
-from urmpipe_models.inverse.closed.idealised import compact, with_parallel_axes, with_spherical_wrist
-from urmpipe_models.inverse.closed.nearly import LOST, MET, NearlyClosedForm
-from urmpipe_models.inverse.closed.parallel_axes import parallel_axes
-from urmpipe_models.inverse.closed.spherical_wrist import spherical_wrist
-from urmpipe_models.inverse.closed.trigonometric import wrapped
-from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.inverse.solve import solve
-from urmpipe_models.inverse.targets import Targets, misses, targets_of
-from urmpipe_models.kinematics.forward import jacobian_over_log, poses_over_log
-from urmpipe_models.kinematics.screws import chain_of, screws
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.closed import (
+    LOST,
+    MET,
+    NearlyClosedForm,
+    closed_form,
+    compact,
+    exact_form,
+    with_parallel_axes,
+    with_spherical_wrist,
+)
+from urmpipe_models.ik.parallel import parallel_axes
+from urmpipe_models.ik.solutions import Solutions, Targets, misses, targets_of
+from urmpipe_models.ik.solve import solve
+from urmpipe_models.ik.spherical import spherical_wrist
+from urmpipe_models.ik.trigonometric import wrapped
+from urmpipe_models.kinematics.forward import chain_of, jacobian_over_log, poses_over_log, screws
+from urmpipe_models.math3d import from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_models.robots.urdf_writer import urdf_text
-from urmpipe_models.transform import from_offset, translation
 
 SINGULAR = 1e-2
 """Least singular value of the Jacobian (m and rad) from which on no branch may be lost."""

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from asserting import there
 from parallel_arms import EXACT, UR, WRISTS, apart, assert_every_solution_meets, form_of, poses, random_arm
 from urmpipe_models.errors import OptionError
-from urmpipe_models.inverse.closed.parallel_axes import parallel_axes
-from urmpipe_models.inverse.targets import Targets
-from urmpipe_models.kinematics.screws import screws
+from urmpipe_models.ik.parallel import parallel_axes
+from urmpipe_models.ik.solutions import Targets
+from urmpipe_models.kinematics.forward import screws
 from urmpipe_models.robots.catalogue import load_robot
 
 

@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 
 from asserting import there
 from parallel_arms import WRISTS, form_of, poses, random_arm
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.targets import Targets, targets_of
-from urmpipe_models.kinematics.screws import screws
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import Targets, targets_of
+from urmpipe_models.kinematics.forward import screws
 from urmpipe_models.kinematics.singularity import singularity_over_log
+from urmpipe_models.math3d import rotation_about
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import rotation_about
 
 
 def test_reasons_say_what_was_found_and_what_is_allowed() -> None:

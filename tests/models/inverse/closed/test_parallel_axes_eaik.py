@@ -9,10 +9,10 @@ import pytest
 from eaik.IK_HP import HPRobot
 
 from parallel_arms import UR, WRISTS, form_of, poses, random_arm
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.targets import Targets
-from urmpipe_models.kinematics.screws import screws
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import Targets
+from urmpipe_models.kinematics.forward import screws
 from urmpipe_models.robots.catalogue import load_robot
 
 

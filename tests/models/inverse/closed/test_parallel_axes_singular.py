@@ -9,11 +9,11 @@ import pytest
 from scipy.optimize import brentq
 
 from parallel_arms import EXACT, apart, assert_every_solution_meets, form_of, rotation_matrix
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import Targets, targets_of
+from urmpipe_models.math3d import Transform, from_offset
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform, from_offset
 
 
 def beside_axis_1(q: FloatArray) -> float:

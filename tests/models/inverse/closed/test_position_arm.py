@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from spherical_arms import assert_reached, away_from, inverse_of, random_arm, random_joints
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.inverse.targets import targets_of
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import targets_of
 
 NEARLY = {
     "axes 1 and 2 nearly meet": "a1",

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from urmpipe_models.inverse.closed.postures import SAME, Meeting, leave_out_equal, leave_out_second
+from urmpipe_models.ik.position_arm import SAME, Meeting, leave_out_equal, leave_out_second
 
 TURNING = np.array([True, True, False])
 NAMES = ("one", "two", "three")

@@ -22,13 +22,13 @@ from spherical_arms import (
     random_arm,
     random_joints,
 )
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.inverse.closed.spherical_wrist import spherical_wrist
-from urmpipe_models.inverse.targets import Targets, targets_of
-from urmpipe_models.kinematics.screws import Screws, screws
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import Targets, targets_of
+from urmpipe_models.ik.spherical import spherical_wrist
+from urmpipe_models.kinematics.forward import Screws, screws
+from urmpipe_models.math3d import from_offset, rotation_about, translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import from_offset, rotation_about, translation
 
 FOUND = 2e-5
 """The given joints come back to this, in [rad] or [m]: the digits that a pose near a fold of the arm has."""

@@ -9,11 +9,10 @@ import pytest
 
 from asserting import there
 from spherical_arms import SPECIAL, inverse_of, random_arm, random_joints
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.targets import targets_of
-from urmpipe_models.kinematics.forward import jacobian_over_log
-from urmpipe_models.kinematics.screws import screws
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import targets_of
+from urmpipe_models.kinematics.forward import jacobian_over_log, screws
 from urmpipe_models.robots.catalogue import load_robot
 
 CLEAR = 1e-2

@@ -9,12 +9,11 @@ import pytest
 
 from asserting import there
 from spherical_arms import assert_explained, assert_reached, away_from, inverse_of, random_arm
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.dh import DHRow, dh_chain
-from urmpipe_models.inverse.closed.spherical_wrist import BLOCK
-from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.arm.geometric_models import DHRow, dh_chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.solutions import Solutions, Targets, targets_of
+from urmpipe_models.ik.spherical import BLOCK
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.robots.catalogue import load_robot
 

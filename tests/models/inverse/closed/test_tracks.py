@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_models.inverse.closed.tracks import MEETING, circle_roots, is_straight, parabola_roots
-from urmpipe_models.inverse.closed.trigonometric import BOUNDARY
+from urmpipe_models.ik.trigonometric import BOUNDARY, MEETING, circle_roots, is_straight, parabola_roots
 
 numbers = st.floats(0.1, 3.0) | st.floats(-3.0, -0.1)
 ROUNDING = 1e-14

@@ -10,8 +10,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.inverse.closed.trigonometric import BOUNDARY, linear_roots, quadric_roots, wrapped
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.trigonometric import BOUNDARY, linear_roots, quadric_roots, wrapped
 
 ROUNDING = 4e-15  # an angle up to pi through atan2, a sum and a wrap
 factors = st.floats(-10.0, 10.0)

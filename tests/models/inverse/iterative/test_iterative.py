@@ -11,18 +11,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
+from urmpipe_models.arm.chain import Chain, Joint, Mimic
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
-from urmpipe_models.inverse.iterative.descent import METHODS, Method
-from urmpipe_models.inverse.iterative.refine import refine
-from urmpipe_models.inverse.iterative.task import redundancy, turn_between, turn_length
-from urmpipe_models.inverse.limits import limits_of
-from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.ik.numeric import METHODS, Method
+from urmpipe_models.ik.restarts import refine
+from urmpipe_models.ik.solutions import Targets, limits_of, misses, targets_of
+from urmpipe_models.ik.task import redundancy, turn_between, turn_length
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.kinematics.singularity import characteristic_length
+from urmpipe_models.math3d import from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import from_offset, translation
 
 MET = 1e-10
 """What is promised by default in [m] and [rad], and what forward kinematics confirms."""
@@ -288,7 +287,7 @@ def test_rows_are_solved_to_the_same_bits_alone_and_in_any_company(
         alone = refine(chain, targets.rows(slice(row, row + 1)), start[row])
         np.testing.assert_array_equal(alone.q[0], whole.q[row])
         assert alone.iterations[0] == whole.iterations[row]
-    monkeypatch.setattr("urmpipe_models.inverse.iterative.refine.BLOCK", 7)
+    monkeypatch.setattr("urmpipe_models.ik.restarts.BLOCK", 7)
     np.testing.assert_array_equal(refine(chain, targets, start, threads=3).q, whole.q)
 
 

@@ -8,17 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.inverse.iterative.descent import Settings
-from urmpipe_models.inverse.iterative.least_motion import AT_LIMIT, LEAST_MOTION, settle
-from urmpipe_models.inverse.iterative.refine import refine
-from urmpipe_models.inverse.iterative.task import task_of, turn_length
-from urmpipe_models.inverse.limits import limits_of
-from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.numeric import AT_LIMIT, LEAST_MOTION, Settings, settle
+from urmpipe_models.ik.restarts import refine
+from urmpipe_models.ik.solutions import Targets, limits_of, misses, targets_of
+from urmpipe_models.ik.task import task_of, turn_length
 from urmpipe_models.kinematics.forward import jacobian_over_log
+from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import translation
 
 
 def posed(robot: str, pose: bool, count: int, noise: float) -> tuple[Chain, Targets, FloatArray]:

@@ -9,16 +9,21 @@ import numpy as np
 import pytest
 
 from asserting import there
-from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.inverse.closed.closed_form import closed_form
-from urmpipe_models.inverse.iterative.refine import refine
-from urmpipe_models.inverse.iterative.restarts import DISTINCT, ROUGH, random_starts, solve_iteratively
-from urmpipe_models.inverse.limits import limits_of, within_limits
-from urmpipe_models.inverse.search import Search
-from urmpipe_models.inverse.solutions import NEAREST_POINT, Solutions
-from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.ik.closed import closed_form
+from urmpipe_models.ik.restarts import DISTINCT, ROUGH, random_starts, refine, solve_iteratively
+from urmpipe_models.ik.solutions import (
+    NEAREST_POINT,
+    Search,
+    Solutions,
+    Targets,
+    limits_of,
+    misses,
+    targets_of,
+    within_limits,
+)
+from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import translation
 
 MET = 1.01e-10
 """In [m] and [rad]: what is promised, and the rounding of the peer's rotation vector."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.inverse.iterative.small_systems import (
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.ik.task import (
     column_squares,
     dot_product,
     factor,

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.iterative.tool_motion import arm_of, tool_motion
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.ik.task import arm_of, tool_motion
 from urmpipe_models.kinematics.forward import jacobian_over_log, poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 

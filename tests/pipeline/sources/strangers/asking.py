@@ -11,10 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import UrmpipeError
-from urmpipe_models.messages import Hint, Message
+from urmpipe_models.arm.chain import Chain
+from urmpipe_models.elementwise import FloatArray
+from urmpipe_models.errors import Hint, Message, UrmpipeError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.sources import ReadOptions, read_log

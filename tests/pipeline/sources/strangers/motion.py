@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.math3d import quaternions
 from urmpipe_models.robots.catalogue import load_robot
 
 FASTEST = 2.0

@@ -25,7 +25,7 @@ from stranger import (
     table,
     unit_clock,
 )
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 EPOCH = 1_679_323_262.0
 NAMED = {"t": "time", "q": "q{}", "qd": "dq{}", "tau": "tau{}"}

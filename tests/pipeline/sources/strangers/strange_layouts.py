@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from asking import Truth
 from motion import Motion, moves, of_robot, sines, times
 from stranger import DEG, Stranger, strangers, told_by_rates
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 
 def stranger(

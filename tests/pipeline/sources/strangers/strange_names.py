@@ -27,7 +27,7 @@ from stranger import (
     table,
     unit_clock,
 )
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 
 
 def made(seed: int, joints: int = 6, rows: int = 200) -> Motion:

@@ -14,8 +14,8 @@ import pandas as pd
 
 from asking import Truth, Verdict, judge
 from motion import Motion
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.sources import ReadOptions
 

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from asking import Truth, judge, outcome
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.sources import ReadOptions

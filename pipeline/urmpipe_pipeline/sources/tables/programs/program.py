@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_pipeline.sources.options import ReadOptions
 
 

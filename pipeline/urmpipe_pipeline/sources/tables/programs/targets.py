@@ -16,7 +16,7 @@ from itertools import groupby
 import numpy as np
 import pyarrow as pa
 
-from urmpipe_models.messages import Hint
+from urmpipe_models.errors import Hint
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.tables.held import Held
 from urmpipe_pipeline.sources.tables.numpy_columns import column

@@ -1,0 +1,374 @@
+"""Arms from Denavit-Hartenberg parameters, in the standard and in Craig's modified form.
+
+Chains by the rows of a geometric model: rotations and translations about and along axes of their own.
+
+The articulated 6R arm of the geometric model: three joints for the place, three about one point.
+
+URM arms: universal rotational modules, one on the other, each tilted against the one before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from urmpipe_models.arm.chain import Chain, Joint, JointKind
+from urmpipe_models.elementwise import ZERO, Element, Vector
+from urmpipe_models.errors import RobotError
+from urmpipe_models.math3d import Step, Transform, made_of
+
+
+@dataclass(frozen=True, slots=True)
+class DHRow:
+    """One joint and one link, or a frame between two of them.
+
+    The coordinate q adds to theta of a revolute and to d of a prismatic joint, so that theta or d is
+    the joint's offset. A fixed row has no coordinate: an auxiliary frame, or a flange at the end.
+
+    Attributes:
+        theta: Angle about z in [rad], any element.
+        d: Way along z in [m], any element.
+        a: Link length along x in [m], any element; a_{i-1} in the modified form.
+        alpha: Link twist about x in [rad], any element; alpha_{i-1} in the modified form.
+        name: The joint's name; where it is empty q1, q2, ... by coordinate, and frame1, ... by row if fixed.
+        kind: revolute, prismatic or fixed.
+        lower: Least coordinate allowed, in [rad] or [m].
+        upper: Largest coordinate allowed, in [rad] or [m].
+        velocity: Largest speed, in [rad/s] or [m/s].
+        acceleration: Largest acceleration either way, in [rad/s2] or [m/s2].
+        effort: Largest torque or force either way, in [N.m] or [N].
+    """
+
+    theta: Element = 0.0
+    d: Element = 0.0
+    a: Element = 0.0
+    alpha: Element = 0.0
+    name: str = ""
+    kind: JointKind = "revolute"
+    lower: float = -math.inf
+    upper: float = math.inf
+    velocity: float = math.inf
+    acceleration: float = math.inf
+    effort: float = math.inf
+
+
+def dh_chain(
+    name: str,
+    rows: Sequence[DHRow],
+    *,
+    base: Transform | None = None,
+    tool: Transform | None = None,
+    start: Sequence[float] = (),
+    description: str = "",
+    source: str = "",
+) -> Chain:
+    """Return the arm of standard parameters: A_i = Rz(theta_i + q_i) Tz(d_i) Tx(a_i) Rx(alpha_i).
+
+    A joint moves first and its link follows, so that point p_i is the origin of DH frame i.
+
+    Args:
+        name: The robot's name.
+        rows: One a joint or fixed frame, from the base outwards.
+        base: Where DH frame 0 stands in the world.
+        tool: The tool centre point in the last DH frame.
+        start: Calibration pose q(0) in [rad] or [m].
+        description: One line for people.
+        source: Where the numbers come from.
+
+    Raises:
+        RobotError: If there is no row, names repeat, or start has another length.
+
+    Source: [DenavitHartenberg1955]_.
+    """
+    links = (made_of(*_screw_z(row, k), *_screw_x(row, k)) for k, row in enumerate(rows, start=1))
+    *origins, tip = made_of(), *links
+    return Chain(
+        name,
+        _joints(rows, origins),
+        tip=tip,
+        base=base or Transform(),
+        tool=tool or Transform(),
+        start=tuple(float(value) for value in start),
+        description=description,
+        source=source,
+    )
+
+
+def modified_dh_chain(
+    name: str,
+    rows: Sequence[DHRow],
+    *,
+    base: Transform | None = None,
+    tool: Transform | None = None,
+    start: Sequence[float] = (),
+    description: str = "",
+    source: str = "",
+) -> Chain:
+    """Return the arm of modified parameters: A_i = Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i + q_i) Tz(d_i).
+
+    A link comes first and its joint moves at its end: frame i sits on joint i, and point p_i is the
+    origin of frame i + 1, the last one the tool centre point.
+
+    Args:
+        name: The robot's name.
+        rows: One a joint or fixed frame, from the base outwards: alpha_{i-1}, a_{i-1}, theta_i, d_i.
+        base: Where frame 0 stands in the world.
+        tool: The tool centre point in the last frame.
+        start: Calibration pose q(0) in [rad] or [m].
+        description: One line for people.
+        source: Where the numbers come from.
+
+    Raises:
+        RobotError: If there is no row, names repeat, or start has another length.
+
+    Source: [Craig2005]_ section 3.4.
+    """
+    origins = [made_of(*_screw_x(row, k), *_screw_z(row, k)) for k, row in enumerate(rows, start=1)]
+    return Chain(
+        name,
+        _joints(rows, origins),
+        tip=made_of(),
+        base=base or Transform(),
+        tool=tool or Transform(),
+        start=tuple(float(value) for value in start),
+        description=description,
+        source=source,
+    )
+
+
+def _screw_z(row: DHRow, k: int) -> tuple[Step, Step]:
+    """Return Rz(theta) Tz(d) of row k, which commutes with the joint's own motion about and along z."""
+    return (
+        Step("about", "z", row.theta, f"theta_{k}", f"DH row {k}"),
+        Step("along", "z", row.d, f"d_{k}", f"DH row {k}"),
+    )
+
+
+def _screw_x(row: DHRow, k: int) -> tuple[Step, Step]:
+    """Return Tx(a) Rx(alpha) of row k."""
+    return (
+        Step("along", "x", row.a, f"a_{k}", f"DH row {k}"),
+        Step("about", "x", row.alpha, f"alpha_{k}", f"DH row {k}"),
+    )
+
+
+def _joints(rows: Sequence[DHRow], origins: Sequence[Transform]) -> tuple[Joint, ...]:
+    """Return the joints of rows, each at its origin."""
+    return tuple(
+        Joint(
+            name,
+            row.kind,
+            origin,
+            lower=row.lower,
+            upper=row.upper,
+            velocity=row.velocity,
+            acceleration=row.acceleration,
+            effort=row.effort,
+        )
+        for name, row, origin in zip(_names(rows), rows, origins, strict=True)
+    )
+
+
+def _names(rows: Sequence[DHRow]) -> Iterator[str]:
+    """Yield the name of every row, given or counted."""
+    coordinate = 0
+    for k, row in enumerate(rows, start=1):
+        coordinate += row.kind != "fixed"
+        yield row.name or (f"frame{k}" if row.kind == "fixed" else f"q{coordinate}")
+
+
+AXES = {
+    "x": (1.0, 0.0, 0.0),
+    "y": (0.0, 1.0, 0.0),
+    "z": (0.0, 0.0, 1.0),
+}
+"""Unit vectors by the names of axes."""
+
+
+@dataclass(frozen=True, slots=True)
+class GeometricRow:
+    """One joint of the model.
+
+    Attributes:
+        kind: R turns system T_k about an axis of its own by q_k in [rad]; T shifts it along one by q_k in
+            [m], and leaves it parallel to T_{k-1}.
+        axis: x, y or z.
+        r: r_k^{k-1}, the origin O_k in system T_{k-1} at q_k = 0, in [m], any elements.
+        name: The joint's name; q1, q2, ... where it is empty.
+    """
+
+    kind: Literal["R", "T"]
+    axis: Literal["x", "y", "z"]
+    r: Vector = ZERO
+    name: str = ""
+
+
+def geometric_chain(
+    name: str,
+    rows: Sequence[GeometricRow],
+    *,
+    tip: Vector = ZERO,
+    start: Sequence[float] = (),
+    description: str = "",
+    source: str = "",
+) -> Chain:
+    """Return the arm of a geometric model: joint k stands at r_k^{k-1} and is parallel to the one before.
+
+    Args:
+        name: The robot's name.
+        rows: One a joint, from the base outwards.
+        tip: r_{n+1}^n, the characteristic point of the gripper in the last system [m], any elements.
+        start: Calibration pose q(0) in [rad] or [m].
+        description: One line for people.
+        source: Where the numbers come from.
+
+    Raises:
+        RobotError: If there is no row, names repeat, or start has another length.
+
+    Source: [Geometric6R]_ eq. 1, 2.
+    """
+    return Chain(
+        name,
+        tuple(
+            Joint(
+                row.name or f"q{k}",
+                "revolute" if row.kind == "R" else "prismatic",
+                _shift(row.r, k),
+                AXES[row.axis],
+            )
+            for k, row in enumerate(rows, start=1)
+        ),
+        tip=_shift(tip, len(rows) + 1),
+        start=tuple(float(value) for value in start),
+        description=description,
+        source=source,
+    )
+
+
+def _shift(r: Vector, k: int) -> Transform:
+    """Return the frame at r_k, parallel to the one before."""
+    x, y, z = r
+    return made_of(
+        Step("along", "x", x, f"r{k}.x", f"geometric row {k}"),
+        Step("along", "y", y, f"r{k}.y", f"geometric row {k}"),
+        Step("along", "z", z, f"r{k}.z", f"geometric row {k}"),
+    )
+
+
+def articulated_6r_rows(l0: Element, l1: Element, l2: Element, l3: Element) -> tuple[GeometricRow, ...]:
+    """Return the joints of the arm: about z, x, x, z, x, z, the last three through one point.
+
+    Args:
+        l0: r_1^0, height of joint 1 in [m], any element.
+        l1: r_2^1, from joint 1 to joint 2 in [m].
+        l2: r_3^2, the upper arm in [m].
+        l3: r_4^3, the forearm in [m], to the wrist centre.
+
+    Source: [Geometric6R]_ eq. 21-26, 39.
+    """
+    return (
+        GeometricRow("R", "z", (0.0, 0.0, l0)),
+        GeometricRow("R", "x", (0.0, 0.0, l1)),
+        GeometricRow("R", "x", (0.0, 0.0, l2)),
+        GeometricRow("R", "z", (0.0, 0.0, l3)),
+        GeometricRow("R", "x"),
+        GeometricRow("R", "z"),
+    )
+
+
+def articulated_6r(
+    l0: Element,
+    l1: Element,
+    l2: Element,
+    l3: Element,
+    l4: Element,
+    *,
+    name: str = "articulated6r",
+    start: Sequence[float] = (),
+    description: str = "",
+    source: str = "",
+) -> Chain:
+    """Return the articulated 6R arm; at q = 0 it stands straight up, l0 + l1 + l2 + l3 + l4 high.
+
+    Args:
+        l0: Height of joint 1 in [m], any element.
+        l1: From joint 1 to joint 2 in [m].
+        l2: The upper arm in [m].
+        l3: The forearm in [m], to the wrist centre.
+        l4: From the wrist centre to the characteristic point of the gripper in [m].
+        name: The robot's name.
+        start: Calibration pose q(0) in [rad].
+        description: One line for people.
+        source: Where the numbers come from.
+
+    Source: [Geometric6R]_ Figure 2, eq. 21-26, 39.
+    """
+    rows = articulated_6r_rows(l0, l1, l2, l3)
+    chain = geometric_chain(name, rows, start=start, description=description, source=source)
+    lengths = enumerate((l0, l1, l2, l3, l4))
+    *links, tip = (made_of(Step("along", "z", length, f"l{k}", "6R length")) for k, length in lengths)
+    origins = (*links, made_of(), made_of())  # the wrist's axes meet
+    joints = (replace(joint, origin=at) for joint, at in zip(chain.joints, origins, strict=True))
+    return replace(chain, joints=tuple(joints), tip=tip)
+
+
+SEGMENT, TILT = "URM segment", "URM tilt"
+"""The sources of an arm's parameters."""
+
+
+def urm_chain(
+    name: str,
+    lengths: Sequence[Element],
+    tilts: Sequence[Element],
+    *,
+    directions: Sequence[float] = (),
+    start: Sequence[float] = (),
+    description: str = "",
+    source: str = "",
+) -> Chain:
+    """Return the chain of n modules: n + 1 segments r_i, n tilts theta_2..theta_{n+1}, n joints about z.
+
+    p_{i+1} = Rz1 [r_1 + sum_k prod_j (Ry_{j+1}(theta_{j+1}) Rz_{j+1}(phi_{j+1})) r_{k+1}]; the last segment
+    is the effector, tilted but not turned (there is no Rz_{n+1}).
+
+    Args:
+        name: The robot's name.
+        lengths: r_1..r_{n+1} in [m], any elements.
+        tilts: theta_2..theta_{n+1} in [rad], any elements.
+        directions: +1 or -1 a module; -1 for one that counter-rotates.
+        start: Calibration pose phi(0) in [rad].
+        description: One line for people.
+        source: Where the numbers come from.
+
+    Raises:
+        RobotError: If the counts do not fit each other.
+
+    Source: [UrmArm2021]_ eq. 1-8, Figure 1.
+    """
+    modules = len(tilts)
+    if len(lengths) != modules + 1 or modules < 1:
+        raise RobotError(
+            f"robot {name}: {len(lengths)} lengths and {modules} tilts; n modules need"
+            " n + 1 lengths and n tilts"
+        )
+    turns = tuple(directions) or (1,) * modules
+    if len(turns) != modules or any(turn not in (1, -1) for turn in turns):
+        raise RobotError(f"robot {name}: directions {list(turns)}; allowed: {modules} values, each 1 or -1")
+    *segments, end = (Step("along", "z", r, f"r{k}", SEGMENT) for k, r in enumerate(lengths, start=1))
+    turned = (Step("about", "y", tilt, f"theta{k}", TILT) for k, tilt in enumerate(tilts, start=2))
+    origins = [made_of(), *map(made_of, segments, turned)]
+    joints = [
+        Joint(f"phi{k}", "revolute", origin, (0.0, 0.0, float(turn)))
+        for k, (origin, turn) in enumerate(zip(origins, turns, strict=False), start=1)
+    ]
+    effector = Joint("effector", "fixed", origins[-1])
+    return Chain(
+        name,
+        (*joints, effector),
+        tip=made_of(end),
+        start=tuple(float(value) for value in start),
+        description=description,
+        source=source,
+    )

@@ -1,1 +1,0 @@
-"""What turns a joint: motor, gear and shaft, controller, set point."""

@@ -1,1 +1,0 @@
-"""Files in: TOML and XML read with every fault and its line."""

@@ -1,0 +1,442 @@
+"""Small symmetric positive definite systems, many at once: one array an entry.
+
+`numpy.linalg.solve` calls LAPACK once a system, which costs more than the Jacobian that a system of six
+unknowns is about. Here a matrix is an array of shape (k, k, n), so that an entry's n values lie side by side
+and each elimination is a few NumPy operations on all systems. Sums run term by term (see `_sum`): their
+rounding must not depend on n, or what one row comes to would depend on which others are solved beside it.
+Entries may be in any unit.
+
+Pose and Jacobian of the tool over many rows in few NumPy calls: a vector is one array of shape (3, n).
+
+The chain of `kinematics` has an array an entry, so that a symbol may stand there too. Here only numbers
+do, and x, y and z of a vector are worked on together: a batch of a few rows costs a tenth. Every joint
+turns about the z axis of a frame of its own, or slides along it,
+
+    T = C_0 Z(q_1) C_1 Z(q_2) ... Z(q_n) C_n,
+
+with constant transforms C that hold all the rest: base, origins, directions of the axes, frames that carry
+a sensor, tip and tool. Products with their 0 and 1 are left out.
+
+What an iterative inverse brings to zero: the tool's distance from its target, and the Jacobian of it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.arm.chain import Chain, Joint
+from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray, Vector, add, cross, scale
+from urmpipe_models.ik.solutions import Targets
+from urmpipe_models.kinematics.forward import jacobian_over_log, joint_values
+from urmpipe_models.kinematics.singularity import characteristic_length
+from urmpipe_models.math3d import Transform
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Factor:
+    """A = L D L^T, the Cholesky factor without square roots.
+
+    Attributes:
+        lower: L below its diagonal of ones [-], shape (k, k, n); what stands elsewhere is not used.
+        inverse: 1 / D_i in one over the unit of A, shape (k, n).
+    """
+
+    lower: FloatArray
+    inverse: FloatArray
+
+    def solve(self, b: FloatArray) -> FloatArray:
+        """Return x of A x = b, both of shape (k, n), b in any unit, x in that over the unit of A."""
+        x = np.array(b)
+        for j in range(len(x) - 1):
+            x[j + 1 :] -= self.lower[j + 1 :, j] * x[j]
+        x *= self.inverse
+        for j in range(len(x) - 1, 0, -1):
+            x[:j] -= self.lower[j, :j] * x[j]
+        return x
+
+
+def factor(A: FloatArray, damping: FloatArray | float = 0.0) -> Factor:
+    """Return the factor of A + mu I.
+
+    Where A is positive semidefinite no pivot D_i is less than mu. Rounding, which can make it so where A is
+    singular, is held to that: the factor is finite for any such A if mu > 0.
+
+    Args:
+        A: Symmetric, in any unit, shape (k, k, n); positive definite where mu is 0.
+        damping: mu in the same unit, not negative, shape (n,) or one for all.
+    """
+    lower, scaled, inverse = np.empty(A.shape), np.empty(A.shape), np.empty(A.shape[1:])
+    for j in range(len(A)):
+        column = A[j:, j] - product(lower[j:, :j], scaled[j, :j]) if j else A[:, 0]
+        np.divide(1.0, np.maximum(column[0] + damping, damping), out=inverse[j])
+        scaled[j + 1 :, j] = column[1:]
+        np.multiply(column[1:], inverse[j], out=lower[j + 1 :, j])
+    return Factor(lower, inverse)
+
+
+def gram(M: FloatArray) -> FloatArray:
+    """Return M M^T, shape (k, k, n), of matrices of shape (k, p, n) in any unit."""
+    return _sum("ipn,jpn->ijn", M, M)
+
+
+def product(M: FloatArray, x: FloatArray) -> FloatArray:
+    """Return M x, shape (k, n), of matrices of shape (k, p, n) and vectors of shape (p, n) in any unit."""
+    return _sum("kpn,pn->kn", M, x)
+
+
+def transposed_product(M: FloatArray, x: FloatArray) -> FloatArray:
+    """Return M^T x, shape (p, n), of matrices of shape (k, p, n) and vectors of shape (k, n) in any unit."""
+    return _sum("kpn,kn->pn", M, x)
+
+
+def dot_product(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return sum_k a_k b_k, shape (n,), of a and b of shape (k, n) in any unit."""
+    return _sum("kn,kn->n", a, b)
+
+
+def column_squares(M: FloatArray) -> FloatArray:
+    """Return the squared lengths, shape (p, n), of the columns of M, shape (k, p, n), in any unit."""
+    return _sum("kpn,kpn->pn", M, M)
+
+
+def outer_sum(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return sum_k a_k b_k^T, shape (p, r, n), of a, shape (k, p, n), and b, (k, r, n), in any units."""
+    return _sum("kpn,krn->prn", a, b)
+
+
+def rows_of(a: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
+    """Return some of the n of an array of shape (..., n) in any unit, their values side by side.
+
+    a[..., rows] has them a matrix apart, which makes all that follows several times as slow.
+    """
+    return np.take(a, rows, axis=-1)
+
+
+def _sum(subscripts: str, a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return a sum of products whose inner loop runs over the n systems, term after term for each.
+
+    Such is `numpy.einsum` where the n values lie side by side and are more than one; of one alone it would
+    sum in another order.
+    """
+    if a.shape[-1] == 1:
+        return np.asarray(np.einsum(subscripts, a.repeat(2, -1), b.repeat(2, -1))[..., :1])
+    return np.asarray(np.einsum(subscripts, _side_by_side(a), _side_by_side(b)))
+
+
+def _side_by_side(a: FloatArray) -> FloatArray:
+    """Return an array whose n values lie side by side."""
+    return a if a.strides[-1] == a.itemsize else np.ascontiguousarray(a)
+
+
+Terms: TypeAlias = tuple[tuple[int, float], ...]
+"""A constant vector by its entries that are not 0: which, and how much."""
+
+Columns: TypeAlias = tuple[FloatArray, FloatArray, FloatArray]
+"""The axes x, y, z of a frame in the world, each of shape (3, n), or (3, 1) where it does not move."""
+
+
+class ToolMotion(NamedTuple):
+    """Where the tool centre point is, and how every joint moves it, in the world.
+
+    Attributes:
+        position: In [m], shape (3, n).
+        columns: The axes x, y, z of the tool [-], shape (3, 3, n), first index: which.
+        jacobian: As `kinematics.jacobian` has it, in [m/rad] or [-], shape (6, joints, n).
+    """
+
+    position: FloatArray
+    columns: FloatArray
+    jacobian: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A constant transform C: its columns and its translation."""
+
+    columns: tuple[Terms, Terms, Terms]
+    translation: Terms
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arm:
+    """A chain made ready for `tool_motion`.
+
+    Attributes:
+        chain: The arm.
+        joints: Those that are not fixed.
+        steps: C_0 ... C_n, one before each joint and one after the last.
+    """
+
+    chain: Chain
+    joints: tuple[Joint, ...]
+    steps: tuple[Step, ...]
+
+
+@lru_cache(maxsize=32)
+def arm_of(chain: Chain) -> Arm:
+    """Return a chain made ready for `tool_motion`."""
+    between, joints, steps = chain.base, [], []
+    for joint in chain.joints:
+        between = between @ joint.origin
+        if joint.kind != "fixed":
+            upright = _upright(joint.axis)
+            steps.append(_step(between @ upright))
+            joints.append(joint)
+            between = upright.inverse()
+    steps.append(_step(between @ chain.tip @ chain.tool))
+    return Arm(chain, tuple(joints), tuple(steps))
+
+
+def _upright(axis: Vector) -> Transform:
+    """Return a frame whose z is a unit vector; of a coordinate axis its entries are 0 and +-1."""
+    along = max(range(3), key=lambda i: abs(axis[i]))
+    beside = [0.0, 0.0, 0.0]
+    beside[(along + 1) % 3] = 1.0
+    x = add((beside[0], beside[1], beside[2]), scale(-axis[(along + 1) % 3], axis))
+    x = scale(1.0 / math.hypot(*x), x)
+    return Transform(Transform((x, cross(axis, x), axis)).columns)
+
+
+def _step(frame: Transform) -> Step:
+    """Return a constant transform by its entries that are not 0."""
+    x, y, z = frame.columns
+    return Step((_terms(x), _terms(y), _terms(z)), _terms(frame.translation))
+
+
+def _terms(vector: Vector) -> Terms:
+    """Return the entries that are not 0."""
+    return tuple((i, float(weight)) for i, weight in enumerate(vector) if weight != 0.0)
+
+
+def tool_motion(arm: Arm, q: FloatArray) -> ToolMotion:
+    """Return pose and Jacobian of the tool centre point.
+
+    Args:
+        arm: Of the chain, by `arm_of`.
+        q: Joint values in [rad] or [m], shape (joints, n).
+    """
+    n = q.shape[1]
+    J, origins = np.empty((6, len(arm.joints), n)), np.empty((3, len(arm.joints), n))
+    values = _values(arm, q)
+    columns: Columns = (np.eye(3)[:, :1], np.eye(3)[:, 1:2], np.eye(3)[:, 2:])
+    point: FloatArray = np.zeros((3, 1))
+    for i, (joint, step) in enumerate(zip(arm.joints, arm.steps, strict=False)):
+        columns, point = _placed(columns, point, step)
+        J[3:, i], origins[:, i] = columns[2], point
+        if joint.kind == "prismatic":
+            point = point + values[i] * columns[2]
+        else:
+            c, s = np.cos(values[i]), np.sin(values[i])
+            columns = (c * columns[0] + s * columns[1], c * columns[1] - s * columns[0], columns[2])
+    columns, point = _placed(columns, point, arm.steps[-1])
+    axes, position = np.empty((3, 3, n)), np.empty((3, n))
+    axes[0], axes[1], axes[2] = columns
+    position[:] = point
+    np.subtract(position[:, None], origins, out=origins)
+    return ToolMotion(position, axes, _jacobian(arm, J, origins))
+
+
+def _values(arm: Arm, q: FloatArray) -> list[FloatArray]:
+    """Return the value of every joint that is not fixed, mimics included."""
+    if len(arm.joints) == len(q):
+        return list(q)
+    every = zip(arm.chain.joints, joint_values(arm.chain, list(q)), strict=True)
+    return [value for joint, value in every if joint.kind != "fixed"]
+
+
+def _jacobian(arm: Arm, J: FloatArray, levers: FloatArray) -> FloatArray:
+    """Return J, whose last rows are the axes, with its first: z x (p - o) of revolute joints, z of others.
+
+    A mimic's column counts with its multiplier towards the joint that it follows.
+    """
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        np.multiply(J[3 + j], levers[k], out=J[i])
+        J[i] -= J[3 + k] * levers[j]
+    for i, joint in enumerate(arm.joints):
+        if joint.kind == "prismatic":
+            J[:3, i], J[3:, i] = J[3:, i], 0.0
+    if J.shape[1] == len(arm.chain.moving):
+        return J
+    place = {joint.name: i for i, joint in enumerate(arm.joints)}
+    for i, joint in enumerate(arm.joints):
+        if joint.mimic is not None:
+            J[:, place[joint.mimic.joint]] += joint.mimic.multiplier * J[:, i]
+    return J[:, [place[name] for name in arm.chain.coordinates]]
+
+
+def _placed(columns: Columns, point: FloatArray, step: Step) -> tuple[Columns, FloatArray]:
+    """Return axes and origin of a constant frame that is given in another's."""
+    x, y, z = step.columns
+    if step.translation:
+        point = point + _combined(columns, step.translation)
+    return (_combined(columns, x), _combined(columns, y), _combined(columns, z)), point
+
+
+def _combined(columns: Columns, terms: Terms) -> FloatArray:
+    """Return the sum of columns times their weights; there is at least one."""
+    (first, weight), *others = terms
+    total = columns[first] if weight == 1.0 else weight * columns[first]
+    for which, weight in others:
+        total = total + weight * columns[which]
+    return total
+
+
+HALF_TURN_SINE = 1e-6
+"""Below this sine an angle near pi takes its axis from the symmetric part of the rotation matrix."""
+
+
+def turn_length(chain: Chain) -> float:
+    """Return the length l in [m] that a radian of orientation counts as: a quarter of the arm's.
+
+    A turn of the tool by a radian is then weighed as a way that the arm makes with ease; the arm's length is
+    its `characteristic_length`, which does not depend on where a description puts its frames.
+    """
+    return characteristic_length(chain) / 4.0
+
+
+def redundancy(chain: Chain, targets: Targets) -> int:
+    """Return how many freedoms a target leaves: joints less the rank of the Jacobian off singular poses."""
+    return len(chain.coordinates) - _rank(chain, 3 if targets.rotation is None else 6)
+
+
+@lru_cache(maxsize=32)
+def _rank(chain: Chain, rows: int) -> int:
+    """Return the rank of the Jacobian's first rows off singular poses."""
+    q = np.random.default_rng(0).uniform(-1.0, 1.0, (8, len(chain.coordinates)))
+    return int(np.linalg.matrix_rank(jacobian_over_log(chain, q)[:, :rows], rtol=1e-9).max())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Miss:
+    """How far the tool is from its target at joint values q, and how that changes with them.
+
+    The gradient of |e|^2 / 2 is -J^T e at any target. e itself changes by -A J dq: A is 1 for the position,
+    and for the rotation vector, of length a, the Jacobian of the logarithm,
+    1 + E/2 + (1/a^2 - (1 + cos a) / (2 a sin a)) E^2 with E = [e]x / l, which goes to 1 with a. It is left
+    out: it leaves e where it is, so that the gradient is the same without it, and near the target steps are.
+
+    Attributes:
+        error: e, shape (3, n) or, of poses, (6, n): target minus tool along x, y, z in [m], then the rotation
+            vector that turns the tool into its target, in the world, in [rad], times l in [m].
+        jacobian: J of the tool's velocity and, times l, of its angular velocity, in [m/rad] or [-],
+            shape (3 or 6, joints, n).
+        distance2: |target - tool|^2 in [m2], shape (n,).
+        turn2: The square of l times the angle in [m2], shape (n,); 0 where any orientation will do.
+        length: l in [m].
+    """
+
+    error: FloatArray
+    jacobian: FloatArray
+    distance2: FloatArray
+    turn2: FloatArray
+    length: float
+
+    @property
+    def square(self) -> FloatArray:
+        """|e|^2 in [m2], shape (n,)."""
+        return np.asarray(self.distance2 + self.turn2)
+
+    def within(self, metres: float, radians: float) -> BoolArray:
+        """Return where position and orientation are as near as that, in [m] and [rad], shape (n,)."""
+        return np.asarray((self.distance2 <= metres**2) & (self.turn2 <= (self.length * radians) ** 2))
+
+    def kept(self, rows: IndexArray) -> Miss:
+        """Return some of the rows, indices of shape (m,)."""
+        error, jacobian = rows_of(self.error, rows), rows_of(self.jacobian, rows)
+        return Miss(error, jacobian, self.distance2[rows], self.turn2[rows], self.length)
+
+    def restore(self, rows: IndexArray, before: Miss) -> None:
+        """Write another's rows, indices of shape (m,), over some of this one's."""
+        for mine, other in (
+            (self.error, before.error),
+            (self.jacobian, before.jacobian),
+            (self.distance2, before.distance2),
+            (self.turn2, before.turn2),
+        ):
+            mine[..., rows] = other[..., rows]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """The targets of a block of rows.
+
+    Attributes:
+        arm: The arm.
+        length: l in [m]: see `turn_length`.
+        position: x, y, z in [m], shape (3, n).
+        columns: The axes that the tool shall take [-], shape (3, 3, n), first index: which; None if any
+            orientation will do.
+    """
+
+    arm: Arm
+    length: float
+    position: FloatArray
+    columns: FloatArray | None
+
+    def kept(self, rows: IndexArray) -> Task:
+        """Return some of the rows, indices of shape (m,)."""
+        columns = None if self.columns is None else rows_of(self.columns, rows)
+        return replace(self, position=rows_of(self.position, rows), columns=columns)
+
+    def miss(self, q: FloatArray) -> Miss:
+        """Return what is missed at joint values q in [rad] or [m], shape (joints, n)."""
+        tool = tool_motion(self.arm, q)
+        size = 3 if self.columns is None else 6
+        error, J = np.empty((size, q.shape[1])), tool.jacobian[:size]
+        np.subtract(self.position, tool.position, out=error[:3])
+        if self.columns is not None:
+            np.multiply(turn_between(tool.columns, self.columns), self.length, out=error[3:])
+            J[3:] *= self.length
+        turn2 = np.zeros(q.shape[1]) if size == 3 else dot_product(error[3:], error[3:])
+        return Miss(error, J, dot_product(error[:3], error[:3]), turn2, self.length)
+
+
+def task_of(chain: Chain, targets: Targets) -> Task:
+    """Return the targets as one array a coordinate."""
+    position, columns = np.ascontiguousarray(targets.position.T), None
+    if targets.rotation is not None:
+        columns = np.ascontiguousarray(targets.rotation.transpose(2, 1, 0))
+    return Task(arm_of(chain), turn_length(chain), position, columns)
+
+
+def turn_between(columns: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return the rotation vector u a, 0 <= a <= pi, in [rad], in the world, of R_wanted R^T: shape (3, n).
+
+    With the columns c_k of R and w_k of R_wanted: u sin(a) = sum_k c_k x w_k / 2 and
+    1 + 2 cos(a) = sum_k c_k . w_k. Near half a turn the sine leaves no digits for u; there it is the largest
+    column of S - cos(a) I with S the symmetric part, which is (1 - cos(a)) u u^T.
+
+    Args:
+        columns: Of R [-], shape (3, 3, n), first index: which.
+        wanted: Of R_wanted [-], shape (3, 3, n), likewise.
+    """
+    turn = outer_sum(wanted, columns)
+    cosine = 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
+    vector = 0.5 * np.stack([turn[k, j] - turn[j, k] for j, k in ((1, 2), (2, 0), (0, 1))])
+    size = np.sqrt(dot_product(vector, vector))
+    angle = np.arctan2(size, cosine)
+    vector *= np.divide(angle, size, out=np.ones_like(size), where=size > 0.0)
+    half = np.flatnonzero((size < HALF_TURN_SINE) & (cosine < 0.0))
+    if len(half):
+        vector[:, half] = _half_turns(rows_of(turn, half)) * angle[half]
+    return vector
+
+
+def _half_turns(turn: FloatArray) -> FloatArray:
+    """Return the axes u of turns by nearly pi, shape (3, 3, n), for which `turn_between` says how: (3, n)."""
+    turn = turn.transpose(2, 0, 1)
+    sine = np.stack([turn[:, i - 1, i - 2] - turn[:, i - 2, i - 1] for i in range(3)], axis=1)
+    cosine = 0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0)
+    square = 0.5 * (turn + turn.transpose(0, 2, 1)) - cosine[:, None, None] * np.eye(3)
+    largest = np.argmax(np.einsum("nii->ni", square), axis=1)
+    axis = square[np.arange(len(turn)), largest]
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    axis[(axis * sine).sum(axis=1) < 0.0] *= -1.0
+    return np.asarray(axis.T)

@@ -1,1 +1,0 @@
-"""Solutions along a path: one continuous motion, and where there is none."""

@@ -1,1 +1,0 @@
-"""Closed forms: all solutions of a pose, written down."""

@@ -1,1 +1,0 @@
-"""Iterative solutions of any arm, many targets at once."""

@@ -1,0 +1,501 @@
+"""The rows of a planned path: points, radii, and where the tool shall be turned.
+
+How the tool is turned along a path: held, or turned at an even rate from row to row.
+
+One arc between two lines: from its corner, or from the point where it begins.
+
+A path of lines and arcs, one after the other: place, direction and curvature by arc length.
+
+Test contours of ISO 9283: the sections of a cube, as rows of a path.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from urmpipe_models.elementwise import FloatArray, IndexArray, IntArray
+from urmpipe_models.errors import Finding, OptionError, not_among
+from urmpipe_models.math3d import conjugate, matrices, quaternions, rotation_vectors
+from urmpipe_models.math3d import quaternion_product as product
+from urmpipe_models.wraps import continuous_quaternions
+
+PROPER = 2
+"""The variant of an arc that turns towards the next row; 1 turns away from it, and round."""
+
+VARIANTS = (1, PROPER)
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class PathRows:
+    """The rows that a path is planned from.
+
+    What is no array of numbers becomes a NaN of shape (): `plan` refuses it, with all else that is wrong.
+
+    Attributes:
+        position: Points in [m], shape (n, 3).
+        radius: Of the arc at each point in [m], shape (n,); 0 where the path stops.
+        corner: What a point with a radius is: True for the corner that the arc rounds, False for the arc's
+            first point, where the line before it touches it (as in the paper).
+        variant: Of each arc [-], shape (n,): 2 turns towards the next row, 1 away from it.
+        rotation: How the tool is turned at each row, as matrices [-], shape (n, 3, 3); None if that is left
+            open.
+
+    Source: [Iso9283]_ section 2.
+    """
+
+    position: FloatArray
+    radius: FloatArray
+    corner: bool
+    variant: IntArray
+    rotation: FloatArray | None
+
+    def __init__(
+        self,
+        position: ArrayLike,
+        radius: ArrayLike = 0.0,
+        corner: bool = False,
+        variant: ArrayLike = PROPER,
+        rotation: ArrayLike | None = None,
+    ) -> None:
+        """Make rows of arrays; one radius, variant or rotation is that of all rows.
+
+        Args:
+            position: In [m], shape (n, 3).
+            radius: In [m], shape (n,), or one number for all rows but the first and the last.
+            corner: Whether a row with a radius is the corner; else it is the arc's first point.
+            variant: 1 or 2 [-], shape (n,), or one number for all rows.
+            rotation: Matrices [-], shape (n, 3, 3), or one of shape (3, 3) for all rows; None if open.
+        """
+        points, radii, variants = _array(position), _array(radius), _array(variant)
+        count = len(points) if points.ndim else 0
+        if radii.ndim == 0 and not np.isnan(radii):
+            radii = np.full(count, radii)
+            radii[:1] = radii[-1:] = 0.0
+        if variants.ndim == 0 and not np.isnan(variants):
+            variants = np.full(count, variants)
+        turned = None if rotation is None else _array(rotation)
+        if turned is not None and turned.shape == (3, 3):
+            turned = np.tile(turned, (count, 1, 1))
+        whole = np.isin(variants, VARIANTS).all()
+        object.__setattr__(self, "position", points)
+        object.__setattr__(self, "radius", radii)
+        object.__setattr__(self, "corner", corner)
+        object.__setattr__(self, "variant", variants.astype(np.int64) if whole else variants)
+        object.__setattr__(self, "rotation", turned)
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+
+def _array(values: ArrayLike) -> FloatArray:
+    """Return values as an array; a NaN of shape () if they are no array of numbers."""
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        return np.array(np.nan)
+
+
+UNEVEN = 2e-5
+"""Turns from row to row that differ by less, in [rad], may be one even turn whose angles have six digits:
+each is then off by up to 5e-6, and a difference of turns has three of them, that of the middle row twice."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Turning:
+    """Orientations at places of a path, and how fast the tool turns from each to the next.
+
+    Attributes:
+        at: Where the rows are along the path in [m], rising, shape (n,).
+        quat_xyzw: The orientation there [-], shape (n, 4), of the sign that is nearest to the one before.
+        rate: From each to the next about a fixed axis, d theta / ds in [rad/m], in the world, shape
+            (n - 1, 3).
+    """
+
+    at: FloatArray
+    quat_xyzw: FloatArray
+    rate: FloatArray
+
+    def rates(self, s: FloatArray, *, before: bool = False) -> FloatArray:
+        """Return the rate in [rad/m], shape (n, 3), at arc lengths in [m], shape (n,); at a row after it."""
+        return np.asarray(self.rate[part_at(self.at, s, before=before)])
+
+    def quaternions(self, s: FloatArray) -> FloatArray:
+        """Return the orientation at arc lengths in [m], shape (n,), as x, y, z, w [-], shape (n, 4)."""
+        k = part_at(self.at, s)
+        turned = self.rate[k] * (s - self.at[k])[:, None]
+        return product(quaternions(turned, "vector"), self.quat_xyzw[k])
+
+    def matrices(self, s: FloatArray) -> FloatArray:
+        """Return the orientation at arc lengths in [m], shape (n,), as matrices [-], shape (n, 3, 3)."""
+        return matrices(self.quaternions(s))
+
+    @property
+    def uneven(self) -> IndexArray:
+        """Rows, from 0, that the tool passes while the rate of its turn changes [-], shape (k,).
+
+        By an angle that is more than rounding of the rows: over the shorter way to a row beside it.
+        """
+        way = np.diff(self.at)
+        change = np.linalg.norm(np.diff(self.rate, axis=0), axis=1) * np.minimum(way[:-1], way[1:])
+        return np.flatnonzero(change > UNEVEN) + 1
+
+
+def part_at(bounds: FloatArray, s: FloatArray, *, before: bool = False) -> IndexArray:
+    """Return the part between bounds in which each arc length is, shape (n,).
+
+    Args:
+        bounds: Where parts begin, and the last one ends, in [m], rising, shape (m + 1,).
+        s: In [m], shape (n,).
+        before: Whether a bound is the end of the part before it; else the next one begins.
+    """
+    found = np.searchsorted(bounds, s, side="left" if before else "right") - 1
+    return np.asarray(np.clip(found, 0, len(bounds) - 2))
+
+
+def turning_of(rotation: FloatArray, at: FloatArray) -> Turning:
+    """Return how the tool turns by the shorter way from row to row, evenly along the path.
+
+    Args:
+        rotation: Matrices at the rows [-], shape (n, 3, 3).
+        at: Where the rows are along the path in [m], rising, shape (n,).
+    """
+    quats = continuous_quaternions(quaternions(rotation.reshape(-1, 9), "matrix"))
+    turn = rotation_vectors(product(quats[1:], conjugate(quats[:-1])))
+    return Turning(at, quats, turn / np.diff(at)[:, None])
+
+
+STRAIGHT = 1e-9
+"""Three points whose lines differ by less, in [rad], span no plane: coordinates have no more digits."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arc:
+    """An arc from a point, along a direction, round a centre.
+
+    Attributes:
+        start: Its first point in [m], shape (3,).
+        tangent: Unit vector of the motion there [-], shape (3,).
+        normal: Unit vector from there to the centre [-], shape (3,).
+        radius: In [m].
+        angle: How far it turns in [rad], 0 to 2 pi.
+    """
+
+    start: FloatArray
+    tangent: FloatArray
+    normal: FloatArray
+    radius: float
+    angle: float
+
+    @property
+    def end(self) -> FloatArray:
+        """Its last point in [m], shape (3,)."""
+        along, across = math.sin(self.angle), 1.0 - math.cos(self.angle)
+        return self.start + self.radius * (along * self.tangent + across * self.normal)
+
+    @property
+    def end_tangent(self) -> FloatArray:
+        """Unit vector of the motion at its end [-], shape (3,)."""
+        return math.cos(self.angle) * self.tangent + math.sin(self.angle) * self.normal
+
+    @property
+    def leg(self) -> float:
+        """From its first point to the corner of its tangents in [m], r tan(angle / 2).
+
+        Negative where the arc begins behind the corner, as one that turns by more than pi does.
+        """
+        return self.radius * math.tan(0.5 * self.angle)
+
+
+def unit(vector: FloatArray) -> FloatArray:
+    """Return the direction of a vector, shape (3,), with length 1 [-]."""
+    return vector / np.linalg.norm(vector)
+
+
+def towards(tangent: FloatArray, onward: FloatArray) -> FloatArray | None:
+    """Return the unit vector across a direction to the side of another [-], shape (3,); None if parallel.
+
+    Args:
+        tangent: Unit vector [-], shape (3,).
+        onward: Unit vector [-], shape (3,).
+    """
+    across = onward - (onward @ tangent) * tangent
+    return None if np.linalg.norm(across) <= STRAIGHT else unit(across)
+
+
+def arc_at_corner(
+    corner: FloatArray, tangent: FloatArray, onward: FloatArray, radius: float, variant: int
+) -> Arc | None:
+    """Return the arc that rounds the corner of two lines; None where they are parallel.
+
+    With the angle d between the lines the proper variant turns by d, and begins r tan(d / 2) before the
+    corner; the other one turns by 2 pi - d the other way, and begins as far behind it.
+
+    Args:
+        corner: In [m], shape (3,).
+        tangent: Direction to the corner [-], shape (3,).
+        onward: Direction away from it [-], shape (3,).
+        radius: In [m].
+        variant: 2 to turn towards `onward`, 1 to turn away from it.
+    """
+    side = towards(tangent, onward)
+    if side is None:
+        return None
+    turn = math.atan2(float(onward @ side), float(onward @ tangent))
+    angle, normal = (turn, side) if variant == PROPER else (2.0 * math.pi - turn, -side)
+    return Arc(corner - radius * math.tan(0.5 * angle) * tangent, tangent, normal, radius, angle)
+
+
+def arc_from(
+    start: FloatArray, tangent: FloatArray, onward: FloatArray, radius: float, variant: int, within: float
+) -> tuple[Arc, float] | None:
+    """Return the arc that leaves a line and leads towards a point, and how far it is from its end to it.
+
+    In the plane of both, with x along the line, y to the side of the centre C = (0, r), and the point at
+    (a, b): D = |(a, b - r)|, the way on is l = sqrt(D^2 - r^2), and the arc turns by
+    atan2(b - r, a) + atan2(r, l). Of the two tangents from the point to the circle this is the one along
+    which the motion goes on. Of a point on the circle l = 0, since sqrt(2 r (D - r)) makes a line of what is
+    rounding.
+
+    Args:
+        start: Where the arc begins in [m], shape (3,).
+        tangent: Direction of the motion there [-], shape (3,).
+        onward: From there to the point in [m], shape (3,).
+        radius: In [m].
+        variant: 2 for the centre on the side of the point, 1 for the other side.
+        within: How far from its circle a point on it may be in [m]: rounding of coordinates.
+
+    Returns:
+        The arc and l in [m]; None where the point lies on the line, or within the circle.
+
+    Source: [Iso9283]_ section 2, section 4 steps 3 to 6.
+    """
+    side = towards(tangent, unit(onward))
+    if side is None:
+        return None
+    normal = side if variant == PROPER else -side
+    a, across = float(onward @ tangent), float(onward @ normal)
+    square, rounding = float(onward @ onward) - 2.0 * radius * across, 2.0 * radius * within
+    if square < -rounding:
+        return None
+    way = math.sqrt(square) if square > rounding else 0.0
+    angle = (math.atan2(across - radius, a) + math.atan2(radius, way)) % (2.0 * math.pi)
+    return Arc(start, tangent, normal, radius, angle), way
+
+
+def largest_radius(tangent: FloatArray, onward: FloatArray) -> float:
+    """Return the largest radius in [m] with which `arc_from` reaches its point, (a^2 + b^2) / (2 b).
+
+    Args:
+        tangent: Direction of the motion [-], shape (3,).
+        onward: From the arc's first point to the next row in [m], shape (3,).
+    """
+    across = float(np.linalg.norm(onward - (onward @ tangent) * tangent))
+    return float(onward @ onward) / (2.0 * across)
+
+
+SegmentKind = Literal["line", "arc"]
+
+
+class PathPoints(NamedTuple):
+    """Points of a path.
+
+    Attributes:
+        position: p in [m], shape (n, 3).
+        tangent: dp/ds, of length 1 [-], shape (n, 3).
+        curvature: d2p/ds2 in [m/m2], shape (n, 3): towards the centre; 0 on a line.
+    """
+
+    position: FloatArray
+    tangent: FloatArray
+    curvature: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class LineArcPath:
+    """Lines and arcs, each going on in the direction in which the one before ends, but for stops.
+
+    Attributes:
+        start: First points of the m segments in [m], shape (m, 3).
+        tangent: Directions there [-], shape (m, 3).
+        normal: From there to the centre [-], shape (m, 3); 0 of a line.
+        radius: In [m], shape (m,); infinity of a line.
+        length: In [m], shape (m,).
+        row: The row that each begins at, or is the arc of, from 0, shape (m,).
+        at: Where each of the n rows is along the path in [m], rising, shape (n,); of a corner the middle of
+            its arc.
+        stop_row: The rows at which the path stops, from 0, shape (k,), the first and the last among them.
+        turning: How the tool is turned along it; None if that is left open.
+
+    Source: [Iso9283]_ section 2, eq. 1-4.
+    """
+
+    start: FloatArray
+    tangent: FloatArray
+    normal: FloatArray
+    radius: FloatArray
+    length: FloatArray
+    row: IndexArray
+    at: FloatArray
+    stop_row: IndexArray
+    turning: Turning | None = None
+
+    def __len__(self) -> int:
+        return len(self.length)
+
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """Where the segments begin along the path, and where the last one ends, in [m], shape (m + 1,)."""
+        return np.concatenate(([0.0], np.cumsum(self.length)))
+
+    @property
+    def stops(self) -> FloatArray:
+        """Where it stops along the path in [m], shape (k,)."""
+        return np.asarray(self.at[self.stop_row])
+
+    @property
+    def total(self) -> float:
+        """The length of the path in [m]."""
+        return float(self.bounds[-1])
+
+    @property
+    def kinds(self) -> list[SegmentKind]:
+        """Line or arc, of each segment."""
+        return ["arc" if arc else "line" for arc in np.isfinite(self.radius)]
+
+    @property
+    def arcs(self) -> IndexArray:
+        """Which segments are arcs [-], shape (arcs,)."""
+        return np.flatnonzero(np.isfinite(self.radius))
+
+    @property
+    def corners(self) -> FloatArray:
+        """Where the tangents at both ends of each arc meet in [m], shape (arcs, 3): what it rounds.
+
+        NaN of an arc whose tangents are parallel: one of half a turn, or of a whole one.
+        """
+        k = self.arcs
+        angle = self.length[k] / self.radius[k]
+        leg = self.radius[k] * np.where(np.abs(np.sin(angle)) > STRAIGHT, np.tan(0.5 * angle), np.nan)
+        return np.asarray(self.start[k] + leg[:, None] * self.tangent[k])
+
+    def segment_at(self, s: FloatArray, *, before: bool = False) -> IndexArray:
+        """Return the segment at each arc length in [m], shape (n,); where two meet the later or the first."""
+        return part_at(self.bounds, s, before=before)
+
+    def points(self, s: FloatArray, *, before: bool = False) -> PathPoints:
+        """Return place, direction and curvature at arc lengths.
+
+        With the way w = s - s_k into segment k: on a line p_k + w t, on an arc
+        p_k + r (sin(w / r) t + (1 - cos(w / r)) n).
+
+        Args:
+            s: In [m], shape (n,).
+            before: Whether a place where two segments meet is the end of the first; else the second begins.
+        """
+        k = self.segment_at(s, before=before)
+        way = s - self.bounds[k]
+        turned = way / self.radius[k]  # 0 on a line
+        sine, versine = np.sin(turned), 2.0 * np.sin(0.5 * turned) ** 2
+        arc = np.isfinite(self.radius[k])
+        radius = np.where(arc, self.radius[k], 1.0)
+        along = np.where(arc, radius * sine, way)
+        across = np.where(arc, radius * versine, 0.0)
+        t, n = self.tangent[k], self.normal[k]
+        cosine = 1.0 - versine
+        return PathPoints(
+            self.start[k] + along[:, None] * t + across[:, None] * n,
+            cosine[:, None] * t + sine[:, None] * n,
+            (cosine[:, None] * n - sine[:, None] * t) / self.radius[k][:, None],
+        )
+
+
+Axis: TypeAlias = tuple[int, int, int]
+
+PLANES: Mapping[str, Mapping[str, tuple[Axis, Axis]]] = {
+    "wall": {
+        "xy": ((1, 0, 0), (0, 1, 0)),
+        "xz": ((1, 0, 0), (0, 0, 1)),
+        "yz": ((0, 1, 0), (0, 0, 1)),
+    },
+    "diagonal": {
+        "c1": ((1, 0, 1), (0, 1, 0)),
+        "c2": ((0, 1, 1), (-1, 0, 0)),
+        "c3": ((-1, 0, 1), (0, -1, 0)),
+        "c4": ((0, -1, 1), (1, 0, 0)),
+    },
+}
+"""Sections of a cube: from its centre to the middles of two sides, u and v, in halves of its edge.
+
+A wall section is parallel to two opposite walls and halfway between them. A diagonal section holds two
+opposite edges: c2, c3 and c4 are c1 turned by 90, 180 and 270 deg about the vertical axis through the centre.
+"""
+
+CORNERS = np.array([[1, 1], [1, -1], [-1, -1], [-1, 1]], dtype=float)
+"""The corners in the order of the contour, in u and v; it starts and ends at v, in the middle of a side."""
+
+
+def cube_rows(
+    kind: str,
+    side: float,
+    radius: float,
+    centre: FloatArray,
+    plane: str | None = None,
+    rotation: FloatArray | None = None,
+) -> PathRows:
+    """Return the rows of the contour of a section: a row is the first tangent point of its arc.
+
+    The corner k stands at centre + a/2 (+-u +- v), and its arc begins R before it. With R = 0 the contour
+    stops at the corners.
+
+    Args:
+        kind: wall, a square a x a, or diagonal, a rectangle a x a sqrt(2).
+        side: Edge of the cube, a, in [m].
+        radius: Of the arcs at the corners, R, in [m].
+        centre: Of the cube in [m], shape (3,).
+        plane: Name of the section in `PLANES`; default: the first, xy or c1.
+        rotation: How the tool is turned all along, a matrix [-], shape (3, 3); None if that is left open.
+
+    Raises:
+        OptionError: With everything that is no such contour.
+
+    Source: [Iso9283]_ section 2, eq. 5, and section 5.
+    """
+    if wrong := list(cube_faults(kind, plane, side, radius)):
+        raise OptionError(*wrong)
+    sections = PLANES[kind]
+    u, v = np.array(sections[plane or next(iter(sections))], dtype=float)
+    start = np.array([0.0, 1.0])
+    flat = np.vstack((start, CORNERS, start))
+    corners = np.asarray(centre) + 0.5 * side * (flat[:, :1] * u + flat[:, 1:] * v)
+    ahead = np.diff(corners, axis=0)
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    corners[1:-1] -= radius * ahead[:-1]
+    return PathRows(corners, radius, rotation=rotation)
+
+
+def cube_faults(kind: str, plane: str | None, side: float, radius: float) -> Iterator[Finding]:
+    """Yield what is wrong with a contour.
+
+    Args:
+        kind: Of its section, a name in `PLANES`.
+        plane: Name of the section; None for the first.
+        side: Edge of the cube in [m]; NaN where it is not known.
+        radius: Of its arcs in [m]; NaN where it is not known.
+    """
+    if kind not in PLANES:
+        yield Finding(not_among(kind, PLANES))
+    elif plane is not None and plane not in PLANES[kind]:
+        yield Finding(f"plane of a {kind} section: {not_among(plane, PLANES[kind])}")
+    if side <= 0.0:
+        yield Finding(found=f"a = {side:g} m", allowed="more than 0")
+    if radius < 0.0:
+        yield Finding(found=f"r = {radius:g} m", allowed="0 or more")
+    elif 0.0 < side <= 2.0 * radius:
+        yield Finding(found=f"a = {side:g} m", allowed=f"more than 2 r = {2.0 * radius:g} m")
