@@ -29,9 +29,9 @@ from scipy.optimize import Bounds, OptimizeResult, differential_evolution
 import urmpipe
 from urmpipe.driven_runs.arm_unit import ArmUnit
 from urmpipe_datasets import ROBOTS
-from urmpipe_fmus.cache import cached_fmu
-from urmpipe_fmus.units.driven_arm import driven_arm
-from urmpipe_fmus.variable import Memory, Parameter, State
+from urmpipe_fmus.block import Memory, Parameter, State
+from urmpipe_fmus.blocks.driven_arm import driven_arm
+from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.dynamics.driven_arm import spectral_radius
 from urmpipe_models.elementwise import FloatArray

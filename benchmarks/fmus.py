@@ -21,15 +21,15 @@ from pairs import table as process_table
 
 from urmpipe.systems.blocks import Blocks
 from urmpipe_datasets import LOGS
-from urmpipe_fmus.build import build_fmu
+from urmpipe_fmus.block import Unit
+from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.build.fmu import build_fmu
 from urmpipe_fmus.cosim import Plan, load_system, prepare
-from urmpipe_fmus.cosim.assembly import Assembly
 from urmpipe_fmus.cosim.job import ELSEWHERE, Progress
 from urmpipe_fmus.cosim.master import Master
+from urmpipe_fmus.cosim.plan import Assembly
 from urmpipe_fmus.cosim.worker import Log
-from urmpipe_fmus.fmu_process import callbacks_with
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.units import make_unit
+from urmpipe_fmus.process import callbacks_with
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
 

@@ -13,11 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.units.dc_drive import dc_drive
-from urmpipe_fmus.units.drive_controller import drive_controller
-from urmpipe_fmus.units.inertia import inertia
-from urmpipe_fmus.units.set_point import set_point
+from urmpipe_fmus.blocks.drives import dc_drive, drive_controller, inertia, set_point
+from urmpipe_fmus.run import Instance
 from urmpipe_models.elementwise import Element, FloatArray
 
 PICTURE = Path(__file__).resolve().parent / "pictures" / "drives.svg"

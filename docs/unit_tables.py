@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from urmpipe_fmus.documentation import TITLES, variable_row
-from urmpipe_fmus.units import make_unit
+from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.build.description import TITLES, variable_row
 
 PAGE = Path(__file__).with_name("drives.md")
 BLOCK = re.compile(r"(<!-- variables of (?P<unit>\w+) -->\n).*?(<!-- end -->)", re.DOTALL)

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from urmpipe.reading import LogReading as LogReading
     from urmpipe.reading import Reading as Reading
     from urmpipe.reading import TableReading as TableReading
-    from urmpipe_fmus.build import BuiltFmu as BuiltFmu
+    from urmpipe_fmus.build.fmu import BuiltFmu as BuiltFmu
     from urmpipe_models.arm.chain import Chain as Chain
     from urmpipe_models.errors import CosimulationError as CosimulationError
     from urmpipe_models.errors import FmuError as FmuError
@@ -91,7 +91,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Accuracy": "urmpipe_pipeline.accuracy.result",
-    "BuiltFmu": "urmpipe_fmus.build",
+    "BuiltFmu": "urmpipe_fmus.build.fmu",
     "Chain": "urmpipe_models.arm.chain",
     "Comparison": "urmpipe_pipeline.comparison.comparison",
     "CosimulationError": "urmpipe_models.errors",

@@ -83,7 +83,7 @@ def _is_baseline(value: Any) -> bool:
 
 
 def _is_unit(value: Any) -> bool:
-    from urmpipe_fmus.unit import Unit
+    from urmpipe_fmus.block import Unit
 
     return isinstance(value, Unit) or _is_path(value)
 

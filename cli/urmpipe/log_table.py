@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-from urmpipe_fmus.table import Table
+from urmpipe_fmus.block import Table
 from urmpipe_pipeline.joint_log import LogWarning
 
 

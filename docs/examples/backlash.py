@@ -4,9 +4,7 @@ import math
 
 import numpy as np
 
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.values import Values
-from urmpipe_fmus.variable import Input, Memory, Output, Parameter
+from urmpipe_fmus.block import Input, Memory, Output, Parameter, Unit, Values
 from urmpipe_models.elementwise import Element
 
 

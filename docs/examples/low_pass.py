@@ -1,7 +1,6 @@
 """A drive that follows its set point with a delay: a low-pass of the first order."""
 
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Parameter, State
+from urmpipe_fmus.block import Input, Parameter, State, Unit
 
 unit = Unit(
     name="low_pass",

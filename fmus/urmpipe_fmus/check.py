@@ -10,10 +10,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from urmpipe_fmus.check_process import Run, run_job
-from urmpipe_fmus.fmu_file import FmuFile, open_fmu
-from urmpipe_fmus.fmu_process import TIMEOUT
-from urmpipe_fmus.platforms import platforms_here
+from urmpipe_fmus.fmu_file import FmuFile, open_fmu, platforms_here
+from urmpipe_fmus.process import TIMEOUT, Run, run_job
 from urmpipe_fmus.python_fmu.place import why_not_in
 from urmpipe_models.errors import Finding, FmuError
 

@@ -17,10 +17,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from urmpipe_fmus.check_process import CALL_BYTES, LOG_BYTES
-from urmpipe_fmus.end_with_parent import end_with_parent
-from urmpipe_fmus.fmu_process import callbacks_with
-from urmpipe_fmus.platforms import binary_in
+from urmpipe_fmus.fmu_file import binary_in
+from urmpipe_fmus.process import CALL_BYTES, LOG_BYTES, callbacks_with, end_with_parent
 from urmpipe_models.processes import limit_memory
 
 MEMORY = 8 * 2**30

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from urmpipe_fmus.equations import Equations
-from urmpipe_fmus.table import Rows
-from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.block import Rows, Unit
+from urmpipe_fmus.run import Equations
 from urmpipe_models.errors import Finding, UnitError
 
 TIME = "time"

@@ -1,20 +1,127 @@
-"""An FMU of any tool as it is opened: its zip and description are checked before anything is unpacked."""
+"""FMI's names of platforms, and where in an FMU the binary for this one is.
+
+An FMU as a file: a zip that is the same bytes for the same content, and a GUID of that content.
+
+An FMU of any tool as it is opened: its zip and description are checked before anything is unpacked.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import platform
 import stat
 import struct
+import sys
+import uuid
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
 from urmpipe_models.errors import Finding, FmuError, shown
-from urmpipe_models.files import meant_by
+from urmpipe_models.files import keep_permissions, meant_by
+
+X86 = ("x86_64", "amd64", "i386", "i486", "i586", "i686", "x86")
+"""What processors call themselves that FMI 2.0's linux64, win64 and their like stand for."""
+
+
+def this_platform() -> str:
+    """Return FMI's name of the platform that this runs on: linux64, or aarch64-linux.
+
+    FMI 2.0's short names are those of x86; FMI 2.0.4 takes the names of FMI 3.0 for all others.
+    """
+    system, processor = platform.system(), platform.machine().lower()
+    if processor in X86:
+        return _short(system)
+    long = {"Windows": "windows", "Darwin": "darwin"}.get(system, "linux")
+    return f"{'aarch64' if processor == 'arm64' else processor}-{long}"
+
+
+def is_windows(name: str) -> bool:
+    """Return whether a platform's name is one of Windows."""
+    return name.startswith("win") or name.endswith("-windows")
+
+
+def suffix_of(name: str) -> str:
+    """Return how a binary's name ends on a platform."""
+    return ".dll" if is_windows(name) else ".dylib" if "darwin" in name else ".so"
+
+
+def platforms_here() -> tuple[str, ...]:
+    """Return the names under which a binary for this platform may be, the better first.
+
+    The second of an ARM processor is the short name, which other tools of FMI 2.0 still give it.
+    """
+    return tuple(dict.fromkeys((this_platform(), _short(platform.system()))))
+
+
+def binaries_here(identifier: str) -> tuple[str, ...]:
+    """Return the paths in an FMU at which its binary for this platform may be, the better first."""
+    return tuple(f"binaries/{one}/{identifier}{suffix_of(one)}" for one in platforms_here())
+
+
+def binary_in(folder: Path, identifier: str) -> Path:
+    """Return the binary for this platform in the folder of an FMU; the better path, if there is none."""
+    paths = [folder / one for one in binaries_here(identifier)]
+    return next((one for one in paths if one.is_file()), paths[0])
+
+
+def _short(system: str) -> str:
+    bits = "64" if sys.maxsize > 2**32 else "32"
+    return {"Windows": "win", "Darwin": "darwin"}.get(system, "linux") + bits
+
+
+EARLIEST = (1980, 1, 1, 0, 0, 0)
+"""The time of every entry: zip knows none before."""
+
+UNIX = 3
+"""Who made the entry, so that its permissions are read as those of a file."""
+
+
+def content_guid(files: Mapping[str, bytes]) -> str:
+    """Return the GUID of some files: the first 128 bits of the SHA-256 of their names and contents."""
+    digest = hashlib.sha256()
+    for name in sorted(files):
+        for part in (name.encode(), files[name]):
+            digest.update(len(part).to_bytes(8, "little") + part)
+    return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
+
+
+def write_fmu(path: Path, files: Mapping[str, bytes]) -> None:
+    """Write an FMU, beside its place first, then renamed: it is whole or not there.
+
+    Args:
+        path: Where it shall stand; what stands there is replaced.
+        files: Contents by their path in the FMU.
+
+    Raises:
+        OSError: If it cannot be written.
+    """
+    part = path.with_name(f"{path.stem[:40]}.{uuid.uuid4().hex[:12]}.part")
+    try:
+        with zipfile.ZipFile(part, "x") as archive:
+            for name in sorted(files):
+                archive.writestr(_entry(name), files[name])
+        keep_permissions(part, path)
+        part.replace(path)
+    finally:
+        with suppress(OSError):  # why it cannot be written is told
+            part.unlink()
+
+
+def _entry(name: str) -> zipfile.ZipInfo:
+    """Return an entry without a trace of when, where and by whom it was made."""
+    entry = zipfile.ZipInfo(name, EARLIEST)
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    entry.create_system = UNIX
+    entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+    return entry
+
 
 DESCRIPTION = "modelDescription.xml"
 

@@ -18,9 +18,9 @@ import urmpipe
 from foreign_fmus import HANGS, Foreign, Scalar, fmu, trouble_in
 from urmpipe.api.build_fmu import build_fmu
 from urmpipe_datasets import LOGS
+from urmpipe_fmus.blocks.registry import unit_names
 from urmpipe_fmus.check import check_fmu
 from urmpipe_fmus.native import native_missing
-from urmpipe_fmus.units import unit_names
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_models.robots.catalogue import load_robot

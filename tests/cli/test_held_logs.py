@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from urmpipe.systems.held_logs import between_samples, on_points
-from urmpipe_fmus.table import Table
+from urmpipe_fmus.block import Table
 from urmpipe_models.elementwise import IntArray
 from urmpipe_pipeline.runs.grid import row_clock
 

@@ -22,8 +22,7 @@ from urmpipe_pipeline.simulations.simulation import Simulation
 RunCommand = Callable[..., Any]
 
 FOLLOWER = """
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Output, Parameter, State
+from urmpipe_fmus.block import Input, Output, Parameter, State, Unit
 
 unit = Unit(
     name="follower",
@@ -43,8 +42,7 @@ unit = Unit(
 SWING = """
 import numpy as np
 
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Output, Parameter, State
+from urmpipe_fmus.block import Output, Parameter, State, Unit
 
 
 def force(v):

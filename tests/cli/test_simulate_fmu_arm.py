@@ -11,7 +11,7 @@ import pytest
 
 from urmpipe.api.build_fmu import build_fmu
 from urmpipe.api.simulate import simulate
-from urmpipe_fmus.robot_entry import ROBOT_FILE, robot_in
+from urmpipe_fmus.build.fmu import ROBOT_FILE, robot_in
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.toml import robot_toml
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from asserting import there
+from urmpipe_fmus.blocks.registry import make_unit
 from urmpipe_fmus.cosim import load_system
-from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.units import make_unit
+from urmpipe_fmus.run import Instance
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "drives.md").read_text(encoding="utf-8")

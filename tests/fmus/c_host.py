@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from urmpipe_fmus.block import TABLE_FILE, Unit, table_bytes
 from urmpipe_fmus.native import guid_header, native_binaries, native_sources
-from urmpipe_fmus.table_file import TABLE_FILE, table_bytes
-from urmpipe_fmus.unit import Unit
 
 GUID = "{12345678-0000-0000-0000-000000000000}"
 HOST = Path(__file__).parent / "native" / "host.c"

@@ -12,8 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from loaded_fmu import Loaded
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Variable
+from urmpipe_fmus.block import Unit, Variable
 from urmpipe_models.elementwise import FloatArray
 
 

@@ -16,9 +16,8 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 from numpy.typing import NDArray
 
-from urmpipe_fmus.unit import INTERNAL_STEP, Recipe, Unit
-from urmpipe_fmus.user_unit import unit_of_source
-from urmpipe_fmus.variable import Variable
+from urmpipe_fmus.block import INTERNAL_STEP, Recipe, Unit, Variable
+from urmpipe_fmus.blocks.user import unit_of_source
 
 FILE = "random_unit.py"
 
@@ -115,9 +114,9 @@ def random_unit_sources(draw: DrawFn, remembers: bool = True) -> str:
     variables = draw(st.permutations([*given, *outputs]))
     lines = [
         "import numpy as np",
-        "from urmpipe_fmus.table import Table",
-        "from urmpipe_fmus.unit import Unit",
-        "from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State",
+        "from urmpipe_fmus.block import Table",
+        "from urmpipe_fmus.block import Unit",
+        "from urmpipe_fmus.block import Input, Memory, Output, Parameter, State",
         "unit = Unit(",
         '    name="random_unit",',
         f"    description={draw(st.text(st.characters(categories=['L', 'Zs', 'P', 'S']), max_size=10))!r},",

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from urmpipe_fmus.block import Unit
+from urmpipe_fmus.blocks.registry import make_unit
 from urmpipe_fmus.cosim import Block, Recorded, load_system, prepare, simulate
-from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import native_missing
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.units import make_unit
+from urmpipe_fmus.run import Instance
 from urmpipe_models.drives import trapezoid
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import forward

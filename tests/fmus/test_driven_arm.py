@@ -18,14 +18,13 @@ from asserting import refusal
 from fmu_run import FmuRun
 from made_masses import DRIVE, driven, with_drives, with_masses
 from sliding_arm import sprung_arm
-from urmpipe_fmus.cache import cached_fmu
+from urmpipe_fmus.block import Output, Unit
+from urmpipe_fmus.blocks.driven_arm import starts_under
+from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.cosim import Block, Recorded, System, load_system, prepare, simulate
-from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import native_missing
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.units import make_unit
-from urmpipe_fmus.units.driven_arm import starts_under
-from urmpipe_fmus.variable import Output
+from urmpipe_fmus.run import Instance
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
 from urmpipe_models.drives import NO_SPRING, Drive, DrivenJoint, Gains, HeldJoint, ReliefSpring, trapezoid
 from urmpipe_models.dynamics.driven_arm import (

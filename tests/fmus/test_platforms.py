@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from urmpipe_fmus.platforms import binaries_here, binary_in, platforms_here, suffix_of, this_platform
+from urmpipe_fmus.fmu_file import binaries_here, binary_in, platforms_here, suffix_of, this_platform
 
 
 @pytest.fixture

@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from asserting import refusal
+from urmpipe_fmus.block import Input, Output, Parameter, Unit
 from urmpipe_fmus.si_units import BaseUnit, base_unit, coherent, display_conversion, same_unit
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Output, Parameter
 from urmpipe_models.errors import UnitError
 
 ALLOWED = (

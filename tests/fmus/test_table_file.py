@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from asserting import refusal
-from urmpipe_fmus.table import Table
-from urmpipe_fmus.table_file import read_table, table_bytes
+from urmpipe_fmus.block import Table, read_table, table_bytes
 from urmpipe_models.errors import FmuError
 
 times = st.lists(st.integers(-(2**63), 2**63 - 1), min_size=1, max_size=9, unique=True).map(sorted)

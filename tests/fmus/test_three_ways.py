@@ -19,16 +19,12 @@ from loaded_fmu import Loaded
 from made_masses import with_drives, with_masses
 from random_units import PATIENT, random_columns, random_starts, random_units
 from sliding_arm import sliding_arm, sprung_arm
-from urmpipe_fmus.build import build_fmu
-from urmpipe_fmus.cache import cached_fmu
-from urmpipe_fmus.instance import Instance
+from urmpipe_fmus.block import INTERNAL_STEP, Table, Unit, Variable
+from urmpipe_fmus.blocks.registry import make_unit, unit_names
+from urmpipe_fmus.blocks.user import load_unit_file
+from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.native import native_missing
-from urmpipe_fmus.run import run
-from urmpipe_fmus.table import Table
-from urmpipe_fmus.unit import INTERNAL_STEP, Unit
-from urmpipe_fmus.units import make_unit, unit_names
-from urmpipe_fmus.user_unit import load_unit_file
-from urmpipe_fmus.variable import Variable
+from urmpipe_fmus.run import Instance, run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError
 from urmpipe_models.robots.catalogue import load_robot

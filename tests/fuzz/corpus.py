@@ -313,7 +313,7 @@ def fmus() -> list[Specimen]:
     """
     from tests.fuzz.archive_mutators import packed
 
-    from urmpipe_fmus.platforms import binaries_here
+    from urmpipe_fmus.fmu_file import binaries_here
 
     def made(library: str) -> bytes:
         return packed(

@@ -225,7 +225,7 @@ def fmu(path: Path, made: Path, rng: Random) -> None:
     """Check an FMU, and read what a system reads of it."""
     from urmpipe.printing.fmu import checked_dict
     from urmpipe_fmus.check import check_fmu
-    from urmpipe_fmus.cosim.interface import read_interface
+    from urmpipe_fmus.cosim.checks import read_interface
 
     if path.name.startswith("here"):
         read_interface(path)

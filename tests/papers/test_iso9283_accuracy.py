@@ -19,8 +19,8 @@ from urmpipe import accuracy
 from urmpipe.driven_runs.arm_unit import ArmUnit
 from urmpipe.systems.units import Backend
 from urmpipe_datasets import ROBOTS
+from urmpipe_fmus.block import INTERNAL_STEP
 from urmpipe_fmus.native import native_missing
-from urmpipe_fmus.unit import INTERNAL_STEP
 from urmpipe_models.arm.chain import GRAVITY, Chain
 from urmpipe_models.drives import DrivenJoint, HeldJoint
 from urmpipe_models.dynamics.driven_arm import spectral_radius

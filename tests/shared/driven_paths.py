@@ -12,7 +12,7 @@ import numpy as np
 import urmpipe
 from fmu_run import FmuRun
 from urmpipe.driven_runs.arm_unit import ArmUnit
-from urmpipe_fmus.cache import cached_fmu
+from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline.planned_paths.result import PlannedPath

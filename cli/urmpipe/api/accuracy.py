@@ -20,7 +20,7 @@ from urmpipe.output_files import guarded_outputs
 from urmpipe.reading import UntimedReading, map_files, options_of, resolved
 from urmpipe.systems.blocks import ON_PYTHON
 from urmpipe.systems.units import Backend
-from urmpipe_fmus.build import chosen_backend
+from urmpipe_fmus.build.fmu import chosen_backend
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import DrivenJoint
 from urmpipe_models.dynamics.driven_arm import spectral_radius

@@ -11,13 +11,13 @@ from urmpipe.arm_placing import Robot
 from urmpipe.keyword_checks import PathLike, one_or_many, public
 from urmpipe.log_table import LogTable
 from urmpipe.systems.units import Backend, unit_of
-from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.block import Unit
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.outputs import guarded_output
 
 if TYPE_CHECKING:
-    from urmpipe_fmus.build import BuiltFmu
+    from urmpipe_fmus.build.fmu import BuiltFmu
     from urmpipe_pipeline.sources import LogMap
 
 
@@ -37,7 +37,7 @@ def build_fmu(
     """Package a unit as an FMU (FMI 2.0 co-simulation).
 
     Args:
-        unit: A name of `urmpipe_fmus.units`, a Python file with a unit in it, or a unit.
+        unit: A name of `urmpipe_fmus.blocks.registry`, a Python file with a unit in it, or a unit.
         robot: Name, file (TOML, URDF) or chain of the arm, for a unit that has one.
         log: A log for a unit that plays one: CSV, a folder of plots, or what `read_table` made of them.
         options: Further options of the unit by name; see `urmpipe fmu list`.
@@ -54,7 +54,7 @@ def build_fmu(
     Raises:
         UrmpipeError: With everything that is wrong with the unit, its options or the output.
     """
-    from urmpipe_fmus.build import build_fmu as build
+    from urmpipe_fmus.build.fmu import build_fmu as build
 
     made = unit_of(unit, robot=robot, log=log, options=options, log_map=log_map)
     path = Path(output)

@@ -16,8 +16,8 @@ from urmpipe.systems.units import Backend
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.cosim import load_system, prepare, read_system, system_name, system_names, system_svg
 from urmpipe_fmus.cosim import simulate as run_plan
-from urmpipe_fmus.cosim.process import Worker
-from urmpipe_fmus.fmu_process import TIMEOUT
+from urmpipe_fmus.cosim.simulation import Worker
+from urmpipe_fmus.process import TIMEOUT
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.simulations.simulation import Simulation

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.units.coordinates import kinds_of
-from urmpipe_fmus.units.driven_arm import driven_arm, starts_under
+from urmpipe_fmus.block import Unit
+from urmpipe_fmus.blocks.coordinates import kinds_of
+from urmpipe_fmus.blocks.driven_arm import driven_arm, starts_under
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import DrivenJoint
 from urmpipe_models.elementwise import FloatArray

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe.printing.terminal import LISTED, new_console, new_table, say
 from urmpipe.systems.units import FROM_LOG, example_of, example_subject
-from urmpipe_fmus.cosim.interface import ELEMENT
-from urmpipe_fmus.documentation import TITLES as VARIABLE_HEADS
-from urmpipe_fmus.documentation import variable_row
-from urmpipe_fmus.units import unit_help, unit_name, unit_names, unit_options
+from urmpipe_fmus.blocks.registry import unit_help, unit_name, unit_names, unit_options
+from urmpipe_fmus.build.description import TITLES as VARIABLE_HEADS
+from urmpipe_fmus.build.description import variable_row
+from urmpipe_fmus.cosim.checks import ELEMENT
 from urmpipe_pipeline import text
 
 if TYPE_CHECKING:
-    from urmpipe_fmus.build import BuiltFmu
+    from urmpipe_fmus.build.fmu import BuiltFmu
     from urmpipe_fmus.check import Checked, CheckedVariable
 
 FIGURES = 6

@@ -15,19 +15,18 @@ from urmpipe.systems.held_logs import between_samples, on_points
 from urmpipe.systems.log_tables import read_table
 from urmpipe.systems.units import Backend, column_names, unit_of
 from urmpipe_datasets import LOGS
-from urmpipe_fmus.build import chosen_backend
-from urmpipe_fmus.cache import cached_fmu
+from urmpipe_fmus.block import Table
+from urmpipe_fmus.build.fmu import cached_fmu, chosen_backend
 from urmpipe_fmus.cosim.plan import LogColumn
 from urmpipe_fmus.cosim.system import STEP
-from urmpipe_fmus.table import Table
 from urmpipe_models.errors import Finding, OptionError, UrmpipeError, shown
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import row_clock
 from urmpipe_pipeline.simulations.simulation import SLOW
 
 if TYPE_CHECKING:
+    from urmpipe_fmus.block import Unit
     from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
-    from urmpipe_fmus.unit import Unit
     from urmpipe_models.arm.chain import Chain
     from urmpipe_models.elementwise import IntArray
 

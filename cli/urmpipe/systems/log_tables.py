@@ -11,7 +11,7 @@ import numpy as np
 from urmpipe.keyword_checks import PathLike
 from urmpipe.log_table import LogTable, Quantity
 from urmpipe.reading import resolved
-from urmpipe_fmus.table import Table
+from urmpipe_fmus.block import Table
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import IN_MAP, IN_NO_FILE, Finding, Hint, LogError

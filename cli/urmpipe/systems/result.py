@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from urmpipe.systems.blocks import CHAIN, METER, Blocks
-from urmpipe_fmus.cosim.interface import ELEMENT, Interface
+from urmpipe_fmus.build.fmu import robot_in
+from urmpipe_fmus.cosim.checks import ELEMENT, Interface
 from urmpipe_fmus.cosim.plan import NANOSECOND, Plan
 from urmpipe_fmus.cosim.simulation import NotFinite, Recorded
 from urmpipe_fmus.cosim.system import Block, Port, System
-from urmpipe_fmus.robot_entry import robot_in
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError

@@ -12,8 +12,8 @@ from urmpipe.keyword_checks import PathLike
 from urmpipe.log_table import LogTable
 from urmpipe.systems.log_tables import read_mapped_table
 from urmpipe_datasets import LOGS
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.units import make_unit, unit_name, unit_options
+from urmpipe_fmus.block import Unit
+from urmpipe_fmus.blocks.registry import make_unit, unit_name, unit_options
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import DRIVE_KEYS, GAIN_KEYS, Drive, DrivenJoint, Gains
 from urmpipe_models.errors import Finding, Hint, OptionError
@@ -114,7 +114,7 @@ def _driven(robot: Chain) -> Chain:
 
 def _from_file(path: Path) -> Unit:
     """Return the unit of a user's file."""
-    from urmpipe_fmus.user_unit import load_unit_file
+    from urmpipe_fmus.blocks.user import load_unit_file
 
     return load_unit_file(path)
 

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from urmpipe_fmus.cosim.system import LogInput as LogInput
     from urmpipe_fmus.cosim.system import Port as Port
     from urmpipe_fmus.cosim.system import System as System
-    from urmpipe_fmus.cosim.system_file import load_system as load_system
-    from urmpipe_fmus.cosim.system_file import read_system as read_system
-    from urmpipe_fmus.cosim.system_file import system_name as system_name
-    from urmpipe_fmus.cosim.system_file import system_names as system_names
-    from urmpipe_fmus.cosim.system_file import system_text as system_text
+    from urmpipe_fmus.cosim.system import load_system as load_system
+    from urmpipe_fmus.cosim.system import read_system as read_system
+    from urmpipe_fmus.cosim.system import system_name as system_name
+    from urmpipe_fmus.cosim.system import system_names as system_names
+    from urmpipe_fmus.cosim.system import system_text as system_text
 
 _HOME = {
     "Block": "system",
@@ -38,14 +38,14 @@ _HOME = {
     "Port": "system",
     "Recorded": "simulation",
     "System": "system",
-    "load_system": "system_file",
+    "load_system": "system",
     "prepare": "plan",
-    "read_system": "system_file",
+    "read_system": "system",
     "simulate": "simulation",
-    "system_name": "system_file",
-    "system_names": "system_file",
+    "system_name": "system",
+    "system_names": "system",
     "system_svg": "drawing",
-    "system_text": "system_file",
+    "system_text": "system",
 }
 
 __all__ = sorted(_HOME)  # noqa: PLE0605 - the names are those of _HOME

@@ -1,16 +1,267 @@
-"""What goes where in a system, by scalars, and all that is wrong with it."""
+"""What an FMU shows of itself: its variables, what they depend on, and what it can do.
+
+What goes where in a system, by scalars, and all that is wrong with it.
+"""
 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
 from typing import Any
 
-from urmpipe_fmus.cosim.interface import Interface, Variable, si_base, unit_fault
 from urmpipe_fmus.cosim.system import Block, Connection, Port, System
-from urmpipe_models.errors import Finding, not_among
+from urmpipe_fmus.fmu_file import binaries_here, open_fmu
+from urmpipe_fmus.si_units import BASE_NAMES, BaseUnit, base_unit, same_unit
+from urmpipe_models.errors import CosimulationError, Finding, UnitError, not_among
 from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
+
+ELEMENT = re.compile(r"(.+)\[(\d+(?:,\s*\d+)*)\]")
+"""The name of an array's element: `phi[1]`, `M[1,2]`."""
+
+NUMBERS = ("Real", "Integer", "Boolean")
+"""The types that are exchanged and recorded."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A scalar of an FMU.
+
+    Attributes:
+        name: Its name.
+        reference: Its value reference.
+        type: Real, Integer, Boolean or String; an Enumeration is exchanged as an Integer.
+        enumeration: Name of the enumeration, if it is one.
+        causality: As FMI spells it.
+        variability: As FMI spells it.
+        initial: As FMI spells it; empty if there is none.
+        unit: Its unit as the FMU spells it; empty if it has none.
+        base: The unit in the base units of SI, if the FMU tells; else what its spelling says, if it is one.
+        minimum: The least value allowed.
+        maximum: The largest value allowed.
+        nominal: The size of its values; 0 if the FMU does not tell.
+        start: Its value at the start, as the FMU spells it; None if it has none.
+        description: One line for people; empty for none.
+        display_unit: The unit that people like to see, such as deg; empty for the unit itself.
+    """
+
+    name: str
+    reference: int
+    type: str
+    enumeration: str
+    causality: str
+    variability: str
+    initial: str
+    unit: str
+    base: BaseUnit | None
+    minimum: float
+    maximum: float
+    nominal: float
+    start: str | None
+    description: str = ""
+    display_unit: str = ""
+
+    @property
+    def settable(self) -> bool:
+        """Whether it takes a start value: no constant, initial exact or approx (FMI 2.0.4, section 4.2.4)."""
+        return self.variability != "constant" and self.initial in ("exact", "approx")
+
+    def refusal(self, value: float) -> str:
+        """Return why it cannot take a value; empty if it can."""
+        if not math.isfinite(value):
+            return f"found {value:g}, allowed: a finite number"
+        if not self.minimum <= value <= self.maximum:
+            return f"found {value:.12g}, allowed: {self.minimum:.12g} to {self.maximum:.12g}"
+        if self.type == "Integer" and not (value == round(value) and abs(value) < 2.0**31):
+            return f"found {value:.12g}, allowed: an integer of 32 bits"
+        if self.type == "Boolean" and value not in (0.0, 1.0):
+            return f"found {value:.12g}, allowed: true, false"
+        return ""
+
+
+@dataclass(frozen=True, eq=False)
+class Interface:
+    """What an FMU shows of itself.
+
+    Attributes:
+        path: The FMU.
+        identifier: Name of its binaries.
+        guid: What binds description and binaries.
+        variables: All of them by name, in order.
+        dependencies: Of each output, the inputs that its value depends on at once.
+        silent: Outputs that do not tell what they depend on: on all inputs, as far as one knows.
+        can_save: Whether its state can be saved and restored.
+        variable_step: Whether its communication step may change.
+        alone: Whether it can be instantiated only once per process.
+        description: One line for people; empty for none.
+    """
+
+    path: Path
+    identifier: str
+    guid: str
+    variables: Mapping[str, Variable]
+    dependencies: Mapping[str, frozenset[str]]
+    silent: frozenset[str]
+    can_save: bool
+    variable_step: bool
+    alone: bool
+    description: str = ""
+
+    @cached_property
+    def inputs(self) -> tuple[Variable, ...]:
+        """Its inputs, in order."""
+        return tuple(one for one in self.variables.values() if one.causality == "input")
+
+    @cached_property
+    def outputs(self) -> tuple[Variable, ...]:
+        """Its outputs that are numbers, in order."""
+        return tuple(v for v in self.variables.values() if v.causality == "output" and v.type in NUMBERS)
+
+    @cached_property
+    def arrays(self) -> Mapping[str, tuple[Variable, ...]]:
+        """The elements of its arrays by the array's name, in the order of their indices."""
+        found: dict[str, list[tuple[tuple[int, ...], Variable]]] = {}
+        for name, one in self.variables.items():
+            match = ELEMENT.fullmatch(name)
+            if match and match[1] not in self.variables:
+                index = tuple(int(i) for i in match[2].split(","))
+                found.setdefault(match[1], []).append((index, one))
+        return {
+            name: tuple(v for _, v in sorted(rows, key=lambda row: row[0])) for name, rows in found.items()
+        }
+
+    def elements(self, name: str) -> tuple[Variable, ...]:
+        """Return the scalar of a name, or all elements of an array; none if there is neither."""
+        one = self.variables.get(name)
+        return (one,) if one else self.arrays.get(name, ())
+
+    def names(self, causality: str) -> list[str]:
+        """Return the names of the variables of a causality, arrays as one."""
+        names: dict[str, None] = {}
+        for name, one in self.variables.items():
+            if one.causality == causality:
+                match = ELEMENT.fullmatch(name)
+                names[match[1] if match and match[1] in self.arrays else name] = None
+        return list(names)
+
+
+def read_interface(path: Path) -> Interface:
+    """Read the description of an FMU.
+
+    It is not held to the standard's schema, as `check_fmu` does: many an FMU that is not quite valid runs.
+
+    Raises:
+        FmuError: If its archive or its description cannot be read.
+        CosimulationError: If its variables cannot be read, it is no FMU for co-simulation by FMI 2.0, or it
+            has no binaries for this platform.
+    """
+    file = open_fmu(path)
+    described = file.described()
+    try:
+        shown = _interface(path, described)
+    except Exception as error:  # what a description can be wrong by is much
+        said = " ".join(str(error).split())
+        raise CosimulationError(f"{path}: cannot be read as an FMU: {said}") from error
+    if shown is None:
+        kinds = [kind for kind in ("coSimulation", "modelExchange") if getattr(described, kind)]
+        found = f"FMI {described.fmiVersion} for {' and '.join(kinds) or 'nothing'}"
+        raise CosimulationError(f"{path}: found {found}, allowed: FMI 2.0 for coSimulation")
+    binaries = binaries_here(shown.identifier)
+    if not set(file.names) & set(binaries):
+        platforms = sorted({name.split("/")[1] for name in file.names if re.match(r"binaries/[^/]+/.", name)})
+        raise CosimulationError(
+            f"{path}: found binaries for {', '.join(platforms) or 'no platform'},"
+            f" allowed: {' or '.join(binaries)}"
+        )
+    return shown
+
+
+def _interface(path: Path, described: Any) -> Interface | None:
+    """Return what FMPy's description shows; None if it is not for co-simulation by FMI 2.0."""
+    can = described.coSimulation
+    if described.fmiVersion != "2.0" or can is None:
+        return None
+    told = {one.variable.name for one in described.outputs if one.dependencies is not None}
+    return Interface(
+        path=path,
+        identifier=can.modelIdentifier,
+        guid=described.guid,
+        variables={one.name: one for one in _variables(described)},
+        dependencies=_dependencies(described),
+        silent=frozenset(v.name for v in described.modelVariables if v.causality == "output") - told,
+        can_save=can.canGetAndSetFMUstate,
+        variable_step=can.canHandleVariableCommunicationStepSize,
+        alone=can.canBeInstantiatedOnlyOncePerProcess,
+        description=described.description or "",
+    )
+
+
+def unit_fault(unit: str, base: BaseUnit | None, destination: Variable) -> str | None:
+    """Return how the unit of a source differs from an input's; empty if one has none, None if it does not.
+
+    Args:
+        unit: The source's unit; empty if it has none.
+        base: The same in the base units of SI, if that is known.
+        destination: The input.
+    """
+    if destination.type != "Real" or unit == destination.unit:
+        return None
+    if not unit or not destination.unit:
+        return ""
+    if base and destination.base and same_unit(base, destination.base):
+        return None
+    return f"found the unit {unit}, allowed: that of the input, {destination.unit}"
+
+
+def _variables(described: Any) -> Iterator[Variable]:
+    """Yield the variables of FMPy's description; what one does not say, its declared type may."""
+    bases = {unit.name: unit.baseUnit for unit in described.unitDefinitions}
+    for one in described.modelVariables:
+        kind = one.declaredType
+        unit = one.unit or (kind and kind.unit) or ""
+        low, high = one.min or (kind and kind.min), one.max or (kind and kind.max)
+        yield Variable(
+            name=one.name,
+            reference=one.valueReference,
+            type="Integer" if one.type == "Enumeration" else one.type,
+            enumeration=kind.name if kind and one.type == "Enumeration" else "",
+            causality=one.causality,
+            variability=one.variability,
+            initial=one.initial or "",
+            unit=unit,
+            base=si_base(unit, bases.get(unit)),
+            minimum=float(low) if low else -math.inf,
+            maximum=float(high) if high else math.inf,
+            nominal=abs(float(one.nominal or (kind and kind.nominal) or 0.0)),
+            start=one.start,
+            description=one.description or "",
+            display_unit=one.displayUnit or (kind and kind.displayUnit) or "",
+        )
+
+
+def si_base(unit: str, told: Any = None) -> BaseUnit | None:
+    """Return a unit in the base units of SI, as FMPy read it or else by its spelling; None if unknown."""
+    if told is not None:
+        exponents = {name: getattr(told, name) for name in BASE_NAMES}
+        return BaseUnit(**exponents, factor=told.factor, offset=told.offset)
+    try:
+        return base_unit(unit) if unit else None
+    except UnitError:
+        return None
+
+
+def _dependencies(described: Any) -> dict[str, frozenset[str]]:
+    """Return what the outputs depend on; on all inputs where an FMU does not say."""
+    inputs = frozenset(v.name for v in described.modelVariables if v.causality == "input")
+    told = {
+        one.variable.name: inputs & {v.name for v in one.dependencies}
+        for one in described.outputs
+        if one.dependencies is not None
+    }
+    return {v.name: told.get(v.name, inputs) for v in described.modelVariables if v.causality == "output"}
 
 
 @dataclass(frozen=True, slots=True)

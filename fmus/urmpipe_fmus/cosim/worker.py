@@ -35,11 +35,9 @@ from urmpipe_fmus.cosim.job import (
     Progress,
     called,
 )
-from urmpipe_fmus.cosim.loops import NoConvergence
-from urmpipe_fmus.cosim.master import Master
+from urmpipe_fmus.cosim.master import Master, NoConvergence
 from urmpipe_fmus.cosim.slave import FmuFailed, status_name
-from urmpipe_fmus.end_with_parent import end_with_parent
-from urmpipe_fmus.fmu_process import callbacks_with
+from urmpipe_fmus.process import callbacks_with, end_with_parent
 from urmpipe_models.processes import limit_memory
 
 MEMORY = 8 * 2**30

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from urmpipe_fmus.equations import Equations
+from urmpipe_fmus.block import Rows, Unit
 from urmpipe_fmus.native.symbols import Symbol, exact_expressions, expression
-from urmpipe_fmus.table import Rows
-from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.run import Equations
 from urmpipe_models.errors import UnitError
 
 ARGUMENTS = ("time", "v[{}]", "rows->before[{}]", "rows->after[{}]", "rows->fraction")

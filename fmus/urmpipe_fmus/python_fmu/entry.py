@@ -9,10 +9,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from urmpipe_fmus.block import TABLE_FILE, Recipe, read_table
 from urmpipe_fmus.python_fmu.remake import remake
 from urmpipe_fmus.python_fmu.slave import Fmi2Slave
-from urmpipe_fmus.table_file import TABLE_FILE, read_table
-from urmpipe_fmus.unit import Recipe
 
 RECIPE_FILE = "unit.json"
 

@@ -9,11 +9,11 @@ from importlib.metadata import files as distribution_files
 from importlib.resources import files
 from pathlib import Path, PurePath
 
-from urmpipe_fmus.archive import content_guid
+from urmpipe_fmus.block import Recipe, Unit
+from urmpipe_fmus.fmu_file import content_guid
 from urmpipe_fmus.python_fmu.closure import check_imports, imports_of, renamed, sources_of
 from urmpipe_fmus.python_fmu.entry import RECIPE_FILE
 from urmpipe_fmus.python_fmu.remake import remake
-from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_models.errors import FmuError, UnitError, UrmpipeError
 
 PLATFORMS = ("linux64", "win64")

@@ -6,8 +6,7 @@ import sys
 from importlib import import_module
 from types import ModuleType
 
-from urmpipe_fmus.table import Table
-from urmpipe_fmus.unit import Recipe, Unit
+from urmpipe_fmus.block import Recipe, Table, Unit
 from urmpipe_models.errors import UnitError
 
 

@@ -15,9 +15,8 @@ from functools import wraps
 from math import isfinite
 from typing import Any, ClassVar, NamedTuple
 
-from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import LARGEST_INTEGER, ValueType
+from urmpipe_fmus.block import LARGEST_INTEGER, Unit, ValueType
+from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import UnitError
 
 ERROR = 3

@@ -11,10 +11,8 @@ import pytest
 from hypothesis import given, settings
 
 from random_units import PATIENT, random_units
+from urmpipe_fmus.block import Input, Memory, Output, Parameter, State, Table, Unit
 from urmpipe_fmus.dependencies import FUNCTIONS, TIME, Dependencies
-from urmpipe_fmus.table import Table
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State
 from urmpipe_models.errors import UnitError
 
 

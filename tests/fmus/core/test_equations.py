@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_fmus.equations import Equations
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State
+from urmpipe_fmus.block import Input, Memory, Output, Parameter, State, Unit
+from urmpipe_fmus.run import Equations
 from urmpipe_models.errors import UnitError
 
 

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 from asserting import refusal
 from random_units import PATIENT, random_columns, random_starts, random_units
-from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.unit import INTERNAL_STEP, Unit
-from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State
+from urmpipe_fmus.block import INTERNAL_STEP, Input, Memory, Output, Parameter, State, Unit
+from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import UnitError
 
 

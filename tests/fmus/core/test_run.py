@@ -11,10 +11,8 @@ from hypothesis import strategies as st
 
 from asserting import refusal
 from random_units import PATIENT, random_columns, random_starts, random_units
-from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.run import run
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Memory, Output, Parameter
+from urmpipe_fmus.block import Input, Memory, Output, Parameter, Unit
+from urmpipe_fmus.run import Instance, run
 from urmpipe_models.errors import UnitError
 
 

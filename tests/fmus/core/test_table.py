@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from asserting import refusal
-from urmpipe_fmus.table import Table
+from urmpipe_fmus.block import Table
 from urmpipe_models.errors import UnitError
 
 

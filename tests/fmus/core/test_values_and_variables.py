@@ -9,9 +9,7 @@ from typing import Any
 
 import pytest
 
-from urmpipe_fmus.unit import INTERNAL_STEP, Unit
-from urmpipe_fmus.values import Values
-from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State, Variable
+from urmpipe_fmus.block import INTERNAL_STEP, Input, Memory, Output, Parameter, State, Unit, Values, Variable
 from urmpipe_models.errors import UnitError
 
 

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from foreign_fmus import COUNTER, INTEGRATOR, Foreign, Scalar, gain, planned
 from urmpipe_fmus.cosim import LogColumn, LogInput, Plan, Port, system_svg
-from urmpipe_fmus.cosim.diagram import Box, Diagram, Pin, Wire, diagram
-from urmpipe_fmus.cosim.layout import Layout
+from urmpipe_fmus.cosim.drawing import Box, Diagram, Layout, Pin, Wire, diagram
 from urmpipe_models.elementwise import FloatArray
 
 SVG = "{http://www.w3.org/2000/svg}"

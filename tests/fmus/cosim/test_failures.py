@@ -16,7 +16,7 @@ import pytest
 from asserting import there
 from foreign_fmus import TROUBLE, Foreign, Scalar, fmu, gain, planned, ran, system
 from urmpipe_fmus.cosim import prepare, simulate
-from urmpipe_fmus.cosim.process import Worker
+from urmpipe_fmus.cosim.simulation import Worker
 
 WELL = "fmi2OK: trouble: all is well at 0.05 s"
 
@@ -123,7 +123,7 @@ def test_an_fmu_that_prints_without_end_does_not_fill_the_disk(
     )
     plan = planned({"f": flood}, step=0.05)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr("urmpipe_fmus.cosim.process.SAID_BYTES", 10_000)
+    monkeypatch.setattr("urmpipe_fmus.cosim.simulation.SAID_BYTES", 10_000)
     sizes: list[int] = []
 
     def look(_: float) -> None:
@@ -214,7 +214,7 @@ def test_the_process_that_runs_the_fmus_imports_little() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.split()
     assert not {"pandas", "scipy", "casadi", "rerun", "pyarrow", "pythonfmu", "click"} & set(loaded)
-    assert not {"urmpipe_fmus.unit", "urmpipe_fmus.cosim.plan"} & set(loaded)
+    assert not {"urmpipe_fmus.block", "urmpipe_fmus.cosim.plan"} & set(loaded)
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ import pytest
 from asserting import refusal
 from foreign_fmus import COUNTER, INTEGRATOR, TROUBLE, Foreign, Scalar, fmu, fmu_of, gain, planned, system
 from urmpipe_fmus.cosim import LogColumn, LogInput, Port, prepare
-from urmpipe_fmus.cosim.interface import read_interface
+from urmpipe_fmus.cosim.checks import read_interface
 from urmpipe_models.errors import CosimulationError
 
 ARM = Foreign(

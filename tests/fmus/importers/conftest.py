@@ -9,9 +9,8 @@ import pytest
 
 from peers import need_builds_for
 from shipped_units import shipped_unit
-from urmpipe_fmus.build import build_fmu
-from urmpipe_fmus.cache import cached_fmu
-from urmpipe_fmus.description import Backend
+from urmpipe_fmus.build.description import Backend
+from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.native import this_platform
 
 Fmu = Callable[..., Path]

@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Variable
+from urmpipe_fmus.block import Unit, Variable
 from urmpipe_models.elementwise import FloatArray
 
 

@@ -14,9 +14,9 @@ import pytest
 
 from peers import need_builds_for, said_by
 from shipped_units import CROSS_BUILT, shipped
-from urmpipe_fmus.build import build_fmu
+from urmpipe_fmus.blocks.user import load_unit_file
+from urmpipe_fmus.build.fmu import build_fmu
 from urmpipe_fmus.native import this_platform
-from urmpipe_fmus.user_unit import load_unit_file
 
 
 def binary(fmu: Path, folder: Path, platform: str = "linux64") -> Path:
@@ -99,8 +99,7 @@ print([[round(value, 9) for value in fmu.getReal([1, 2])] for fmu in (one, two)]
 """
 
 USER_UNIT = """
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Output, State
+from urmpipe_fmus.block import Input, Output, State, Unit
 
 
 def outputs(v):

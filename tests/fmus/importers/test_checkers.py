@@ -13,7 +13,7 @@ import pytest
 
 from peers import need
 from shipped_units import shipped
-from urmpipe_fmus.description import Backend
+from urmpipe_fmus.build.description import Backend
 
 CASES: list[tuple[str, Backend]] = [
     *((name, "native") for name in shipped()),

@@ -15,8 +15,8 @@ from libcosim_master import run_libcosim
 from peers import need
 from shipped_units import STEP, columns, drawn_inputs, sample_times, shipped, shipped_unit
 from systems import System, Trace, alone
+from urmpipe_fmus.block import Unit
 from urmpipe_fmus.run import run
-from urmpipe_fmus.unit import Unit
 from urmpipe_models.elementwise import FloatArray
 
 STEPS, FEW = 61, 9

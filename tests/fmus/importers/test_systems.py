@@ -13,11 +13,11 @@ from libcosim_master import run_libcosim
 from peers import need, need_builds_for
 from shipped_units import STEP, sample_times, shipped_unit
 from systems import Block, Scalar, System, Trace, empty_trace
-from urmpipe_fmus.cache import cached_fmu
-from urmpipe_fmus.instance import Instance
+from urmpipe_fmus.block import Table
+from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.native import this_platform
-from urmpipe_fmus.table import Table
-from urmpipe_fmus.units import make_unit
+from urmpipe_fmus.run import Instance
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.robots.catalogue import load_robot

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 from shipped_units import CROSS_BUILT, STEP, columns, drawn_inputs, sample_times, shipped_unit
+from urmpipe_fmus.block import Unit
 from urmpipe_fmus.run import run
-from urmpipe_fmus.unit import Unit
 from urmpipe_models.elementwise import FloatArray
 
 STEPS = 41

@@ -11,11 +11,8 @@ import numpy as np
 import pytest
 
 from c_host import GUID, host
+from urmpipe_fmus.block import TABLE_FILE, Input, Memory, Output, Parameter, State, Table, Unit, table_bytes
 from urmpipe_fmus.native import guid_header, native_binaries, native_missing, native_sources, this_platform
-from urmpipe_fmus.table import Table
-from urmpipe_fmus.table_file import TABLE_FILE, table_bytes
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State
 
 
 class Native:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.block import Unit
+from urmpipe_fmus.run import Instance
 
 
 def assert_same(found: Sequence[float], expected: Sequence[float]) -> None:

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from c_host import GUID, host, ran, script, write
-from urmpipe_fmus.instance import Instance
+from urmpipe_fmus.block import Unit
 from urmpipe_fmus.native import native_binaries, native_missing, native_sources, this_platform
 from urmpipe_fmus.native.compile import TARGETS
-from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import FmuError
 
 needs_compiler = pytest.mark.skipif(native_missing() is not None, reason=f"needs {native_missing()}")

@@ -8,11 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from urmpipe_fmus.block import Input, Output, Unit
 from urmpipe_fmus.dependencies import FUNCTIONS, LOGICAL
 from urmpipe_fmus.native.symbols import Symbol, traceable
 from urmpipe_fmus.native.trace import traced
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Output
 from urmpipe_models.errors import UnitError
 
 EXACT = (

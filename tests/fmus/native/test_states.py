@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.block import Unit
 
 DAMPING, GOAL, X, FORCE, COUNT = 1, 2, 5, 9, 7
 EVERYTHING = [0, 1, 2, 5, 6, 8, 9, 12, 13]

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_fmus.table import Table
-from urmpipe_fmus.unit import Recipe, Unit
+from urmpipe_fmus.block import Recipe, Table, Unit
 
 UNIT_FILES = Path(__file__).parent / "unit_files"
 TABLE = Table(

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from urmpipe_fmus.archive import content_guid, write_fmu
+from urmpipe_fmus.fmu_file import content_guid, write_fmu
 
 FILES = {"sources/b.c": b"int b;", "a.xml": b"<a/>", "binaries/linux64/a.so": bytes(range(256)) * 50}
 

@@ -16,15 +16,13 @@ from fmpy.validation import validate_fmu
 from asserting import there
 from loaded_fmu import Loaded
 from made_masses import with_drives, with_masses
-from urmpipe_fmus.archive import content_guid
-from urmpipe_fmus.build import build_fmu
-from urmpipe_fmus.cache import cached_fmu
+from urmpipe_fmus.block import Input, Output, Unit
+from urmpipe_fmus.blocks.logs import log_source
+from urmpipe_fmus.blocks.registry import make_unit, unit_names
+from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
+from urmpipe_fmus.fmu_file import content_guid
 from urmpipe_fmus.native import native_missing, this_platform
 from urmpipe_fmus.run import run
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.units import make_unit, unit_names
-from urmpipe_fmus.units.log_source import log_source
-from urmpipe_fmus.variable import Input, Output
 from urmpipe_models.errors import FmuError
 from urmpipe_models.robots.catalogue import load_robot
 

@@ -14,11 +14,10 @@ import pytest
 
 from asserting import refusal
 from loaded_fmu import Loaded
-from urmpipe_fmus.cache import _key, cache_folder, cached_fmu
-from urmpipe_fmus.table import Table
-from urmpipe_fmus.unit import Recipe, Unit
-from urmpipe_fmus.units import make_unit
-from urmpipe_fmus.user_unit import load_unit_file
+from urmpipe_fmus.block import Recipe, Table, Unit
+from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks.user import load_unit_file
+from urmpipe_fmus.build.fmu import _key, cache_folder, cached_fmu
 from urmpipe_models.errors import FmuError
 
 Make = Callable[..., Unit]
@@ -88,8 +87,7 @@ def test_a_unit_without_a_recipe_or_with_one_of_somebody_elses_module_is_never_t
 
 
 READING = """from pathlib import Path
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Output
+from urmpipe_fmus.block import Input, Output, Unit
 gain = float(Path(__file__).with_name("gain.txt").read_text())
 unit = Unit(name="reading", description="", outputs=lambda v: {"y": gain * v.u},
     variables=(Input(name="u", description="", start=1.0), Output(name="y", description="")))
@@ -127,8 +125,8 @@ def test_another_file_behind_the_command_of_the_compiler_is_another_fmu(
 def test_a_hit_imports_nothing_that_traces_and_runs_no_function() -> None:
     built = cached_fmu(make_unit("inertia"))
     code = (
-        "from urmpipe_fmus.cache import cached_fmu\n"
-        "from urmpipe_fmus.units import make_unit\n"
+        "from urmpipe_fmus.build.fmu.fmu import cached_fmu\n"
+        "from urmpipe_fmus.blocks.registry import make_unit\n"
         "import sys; print(cached_fmu(make_unit('inertia')))\n"
         "print(*sorted({'casadi', 'fmpy', 'pythonfmu', 'jinja2', 'lxml', 'scipy'} & set(sys.modules)))\n"
     )

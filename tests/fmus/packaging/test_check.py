@@ -17,14 +17,13 @@ import pytest
 
 from asserting import refusal
 from foreign_fmus import Foreign, Scalar, fmu
-from urmpipe_fmus.archive import write_fmu
-from urmpipe_fmus.build import build_fmu
-from urmpipe_fmus.cache import cached_fmu
+from urmpipe_fmus.block import Recipe, Unit
+from urmpipe_fmus.blocks.user import unit_of_source
+from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.check import check_fmu
-from urmpipe_fmus.instance import Instance
+from urmpipe_fmus.fmu_file import write_fmu
 from urmpipe_fmus.native import native_missing, this_platform
-from urmpipe_fmus.unit import Recipe, Unit
-from urmpipe_fmus.user_unit import unit_of_source
+from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import FmuError
 
 Make = Callable[..., Unit]
@@ -125,8 +124,7 @@ def test_an_fmu_of_another_tool_is_checked_too(tmp_path: Path) -> None:
 
 FAILING = '''"""A unit that fails on its way."""
 import os, time
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Memory
+from urmpipe_fmus.block import Memory, Unit
 
 def failing(v):
     if isinstance(v.time, float) and v.time > 0.012:

@@ -14,9 +14,8 @@ from fmpy.validation import validate_fmu
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from urmpipe_fmus.description import model_description
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Output, Parameter
+from urmpipe_fmus.block import Input, Output, Parameter, Unit
+from urmpipe_fmus.build.description import model_description
 
 NOT_XML = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """XML 1.0, production 2."""

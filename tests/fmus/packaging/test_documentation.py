@@ -11,10 +11,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from lxml import html  # type: ignore[import-untyped]
 
-from urmpipe_fmus.documentation import documentation
-from urmpipe_fmus.table import Table
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Output, Parameter
+from urmpipe_fmus.block import Input, Output, Parameter, Table, Unit
+from urmpipe_fmus.build.description import documentation
 
 Make = Callable[..., Unit]
 

@@ -12,12 +12,10 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from loaded_fmu import Loaded
-from urmpipe_fmus.build import build_fmu
-from urmpipe_fmus.cache import cached_fmu
-from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.unit import Recipe, Unit
-from urmpipe_fmus.user_unit import unit_of_source
-from urmpipe_fmus.variable import Input, Parameter
+from urmpipe_fmus.block import Input, Parameter, Recipe, Unit
+from urmpipe_fmus.blocks.user import unit_of_source
+from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
+from urmpipe_fmus.run import Instance
 
 Make = Callable[..., Unit]
 HELPERS = str(Path(__file__).parents[1])
@@ -218,8 +216,7 @@ def test_a_step_that_fails_is_undone_and_told(make: Make) -> None:
 
 
 RAISING = '''"""A unit that fails."""
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Memory, Output
+from urmpipe_fmus.block import Input, Memory, Output, Unit
 unit = Unit(name="raising", description="", variables=(
     Input(name="u", description="", start=1.0), Memory(name="n", description=""),
     Output(name="y", description="")),

@@ -12,11 +12,11 @@ import pytest
 
 from asserting import refusal
 from loaded_fmu import Loaded
-from urmpipe_fmus.build import build_fmu
-from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.unit import Recipe, Unit
-from urmpipe_fmus.units import make_unit
-from urmpipe_fmus.user_unit import load_unit_file, unit_of_source
+from urmpipe_fmus.block import Recipe, Unit
+from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks.user import load_unit_file, unit_of_source
+from urmpipe_fmus.build.fmu import build_fmu
+from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import FmuError, UnitError
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -35,8 +35,7 @@ def from_text(source: str, file: str) -> Unit:
 
 
 HELPED = '''"""A gain, with a helper of its own."""
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Output
+from urmpipe_fmus.block import Input, Output, Unit
 
 class Helper:
     gain = {gain}

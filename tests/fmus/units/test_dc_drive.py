@@ -10,13 +10,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from urmpipe_fmus.block import State, Unit, Values
+from urmpipe_fmus.blocks.registry import make_unit
 from urmpipe_fmus.dependencies import Dependencies
-from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.run import run
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.units import make_unit
-from urmpipe_fmus.values import Values
-from urmpipe_fmus.variable import State
+from urmpipe_fmus.run import Instance, run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError
 

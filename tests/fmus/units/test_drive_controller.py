@@ -7,9 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from asserting import refusal
-from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.run import run
-from urmpipe_fmus.units import make_unit
+from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.run import Instance, run
 from urmpipe_models.errors import UnitError
 
 GAINS = {"Kphi": 1.0, "Kw": 0.0, "Keps": 0.0}

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from asserting import refusal
+from urmpipe_fmus.block import Table
+from urmpipe_fmus.blocks.logs import Column, delta_meter, log_source
 from urmpipe_fmus.dependencies import TIME, Dependencies
 from urmpipe_fmus.run import run
-from urmpipe_fmus.table import Table
-from urmpipe_fmus.units.delta_meter import delta_meter
-from urmpipe_fmus.units.log_source import Column, log_source
 from urmpipe_models.errors import UnitError
 
 LOG = Table(

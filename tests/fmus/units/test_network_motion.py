@@ -10,11 +10,11 @@ import pytest
 
 from fmu_run import FmuRun
 from urmpipe import network_drive
-from urmpipe_fmus.cache import cached_fmu
+from urmpipe_fmus.block import Unit
+from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.run import run
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.units import make_unit
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError, UrmpipeError
 from urmpipe_models.networks.closure import descend

@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from random_units import PATIENT
-from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.run import run
-from urmpipe_fmus.units.repolarizer import repolarizer
+from urmpipe_fmus.blocks.logs import repolarizer
+from urmpipe_fmus.run import Instance, run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.wraps import repolarize
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from urmpipe_fmus.blocks.registry import make_unit
 from urmpipe_fmus.dependencies import TIME, Dependencies
-from urmpipe_fmus.instance import Instance
-from urmpipe_fmus.run import run
-from urmpipe_fmus.units import make_unit
+from urmpipe_fmus.run import Instance, run
 from urmpipe_models.drives import ramp, step, trapezoid
 from urmpipe_models.errors import UnitError
 

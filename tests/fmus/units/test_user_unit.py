@@ -12,15 +12,14 @@ import pytest
 from hypothesis import given, settings
 
 from random_units import PATIENT, random_unit_sources
+from urmpipe_fmus.blocks.user import load_unit_file, unit_of_source
 from urmpipe_fmus.run import run
-from urmpipe_fmus.user_unit import load_unit_file, unit_of_source
 from urmpipe_models.errors import UnitError
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 
 UNIT = """import numpy as np
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Output
+from urmpipe_fmus.block import Input, Output, Unit
 unit = Unit(
     name="own",
     description="Own",
@@ -182,8 +181,8 @@ def test_a_file_that_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, e
     assert said(written(tmp_path, text)) == expected
 
 
-THREE_FUNCTIONS = """from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Memory, Output, State
+THREE_FUNCTIONS = """from urmpipe_fmus.block import Unit
+from urmpipe_fmus.block import Input, Memory, Output, State
 
 def state(v):
     \"\"\"The derivative.\"\"\"

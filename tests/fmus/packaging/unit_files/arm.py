@@ -4,9 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.values import Values
-from urmpipe_fmus.variable import Input, Output, Parameter
+from urmpipe_fmus.block import Input, Output, Parameter, Unit, Values
 
 
 def tip(v: Values) -> dict[str, Any]:

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Memory, Output, Parameter
+from urmpipe_fmus.block import Input, Memory, Output, Parameter, Unit
 
 unit = Unit(
     name="counter",

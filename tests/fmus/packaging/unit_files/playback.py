@@ -1,8 +1,6 @@
 """A table over time, read held and interpolated."""
 
-from urmpipe_fmus.table import Table
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Output, Parameter
+from urmpipe_fmus.block import Output, Parameter, Table, Unit
 
 
 def make(table: Table, gain: float = 1.0) -> Unit:

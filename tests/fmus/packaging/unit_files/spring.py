@@ -1,7 +1,6 @@
 """A mass on a damped spring: continuous states, one of them an output."""
 
-from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Output, Parameter, State
+from urmpipe_fmus.block import Input, Output, Parameter, State, Unit
 
 unit = Unit(
     name="spring",

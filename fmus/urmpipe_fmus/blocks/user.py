@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
+from urmpipe_fmus.block import Recipe, Unit
 from urmpipe_fmus.dependencies import Dependencies
-from urmpipe_fmus.equations import Equations
-from urmpipe_fmus.unit import Recipe, Unit
+from urmpipe_fmus.run import Equations
 from urmpipe_models.errors import Finding, UnitError, UrmpipeError
 from urmpipe_models.files import read_contents
 

@@ -12,10 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_fmus.unit import Recipe, Unit
-from urmpipe_fmus.units.options import whole_number
-from urmpipe_fmus.values import Values
-from urmpipe_fmus.variable import Input, Memory, Output, Variable
+from urmpipe_fmus.block import Input, Memory, Output, Recipe, Unit, Values, Variable
+from urmpipe_fmus.blocks.coordinates import whole_number
 from urmpipe_models.elementwise import Element, Vector
 from urmpipe_models.errors import UnitError, not_among, shown
 from urmpipe_models.measure_units import WRITTEN, quantity
@@ -28,7 +26,7 @@ from urmpipe_models.networks.parts import POSE_UNITS
 from urmpipe_models.networks.rates import changes, close_network, largest_residual, predict_variables
 from urmpipe_models.toml_tables import are_numbers, is_number
 
-OPTIONS: Mapping[str, str] = {
+NETWORK_MOTION_OPTIONS: Mapping[str, str] = {
     "network": "a kinematic network: a name of the catalogue, or a .toml file",
     "controls": 'start values of controls, such as { crank = "40deg" } (default: those of the network)',
     "start": "joint values, in rad and m or with units, to which the assembly at the start is the nearest",

@@ -11,7 +11,7 @@ from importlib import import_module
 from inspect import Parameter, signature
 from typing import Any, cast
 
-from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.block import Unit
 from urmpipe_models.errors import UnitError, did_you_mean, not_among
 
 _UNITS: dict[str, str] = {

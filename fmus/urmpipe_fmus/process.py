@@ -1,12 +1,21 @@
-"""The process in which `check_fmu` runs an FMU, from the parent's side: started, watched, ended."""
+"""What the processes share in which FMUs run: what an FMU is given, and how long its calls may take.
+
+How a process in which an FMU runs ends with the one that started it, however that ended.
+
+The process in which `check_fmu` runs an FMU, from the parent's side: started, watched, ended.
+"""
 
 from __future__ import annotations
 
+import ctypes
 import json
 import mmap
 import os
+import shutil
+import signal
 import subprocess
-from collections.abc import Iterator, Mapping
+import threading
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +23,54 @@ from time import monotonic
 from typing import Any
 
 from urmpipe_models.processes import command, end_group, ending, environment
+
+TIMEOUT = 60.0
+"""Seconds that a call of an FMU may take; one that takes longer has hung."""
+
+
+def callbacks_with(take: Callable[..., None]) -> Any:
+    """Return FMPy's callbacks that give an FMU memory, and what it logs to a function.
+
+    Args:
+        take: Called with environment, instance, status, category and the text, in which FMPy has put the
+            values for its %s and %d.
+    """
+    from fmpy import calloc, fmi2, free
+    from fmpy.logging import addLoggerProxy
+
+    made = fmi2.fmi2CallbackFunctions()
+    made.logger = fmi2.fmi2CallbackLoggerTYPE(take)
+    made.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
+    made.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
+    addLoggerProxy(ctypes.byref(made))
+    return made
+
+
+def end_with_parent(folder: Path) -> None:
+    """End this process when the one that started it does: its end of the standard input is closed then.
+
+    The input is taken away from the standard one, so that an FMU that reads waits for nothing.
+
+    Args:
+        folder: The folder of the run, of no use to anybody then.
+    """
+    watched = os.dup(0)
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+
+    def watch() -> None:
+        """Wait until the input is closed, then leave nothing behind."""
+        while os.read(watched, 1024):
+            pass
+        shutil.rmtree(folder, ignore_errors=True)
+        with suppress(AttributeError, OSError):  # Windows has no groups
+            if os.getpgrp() == os.getpid():  # what the FMU started ends, too
+                os.killpg(os.getpid(), signal.SIGKILL)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
 
 STARTING = 60.0
 """Seconds that the process may take until it calls the FMU."""

@@ -1,0 +1,291 @@
+"""A log as a unit: the columns of a table inside the FMU, over time.
+
+The repolarizer as a unit: joint angles without the jumps of limited joints.
+
+The deviation of a point from where it should be, as a unit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from typing import Any, NamedTuple
+
+from urmpipe_fmus.block import (
+    Input,
+    Memory,
+    Output,
+    Parameter,
+    Recipe,
+    Table,
+    Unit,
+    Values,
+    ValueType,
+    Variable,
+)
+from urmpipe_fmus.blocks.coordinates import whole_number, yes_or_no
+from urmpipe_models.delta import DEFAULT_TOLERANCE, delta, outside
+from urmpipe_models.elementwise import Element
+from urmpipe_models.errors import UnitError, shown
+from urmpipe_models.wraps import State, step
+
+LOG_SOURCE_OPTIONS: Mapping[str, str] = {
+    "table": "the rows of a log: its times from its start, and the columns of its values",
+    "columns": 'what the columns are: name, unit and number of each, such as ["q", "rad", 6]',
+    "interpolate": "true: linear between two rows; false (default): each row holds until the next",
+}
+
+
+class Column(NamedTuple):
+    """A column of the table, or some that stand side by side and make an array.
+
+    Attributes:
+        name: Of the output.
+        unit: Spelled as FMI does.
+        size: How many columns; None for one that is no array.
+        description: One line for people.
+    """
+
+    name: str
+    unit: str = ""
+    size: int | None = None
+    description: str = ""
+
+
+def log_source(table: Table, columns: Sequence[Column | Sequence[Any]], interpolate: bool = False) -> Unit:
+    """Return the unit that plays a log.
+
+    Before the first row its values are those of the first, after the last those of the last. Angles that
+    jump by a period are better held than interpolated: a value on the jump is no place where the joint was.
+
+    Args:
+        table: The rows; times count from the log's start.
+        columns: What the columns of the table are, from left to right: `Column`s or what makes one.
+        interpolate: Linear between two rows, else each row holds until the next.
+
+    Raises:
+        UnitError: If the columns are not as many as the table has, or with what is wrong with their names.
+    """
+    yes_or_no("log_source", "interpolate", interpolate)
+    if not isinstance(table, Table) or isinstance(columns, str) or not isinstance(columns, Sequence):
+        raise UnitError("unit log_source: found no table and columns, allowed: a Table, a list of columns")
+    shown = [_column(one) for one in columns]
+    width = sum(one.size or 1 for one in shown)
+    if width != table.columns or not shown:
+        raise UnitError(
+            f"unit log_source: option columns: found {width} columns, allowed: {table.columns} of the table"
+        )
+
+    def outputs(v: Values) -> Mapping[str, Element | Sequence[Element]]:
+        """Return the columns at the instant, those of an array together."""
+        before, after, fraction = v.table
+        values = iter(
+            [a + fraction * (b - a) for a, b in zip(before, after, strict=True)] if interpolate else before
+        )
+        return {
+            one.name: next(values) if one.size is None else tuple(islice(values, one.size)) for one in shown
+        }
+
+    return Unit(
+        name="log_source",
+        description=f"A log of {len(table.t_ns)} rows, {'interpolated' if interpolate else 'held'}",
+        variables=tuple(_output(one) for one in shown),
+        outputs=outputs,
+        table=table,
+        equations=(
+            "y = y_k + (t - t_k) / (t_(k+1) - t_k) (y_(k+1) - y_k), with t_k <= t < t_(k+1)"
+            if interpolate
+            else "y = y_k, with t_k <= t < t_(k+1)",
+            "before the first row its values, after the last those of the last",
+            "t in whole nanoseconds",
+        ),
+        recipe=Recipe(
+            __name__, "log_source", {"columns": [list(one) for one in shown], "interpolate": interpolate}
+        ),
+    )
+
+
+def _column(given: Column | Sequence[Any]) -> Column:
+    """Return a column from what makes one.
+
+    Raises:
+        UnitError: If it makes none.
+    """
+    parts = () if isinstance(given, str) or not isinstance(given, Sequence) else tuple(given)
+    texts = (*parts[:2], *parts[3:])
+    if not 1 <= len(parts) <= len(Column._fields) or not all(isinstance(one, str) for one in texts):
+        allowed = "name, unit, size and description"
+        raise UnitError(f"unit log_source: option columns: found {shown(given)}, allowed: {allowed}")
+    column = Column(*parts)
+    if column.size is not None:
+        whole_number("log_source", f"columns: {column.name}: size", column.size)
+    return column
+
+
+def _output(column: Column) -> Output:
+    return Output(
+        name=column.name,
+        description=column.description or f"Column {column.name} of the log",
+        unit=column.unit,
+        display_unit="deg" if column.unit == "rad" else "",
+        size=column.size,
+    )
+
+
+REPOLARIZER_OPTIONS: Mapping[str, str] = {"joints": "the number of joints, such as 6"}
+
+POINT = 1.0
+"""Time is counted in communication points: what lies between two of them, `max_step` tells."""
+
+
+def repolarizer(joints: int) -> Unit:
+    """Return the unit that adds whole periods to angles, so that they go on where they were.
+
+    What `urmpipe_models.wraps.step` gives sample by sample, the samples being the communication points
+    and max_step in place of a largest speed.
+
+    Args:
+        joints: The number of joints.
+
+    Raises:
+        UnitError: If it is no integer from 1 to 1000.
+
+    Source: [UrmArm2021]_ eq. 15-18 with the corrections of the errata.
+    """
+    whole_number("repolarizer", "joints", joints)
+    return Unit(
+        name="repolarizer",
+        description="Joint angles without the jumps of joints that are limited to one period",
+        variables=(*_parameters(), *_signals(joints), *_memories(joints)),
+        outputs=_outputs,
+        update=_update,
+        equations=(
+            "q = raw + period turns (eq. 15)",
+            "turns changes by -sign(d) where a step d of raw meets ||d| - period| <= max_step (eq. 17, 18),",
+            "or where two steps of one sign do so only together",
+            "max_step counts as at least period / 100 and at most period / 4",
+        ),
+        source="UrmArm2021, eq. 15-18, with the sign of eq. 17 corrected and whole turns counted",
+        recipe=Recipe(__name__, "repolarizer", {"joints": joints}),
+    )
+
+
+def _parameters() -> tuple[Parameter, ...]:
+    return (
+        Parameter(
+            name="period",
+            description="What a joint jumps by where its environment limits it",
+            unit="rad",
+            display_unit="deg",
+            start=2.0 * math.pi,
+            minimum=1e-6,
+        ),
+        Parameter(
+            name="max_step",
+            description="How far a joint can move from one communication point to the next",
+            unit="rad",
+            display_unit="deg",
+            start=math.pi / 2.0,
+            minimum=1e-9,
+        ),
+    )
+
+
+def _signals(joints: int) -> tuple[Variable, ...]:
+    return (
+        Input(
+            name="raw",
+            description="Joint angles as their environment limits them",
+            unit="rad",
+            display_unit="deg",
+            size=joints,
+        ),
+        Output(name="q", description="Repolarized joint angles", unit="rad", display_unit="deg", size=joints),
+        Output(name="turns", description="Whole periods added", size=joints, type="Integer"),
+    )
+
+
+def _memories(joints: int) -> tuple[Memory, ...]:
+    def memory(name: str, description: str, unit: str = "", kind: ValueType = "Real") -> Memory:
+        """Return a memory of every joint."""
+        return Memory(name=name, description=description, unit=unit, type=kind, size=joints)
+
+    return (
+        memory("last", "Raw angles of the communication point before", "rad"),
+        memory("residual", "Step to them, less a period if it was a repolarization", "rad"),
+        memory("lasted", "Communication points that this step took"),
+        memory("turns_before", "Whole periods added there", kind="Integer"),
+        memory("elapsed", "Communication points without a value since then"),
+        memory("seen", "Whether there was one before", kind="Boolean"),
+    )
+
+
+def _steps(v: Values) -> Iterator[tuple[State, Element]]:
+    """Yield what `step` gives of each joint: the state to remember and the repolarized angle."""
+    remembered = zip(v.last, v.residual, v.lasted, v.turns_before, v.elapsed, v.seen, strict=True)
+    for fields, raw in zip(remembered, v.raw, strict=True):
+        state, q, _ = step(State(*fields), raw, POINT, period=v.period, max_speed=v.max_step)
+        yield state, q
+
+
+def _outputs(v: Values) -> Mapping[str, Sequence[Element]]:
+    states, q = zip(*_steps(v), strict=True)
+    return {"q": q, "turns": tuple(state.turns for state in states)}
+
+
+def _update(v: Values) -> Mapping[str, Sequence[Element]]:
+    states = [state for state, _ in _steps(v)]
+    fields = dict(zip(State._fields, zip(*states, strict=True), strict=True))
+    fields["turns_before"] = fields.pop("turns")
+    return fields
+
+
+DELTA_METER_OPTIONS: Mapping[str, str] = {}
+
+
+def delta_meter() -> Unit:
+    """Return the unit that subtracts where a point is from where it should be.
+
+    Source: [UrmArm2021]_ eq. 19-21, 23.
+    """
+    return Unit(
+        name="delta_meter",
+        description="Deviation of a point from where it should be, and whether it is tolerated",
+        variables=(
+            Parameter(
+                name="tolerance",
+                description="Largest deviation allowed along x, y and z",
+                unit="m",
+                display_unit="mm",
+                start=DEFAULT_TOLERANCE,
+                minimum=0.0,
+            ),
+            Input(name="reference", description="Where the point should be: x, y, z", unit="m", size=3),
+            Input(name="actual", description="Where the point is: x, y, z", unit="m", size=3),
+            Output(name="delta", description="Deviation: x, y, z", unit="m", display_unit="mm", size=3),
+            Output(name="norm", description="Length of the deviation", unit="m", display_unit="mm"),
+            Output(
+                name="out_of_tolerance",
+                description="Whether the deviation along x, y or z is above the tolerance or has no value",
+                type="Boolean",
+            ),
+        ),
+        outputs=_outputs_delta_meter,
+        equations=(
+            "delta = reference - actual (eq. 19-21)",
+            "norm = sqrt(delta_x^2 + delta_y^2 + delta_z^2) (eq. 23)",
+            "out_of_tolerance = not max(|delta_x|, |delta_y|, |delta_z|) <= tolerance",
+        ),
+        source="UrmArm2021, eq. 19-21 and 23",
+        recipe=Recipe(__name__, "delta_meter"),
+    )
+
+
+def _outputs_delta_meter(v: Values) -> Mapping[str, Element]:
+    found = delta(v.reference, v.actual)
+    return {
+        "delta": (found.x, found.y, found.z),
+        "norm": found.norm,
+        "out_of_tolerance": outside(found, v.tolerance),
+    }
