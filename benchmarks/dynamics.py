@@ -22,7 +22,7 @@ from pairs import Bound, in_turn, machine, timed, write_results
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "shared"))
 
 from made_masses import with_drives, with_masses
-from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.build.fmu import build_fmu
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.dynamics.equations import terms_over_log, torque_over_log

@@ -22,7 +22,7 @@ from pairs import table as process_table
 from urmpipe.systems.blocks import Blocks
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.block import Unit
-from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.build.fmu import build_fmu
 from urmpipe_fmus.cosim import Plan, load_system, prepare
 from urmpipe_fmus.cosim.job import ELSEWHERE, Progress

@@ -18,7 +18,7 @@ import urmpipe
 from foreign_fmus import HANGS, Foreign, Scalar, fmu, trouble_in
 from urmpipe.api.build_fmu import build_fmu
 from urmpipe_datasets import LOGS
-from urmpipe_fmus.blocks.registry import unit_names
+from urmpipe_fmus.blocks import unit_names
 from urmpipe_fmus.check import check_fmu
 from urmpipe_fmus.native import native_missing
 from urmpipe_models.errors import UrmpipeError

@@ -13,7 +13,7 @@ from urmpipe.options.named import option_value
 from urmpipe.systems.log_tables import read_mapped_table, read_table
 from urmpipe.systems.units import unit_of
 from urmpipe_datasets import LOGS
-from urmpipe_fmus.blocks.registry import unit_names
+from urmpipe_fmus.blocks import unit_names
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.robots.catalogue import load_robot
 

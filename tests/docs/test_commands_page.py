@@ -13,7 +13,7 @@ import pytest
 from pages import DOCS, command_lines, commands_in_text, pages, script, text_of
 from urmpipe.defaults import EACH_TIME
 from urmpipe.main import cli
-from urmpipe_fmus.blocks.registry import unit_names
+from urmpipe_fmus.blocks import unit_names
 from urmpipe_fmus.cosim import system_names
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.networks.file import network_names

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from asserting import there
-from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.cosim import load_system
 from urmpipe_fmus.run import Instance
 

@@ -13,7 +13,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from urmpipe_fmus.block import Unit
-from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.cosim import Block, Recorded, load_system, prepare, simulate
 from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.run import Instance

@@ -19,8 +19,8 @@ from fmu_run import FmuRun
 from made_masses import DRIVE, driven, with_drives, with_masses
 from sliding_arm import sprung_arm
 from urmpipe_fmus.block import Output, Unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.blocks.driven_arm import starts_under
-from urmpipe_fmus.blocks.registry import make_unit
 from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.cosim import Block, Recorded, System, load_system, prepare, simulate
 from urmpipe_fmus.native import native_missing

@@ -20,7 +20,7 @@ from made_masses import with_drives, with_masses
 from random_units import PATIENT, random_columns, random_starts, random_units
 from sliding_arm import sliding_arm, sprung_arm
 from urmpipe_fmus.block import INTERNAL_STEP, Table, Unit, Variable
-from urmpipe_fmus.blocks.registry import make_unit, unit_names
+from urmpipe_fmus.blocks import make_unit, unit_names
 from urmpipe_fmus.blocks.user import load_unit_file
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.native import native_missing

@@ -51,7 +51,7 @@ def argument_names(ctx: click.Context) -> Iterable[str]:
 
 def option_names(ctx: click.Context) -> Iterable[str]:
     """Return the options of the unit on the line that -s gives: not its robot or log."""
-    from urmpipe_fmus.blocks.registry import unit_options
+    from urmpipe_fmus.blocks import unit_options
 
     return [name for unit in operands(ctx) for name in unit_options(unit) if name not in ("robot", "table")]
 

@@ -70,7 +70,7 @@ def robots() -> Iterable[str]:
 
 def _units() -> Iterable[str]:
     """Return the names of the units."""
-    from urmpipe_fmus.blocks.registry import unit_names
+    from urmpipe_fmus.blocks import unit_names
 
     return unit_names()
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe.printing.terminal import LISTED, new_console, new_table, say
 from urmpipe.systems.units import FROM_LOG, example_of, example_subject
-from urmpipe_fmus.blocks.registry import unit_help, unit_name, unit_names, unit_options
+from urmpipe_fmus.blocks import unit_help, unit_name, unit_names, unit_options
 from urmpipe_fmus.build.description import TITLES as VARIABLE_HEADS
 from urmpipe_fmus.build.description import variable_row
 from urmpipe_fmus.cosim.checks import ELEMENT

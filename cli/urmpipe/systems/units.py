@@ -13,7 +13,7 @@ from urmpipe.log_table import LogTable
 from urmpipe.systems.log_tables import read_mapped_table
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.block import Unit
-from urmpipe_fmus.blocks.registry import make_unit, unit_name, unit_options
+from urmpipe_fmus.blocks import make_unit, unit_name, unit_options
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import DRIVE_KEYS, GAIN_KEYS, Drive, DrivenJoint, Gains
 from urmpipe_models.errors import Finding, Hint, OptionError

@@ -34,8 +34,6 @@ from urmpipe_models.drives import (
 from urmpipe_models.drives import set_point as set_point_at
 from urmpipe_models.elementwise import Element
 
-DC_DRIVE_OPTIONS: Mapping[str, str] = {}
-
 
 def dc_drive() -> Unit:
     """Return the unit: voltage, driven angle and its rate in; shaft torque, angle, rate and current out.
@@ -147,8 +145,6 @@ def _derivatives(v: Values) -> Mapping[str, Element]:
     }
 
 
-DRIVE_CONTROLLER_OPTIONS: Mapping[str, str] = {}
-
 NO_SAMPLE = -(2.0**53)
 """Below the number of every sample: a run may begin before 0 s."""
 
@@ -234,9 +230,6 @@ def _voltage(v: Values) -> Element:
     return voltage_at(v.time, v.period, v.sample, fresh, v.last)
 
 
-INERTIA_OPTIONS: Mapping[str, str] = {}
-
-
 def inertia() -> Unit:
     """Return the unit: torques in; angle, rate and acceleration out.
 
@@ -293,9 +286,6 @@ def _inertia_states() -> tuple[State, ...]:
 def _acceleration(v: Values) -> Element:
     """Return omega'."""
     return load_acceleration(v.J, v.d, v.omega, v.tau, v.tau_ext)
-
-
-SET_POINT_OPTIONS: Mapping[str, str] = {}
 
 
 def set_point() -> Unit:

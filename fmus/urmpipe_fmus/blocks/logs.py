@@ -241,9 +241,6 @@ def _update(v: Values) -> Mapping[str, Sequence[Element]]:
     return fields
 
 
-DELTA_METER_OPTIONS: Mapping[str, str] = {}
-
-
 def delta_meter() -> Unit:
     """Return the unit that subtracts where a point is from where it should be.
 

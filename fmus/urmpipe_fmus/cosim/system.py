@@ -15,7 +15,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from urmpipe_fmus.blocks.registry import unit_name
+from urmpipe_fmus.blocks import unit_name
 from urmpipe_models.errors import CosimulationError, Finding, Hint, did_you_mean, not_among, shown
 from urmpipe_models.files import is_there, meant_by, placed
 from urmpipe_models.measure_units import WRITTEN, quantity

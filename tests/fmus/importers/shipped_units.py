@@ -8,7 +8,7 @@ import numpy as np
 
 from made_masses import with_drives, with_masses
 from urmpipe_fmus.block import Input, Table, Unit
-from urmpipe_fmus.blocks.registry import make_unit, unit_names
+from urmpipe_fmus.blocks import make_unit, unit_names
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 

@@ -14,7 +14,7 @@ from peers import need, need_builds_for
 from shipped_units import STEP, sample_times, shipped_unit
 from systems import Block, Scalar, System, Trace, empty_trace
 from urmpipe_fmus.block import Table
-from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.native import this_platform
 from urmpipe_fmus.run import Instance

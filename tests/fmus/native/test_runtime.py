@@ -14,7 +14,7 @@ import pytest
 from c_host import host, ran, script, write
 from sliding_arm import sliding_arm
 from urmpipe_fmus.block import Unit
-from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.native import native_missing
 
 HERE = Path(__file__).parent

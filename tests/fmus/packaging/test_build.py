@@ -17,8 +17,8 @@ from asserting import there
 from loaded_fmu import Loaded
 from made_masses import with_drives, with_masses
 from urmpipe_fmus.block import Input, Output, Unit
+from urmpipe_fmus.blocks import make_unit, unit_names
 from urmpipe_fmus.blocks.logs import log_source
-from urmpipe_fmus.blocks.registry import make_unit, unit_names
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.fmu_file import content_guid
 from urmpipe_fmus.native import native_missing, this_platform

@@ -15,7 +15,7 @@ import pytest
 from asserting import refusal
 from loaded_fmu import Loaded
 from urmpipe_fmus.block import Recipe, Table, Unit
-from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.blocks.user import load_unit_file
 from urmpipe_fmus.build.fmu import _key, cache_folder, cached_fmu
 from urmpipe_models.errors import FmuError
@@ -126,7 +126,7 @@ def test_a_hit_imports_nothing_that_traces_and_runs_no_function() -> None:
     built = cached_fmu(make_unit("inertia"))
     code = (
         "from urmpipe_fmus.build.fmu.fmu import cached_fmu\n"
-        "from urmpipe_fmus.blocks.registry import make_unit\n"
+        "from urmpipe_fmus.blocks import make_unit\n"
         "import sys; print(cached_fmu(make_unit('inertia')))\n"
         "print(*sorted({'casadi', 'fmpy', 'pythonfmu', 'jinja2', 'lxml', 'scipy'} & set(sys.modules)))\n"
     )

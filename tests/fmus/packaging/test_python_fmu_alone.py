@@ -13,7 +13,7 @@ import pytest
 from asserting import refusal
 from loaded_fmu import Loaded
 from urmpipe_fmus.block import Recipe, Unit
-from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.blocks.user import load_unit_file, unit_of_source
 from urmpipe_fmus.build.fmu import build_fmu
 from urmpipe_fmus.run import Instance

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from urmpipe_fmus.block import State, Unit, Values
-from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.dependencies import Dependencies
 from urmpipe_fmus.run import Instance, run
 from urmpipe_models.elementwise import FloatArray

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from asserting import refusal
-from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.run import Instance, run
 from urmpipe_models.errors import UnitError
 

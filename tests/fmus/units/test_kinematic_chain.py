@@ -10,8 +10,8 @@ import pytest
 
 from sliding_arm import sliding_arm
 from urmpipe_fmus.block import Unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.blocks.kinematic_chain import kinematic_chain
-from urmpipe_fmus.blocks.registry import make_unit
 from urmpipe_fmus.run import Instance, run
 from urmpipe_models.arm.chain import Chain, Sphere, Visual
 from urmpipe_models.arm.geometric_models import urm_chain

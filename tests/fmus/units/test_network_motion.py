@@ -11,7 +11,7 @@ import pytest
 from fmu_run import FmuRun
 from urmpipe import network_drive
 from urmpipe_fmus.block import Unit
-from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.run import run

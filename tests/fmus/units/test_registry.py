@@ -11,7 +11,7 @@ import pytest
 from asserting import refusal
 from made_masses import with_drives, with_masses
 from urmpipe_fmus.block import Output, Table, Unit
-from urmpipe_fmus.blocks.registry import make_unit, unit_help, unit_name, unit_names, unit_options
+from urmpipe_fmus.blocks import make_unit, unit_help, unit_name, unit_names, unit_options
 from urmpipe_models.errors import UnitError
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -29,7 +29,7 @@ def test_the_options_told_are_the_arguments_taken_and_a_unit_has_its_own_name() 
         "network_motion": {"network": "four-bar"},
     }
     for name in unit_names():
-        module = importlib.import_module(f"urmpipe_fmus.blocks.registry.{name}")
+        module = importlib.import_module(f"urmpipe_fmus.blocks.{name}")
         assert list(inspect.signature(getattr(module, name)).parameters) == list(unit_options(name))
         assert unit_help(name)
         assert make_unit(name, **given.get(name, {})).name == name

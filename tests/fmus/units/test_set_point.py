@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from urmpipe_fmus.blocks.registry import make_unit
+from urmpipe_fmus.blocks import make_unit
 from urmpipe_fmus.dependencies import TIME, Dependencies
 from urmpipe_fmus.run import Instance, run
 from urmpipe_models.drives import ramp, step, trapezoid
