@@ -237,7 +237,7 @@ def test_exceptions_of_a_users_functions_are_told_with_their_type() -> None:
     fmu = Loaded(cached_fmu(from_text(RAISING, "raising.py"), "python"))
     fmu.set("u", 3.0)
     assert fmu.status_of("getReal", [2]) == FATAL
-    assert fmu.log[-1][2] == REFUSED.format("getReal", "raising.py:7: unit raising: outputs: KeyError: 3.0")
+    assert fmu.log[-1][2] == REFUSED.format("getReal", "raising.py:6: unit raising: outputs: KeyError: 3.0")
     fmu.set("u", 2.0)
     assert fmu.status_of("doStep", 0.0, 0.1) == DISCARD
     assert fmu.log[-1] == (3, "logStatusError", "unit raising: next value n is not finite at 0 s")
@@ -247,7 +247,7 @@ def test_exceptions_of_a_users_functions_are_told_with_their_type() -> None:
     assert fmu.log[-1] == (
         3,
         "logStatusError",
-        "raising.py:11: unit raising: update: ArithmeticError: 100%% wrong",
+        "raising.py:10: unit raising: update: ArithmeticError: 100%% wrong",
     )
     assert fmu.get(["n"]) == [0.0]
     fmu.free()

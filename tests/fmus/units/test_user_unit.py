@@ -144,29 +144,29 @@ def test_a_file_may_hold_dataclasses_and_private_units(tmp_path: Path) -> None:
         (
             UNIT.replace('"own"', '"my own"').replace('name="u"', 'name="1u"'),
             [
-                "own.py:4: unit my own: found 'my own' as its name, allowed: a letter, then letters, digits"
+                "own.py:3: unit my own: found 'my own' as its name, allowed: a letter, then letters, digits"
                 " and _",
-                "own.py:4: unit my own: '1u': found as a name, allowed: a letter, then letters, digits and _",
+                "own.py:3: unit my own: '1u': found as a name, allowed: a letter, then letters, digits and _",
             ],
         ),
         (
             UNIT.replace("OUT", "1.0 if v.u > 0.0 else 0.0"),
             [
-                "own.py:8: unit own: outputs: a branch on u: found in a unit's function (if, and, or, not,"
+                "own.py:7: unit own: outputs: a branch on u: found in a unit's function (if, and, or, not,"
                 " min, max, in), allowed: np.where, np.logical_and, np.minimum and their like"
             ],
         ),
         (
             UNIT.replace("OUT", "v.w"),
-            ["own.py:8: unit own: outputs: v.w: found in a unit's function, allowed: table, time, u"],
+            ["own.py:7: unit own: outputs: v.w: found in a unit's function, allowed: table, time, u"],
         ),
         (
             UNIT.replace("OUT", "(v.u, v.u)"),
-            ["own.py:8: unit own: outputs: y: found tuple, allowed: one element"],
+            ["own.py:7: unit own: outputs: y: found tuple, allowed: one element"],
         ),
         (
             UNIT.replace('{"y": OUT}', "None"),
-            ["own.py:8: unit own: outputs: returns nothing (None), allowed: a dict of y"],
+            ["own.py:7: unit own: outputs: returns nothing (None), allowed: a dict of y"],
         ),
         (
             UNIT.replace("OUT", "np.random.default_rng().uniform() + v.u"),
