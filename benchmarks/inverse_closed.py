@@ -20,7 +20,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.closed import ClosedForm, closed_form
 from urmpipe_models.ik.solutions import Targets, targets_of
 from urmpipe_models.ik.solve import solve
-from urmpipe_models.kinematics.forward import screws
+from urmpipe_models.kinematics.forward import chain_to_screws
 from urmpipe_models.robots.catalogue import load_robot
 
 ALONE = 500
@@ -81,7 +81,7 @@ def plain(position: FloatArray, rotation: FloatArray) -> FloatArray:
 
 def peer(chain: Chain, targets: Targets) -> tuple[HPRobot, FloatArray]:
     """Return EAIK's model of a chain, and the poses that it is asked for, shape (n, 4, 4)."""
-    of_chain = screws(chain)
+    of_chain = chain_to_screws(chain)
     assert of_chain is not None and targets.rotation is not None
     offsets = np.diff(np.vstack((np.zeros(3), of_chain.point, of_chain.position)), axis=0)
     poses = np.tile(np.eye(4), (len(targets), 1, 1))

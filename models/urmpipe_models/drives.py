@@ -78,7 +78,7 @@ def shaft_torque(drive: Drive, theta1: Element, omega1: Element, theta2: Element
     return drive.stiffness * (theta1 - theta2) + drive.damping * (omega1 - omega2)
 
 
-def driving_torque(drive: Drive, current: Element) -> Element:
+def motor_torque(drive: Drive, current: Element) -> Element:
     """Return Mn = i_p C i_a, the motor's torque at the output shaft in [N.m], of the current in [A].
 
     Source: [Iso9283]_ eq. 16 and 17.
@@ -96,7 +96,7 @@ def shaft_acceleration(drive: Drive, current: Element, torque: Element) -> Eleme
 
     Source: [Iso9283]_ eq. 15, which is missing in print.
     """
-    return (driving_torque(drive, current) - torque) / drive.inertia
+    return (motor_torque(drive, current) - torque) / drive.inertia
 
 
 def current_rate(drive: Drive, voltage: Element, omega1: Element, current: Element) -> Element:
@@ -131,7 +131,7 @@ def stored_energy(
     return 0.5 * (turning + winding + drive.stiffness * twist * twist)
 
 
-def lost_power(drive: Drive, omega1: Element, current: Element, omega2: Element) -> Element:
+def dissipated_power(drive: Drive, omega1: Element, current: Element, omega2: Element) -> Element:
     """Return R i_a^2 + l (theta1' - theta2')^2, the heat of armature and shaft, in [W].
 
     Args:
@@ -255,7 +255,7 @@ def trapezoid(
     )
 
 
-def set_point(
+def evaluate_setpoint(
     kind: Element,
     time: Element,
     begin: Element,
@@ -321,7 +321,7 @@ class Gains(NamedTuple):
     acceleration: Element
 
 
-def next_voltage(
+def control_voltage(
     last: Element, gains: Gains, wanted: JointMotion, real: JointMotion, limit: Element
 ) -> Element:
     """Return the voltage u_n of a sample in [V], within -limit .. limit.
@@ -344,12 +344,12 @@ def next_voltage(
     return np.minimum(np.maximum(voltage, -limit), limit)
 
 
-def sample_number(time: Element, period: Element) -> Element:
+def sample_index(time: Element, period: Element) -> Element:
     """Return the number of the last sample instant, n T, that is not after a time in [s]."""
     return np.floor(time / period + SAMPLE_SLACK)
 
 
-def voltage_at(time: Element, period: Element, sample: Element, fresh: Element, last: Element) -> Element:
+def held_voltage(time: Element, period: Element, sample: Element, fresh: Element, last: Element) -> Element:
     """Return the voltage from a time on in [V]: a new one where a sample is due, else the held one.
 
     Args:
@@ -359,11 +359,11 @@ def voltage_at(time: Element, period: Element, sample: Element, fresh: Element, 
         fresh: What `next_voltage` gives now, in [V].
         last: The voltage of the last sample in [V].
     """
-    return np.where(sample_number(time, period) > sample, fresh, last)
+    return np.where(sample_index(time, period) > sample, fresh, last)
 
 
 @dataclass(frozen=True, slots=True)
-class HeldJoint:
+class PassiveJoint:
     """A joint without a drive, held where it starts by a spring and a damper.
 
     Attributes:
@@ -378,11 +378,11 @@ class HeldJoint:
 
     def faults(self) -> Iterator[str]:
         """Yield which constants no spring and damper have."""
-        yield from _at_least(SMALLEST, self.joint, {"k": self.stiffness})
+        yield from _at_least(MIN_CONSTANT, self.joint, {"k": self.stiffness})
         yield from _at_least(0.0, self.joint, {"l": self.damping})
 
 
-class ReliefSpring(NamedTuple):
+class CounterbalanceSpring(NamedTuple):
     """A spring without mass beside a drive, which carries a part of the load: k (rest - q).
 
     Attributes:
@@ -394,7 +394,7 @@ class ReliefSpring(NamedTuple):
     rest: Element
 
 
-NO_SPRING = ReliefSpring(0.0, 0.0)
+NO_SPRING = CounterbalanceSpring(0.0, 0.0)
 """Of a drive that carries all of the load."""
 
 
@@ -416,18 +416,18 @@ class DrivenJoint:
     period: float
     gains: Gains = field(metadata={"stored": tuple[float, ...]})
     largest_voltage: float
-    spring: ReliefSpring = field(default=NO_SPRING, metadata={"stored": tuple[float, ...]})
+    spring: CounterbalanceSpring = field(default=NO_SPRING, metadata={"stored": tuple[float, ...]})
 
     def __post_init__(self) -> None:
         """Make drive, gains and spring of the plain numbers that a recording gives."""
         object.__setattr__(self, "drive", Drive(*self.drive))
         object.__setattr__(self, "gains", Gains(*self.gains))
-        object.__setattr__(self, "spring", ReliefSpring(*self.spring))
+        object.__setattr__(self, "spring", CounterbalanceSpring(*self.spring))
 
     def faults(self) -> Iterator[str]:
         """Yield which constants no drive has; gains may have any sign (see `drive_controller`)."""
-        yield from _at_least(SMALLEST, self.joint, dict(zip(DRIVE_KEYS, self.drive, strict=True)))
-        yield from _at_least(SHORTEST_PERIOD, self.joint, {"period": self.period})
+        yield from _at_least(MIN_CONSTANT, self.joint, dict(zip(DRIVE_KEYS, self.drive, strict=True)))
+        yield from _at_least(MIN_PERIOD, self.joint, {"period": self.period})
         yield from _at_least(0.0, self.joint, {"u_max": self.largest_voltage})
         yield from _at_least(0.0, self.joint, {SPRING_KEYS[0]: self.spring.stiffness})
         free = zip((*GAIN_KEYS, SPRING_KEYS[1]), (*self.gains, self.spring.rest), strict=True)
@@ -436,7 +436,7 @@ class DrivenJoint:
                 yield f"drives.{self.joint}.{key}: found {value:g}, allowed: a finite number"
 
 
-JointDrive: TypeAlias = HeldJoint | DrivenJoint
+JointDrive: TypeAlias = PassiveJoint | DrivenJoint
 
 DRIVE_KEYS = ("k", "l", "i_p", "C", "R", "L", "I1")
 """The constants of `Drive`, as robot files and units name them."""
@@ -448,10 +448,10 @@ SPRING_KEYS = ("k_spring", "rest_spring")
 """The constants of `ReliefSpring`, as robot files and units name them."""
 
 
-SMALLEST = 1e-9
+MIN_CONSTANT = 1e-9
 """The least value of a constant that is above 0, in its unit; FMI's min is a value that is allowed."""
 
-SHORTEST_PERIOD = 1e-6
+MIN_PERIOD = 1e-6
 """The least time between two samples of a controller in [s]."""
 
 

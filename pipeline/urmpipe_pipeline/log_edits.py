@@ -16,7 +16,7 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.robots.catalogue import load_robot, moving_differently
+from urmpipe_models.robots.catalogue import kinematically_distinct_names, load_robot
 from urmpipe_models.wraps import FULL_TURN
 
 MOST_SIGNS = 7
@@ -180,7 +180,7 @@ def unit_edits(*sides: str) -> Iterator[Edits]:
 
 def robot_edits(chain: Chain) -> Iterator[Edits]:
     """Yield the other robots of the catalogue with as many joints."""
-    for name in moving_differently():
+    for name in kinematically_distinct_names():
         other = load_robot(name)
         if name != chain.name and len(other.moving) == len(chain.moving):
             yield (Edit("other_robot", robot=other, name=name),)

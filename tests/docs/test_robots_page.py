@@ -13,7 +13,7 @@ import pytest
 
 from pages import lay_files, snippets, text_of
 from urmpipe_models.arm.chain import Box, Chain, Cylinder
-from urmpipe_models.drives import HeldJoint
+from urmpipe_models.drives import PassiveJoint
 from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.math3d import rotation_y
@@ -198,7 +198,7 @@ def test_the_parallelogram_turns_forearm_and_counterweight_by_the_angle_to_the_g
     assert [one.source for one in chain.inertials] == [
         "column", "counterweight", "upper arm", "forearm", "wrist",
     ]  # fmt: skip
-    assert chain.drives == (HeldJoint("theta4", 2500.0, 20.0),)
+    assert chain.drives == (PassiveJoint("theta4", 2500.0, 20.0),)
     q = (0.0, 0.3, 0.2, 0.0)
     crank, uncrank, upper, undone, forearm, level = forward(chain, q)[1:7]
     turned = (rotation_y(angle).rotation for angle in (0.2, 0.0, 0.3, 0.0, 0.2, 0.0))

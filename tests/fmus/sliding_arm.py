@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from made_masses import driven, with_masses
 from urmpipe_models.arm.chain import Chain, Joint, Mimic
-from urmpipe_models.drives import Gains, HeldJoint, ReliefSpring
+from urmpipe_models.drives import CounterbalanceSpring, Gains, PassiveJoint
 from urmpipe_models.math3d import from_offset
 
 
@@ -32,6 +32,6 @@ def sliding_arm() -> Chain:
 def sprung_arm() -> Chain:
     """Return it with masses and drives: springs beside the drives, two periods, and a wrist that is held."""
     calm = Gains(3.75, 0.375, 0.005)
-    turn = replace(driven("turn"), gains=calm, spring=ReliefSpring(1000.0, 0.315))
-    slide = replace(driven("slide"), gains=calm, spring=ReliefSpring(2000.0, 0.195), period=7.5e-3)
-    return replace(with_masses(sliding_arm()), drives=(turn, slide, HeldJoint("wrist", 2500.0, 5.0)))
+    turn = replace(driven("turn"), gains=calm, spring=CounterbalanceSpring(1000.0, 0.315))
+    slide = replace(driven("slide"), gains=calm, spring=CounterbalanceSpring(2000.0, 0.195), period=7.5e-3)
+    return replace(with_masses(sliding_arm()), drives=(turn, slide, PassiveJoint("wrist", 2500.0, 5.0)))

@@ -26,7 +26,15 @@ from urmpipe_fmus.cosim import Block, Recorded, System, load_system, prepare, si
 from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.run import Instance
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
-from urmpipe_models.drives import NO_SPRING, Drive, DrivenJoint, Gains, HeldJoint, ReliefSpring, trapezoid
+from urmpipe_models.drives import (
+    NO_SPRING,
+    CounterbalanceSpring,
+    Drive,
+    DrivenJoint,
+    Gains,
+    PassiveJoint,
+    trapezoid,
+)
 from urmpipe_models.dynamics.driven_arm import (
     Actuator,
     ArmState,
@@ -197,7 +205,7 @@ def test_a_held_pendulum_swings_with_the_root_of_k_over_j() -> None:
         (Joint("q", axis=(0.0, -1.0, 0.0)),),
         tip=translation(r, 0.0, 0.0),
         inertials=(Inertial("q", m, (r, 0.0, 0.0)),),
-        drives=(HeldJoint("q", k, 0.0),),
+        drives=(PassiveJoint("q", k, 0.0),),
         gravity=(0.0, 0.0, 0.0),
     )
     unit = Instance(make_unit("driven_arm", robot=chain))
@@ -233,7 +241,7 @@ def test_the_internal_step_is_one_at_which_a_stiff_joint_is_stable(
         "stiff",
         (Joint("q"),),
         inertials=(Inertial("q", 1e-4, (0.0, 0.0, 0.0), (inertia, inertia, inertia, 0.0, 0.0, 0.0)),),
-        drives=(driven("q", drive) if rotor else HeldJoint("q", stiffness, damping),),
+        drives=(driven("q", drive) if rotor else PassiveJoint("q", stiffness, damping),),
     )
     unit = make_unit("driven_arm", robot=chain)
     assert 0.7 < unit.internal_step * rate / 1.4 < 1.3  # half of 2.8, and what couples with it
@@ -269,7 +277,7 @@ def test_a_force_on_the_tool_bends_the_springs_by_the_jacobian() -> None:
 
 def test_robots_without_drives_or_with_too_little_voltage_are_refused() -> None:
     bare = with_masses(load_robot("urm4"))
-    some = replace(bare, drives=(driven("phi1"), HeldJoint("phi3", 9.0, 0.0)))
+    some = replace(bare, drives=(driven("phi1"), PassiveJoint("phi3", 9.0, 0.0)))
     assert refused("driven_arm", some) == [
         f"robot urm4: key drives.{name}: not found, allowed: the drive of the joint,"
         " or { k, l } of a spring that holds it"
@@ -459,7 +467,7 @@ def test_a_spring_beside_a_drive_takes_its_torque_from_the_drive_and_the_arm_sta
 
 def test_the_torque_of_a_spring_is_what_its_energy_changes_by() -> None:
     chain = sprung_arm()
-    spring = ReliefSpring(300.0, 0.7)
+    spring = CounterbalanceSpring(300.0, 0.7)
     actuators: list[Actuator] = [
         Motor(DRIVE, 0.1, 0.2, 0.3, 0.4, spring),
         Motor(DRIVE, 0.1, 0.2, 0.3, 0.4),
@@ -488,8 +496,8 @@ def test_the_torque_of_a_spring_is_what_its_energy_changes_by() -> None:
 def test_the_unit_is_what_dop853_makes_of_the_equations_and_no_energy_is_lost() -> None:
     turn, slide, _ = sprung_arm().drives
     assert isinstance(slide, DrivenJoint)
-    slide = replace(slide, period=PERIOD, spring=ReliefSpring(2000.0, 0.22))
-    drives = (turn, slide, HeldJoint("wrist", 200.0, 5.0))
+    slide = replace(slide, period=PERIOD, spring=CounterbalanceSpring(2000.0, 0.22))
+    drives = (turn, slide, PassiveJoint("wrist", 200.0, 5.0))
     chain = replace(sprung_arm(), drives=drives)
     wanted = moves(chain, np.array([0.6, -0.3, 0.0]))
     whole, unit = OneSystem(chain, PUSH), Instance(make_unit("driven_arm", robot=chain))
@@ -523,7 +531,7 @@ def test_the_unit_is_what_dop853_makes_of_the_equations_and_no_energy_is_lost() 
 
 @pytest.mark.slow
 def test_a_stiff_spring_beside_a_drive_shortens_the_internal_step() -> None:
-    stiff = replace(driven("q"), spring=ReliefSpring(1e7, 0.0))
+    stiff = replace(driven("q"), spring=CounterbalanceSpring(1e7, 0.0))
     inertia = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
     chain = Chain(
         "stiff", (Joint("q"),), inertials=(Inertial("q", 1e-4, (0.0, 0.0, 0.0), inertia),), drives=(stiff,)
@@ -552,7 +560,7 @@ def wristed() -> Chain:
         (Joint("shoulder", axis=lifting), Joint("wrist", origin=translation(UPPER, 0.0, 0.0), axis=lifting)),
         tip=translation(LENGTH, 0.0, 0.0),
         inertials=(Inertial("shoulder", 3.0, (0.2, 0.0, 0.0)), Inertial("wrist", 1.0, (0.1, 0.0, 0.0))),
-        drives=(driven("shoulder"), HeldJoint("wrist", 2500.0, 5.0)),
+        drives=(driven("shoulder"), PassiveJoint("wrist", 2500.0, 5.0)),
     )
 
 
@@ -583,7 +591,7 @@ def test_a_spring_weaker_than_the_weight_it_hangs_by_bears_a_small_force() -> No
     mass = Inertial("hanging", 3.0, (0.5, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     chain = Chain(
         "pendulum", (Joint("hanging", axis=(0.0, 1.0, 0.0)),), tip=translation(0.5, 0.0, 0.0),
-        start=(math.pi / 2,), inertials=(mass,), drives=(HeldJoint("hanging", 9.0, 1.0),),
+        start=(math.pi / 2,), inertials=(mass,), drives=(PassiveJoint("hanging", 9.0, 1.0),),
     )  # fmt: skip
     (under,) = at_rest(chain, Wrench((0.1, 0.0, 0.0)))
     # along x, which raises the tip: F l over both rigidities; the next order is that angle squared
@@ -591,7 +599,7 @@ def test_a_spring_weaker_than_the_weight_it_hangs_by_bears_a_small_force() -> No
 
 
 def test_a_force_that_is_too_large_for_the_springs_is_refused() -> None:
-    weak = replace(wristed(), drives=(driven("shoulder"), HeldJoint("wrist", 50.0, 1.0)))
+    weak = replace(wristed(), drives=(driven("shoulder"), PassiveJoint("wrist", 50.0, 1.0)))
     assert at_rest(weak, Wrench((0.0, 0.0, 10.0)))[1].q == pytest.approx(0.06, abs=1e-3)
     said = "robot wristed: force: found more than the springs of its held joints bear, allowed: less"
     assert refusal(RobotError, at_rest, weak, Wrench((0.0, 0.0, 1e3))) == said
@@ -646,7 +654,7 @@ def test_the_spectral_radius_is_that_of_the_unit_from_sample_to_sample() -> None
 @pytest.mark.slow
 def test_above_a_spectral_radius_of_1_the_simulation_grows_by_it_and_below_it_dies_away() -> None:
     def with_gain(velocity: float) -> Chain:
-        own = replace(driven("q"), gains=Gains(7.5, velocity, 0.01), spring=ReliefSpring(200.0, 0.1))
+        own = replace(driven("q"), gains=Gains(7.5, velocity, 0.01), spring=CounterbalanceSpring(200.0, 0.1))
         return Chain("one", (Joint("q", axis=(0.0, -1.0, 0.0)),),
                      inertials=(Inertial("q", 2.0, (0.5, 0.0, 0.0)),), drives=(own,))  # fmt: skip
 

@@ -14,12 +14,12 @@ from urmpipe_models.arm.chain import Chain, Inertial, Joint, JointKind, Mimic
 from urmpipe_models.arm.geometric_models import DHRow
 from urmpipe_models.drives import (
     NO_SPRING,
+    CounterbalanceSpring,
     Drive,
     DrivenJoint,
     Gains,
-    HeldJoint,
     JointDrive,
-    ReliefSpring,
+    PassiveJoint,
 )
 from urmpipe_models.math3d import Transform, from_offset
 
@@ -102,9 +102,9 @@ def inertials(draw: DrawFn, joint: str | None) -> Inertial:
 def drives(draw: DrawFn, joint: str) -> JointDrive:
     """A joint that is held, or one with a drive and a controller."""
     if draw(st.booleans()):
-        return HeldJoint(joint, draw(above_zero), draw(above_zero))
+        return PassiveJoint(joint, draw(above_zero), draw(above_zero))
     drive, gains = Drive(*(draw(above_zero) for _ in range(7))), Gains(*(draw(lengths) for _ in range(3)))
-    spring = ReliefSpring(draw(above_zero), draw(lengths)) if draw(st.booleans()) else NO_SPRING
+    spring = CounterbalanceSpring(draw(above_zero), draw(lengths)) if draw(st.booleans()) else NO_SPRING
     return DrivenJoint(joint, drive, draw(above_zero), gains, draw(above_zero), spring)
 
 

@@ -14,13 +14,13 @@ from hypothesis.strategies import SearchStrategy
 
 from differences import assert_jacobian, assert_slope
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.drives import RAMP, STEP, TRAPEZOID, set_point
+from urmpipe_models.drives import RAMP, STEP, TRAPEZOID, evaluate_setpoint
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik import loop_equations as polishing
 from urmpipe_models.ik import trigonometric
 from urmpipe_models.ik.solutions import Targets, targets_of
 from urmpipe_models.ik.task import Task, task_of
-from urmpipe_models.kinematics.forward import Screws, chain_of, jacobian_over_log
+from urmpipe_models.kinematics.forward import Screws, jacobian_over_log, screws_to_chain
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 
 # --- what an iterative inverse misses its targets by ---------------------------------------------------
@@ -131,7 +131,7 @@ def test_the_columns_that_newton_s_rule_polishes_with_are_the_miss_s_derivatives
 @pytest.mark.parametrize("kinds", KINDS, ids=str)
 def test_their_determinant_is_that_of_the_wrist_s_jacobian(kinds: tuple[bool, ...]) -> None:
     arm, wrist, q, _ = random_screws(kinds, 5)
-    J = jacobian_over_log(chain_of(arm, ("a", "b", "c")), q.T)[:, :3]
+    J = jacobian_over_log(screws_to_chain(arm, ("a", "b", "c")), q.T)[:, :3]
     # products of three levers of up to 10 m
     np.testing.assert_allclose(polishing.jacobian_determinant(arm, wrist, q), np.linalg.det(J), atol=1e-11)
 
@@ -147,5 +147,7 @@ def test_rates_of_a_set_point_are_its_derivatives_but_at_corners(kind: int, valu
     arguments = (0.5, -1.0, 3.0, 2.0, 4.0)
     corners = np.array([0.5, 1.0, 2.5, 3.0])  # of the trapezoid; the step and the ramp have some of them
     within = t[(np.abs(t[:, None] - corners) > h).all(axis=1)]
-    slope = set_point(kind, within, *arguments)[rate]
-    assert_slope(lambda s: set_point(kind, within + s, *arguments)[value], slope, third=0.0, size=4.0, h=h)
+    slope = evaluate_setpoint(kind, within, *arguments)[rate]
+    assert_slope(
+        lambda s: evaluate_setpoint(kind, within + s, *arguments)[value], slope, third=0.0, size=4.0, h=h
+    )

@@ -15,17 +15,17 @@ from urmpipe_models.drives import (
     Drive,
     Gains,
     JointMotion,
+    control_voltage,
     current_rate,
-    driving_torque,
+    evaluate_setpoint,
     load_acceleration,
-    next_voltage,
-    sample_number,
-    set_point,
+    motor_torque,
+    sample_index,
     shaft_acceleration,
     shaft_torque,
 )
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.kinematics.forward import forward, jacobian, motions, tip_position
+from urmpipe_models.kinematics.forward import forward, jacobian, point_motions, tip_position
 from urmpipe_models.kinematics.identification import Twist, sensitivities
 from urmpipe_models.math3d import (
     euler_zxz,
@@ -93,7 +93,7 @@ def test_forward_jacobian_and_motions_trace_with_symbolic_joints(symbols: list[A
     euler_of = traced("euler", [q], [*euler_zyx(forward(chain, x)[-1].rotation)])
     zxz_of = traced("zxz", [q], [*euler_zxz(forward(chain, x)[-1].rotation)])
     jacobian_of = traced("jacobian", [q], flat(jacobian(chain, x)))
-    motion_of = traced("motion", [q, qd, qdd], everything(motions(chain, x, xd, xdd)[-1]))
+    motion_of = traced("motion", [q, qd, qdd], everything(point_motions(chain, x, xd, xdd)[-1]))
     for values in np.random.default_rng(11).uniform(-1.0, 1.0, (20, 3, 6)).tolist():
         tip = forward(chain, values[0])[-1]
         assert_traced(pose_of(values[0]), flat(tip.translation))
@@ -102,7 +102,7 @@ def test_forward_jacobian_and_motions_trace_with_symbolic_joints(symbols: list[A
         assert_traced(zxz_of(values[0]), flat(euler_zxz(tip.rotation)), size=20.0)  # 1 / sin(x)
         assert_traced(jacobian_of(values[0]), flat(jacobian(chain, values[0])))
         assert_traced(
-            motion_of(*values), everything(motions(chain, *values)[-1]), size=20.0
+            motion_of(*values), everything(point_motions(chain, *values)[-1]), size=20.0
         )  # speeds of up to 6
 
 
@@ -122,7 +122,7 @@ def test_lengths_and_tilts_trace_as_parameters(symbols: list[Any]) -> None:
     chain = urm_chain("urm6", r.elements(), theta.elements())
     pose_of = traced("pose", [q, r, theta], [*forward(chain, x)[-1].translation])
     jacobian_of = traced("jacobian", [q, r, theta], flat(jacobian(chain, x)))
-    motion_of = traced("motion", [q, r, theta], everything(motions(chain, x, zero, x)[-1]))
+    motion_of = traced("motion", [q, r, theta], everything(point_motions(chain, x, zero, x)[-1]))
     rng = np.random.default_rng(12)
     for _ in range(20):
         values = rng.uniform(-1.0, 1.0, 6).tolist()
@@ -130,7 +130,9 @@ def test_lengths_and_tilts_trace_as_parameters(symbols: list[Any]) -> None:
         numeric, given = urm_chain("urm6", lengths, tilts), (values, lengths, tilts)
         assert_traced(pose_of(*given), flat(forward(numeric, values)[-1].translation))
         assert_traced(jacobian_of(*given), flat(jacobian(numeric, values)))
-        assert_traced(motion_of(*given), everything(motions(numeric, values, zero, values)[-1]), size=20.0)
+        assert_traced(
+            motion_of(*given), everything(point_motions(numeric, values, zero, values)[-1]), size=20.0
+        )
 
 
 def test_one_trace_serves_a_float_and_a_column() -> None:
@@ -169,7 +171,7 @@ def test_arms_of_every_kind_trace_with_all_their_parameters(number: int) -> None
     q = casadi.SX.sym("q", joints)
 
     def values_of(arm: Chain, at: Sequence[Any]) -> list[Any]:
-        return [*everything(motions(arm, at, at, at)[-1]), *flat(jacobian(arm, at))]
+        return [*everything(point_motions(arm, at, at, at)[-1]), *flat(jacobian(arm, at))]
 
     function = traced("arm", [x, q], values_of(arms_of(x.elements())[number], q.elements()))
     rng = np.random.default_rng(15)
@@ -204,7 +206,7 @@ def drive_values(x: Sequence[Any]) -> list[Any]:
     torque = shaft_torque(drive, theta1, omega1, theta2, omega2)
     return [
         torque,
-        driving_torque(drive, current),
+        motor_torque(drive, current),
         load_acceleration(x[0], x[1], omega2, torque, voltage),
         shaft_acceleration(drive, current, torque),
         current_rate(drive, voltage, omega1, current),
@@ -214,7 +216,7 @@ def drive_values(x: Sequence[Any]) -> list[Any]:
 def controller_values(x: Sequence[Any]) -> list[Any]:
     """Return what the controller's functions give for 13 elements."""
     gains, wanted, real = Gains(*x[:3]), JointMotion(*x[3:6]), JointMotion(*x[6:9])
-    return [next_voltage(x[9], gains, wanted, real, x[10]), sample_number(x[11], x[12])]
+    return [control_voltage(x[9], gains, wanted, real, x[10]), sample_index(x[11], x[12])]
 
 
 @pytest.mark.parametrize("values_of", [drive_values, controller_values])
@@ -230,7 +232,7 @@ def test_drive_and_controller_trace_with_all_their_parameters(values_of: Callabl
 def test_set_points_trace_before_within_and_after_a_move(kind: float) -> None:
     casadi.GlobalOptions.setNumpyMode(-1)
     x = casadi.SX.sym("x", 7)
-    function = traced("set_point", [x], [*set_point(*x.elements())])
+    function = traced("set_point", [x], [*evaluate_setpoint(*x.elements())])
     for time in np.linspace(0.0, 3.0, 31).tolist():
         values = [kind, time, 0.5, 3.0, 1.5, 1.0, 4.0]
-        assert_traced(function(values), [*set_point(*values)], size=4.0)
+        assert_traced(function(values), [*evaluate_setpoint(*values)], size=4.0)

@@ -50,7 +50,7 @@ from geometric_6r import (
     model,
     vector,
 )
-from urmpipe_models.arm.geometric_models import GeometricRow, articulated_6r, articulated_6r_rows
+from urmpipe_models.arm.geometric_models import GeometricModelRow, articulated_6r, articulated_6r_rows
 from urmpipe_models.kinematics.forward import forward
 
 # --- the model and the chain -----------------------------------------------------------------------
@@ -186,7 +186,7 @@ def test_eq_43_needs_the_system_before_it() -> None:
     """[R]_3^0, as printed, only passes because [r]_5^4 is zero."""
     offset = (0.1, 0.2, 0.3)
     rows = [*articulated_6r_rows(L0, L1, L2, L3)]
-    rows[4] = GeometricRow("R", "x", offset)
+    rows[4] = GeometricModelRow("R", "x", offset)
     p54 = vector(geometric_model(rows, list(Q)).steps[4])
     assert_same(PRODUCT.rotations[4] @ np.array(offset), p54)
     assert_misprint(PRODUCT.rotations[3] @ np.array(offset), p54)

@@ -22,7 +22,7 @@ from urmpipe_datasets import ROBOTS
 from urmpipe_fmus.block import INTERNAL_STEP
 from urmpipe_fmus.native import native_missing
 from urmpipe_models.arm.chain import GRAVITY, Chain
-from urmpipe_models.drives import DrivenJoint, HeldJoint
+from urmpipe_models.drives import DrivenJoint, PassiveJoint
 from urmpipe_models.dynamics.driven_arm import spectral_radius
 from urmpipe_models.kinematics.forward import jacobian, poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
@@ -271,7 +271,7 @@ def second_order(arm: Chain, turned: float) -> float:
     """Return by what share the tip yields otherwise than by F l^2 / k, its wrist turned so far in [rad]."""
     (body,) = (one for one in arm.inertials if one.joint == "theta4")
     held = next(one for one in arm.drives if one.joint == "theta4")
-    assert isinstance(held, HeldJoint)
+    assert isinstance(held, PassiveJoint)
     x, _, z = body.centre
     # the body's weight turns with it, and its centre is not at the axis
     weight = body.mass * -GRAVITY[2] * (abs(z) + abs(x) * turned) / held.stiffness
@@ -283,7 +283,7 @@ def second_order(arm: Chain, turned: float) -> float:
 def test_a_force_on_the_tool_shifts_it_by_the_wrist_alone(tmp_path: Path) -> None:
     arm, path = irb60(), short_path(tmp_path)
     (motion,) = accuracy(path, arm, velocities=[0.1], force=(0.0, 0.0, -FORCE)).motions
-    (held,) = (one for one in arm.drives if isinstance(one, HeldJoint))
+    (held,) = (one for one in arm.drives if isinstance(one, PassiveJoint))
     lever = lever_of(arm, motion.set_q[0].tolist())
     expected, turned = FORCE * lever**2 / held.stiffness, FORCE * lever / held.stiffness
     assert lever == pytest.approx(arm.tip.translation[0], rel=1e-12)  # the wrist is level

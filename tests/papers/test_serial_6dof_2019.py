@@ -14,7 +14,7 @@ import pytest
 
 from serial_6dof_rows import INVERSE, UPSIDE
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.kinematics.forward import frames, poses_over_log, tip_pose
+from urmpipe_models.kinematics.forward import iter_frames, poses_over_log, tip_pose
 from urmpipe_models.math3d import Transform, euler_zyx, from_rpy
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -92,7 +92,7 @@ def turned(alpha: float, beta: float, gamma: float) -> FloatArray:
 def test_eq_3_1_and_3_2_with_table_3_1_are_the_frames_of_the_arm() -> None:
     for q in some_poses(20):
         product = np.eye(4)
-        _, *links = frames(ARM, q)
+        _, *links = iter_frames(ARM, q)
         for (_, alpha, a, d, theta, moves), link in zip(TABLE_3_1, links, strict=True):
             product = product @ equation_3_1(alpha, a, d, theta + (0.0 if moves is None else q[moves]))
             # entries of up to 1, and 330 mm
@@ -129,7 +129,7 @@ def test_the_re_entered_forward_rows(row: int) -> None:
 
 def test_eq_4_3_is_the_wrist_centre() -> None:
     for q in some_poses(20):
-        *_, frame5, _ = frames(ARM, q)
+        *_, frame5, _ = iter_frames(ARM, q)
         tip = tip_pose(ARM, q)
         centre = np.array(tip.translation) - np.array(tip.rotation) @ (0.0, 0.0, 0.029)
         np.testing.assert_allclose(frame5.translation, centre, rtol=0.0, atol=ROUNDING)
@@ -137,7 +137,7 @@ def test_eq_4_3_is_the_wrist_centre() -> None:
 
 def test_eq_4_6_turns_the_position_the_other_way_back() -> None:
     for q in some_poses(20):
-        frame3 = list(frames(ARM, q))[4]
+        frame3 = list(iter_frames(ARM, q))[4]
         rotation: FloatArray = np.array(frame3.rotation)
         position: FloatArray = np.array(frame3.translation)
         back = frame3.inverse().translation
@@ -157,7 +157,7 @@ def test_eq_4_7_is_frame_6_in_frame_3() -> None:
                 [-s4 * c5 * c6 - c4 * s6, s4 * c5 * s6 - c4 * c6, s4 * s5],
             ]
         )
-        found = list(frames(ARM, q))[4].inverse() @ tip_pose(ARM, q)
+        found = list(iter_frames(ARM, q))[4].inverse() @ tip_pose(ARM, q)
         np.testing.assert_allclose(found.rotation, expected, rtol=0.0, atol=ROUNDING)
         translation = [-d6 * c4 * s5 + a4, d6 * c5 + d5, d6 * s4 * s5]
         np.testing.assert_allclose(found.translation, translation, rtol=0.0, atol=ROUNDING)
@@ -191,7 +191,7 @@ def test_the_arm_stretched_upwards_is_372_5294643797_mm_high() -> None:
     """Section 6.5 takes a2 for 130 mm; it is 120."""
     lean = math.atan2(20.0, 130.0)  # between the forearm's axis 4 and the line from elbow to wrist
     q = [0.0, math.pi / 2, lean - math.pi, 0.0, -lean, 0.0]
-    *_, frame5, _ = frames(ARM, q)
+    *_, frame5, _ = iter_frames(ARM, q)
     shoulder, elbow = (-0.03, 0.0, 0.092), (-0.03, 0.0, 0.212)
     assert math.dist(elbow, frame5.translation) * 1e3 == pytest.approx(131.52946438, abs=1e-8)  # as printed
     assert math.dist(shoulder, frame5.translation) * 1e3 == pytest.approx(251.52946438, abs=1e-8)

@@ -16,7 +16,7 @@ from serial_6dof_rows import INVERSE
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import Solutions, Targets, misses
 from urmpipe_models.ik.spherical import SphericalWrist, spherical_wrist
-from urmpipe_models.kinematics.forward import screws
+from urmpipe_models.kinematics.forward import chain_to_screws
 from urmpipe_models.math3d import from_rpy
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -32,7 +32,7 @@ REACH = 372.5294643797
 
 @pytest.fixture(scope="module")
 def inverse() -> SphericalWrist:
-    found = there(screws(ARM))
+    found = there(chain_to_screws(ARM))
     return there(spherical_wrist(found, ARM.coordinates))
 
 

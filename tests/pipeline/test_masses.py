@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from urmpipe_models.arm.chain import Chain, Joint
-from urmpipe_models.drives import HeldJoint
+from urmpipe_models.drives import PassiveJoint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.masses import lost_in_urdf, mass_notices
 
@@ -30,7 +30,7 @@ def test_masses_that_are_not_used_say_why() -> None:
 
 def test_what_a_urdf_does_not_hold_is_named() -> None:
     assert lost_in_urdf(Chain("arm", (Joint("j"),))) == []
-    drives = (HeldJoint("j", 1.0, 0.0),)
+    drives = (PassiveJoint("j", 1.0, 0.0),)
     robot = Chain("arm", (Joint("j"),), gravity=(0.0, -9.81, 0.0), drives=drives, left_out=("finger",))
     words = "a URDF does not hold gravity [0.0, -9.81, 0.0] m/s2 and the drives and which masses are left out"
     assert lost_in_urdf(robot) == [LogWarning("not-in-urdf", f"{words}: a TOML robot file does")]

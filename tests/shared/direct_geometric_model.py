@@ -8,7 +8,7 @@ from itertools import accumulate
 from operator import matmul
 from typing import TypeAlias
 
-from urmpipe_models.arm.geometric_models import AXES, GeometricRow
+from urmpipe_models.arm.geometric_models import AXES, GeometricModelRow
 from urmpipe_models.elementwise import ZERO, Element, Vector, add, scale
 from urmpipe_models.math3d import Transform, euler_zxz, rotation_about
 
@@ -63,7 +63,9 @@ class GeometricModel:
         return (*self.positions[-1], alpha, beta, gamma)
 
 
-def geometric_model(rows: Sequence[GeometricRow], q: Sequence[Element], tip: Vector = ZERO) -> GeometricModel:
+def geometric_model(
+    rows: Sequence[GeometricModelRow], q: Sequence[Element], tip: Vector = ZERO
+) -> GeometricModel:
     """Return the direct geometric model of a chain of R and T joints.
 
     [R]_k^0 = prod_j [R]_j^{j-1} with [R]_j^{j-1} = R(axis, q_j) of a rotation and I_3 of a translation;
@@ -89,7 +91,7 @@ def geometric_model(rows: Sequence[GeometricRow], q: Sequence[Element], tip: Vec
     )
 
 
-def _link(row: GeometricRow, value: Element) -> Transform:
+def _link(row: GeometricModelRow, value: Element) -> Transform:
     """Return system T_k in T_{k-1}: [R]_k^{k-1} and r_k^{k-1}(q_k), eq. 1 and 2."""
     axis = AXES[row.axis]
     if row.kind == "T":

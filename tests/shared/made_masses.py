@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain, Inertial
-from urmpipe_models.drives import Drive, DrivenJoint, Gains, HeldJoint
+from urmpipe_models.drives import Drive, DrivenJoint, Gains, PassiveJoint
 
 
 def body(joint: str | None, rng: np.random.Generator) -> Inertial:
@@ -42,5 +42,5 @@ def driven(joint: str, drive: Drive = DRIVE) -> DrivenJoint:
 
 def with_drives(chain: Chain, held: Sequence[str] = ()) -> Chain:
     """Return an arm with a drive on every coordinate, but for those that are held by 2500 N.m/rad."""
-    drives = [HeldJoint(one, 2500.0, 5.0) if one in held else driven(one) for one in chain.coordinates]
+    drives = [PassiveJoint(one, 2500.0, 5.0) if one in held else driven(one) for one in chain.coordinates]
     return replace(chain, drives=tuple(drives))

@@ -12,7 +12,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.closed import ClosedForm
 from urmpipe_models.ik.parallel import parallel_axes
 from urmpipe_models.ik.solutions import Solutions, Targets, misses, targets_of
-from urmpipe_models.kinematics.forward import screws
+from urmpipe_models.kinematics.forward import chain_to_screws
 from urmpipe_models.math3d import from_offset
 
 UR = ("ur3", "ur3e", "ur5", "ur5e", "ur10", "ur10e")
@@ -54,7 +54,7 @@ def random_arm(
     """
     for _ in range(20):
         chain = drawn_arm(rng, wrist, signs, spread)
-        of_chain = screws(chain)
+        of_chain = chain_to_screws(chain)
         if of_chain is not None and parallel_axes(of_chain, chain.coordinates) is not None:
             break
     return chain

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe.printing.terminal import new_console, new_table
-from urmpipe_models.arm.chain import GRAVITY, Chain, Joint, Parameter, parts_of
-from urmpipe_models.drives import HeldJoint
+from urmpipe_models.arm.chain import GRAVITY, Chain, Joint, Parameter, frame_to_steps
+from urmpipe_models.drives import PassiveJoint
 from urmpipe_models.ik.closed import closed_form, method_words
 from urmpipe_models.kinematics.forward import forward, points_over_log
 from urmpipe_models.math3d import Transform, euler_zyx, rpy_of
@@ -135,7 +135,7 @@ def _parameters(chain: Chain) -> Table:
         for one in chain.parameters:
             if one.frame_index == k and one.value:
                 table.add_row(one.name, _value(one), f"{one.kind} {one.axis}", name, one.source)
-        for part in parts_of(frame):
+        for part in frame_to_steps(frame):
             if isinstance(part, Transform) and part != Transform():
                 turn = _figures(math.degrees(angle) for angle in rpy_of(part.rotation))
                 table.add_row("", f"{turn} deg", "about x, y, z", name, "constant")
@@ -175,7 +175,7 @@ def _drives(chain: Chain) -> Table:
     table = new_table("Joint", "Kind", "Constants", title="Drives; constants in SI")
     for one in chain.drives:
         constants = ", ".join(f"{key} = {value:.6g}" for key, value in drive_to_dict(one).items())
-        table.add_row(one.joint, "held" if isinstance(one, HeldJoint) else "driven", constants)
+        table.add_row(one.joint, "held" if isinstance(one, PassiveJoint) else "driven", constants)
     return table
 
 

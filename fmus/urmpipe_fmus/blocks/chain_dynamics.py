@@ -25,7 +25,7 @@ from urmpipe_fmus.blocks.coordinates import (
     values_of,
 )
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.drives import SMALLEST
+from urmpipe_models.drives import MIN_CONSTANT
 from urmpipe_models.dynamics.equations import check_motion, forward_dynamics
 from urmpipe_models.dynamics.links import (
     Links,
@@ -96,7 +96,7 @@ def masses_of(robot: Chain) -> Masses:
         description="Masses on the joints " + ", ".join(str(one.joint) for one in moving),
         unit="kg",
         start=tuple(float(one.mass) for one in moving),
-        minimum=SMALLEST,
+        minimum=MIN_CONSTANT,
         size=len(moving),
     )
     places = (

@@ -30,19 +30,19 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import (
     DRIVE_KEYS,
     GAIN_KEYS,
+    MIN_CONSTANT,
+    MIN_PERIOD,
     NO_SPRING,
-    SHORTEST_PERIOD,
-    SMALLEST,
     SPRING_KEYS,
+    CounterbalanceSpring,
     Drive,
     DrivenJoint,
     Gains,
-    HeldJoint,
     JointMotion,
-    ReliefSpring,
-    next_voltage,
-    sample_number,
-    voltage_at,
+    PassiveJoint,
+    control_voltage,
+    held_voltage,
+    sample_index,
 )
 from urmpipe_models.dynamics.driven_arm import (
     Actuator,
@@ -92,7 +92,7 @@ class DriveGroup:
     kind: CoordinateKind
     robot: Chain
     driven: Mapping[int, tuple[DrivenJoint, Rest]]
-    held: Mapping[int, tuple[HeldJoint, Rest]]
+    held: Mapping[int, tuple[PassiveJoint, Rest]]
 
     @property
     def suffix(self) -> str:
@@ -116,10 +116,10 @@ class DriveGroup:
             constants = zip(*((*one.drive, *one.gains) for one in joints), strict=True)
             for key, values in zip((*DRIVE_KEYS, *GAIN_KEYS), constants, strict=True):
                 description, unit = _CONSTANTS[key]
-                least = -np.inf if key in GAIN_KEYS else SMALLEST
+                least = -np.inf if key in GAIN_KEYS else MIN_CONSTANT
                 yield self._parameter(key, description, self._unit(unit), values, least)
             periods, largest = zip(*((one.period, one.largest_voltage) for one in joints), strict=True)
-            period = self._parameter("period", "Time between two samples", "s", periods, SHORTEST_PERIOD)
+            period = self._parameter("period", "Time between two samples", "s", periods, MIN_PERIOD)
             yield replace(period, tunable=False)
             yield replace(self._parameter("u_max", "Largest voltage", "V", largest, 0.0), name=self._limit)
             if self.relieved:
@@ -133,7 +133,7 @@ class DriveGroup:
             springs = ((one.stiffness, one.damping, rest.rest) for one, rest in self.held.values())
             k, l_held, rest = zip(*springs, strict=True)
             for name, description, unit, values, least in (
-                ("k_held", "Rigidity of the spring", self._unit("{torque}/{way}"), k, SMALLEST),
+                ("k_held", "Rigidity of the spring", self._unit("{torque}/{way}"), k, MIN_CONSTANT),
                 ("l_held", "Damping of the spring", self._unit("{torque}.s/{way}"), l_held, 0.0),
                 ("rest", "Where the spring gives no torque", self.kind.unit, rest, -np.inf),
             ):
@@ -218,7 +218,7 @@ class DriveGroup:
             )
             spring = NO_SPRING
             if self.relieved:
-                spring = ReliefSpring(*(self._read(v, key)[j] for key in SPRING_KEYS))
+                spring = CounterbalanceSpring(*(self._read(v, key)[j] for key in SPRING_KEYS))
             found[k] = Motor(drive, angle, rate, current, voltage, spring)
         for j, k in enumerate(self.held):
             stiffness, damping, rest = (self._read(v, key)[j] for key in ("k_held", "l_held", "rest"))
@@ -236,8 +236,8 @@ class DriveGroup:
             wanted = JointMotion(*(getattr(v, name + dots)[j] for dots in ("", "d", "dd")))
             last, period, sample = (self._read(v, key)[j] for key in ("last", "period", "sample"))
             limit = getattr(v, self._limit)[j]
-            fresh = next_voltage(last, gains, wanted, JointMotion(q[k], qd[k], qdd[k]), limit)
-            found.append(voltage_at(v.time, period, sample, fresh, last))
+            fresh = control_voltage(last, gains, wanted, JointMotion(q[k], qd[k], qdd[k]), limit)
+            found.append(held_voltage(v.time, period, sample, fresh, last))
         return found
 
     def outputs(self, state: ArmState, voltages: Sequence[Element]) -> dict[str, tuple[Element, ...]]:
@@ -257,7 +257,7 @@ class DriveGroup:
         if not self.driven:
             return {}
         numbers = (
-            np.maximum(sample, sample_number(v.time, period))
+            np.maximum(sample, sample_index(v.time, period))
             for sample, period in zip(self._read(v, "sample"), self._read(v, "period"), strict=True)
         )
         return {f"last{self.suffix}": tuple(voltages), f"sample{self.suffix}": tuple(numbers)}
@@ -309,7 +309,7 @@ def drive_groups(robot: Chain, rests: Sequence[Rest]) -> list[DriveGroup]:
     found = []
     for kind in kinds_of(robot):
         driven: dict[int, tuple[DrivenJoint, Rest]] = {}
-        held: dict[int, tuple[HeldJoint, Rest]] = {}
+        held: dict[int, tuple[PassiveJoint, Rest]] = {}
         for k in kind.of(robot):
             own = by_joint[robot.coordinates[k]]
             if isinstance(own, DrivenJoint):

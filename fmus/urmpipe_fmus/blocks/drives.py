@@ -15,23 +15,23 @@ import numpy as np
 
 from urmpipe_fmus.block import Input, Memory, Output, Parameter, Recipe, State, Unit, Values
 from urmpipe_models.drives import (
-    SHORTEST_PERIOD,
-    SMALLEST,
+    MIN_CONSTANT,
+    MIN_PERIOD,
     TRAPEZOID,
     Drive,
     Gains,
     JointMotion,
+    control_voltage,
     current_rate,
+    dissipated_power,
+    held_voltage,
     load_acceleration,
-    lost_power,
-    next_voltage,
-    sample_number,
+    sample_index,
     shaft_acceleration,
     shaft_torque,
     stored_energy,
-    voltage_at,
 )
-from urmpipe_models.drives import set_point as set_point_at
+from urmpipe_models.drives import evaluate_setpoint as set_point_at
 from urmpipe_models.elementwise import Element
 
 
@@ -72,7 +72,7 @@ def _drive_parameters() -> tuple[Parameter, ...]:
     def assumed(name: str, description: str, unit: str, start: float) -> Parameter:
         """Return a parameter above 0 whose value is an assumption."""
         return Parameter(
-            name=name, description=f"{description} (assumed)", unit=unit, start=start, minimum=SMALLEST
+            name=name, description=f"{description} (assumed)", unit=unit, start=start, minimum=MIN_CONSTANT
         )
 
     return (
@@ -81,7 +81,7 @@ def _drive_parameters() -> tuple[Parameter, ...]:
             description="Torsional rigidity of the shaft (2500: the paper's wrist drive)",
             unit="N.m/rad",
             start=2500.0,
-            minimum=SMALLEST,
+            minimum=MIN_CONSTANT,
         ),
         assumed("l", "Damping of the shaft's torsion", "N.m.s/rad", 5.0),
         assumed("i_p", "Gear ratio: turns of the motor for one of the output shaft", "", 100.0),
@@ -141,7 +141,7 @@ def _derivatives(v: Values) -> Mapping[str, Element]:
         "omega1": shaft_acceleration(_drive(v), v.i_a, _torque(v)),
         "i_a": current_rate(_drive(v), v.u, v.omega1, v.i_a),
         "energy_in": v.u * v.i_a,
-        "energy_lost": lost_power(_drive(v), v.omega1, v.i_a, v.omega2),
+        "energy_lost": dissipated_power(_drive(v), v.omega1, v.i_a, v.omega2),
     }
 
 
@@ -172,7 +172,7 @@ def drive_controller() -> Unit:
         outputs=lambda v: {"u": _voltage(v)},
         update=lambda v: {
             "last": _voltage(v),
-            "sample": np.maximum(v.sample, sample_number(v.time, v.period)),
+            "sample": np.maximum(v.sample, sample_index(v.time, v.period)),
         },
         equations=(
             "u_n = u_n-1 + Kphi (set_theta - real_theta) + Kw (set_omega - real_omega)",
@@ -191,9 +191,7 @@ _VOLTAGE = Output(name="u", description="Voltage for the drive's armature", unit
 def _controller_parameters() -> tuple[Parameter, ...]:
     period, gain = "Time between two samples", "Voltage that a sample adds for an error of"
     return (
-        Parameter(
-            name="period", description=period, unit="s", start=5e-3, minimum=SHORTEST_PERIOD, tunable=False
-        ),
+        Parameter(name="period", description=period, unit="s", start=5e-3, minimum=MIN_PERIOD, tunable=False),
         Parameter(name="Kphi", description=f"{gain} position (assumed)", unit="V/rad", start=7.5),
         Parameter(name="Kw", description=f"{gain} velocity (assumed)", unit="V.s/rad", start=0.75),
         Parameter(name="Keps", description=f"{gain} acceleration (assumed)", unit="V.s2/rad", start=0.01),
@@ -220,14 +218,14 @@ def _memories() -> tuple[Memory, ...]:
 
 def _voltage(v: Values) -> Element:
     """Return the voltage from the communication point on: a new one at a sample, else the held one."""
-    fresh = next_voltage(
+    fresh = control_voltage(
         v.last,
         Gains(v.Kphi, v.Kw, v.Keps),
         JointMotion(v.set_theta, v.set_omega, v.set_alpha),
         JointMotion(v.real_theta, v.real_omega, v.real_alpha),
         v.u_max,
     )
-    return voltage_at(v.time, v.period, v.sample, fresh, v.last)
+    return held_voltage(v.time, v.period, v.sample, fresh, v.last)
 
 
 def inertia() -> Unit:

@@ -22,9 +22,9 @@ from urmpipe_fmus.blocks.coordinates import (
 )
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.arm.chain import Parameter as ArmParameter
-from urmpipe_models.arm.geometric_models import SEGMENT, TILT
+from urmpipe_models.arm.geometric_models import SEGMENT_SOURCE, TILT_SOURCE
 from urmpipe_models.errors import UnitError
-from urmpipe_models.kinematics.forward import Motion, each_motion, forward
+from urmpipe_models.kinematics.forward import Motion, forward, iter_point_motions
 from urmpipe_models.math3d import Transform, euler_zyx, from_rpy, rpy_of
 from urmpipe_models.robots.toml import chain_from_dict
 
@@ -47,7 +47,7 @@ def geometry_of(robot: Chain) -> Geometry:
     Where it stands (`base`) and its `tool` are parameters of both.
     """
     links = [one for one in robot.parameters if one.place not in ("base", "tool")]
-    of_urm = {one.source for one in links} == {SEGMENT, TILT}
+    of_urm = {one.source for one in links} == {SEGMENT_SOURCE, TILT_SOURCE}
     shape = _of_urm(robot, links) if of_urm else _of_frames(robot)
     ends = (
         *_frame_parameters("base", "the base in the world", robot.base),
@@ -63,7 +63,9 @@ def geometry_of(robot: Chain) -> Geometry:
 
 def _of_urm(robot: Chain, links: Sequence[ArmParameter]) -> Geometry:
     """Return the shape of a URM arm."""
-    lengths, tilts = ([one for one in links if one.source == source] for source in (SEGMENT, TILT))
+    lengths, tilts = (
+        [one for one in links if one.source == source] for source in (SEGMENT_SOURCE, TILT_SOURCE)
+    )
 
     def chain_at(v: Values) -> Chain:
         """Return the arm of some lengths and tilts."""
@@ -172,7 +174,7 @@ def kinematic_chain(
     Raises:
         UnitError: With what is wrong with the options.
 
-    Source: [UrmArm2021]_ eq. 1-14; v and a by the outward recursion (see `each_motion`).
+    Source: [UrmArm2021]_ eq. 1-14; v and a by the outward recursion (see `iter_point_motions`).
     """
     an_arm("kinematic_chain", robot)
     names = robot.point_names
@@ -219,7 +221,7 @@ def _moved(arm: Chain, v: Values, rates: bool) -> tuple[Sequence[Transform], Seq
     q = values_of(arm, v)
     if not rates:
         return forward(arm, q), ()
-    motions = tuple(each_motion(arm, q, values_of(arm, v, "d"), values_of(arm, v, "dd")))
+    motions = tuple(iter_point_motions(arm, q, values_of(arm, v, "d"), values_of(arm, v, "dd")))
     return [motion.pose for motion in motions], motions
 
 

@@ -69,7 +69,7 @@ def parameters_of(frames: Sequence[Transform], places: Sequence[str]) -> Iterato
     """
     names: set[str] = set()
     for index, (frame, place) in enumerate(zip(frames, places, strict=True)):
-        parts = parts_of(frame)
+        parts = frame_to_steps(frame)
         for k, step in enumerate(parts):
             if isinstance(step, Transform):
                 continue
@@ -81,7 +81,7 @@ def parameters_of(frames: Sequence[Transform], places: Sequence[str]) -> Iterato
             yield Parameter(name, step.kind, step.axis, step.value, step.source, place, index, before, after)
 
 
-def parts_of(frame: Transform) -> tuple[Transform | Step, ...]:
+def frame_to_steps(frame: Transform) -> tuple[Transform | Step, ...]:
     """Return what a frame is made of.
 
     One that does not tell is x, y, z, then its rotation as a constant, then turns by 0 about z, y, x.
@@ -103,7 +103,7 @@ def parts_of(frame: Transform) -> tuple[Transform | Step, ...]:
 def with_values(frame: Transform, values: Sequence[Element]) -> Transform:
     """Return a frame with other values of its parameters, in [m] and [rad], multiplied again."""
     given = iter(values)
-    parts = parts_of(frame)
+    parts = frame_to_steps(frame)
     return made_of(*(replace(one, value=next(given)) if isinstance(one, Step) else one for one in parts))
 
 
@@ -261,10 +261,10 @@ class Visual:
         """Return the same shape with its mesh file looked up from the folder of the description."""
         if not isinstance(self.shape, Mesh):
             return self
-        return replace(self, shape=replace(self.shape, file=mesh_file(self.shape.file, folder)))
+        return replace(self, shape=replace(self.shape, file=resolve_mesh_path(self.shape.file, folder)))
 
 
-def mesh_file(reference: str, folder: Path) -> str:
+def resolve_mesh_path(reference: str, folder: Path) -> str:
     """Return where a mesh file stands, if a description in a folder may take it.
 
     A description takes files from its own folder, from the ROS package that it stands in, from those around,
@@ -321,7 +321,7 @@ JointKind = Literal["revolute", "prismatic", "fixed"]
 AXIS_TOLERANCE = 1e-9
 """An axis may differ from unit length by this: rounding, not a forgotten normalisation."""
 
-FARTHEST = 1e6
+MAX_COORDINATE = 1e6
 """Largest offset of a frame in [m]: products of several of much larger ones are no numbers any more."""
 
 
@@ -458,8 +458,8 @@ class Chain(Shown):
         frames |= {f"joint {joint.name}": joint.origin for joint in self.joints}
         for where, frame in frames.items():
             numbers = [float(one) for one in frame.translation if isinstance(one, Real)]
-            if not all(abs(one) <= FARTHEST for one in numbers):
-                yield f"{where} stands at {numbers} m; allowed: {FARTHEST:g} m at most"
+            if not all(abs(one) <= MAX_COORDINATE for one in numbers):
+                yield f"{where} stands at {numbers} m; allowed: {MAX_COORDINATE:g} m at most"
 
     def _drive_faults(self) -> Iterator[str]:
         """Yield the faults of the drives, and drives of joints that have no coordinate or have two."""

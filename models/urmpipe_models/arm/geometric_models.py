@@ -188,7 +188,7 @@ AXES = {
 
 
 @dataclass(frozen=True, slots=True)
-class GeometricRow:
+class GeometricModelRow:
     """One joint of the model.
 
     Attributes:
@@ -207,7 +207,7 @@ class GeometricRow:
 
 def geometric_chain(
     name: str,
-    rows: Sequence[GeometricRow],
+    rows: Sequence[GeometricModelRow],
     *,
     tip: Vector = ZERO,
     start: Sequence[float] = (),
@@ -257,7 +257,7 @@ def _shift(r: Vector, k: int) -> Transform:
     )
 
 
-def articulated_6r_rows(l0: Element, l1: Element, l2: Element, l3: Element) -> tuple[GeometricRow, ...]:
+def articulated_6r_rows(l0: Element, l1: Element, l2: Element, l3: Element) -> tuple[GeometricModelRow, ...]:
     """Return the joints of the arm: about z, x, x, z, x, z, the last three through one point.
 
     Args:
@@ -269,12 +269,12 @@ def articulated_6r_rows(l0: Element, l1: Element, l2: Element, l3: Element) -> t
     Source: [Geometric6R]_ eq. 21-26, 39.
     """
     return (
-        GeometricRow("R", "z", (0.0, 0.0, l0)),
-        GeometricRow("R", "x", (0.0, 0.0, l1)),
-        GeometricRow("R", "x", (0.0, 0.0, l2)),
-        GeometricRow("R", "z", (0.0, 0.0, l3)),
-        GeometricRow("R", "x"),
-        GeometricRow("R", "z"),
+        GeometricModelRow("R", "z", (0.0, 0.0, l0)),
+        GeometricModelRow("R", "x", (0.0, 0.0, l1)),
+        GeometricModelRow("R", "x", (0.0, 0.0, l2)),
+        GeometricModelRow("R", "z", (0.0, 0.0, l3)),
+        GeometricModelRow("R", "x"),
+        GeometricModelRow("R", "z"),
     )
 
 
@@ -314,7 +314,7 @@ def articulated_6r(
     return replace(chain, joints=tuple(joints), tip=tip)
 
 
-SEGMENT, TILT = "URM segment", "URM tilt"
+SEGMENT_SOURCE, TILT_SOURCE = "URM segment", "URM tilt"
 """The sources of an arm's parameters."""
 
 
@@ -356,8 +356,8 @@ def urm_chain(
     turns = tuple(directions) or (1,) * modules
     if len(turns) != modules or any(turn not in (1, -1) for turn in turns):
         raise RobotError(f"robot {name}: directions {list(turns)}; allowed: {modules} values, each 1 or -1")
-    *segments, end = (Step("along", "z", r, f"r{k}", SEGMENT) for k, r in enumerate(lengths, start=1))
-    turned = (Step("about", "y", tilt, f"theta{k}", TILT) for k, tilt in enumerate(tilts, start=2))
+    *segments, end = (Step("along", "z", r, f"r{k}", SEGMENT_SOURCE) for k, r in enumerate(lengths, start=1))
+    turned = (Step("about", "y", tilt, f"theta{k}", TILT_SOURCE) for k, tilt in enumerate(tilts, start=2))
     origins = [made_of(), *map(made_of, segments, turned)]
     joints = [
         Joint(f"phi{k}", "revolute", origin, (0.0, 0.0, float(turn)))

@@ -10,7 +10,17 @@ from typing import TypeAlias
 
 import numpy as np
 
-from urmpipe_models.arm.chain import FARTHEST, Box, Capsule, Chain, Colour, Cylinder, Joint, Shape, Visual
+from urmpipe_models.arm.chain import (
+    MAX_COORDINATE,
+    Box,
+    Capsule,
+    Chain,
+    Colour,
+    Cylinder,
+    Joint,
+    Shape,
+    Visual,
+)
 from urmpipe_models.elementwise import FloatArray, Vector
 from urmpipe_models.math3d import Transform
 
@@ -70,7 +80,7 @@ class _Link:
         return Visual(self.joint.name or None, shape, origin, colour)
 
 
-def solids_of(chain: Chain, colours: Mapping[str, Colour] | None = None) -> tuple[Visual, ...]:
+def build_placeholder_solids(chain: Chain, colours: Mapping[str, Colour] | None = None) -> tuple[Visual, ...]:
     """Return solids for the links and joints of an arm, however it was described.
 
     A link goes from its joint's frame along this joint's axis, then along the common normal to the next axis,
@@ -111,7 +121,7 @@ def _links(chain: Chain) -> tuple[float, tuple[_Link, ...]]:
     ways = [_way(joint, following) for joint, following in pairwise(joints)]
     lengths = [sum(map(_length, way)) for way in ways]
     strokes = [joint.upper - joint.lower for joint in joints if joint.kind == "prismatic"]
-    real = LONGEST_RAIL * sum(lengths) or FARTHEST
+    real = LONGEST_RAIL * sum(lengths) or MAX_COORDINATE
     stroke = STROKE * sum(one for one in strokes if one <= real)
     size = max(sum(lengths), stroke) or math.hypot(*chain.tool.translation) or 1.0
     long = sum(length > SHORT * size for length in lengths)

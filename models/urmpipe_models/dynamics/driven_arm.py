@@ -23,14 +23,14 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import (
     NO_SPRING,
+    CounterbalanceSpring,
     Drive,
     DrivenJoint,
-    HeldJoint,
     JointDrive,
-    ReliefSpring,
+    PassiveJoint,
     current_rate,
-    driving_torque,
-    lost_power,
+    dissipated_power,
+    motor_torque,
     shaft_acceleration,
     shaft_torque,
     stored_energy,
@@ -82,7 +82,7 @@ class Motor(NamedTuple):
     rate: Element
     current: Element
     voltage: Element
-    spring: ReliefSpring = NO_SPRING
+    spring: CounterbalanceSpring = NO_SPRING
 
 
 Actuator: TypeAlias = Spring | Motor
@@ -221,7 +221,7 @@ def powers(chain: Chain, state: ArmState, wrench: Wrench | None = None) -> Power
     for one, qd in zip(state.actuators, state.qd, strict=True):
         if isinstance(one, Motor):
             given = given + one.voltage * one.current
-            lost = lost + lost_power(one.drive, one.rate, one.current, qd)
+            lost = lost + dissipated_power(one.drive, one.rate, one.current, qd)
         else:
             lost = lost + one.damping * qd * qd
     return Powers(given, lost)
@@ -283,7 +283,7 @@ def at_rest(chain: Chain, wrench: Wrench | None = None) -> list[Rest]:
         q = _yielded(chain, drives, [one.rest for one in rests], wrench)
         torques = _torques(chain, q, wrench)
         rests = [
-            rest._replace(q=value) if isinstance(own, HeldJoint) else _held(own, value, torque)
+            rest._replace(q=value) if isinstance(own, PassiveJoint) else _held(own, value, torque)
             for own, rest, value, torque in zip(drives, rests, q, torques, strict=True)
         ]
     weak = [
@@ -317,7 +317,7 @@ def stable_step(chain: Chain) -> float:
 
 def _alone(one: JointDrive, lightness: float) -> FloatArray:
     """Return the matrix of q, q', theta1, theta1', i_a of a joint that yields by 1 / J to its torque."""
-    if isinstance(one, HeldJoint):
+    if isinstance(one, PassiveJoint):
         return np.array([[0.0, 1.0], [-one.stiffness * lightness, -one.damping * lightness]])
     k, damping, ratio, constant, resistance, inductance, inertia = one.drive
     torque = np.array([-k, -damping, k, damping, 0.0])
@@ -334,12 +334,12 @@ def _alone(one: JointDrive, lightness: float) -> FloatArray:
     )
 
 
-def _held(one: HeldJoint | DrivenJoint, q: float, torque: float) -> Rest:
+def _held(one: PassiveJoint | DrivenJoint, q: float, torque: float) -> Rest:
     """Return what gives a joint a torque at rest."""
-    if isinstance(one, HeldJoint):
+    if isinstance(one, PassiveJoint):
         return Rest(q, q + torque / one.stiffness, 0.0, 0.0)
     torque -= one.spring.stiffness * (one.spring.rest - q)
-    current = torque / driving_torque(one.drive, 1.0)
+    current = torque / motor_torque(one.drive, 1.0)
     return Rest(q, q + torque / one.drive.stiffness, current, one.drive.resistance * current)
 
 
@@ -360,10 +360,10 @@ def _yielded(
     from scipy.optimize import root
 
     start = np.array([float(value) for value in chain.start])
-    held = [k for k, own in enumerate(drives) if isinstance(own, HeldJoint)]
+    held = [k for k, own in enumerate(drives) if isinstance(own, PassiveJoint)]
     if not held:
         return [float(value) for value in start]
-    stiffness = np.array([own.stiffness for own in drives if isinstance(own, HeldJoint)])
+    stiffness = np.array([own.stiffness for own in drives if isinstance(own, PassiveJoint)])
 
     def standing(moved: FloatArray) -> FloatArray:
         """Return the pose when the held joints have moved by so much, shape (coordinates,), [rad] or [m]."""
@@ -435,7 +435,7 @@ def _linear(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray, FloatA
     torque = np.zeros((count, size))
     torque[:, :count] = -_weight_stiffness(chain, q)
     for k, held in enumerate(drives):
-        if isinstance(held, HeldJoint):
+        if isinstance(held, PassiveJoint):
             torque[k, [k, count + k]] -= held.stiffness, held.damping
     motion, voltage = np.zeros((size, size)), np.zeros((size, len(driven)))
     motion[:count, count : 2 * count] = np.eye(count)

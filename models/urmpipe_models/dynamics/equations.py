@@ -55,7 +55,7 @@ from urmpipe_models.elementwise import (
     times,
 )
 from urmpipe_models.errors import RobotError
-from urmpipe_models.kinematics.forward import joint_values, moved
+from urmpipe_models.kinematics.forward import apply_joint, joint_values
 from urmpipe_models.math3d import Transform
 
 
@@ -140,7 +140,7 @@ def posed_links(chain: Chain, q: Sequence[Element], arm: Links | None = None) ->
     """
     arm = arm or links_of(chain)
     values = dict(zip((joint.name for joint in chain.joints), joint_values(chain, q), strict=True))
-    frames = [moved(link.joint.origin, link.joint, values[link.joint.name]) for link in arm.links]
+    frames = [apply_joint(link.joint.origin, link.joint, values[link.joint.name]) for link in arm.links]
     return PosedLinks(chain, arm, frames)
 
 

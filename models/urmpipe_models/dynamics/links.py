@@ -28,7 +28,7 @@ from urmpipe_models.elementwise import (
     times,
 )
 from urmpipe_models.errors import RobotError
-from urmpipe_models.kinematics.forward import frames, jacobian, joint_rates
+from urmpipe_models.kinematics.forward import iter_frames, jacobian, joint_rates
 from urmpipe_models.math3d import Transform
 
 Symmetric: TypeAlias = tuple[Vector, Vector, Vector]
@@ -216,7 +216,7 @@ def mass_centres(chain: Chain, q: Sequence[Element]) -> list[Vector]:
 
     Source: [Iso9283]_ eq. 8.
     """
-    placed = dict(zip((None, *(joint.name for joint in chain.joints)), frames(chain, q), strict=True))
+    placed = dict(zip((None, *(joint.name for joint in chain.joints)), iter_frames(chain, q), strict=True))
     return [placed[one.joint].point(one.centre) for one in chain.inertials]
 
 
@@ -224,7 +224,7 @@ def _frame_motions(
     chain: Chain, q: Sequence[Element], qd: Sequence[Element]
 ) -> Iterator[tuple[Transform, Vector, Vector]]:
     """Yield pose, velocity of the origin and angular velocity in the world, of the base and every joint."""
-    base, *moved = frames(chain, q)
+    base, *moved = iter_frames(chain, q)
     before, velocity, omega = base.translation, ZERO, ZERO
     yield base, velocity, omega
     for frame, joint, rate in zip(moved, chain.joints, joint_rates(chain, qd), strict=True):

@@ -27,7 +27,7 @@ from urmpipe_models.ik.restarts import refine
 from urmpipe_models.ik.solutions import Solutions, Targets, misses, targets_of
 from urmpipe_models.ik.spherical import TILT, SphericalWrist, meeting_point, spherical_wrist
 from urmpipe_models.ik.trigonometric import wrapped
-from urmpipe_models.kinematics.forward import Screws, chain_of, screws
+from urmpipe_models.kinematics.forward import Screws, chain_to_screws, screws_to_chain
 from urmpipe_models.math3d import rotation_about
 
 NEARLY = 1e-2
@@ -331,7 +331,7 @@ def _deviation(chain: Chain, ideal: Screws) -> tuple[float, float]:
     """Return the largest distance in [m] and angle in [rad] between two arms, of some random joint values."""
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (64, len(ideal.revolute)))
     q *= np.where(ideal.revolute, 1.0, ideal.size / np.pi)
-    apart = misses(chain, q, targets_of(chain_of(ideal, chain.coordinates), q))
+    apart = misses(chain, q, targets_of(screws_to_chain(ideal, chain.coordinates), q))
     metres, radians = (float(np.linalg.norm(one, axis=1).max()) for one in apart)
     return metres, radians
 
@@ -375,7 +375,7 @@ def closed_form(chain: Chain) -> ClosedForm | None:
     (`nearly.NearlyClosedForm`).
     """
     exact = exact_form(chain)
-    of_chain = screws(chain)
+    of_chain = chain_to_screws(chain)
     if exact is not None or of_chain is None:
         return exact
     return nearly_closed_form(chain, of_chain)
@@ -388,7 +388,7 @@ def exact_form(chain: Chain) -> ClosedForm | None:
     Paths are followed by these alone: beside singular poses the branches of an arm that only nearly has one
     are not those of the idealised arm.
     """
-    of_chain = screws(chain)
+    of_chain = chain_to_screws(chain)
     if of_chain is None:
         return None
     names = chain.coordinates

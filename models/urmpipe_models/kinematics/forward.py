@@ -54,7 +54,7 @@ def joint_rates(chain: Chain, rates: Sequence[Element]) -> list[Element]:
     ]
 
 
-def frames(chain: Chain, q: Sequence[Element]) -> Iterator[Transform]:
+def iter_frames(chain: Chain, q: Sequence[Element]) -> Iterator[Transform]:
     """Yield the base and the moving frame of every joint, in the world: what the links hang on.
 
     Args:
@@ -64,11 +64,11 @@ def frames(chain: Chain, q: Sequence[Element]) -> Iterator[Transform]:
     frame = chain.base
     yield frame
     for joint, value in zip(chain.joints, joint_values(chain, q), strict=True):
-        frame = moved(frame @ joint.origin, joint, value)
+        frame = apply_joint(frame @ joint.origin, joint, value)
         yield frame
 
 
-def moved(at_joint: Transform, joint: Joint, value: Element) -> Transform:
+def apply_joint(at_joint: Transform, joint: Joint, value: Element) -> Transform:
     """Return the joint's moving frame from its fixed one and its value in [rad] or [m]."""
     if joint.kind == "revolute":
         return at_joint.turned(joint.axis, value)
@@ -84,10 +84,10 @@ def tip_position(chain: Chain, q: Sequence[Element]) -> Vector:
         chain: The arm.
         q: One element per coordinate, in [rad] or [m].
     """
-    return from_tip(chain, q, chain.tip.point(chain.tool.translation))[0]
+    return tip_to_world(chain, q, chain.tip.point(chain.tool.translation))[0]
 
 
-def from_tip(chain: Chain, q: Sequence[Element], point: Vector, *directions: Vector) -> list[Vector]:
+def tip_to_world(chain: Chain, q: Sequence[Element], point: Vector, *directions: Vector) -> list[Vector]:
     """Return a point [m] and directions that are given in the frame of the last joint, in the world.
 
     Inward recursion: what is known in a link's frame becomes the same in the frame before,
@@ -132,7 +132,7 @@ class Motion:
     alpha: Vector
 
 
-def motions(
+def point_motions(
     chain: Chain, q: Sequence[Element], qd: Sequence[Element], qdd: Sequence[Element]
 ) -> tuple[Motion, ...]:
     """Return pose, velocity and acceleration of the points p1..pn, from q, q' and q''.
@@ -149,10 +149,10 @@ def motions(
 
     Source: [UrmArm2021]_ section 3, Figure 10 b and c (v7 of q', a7 of q'' and q'^2).
     """
-    return tuple(each_motion(chain, q, qd, qdd))
+    return tuple(iter_point_motions(chain, q, qd, qdd))
 
 
-def each_motion(
+def iter_point_motions(
     chain: Chain, q: Sequence[Element], qd: Sequence[Element], qdd: Sequence[Element]
 ) -> Iterator[Motion]:
     """Yield the motions of p1..pn; who wants one of them need not keep the arrays of all.
@@ -190,7 +190,7 @@ def _carried(state: Motion, origin: Transform) -> Motion:
 
 def _driven(state: Motion, joint: Joint, value: Element, rate: Element, second: Element) -> Motion:
     """Return the motion of the joint's moving frame from that of its fixed one; a fixed joint slides by 0."""
-    pose = moved(state.pose, joint, value)
+    pose = apply_joint(state.pose, joint, value)
     axis = state.pose.rotate(joint.axis)
     own, own_second = scale(rate, axis), scale(second, axis)
     coupling = cross(state.omega, own)
@@ -226,7 +226,7 @@ def forward(chain: Chain, q: Sequence[Element]) -> tuple[Transform, ...]:
 
     Source: [UrmArm2021]_ eq. 7 and 8.
     """
-    _, *links = frames(chain, q)
+    _, *links = iter_frames(chain, q)
     poses = [
         Transform(frame.rotation, frame.point(joint.origin.translation))
         for frame, joint in zip(links, chain.joints[1:], strict=False)
@@ -244,7 +244,7 @@ def tip_pose(chain: Chain, q: Sequence[Element]) -> Transform:
         q: One element per coordinate, in [rad] or [m].
     """
     tip = chain.tip @ chain.tool
-    point, x, y = from_tip(chain, q, tip.translation, *tip.columns[:2])
+    point, x, y = tip_to_world(chain, q, tip.translation, *tip.columns[:2])
     return Transform(Transform((x, y, cross(x, y))).columns, point)
 
 
@@ -273,7 +273,7 @@ def jacobian(chain: Chain, q: Sequence[Element], point: int = -1) -> tuple[tuple
             target = at_joint.translation
             break
         axes.append((at_joint.rotate(joint.axis), at_joint.translation))
-        frame = moved(at_joint, joint, value)
+        frame = apply_joint(at_joint, joint, value)
     else:
         target = (frame @ chain.tip @ chain.tool).translation
 
@@ -365,7 +365,7 @@ def point_over_log(
 
     def work(block: slice) -> None:
         """Fill the rows of a block."""
-        every = each_motion(chain, _columns(q[block]), _columns(qd[block]), _columns(qdd[block]))
+        every = iter_point_motions(chain, _columns(q[block]), _columns(qd[block]), _columns(qdd[block]))
         motion = next(islice(every, place, None))
         rz, ry, rx, singular[block] = euler_zyx(motion.pose.rotation)
         _fill(position[:, block], motion.pose.translation)
@@ -412,7 +412,7 @@ def frames_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray
 
     def work(block: slice) -> None:
         """Fill the rows of a block."""
-        for k, frame in enumerate(frames(chain, _columns(q[block]))):
+        for k, frame in enumerate(iter_frames(chain, _columns(q[block]))):
             _fill(position[k, :, block], frame.translation)
             for row in range(3):
                 _fill(rotation[k, row, :, block], frame.rotation[row])
@@ -460,7 +460,7 @@ def bias_over_log(chain: Chain, q: FloatArray, qd: FloatArray) -> FloatArray:
     def work(block: slice) -> None:
         """Fill the rows of a block."""
         rates = _columns(qd[block])
-        *_, tip = each_motion(chain, _columns(q[block]), rates, [0.0] * len(rates))
+        *_, tip = iter_point_motions(chain, _columns(q[block]), rates, [0.0] * len(rates))
         _fill(result[:3, block], tip.acceleration)
         _fill(result[3:, block], tip.alpha)
 
@@ -509,7 +509,7 @@ class Screws:
         return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) or 1.0
 
 
-def screws(chain: Chain) -> Screws | None:
+def chain_to_screws(chain: Chain) -> Screws | None:
     """Return the screws of a chain, base and tool included; None if a joint follows another (mimic).
 
     Such a joint turns about a line that moves with the joint it follows, and is no screw of its own.
@@ -519,7 +519,7 @@ def screws(chain: Chain) -> Screws | None:
     zero = [0.0] * len(chain.coordinates)
     placed = [
         (frame.rotate(joint.axis), frame.translation, joint.kind == "revolute")
-        for joint, frame in zip(chain.joints, list(frames(chain, zero))[1:], strict=True)
+        for joint, frame in zip(chain.joints, list(iter_frames(chain, zero))[1:], strict=True)
         if joint.kind != "fixed"
     ]
     direction, point, revolute = zip(*placed, strict=True)
@@ -533,7 +533,7 @@ def screws(chain: Chain) -> Screws | None:
     )
 
 
-def chain_of(screws: Screws, names: tuple[str, ...]) -> Chain:
+def screws_to_chain(screws: Screws, names: tuple[str, ...]) -> Chain:
     """Return a chain that has these screws: each joint's frame on a point of its axis, turned as the world.
 
     Args:

@@ -12,7 +12,7 @@ from typing import Literal
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import ZERO, Element, Vector, cross, scale, subtract
-from urmpipe_models.kinematics.forward import frames
+from urmpipe_models.kinematics.forward import iter_frames
 from urmpipe_models.math3d import Transform, rotation_about, translation
 
 BASE = 0
@@ -57,12 +57,12 @@ def sensitivities(chain: Chain, q: Sequence[Element], twists: Sequence[Twist]) -
 
     Source: [Khalil2002]_ section 11.4.
     """
-    *parents, last = [Transform(), *frames(chain, q)]
+    *parents, last = [Transform(), *iter_frames(chain, q)]
     parents += [last, last @ chain.tip]
-    return columns_of(parents, (parents[-1] @ chain.tool).translation, twists)
+    return sensitivity_columns(parents, (parents[-1] @ chain.tool).translation, twists)
 
 
-def columns_of(
+def sensitivity_columns(
     parents: Sequence[Transform], target: Vector, twists: Sequence[Twist]
 ) -> list[tuple[Vector, Vector]]:
     """Return how each twist moves a point, as `sensitivities` does.
@@ -83,7 +83,7 @@ def columns_of(
     return columns
 
 
-def changed(chain: Chain, changes: Sequence[tuple[Twist, float]]) -> tuple[Chain, list[Twist]]:
+def apply_twists(chain: Chain, changes: Sequence[tuple[Twist, float]]) -> tuple[Chain, list[Twist]]:
     """Return a chain some of whose frames differ, and the twists where they then are.
 
     Args:
@@ -93,14 +93,14 @@ def changed(chain: Chain, changes: Sequence[tuple[Twist, float]]) -> tuple[Chain
     Returns:
         The changed arm; and the same twists for `sensitivities` of it.
     """
-    (base, *origins, tip, tool), located = changed_frames(chain.frames, changes)
+    (base, *origins, tip, tool), located = apply_twists_to_frames(chain.frames, changes)
     if not any(value for _, value in changes):
         return chain, located
     joints = tuple(replace(joint, origin=origin) for joint, origin in zip(chain.joints, origins, strict=True))
     return replace(chain, joints=joints, base=base, tip=tip, tool=tool), located
 
 
-def changed_frames(
+def apply_twists_to_frames(
     places: Sequence[Transform], changes: Sequence[tuple[Twist, float]]
 ) -> tuple[list[Transform], list[Twist]]:
     """Return frames of which some differ, and the twists where they then are.

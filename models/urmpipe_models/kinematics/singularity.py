@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.kinematics.forward import jacobian_over_log, screws
+from urmpipe_models.kinematics.forward import chain_to_screws, jacobian_over_log
 
-PARALLEL = 0.1
+MAX_PARALLEL_SINE = 0.1
 """Sine of the angle between two axes below which they count as parallel.
 
 A calibrated arm has axes that were meant to be parallel and are not by 1e-4 rad: where their common normal
@@ -97,7 +97,7 @@ def characteristic_length(chain: Chain) -> float:
     place, and adds nothing; of an arm without any length it is 1 m.
     """
     alone = replace(chain, joints=tuple(replace(joint, mimic=None) for joint in chain.joints), start=())
-    found = screws(alone)
+    found = chain_to_screws(alone)
     assert found is not None  # there is no mimic left
     lines = list(zip(found.point[found.revolute], found.direction[found.revolute], strict=True))
     if not lines:
@@ -129,7 +129,7 @@ def _common_normal(one: Line, other: Line) -> tuple[FloatArray, FloatArray] | No
     (point, axis), (target, direction) = one, other
     normal = np.cross(axis, direction)
     square = float(normal @ normal)
-    if square < PARALLEL**2:
+    if square < MAX_PARALLEL_SINE**2:
         return None
     away = target - point
     return (

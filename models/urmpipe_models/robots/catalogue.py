@@ -21,7 +21,7 @@ def robot_names() -> tuple[str, ...]:
 
 
 @cache
-def moving_differently() -> tuple[str, ...]:
+def kinematically_distinct_names() -> tuple[str, ...]:
     """Return the names without those of arms that move as an earlier one, and differ in masses or drives."""
     found: dict[str, Chain] = {}
     for name in robot_names():

@@ -43,19 +43,19 @@ from urmpipe_models.drives import (
     GAIN_KEYS,
     NO_SPRING,
     SPRING_KEYS,
+    CounterbalanceSpring,
     Drive,
     DrivenJoint,
     Gains,
-    HeldJoint,
     JointDrive,
-    ReliefSpring,
+    PassiveJoint,
 )
 from urmpipe_models.elementwise import ZERO, cross, dot
 from urmpipe_models.errors import Finding, RobotError
 from urmpipe_models.files import EXPORT_MARK
 from urmpipe_models.math3d import Step, Transform, from_xyz_rpy, made_of
 from urmpipe_models.robots.urdf import read_urdf
-from urmpipe_models.robots.urdf_tree import MOST
+from urmpipe_models.robots.urdf_tree import MAX_LINKS
 from urmpipe_models.toml_tables import Table, parse_toml, toml_lines, toml_text
 
 ORTHONORMAL = 1e-9
@@ -169,15 +169,15 @@ def read_drive(joint: str, table: Table) -> JointDrive:
     values = {key: table.number(key) for key in (*HELD_KEYS, *(further if driven else ()), *sprung)}
     table.close()
     if not driven:
-        return HeldJoint(joint, *values.values())
+        return PassiveJoint(joint, *values.values())
     drive, gains = Drive(*map(values.get, DRIVE_KEYS)), Gains(*map(values.get, GAIN_KEYS))
-    spring = ReliefSpring(*map(values.get, SPRING_KEYS)) if sprung else NO_SPRING
+    spring = CounterbalanceSpring(*map(values.get, SPRING_KEYS)) if sprung else NO_SPRING
     return DrivenJoint(joint, drive, values["period"], gains, values["u_max"], spring)
 
 
 def drive_to_dict(drive: JointDrive) -> dict[str, float]:
     """Return the constants of a drive as a JSON object: `read_drive`'s exact inverse."""
-    if isinstance(drive, HeldJoint):
+    if isinstance(drive, PassiveJoint):
         return {"k": float(drive.stiffness), "l": float(drive.damping)}
     given = {
         **dict(zip(DRIVE_KEYS, drive.drive, strict=True)),
@@ -462,8 +462,8 @@ def _read(
     except RobotError as error:
         further = (Finding(f"robot {name}: {fault}") for fault in own_faults(carried))
         raise RobotError(*_in_file(file, (*error.findings, *further))) from error
-    if len(chain.joints) > MOST:
-        raise RobotError(Finding(f"found {len(chain.joints)} joints, allowed: {MOST} at most", file))
+    if len(chain.joints) > MAX_LINKS:
+        raise RobotError(Finding(f"found {len(chain.joints)} joints, allowed: {MAX_LINKS} at most", file))
     try:
         return replace(
             chain.placed(base, tool),

@@ -33,16 +33,16 @@ from urmpipe_models.robots.urdf_tree import (
     BASE_JOINT,
     KINDS,
     MASS_JOINT,
-    OTHER_TYPES,
     STAND_IN,
     TIP_JOINT,
     TOOL_JOINT,
-    Carrier,
+    UNSUPPORTED_TYPES,
+    CarrierLink,
     Edge,
     Node,
     UrdfTree,
-    numbers_of,
-    origin_of,
+    read_numbers,
+    read_origin,
     read_tree,
 )
 
@@ -67,7 +67,7 @@ class ChainMasses(NamedTuple):
     faults: tuple[str, ...]
 
 
-def chain_masses(tree: UrdfTree, carriers: Sequence[Carrier]) -> ChainMasses:
+def chain_masses(tree: UrdfTree, carriers: Sequence[CarrierLink]) -> ChainMasses:
     """Return the masses that a chain carries.
 
     What is fixed to a link of the chain is carried by what carries the link. What moves against a moving
@@ -93,7 +93,7 @@ def chain_masses(tree: UrdfTree, carriers: Sequence[Carrier]) -> ChainMasses:
     return ChainMasses(() if faults else tuple(inertials), tuple(left_out), tuple(faults))
 
 
-def _fixed_to(tree: UrdfTree, carrier: Carrier, chain: Set[str]) -> Iterator[Carrier]:
+def _fixed_to(tree: UrdfTree, carrier: CarrierLink, chain: Set[str]) -> Iterator[CarrierLink]:
     """Yield a link of the chain and all that is fixed to it beside the chain."""
     waiting = [carrier]
     while waiting:
@@ -119,7 +119,7 @@ def _moving_on(tree: UrdfTree, link: str, chain: Set[str]) -> Iterator[str]:
         waiting += [edge.child for edge in reversed(tree.below(one))]
 
 
-def _inertial(tree: UrdfTree, carrier: Carrier) -> tuple[list[Inertial], list[str]]:
+def _inertial(tree: UrdfTree, carrier: CarrierLink) -> tuple[list[Inertial], list[str]]:
     """Return the inertial of a link in the frame that carries it, if there is one, and what is wrong."""
     found, wrong = _mass(tree, carrier.link)
     if found is None:
@@ -146,7 +146,7 @@ def _mass(tree: UrdfTree, link: str) -> tuple[_Mass | None, list[str]]:
         tree.fault(f"link {link}: found a second <inertial>; allowed: one", other.line)
     (mass,) = _numbers(tree, node, place, "mass", ("value",))
     ixx, iyy, izz, ixy, ixz, iyz = _numbers(tree, node, place, "inertia", MOMENTS)
-    origin = origin_of(tree, node, place)
+    origin = read_origin(tree, node, place)
     wrong = [str(fault) for fault in tree.faults[before:]]
     del tree.faults[before:]
     if wrong or not any((mass, ixx, iyy, izz, ixy, ixz, iyz)):
@@ -162,7 +162,7 @@ def _numbers(tree: UrdfTree, node: Node, place: str, tag: str, names: Sequence[s
         tree.fault(f"{place}: {tag}: no {', '.join(missing)}; allowed: a number each", (element or node).line)
     if element is None:
         return [0.0] * len(names)
-    return [numbers_of(tree, element, f"{place}: {tag}", name, (0.0,))[0] for name in names]
+    return [read_numbers(tree, element, f"{place}: {tag}", name, (0.0,))[0] for name in names]
 
 
 SHAPES = ("box", "cylinder", "capsule", "sphere", "mesh")
@@ -189,13 +189,13 @@ def link_visuals(tree: UrdfTree, link: str, joint: str | None) -> Iterator[Visua
             tree.fault(f"{place}: found {found}; allowed: one of {', '.join(SHAPES)}", node.line)
             continue
         shape = _shape(tree, shapes[0], f"{place}: {shapes[0].tag}")
-        yield Visual(joint, shape, origin_of(tree, node, place), _colour(tree, material, place))
+        yield Visual(joint, shape, read_origin(tree, node, place), _colour(tree, material, place))
 
 
 def _shape(tree: UrdfTree, node: Node, place: str) -> Shape:
     """Return the shape that an element describes, in [m]."""
     if node.tag == "mesh":
-        scale = numbers_of(tree, node, place, "scale", (1.0, 1.0, 1.0))
+        scale = read_numbers(tree, node, place, "scale", (1.0, 1.0, 1.0))
         if not (file := node.attributes.get("filename", "")):
             tree.fault(f"{place}: no filename; allowed: one", node.line)
         return Mesh(file, cast("tuple[float, float, float]", scale))
@@ -212,7 +212,7 @@ def _sizes(tree: UrdfTree, node: Node, place: str, attribute: str, count: int = 
     """Return sizes, which must be there and not be negative."""
     if attribute not in node.attributes:
         tree.fault(f"{place}: no {attribute}; allowed: one", node.line)
-    sizes = numbers_of(tree, node, place, attribute, (0.0,) * count)
+    sizes = read_numbers(tree, node, place, attribute, (0.0,) * count)
     if min(sizes) < 0.0:
         tree.fault(f"{place} {attribute}: found {min(sizes):g}; allowed: 0 or more", node.line)
     return sizes
@@ -225,7 +225,7 @@ def _colour(tree: UrdfTree, material: Node | None, place: str) -> Colour | None:
     node = material.first("color") or tree.colours.get(material.attributes.get("name", ""))
     if node is None:
         return None
-    rgba = numbers_of(tree, node, f"{place}: color", "rgba", (1.0, 1.0, 1.0, 1.0))
+    rgba = read_numbers(tree, node, f"{place}: color", "rgba", (1.0, 1.0, 1.0, 1.0))
     return cast("Colour", tuple(min(max(share, 0.0), 1.0) for share in rgba))
 
 
@@ -366,7 +366,7 @@ def _moves(edge: Edge) -> bool:
 
 def _joint(tree: UrdfTree, edge: Edge, chain: Sequence[Edge]) -> Joint:
     """Return a joint of the chain; one that mimics follows the joint that has the coordinate."""
-    if edge.type in OTHER_TYPES:
+    if edge.type in UNSUPPORTED_TYPES:
         tree.fault(
             f"joint {edge.joint.name}: is {edge.type}; allowed on a chain: {', '.join(KINDS)}", edge.line
         )
@@ -411,7 +411,7 @@ def _take(joints: list[Joint], name: str, index: int) -> Transform:
     return Transform()
 
 
-def _carriers(edges: Sequence[Edge], joints: Sequence[Joint], base: Transform) -> Iterator[Carrier]:
+def _carriers(edges: Sequence[Edge], joints: Sequence[Joint], base: Transform) -> Iterator[CarrierLink]:
     """Yield the links of the chain, each with the joint of the chain that carries it.
 
     Links that hang on a joint which became base, tip or tool are carried by the joint before it.
@@ -419,16 +419,16 @@ def _carriers(edges: Sequence[Edge], joints: Sequence[Joint], base: Transform) -
     if not edges:
         return
     kept = {joint.name for joint in joints}
-    carrier = Carrier(edges[0].parent, None, base.inverse(), moves=False)
+    carrier = CarrierLink(edges[0].parent, None, base.inverse(), moves=False)
     yield carrier
     for edge in edges:
         name, moves = edge.joint.name, carrier.moves or edge.joint.kind != "fixed"
         on = (name, Transform()) if name in kept else (carrier.joint, carrier.frame @ edge.joint.origin)
-        carrier = Carrier(edge.child, *on, moves)
+        carrier = CarrierLink(edge.child, *on, moves)
         yield carrier
 
 
-def _visuals(tree: UrdfTree, carrier: Carrier) -> Iterator[Visual]:
+def _visuals(tree: UrdfTree, carrier: CarrierLink) -> Iterator[Visual]:
     """Yield what a link of the chain shows, in the frame that carries it."""
     shapes = link_visuals(tree, carrier.link, carrier.joint)
     return (replace(visual, origin=carrier.frame @ visual.origin) for visual in shapes)

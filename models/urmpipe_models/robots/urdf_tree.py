@@ -109,7 +109,7 @@ KINDS: dict[str, JointKind] = {
 }  # fmt: skip
 """URDF's joint types that a chain can hold."""
 
-OTHER_TYPES = ("floating", "planar")
+UNSUPPORTED_TYPES = ("floating", "planar")
 """URDF's joint types that it cannot; they may stand beside the chain."""
 
 UNLIMITED = 1.7976931348623157e308
@@ -124,7 +124,7 @@ MASS_JOINT = "urmpipe_mass_"
 STAND_IN = "urmpipe"
 """Name of the material of the shapes that `write_urdf` gives an arm that has none."""
 
-MOST = 1000
+MAX_LINKS = 1000
 """Links of a file, and joints of an arm, at most: a humanoid has a hundred."""
 
 ASKED = 20
@@ -152,7 +152,7 @@ class Edge:
     line: int
 
 
-class Carrier(NamedTuple):
+class CarrierLink(NamedTuple):
     """A link that a chain carries.
 
     Attributes:
@@ -213,8 +213,8 @@ def read_tree(path: Path) -> UrdfTree:
         raise RobotError(
             Finding(f"found <{root.tag}>; allowed: a URDF file, <robot>", str(path), line=root.line)
         )
-    if (most := max(len(root.all("link")), len(root.all("joint")))) > MOST:
-        raise RobotError(Finding(f"found {most} links or joints, allowed: {MOST} at most", str(path)))
+    if (most := max(len(root.all("link")), len(root.all("joint")))) > MAX_LINKS:
+        raise RobotError(Finding(f"found {most} links or joints, allowed: {MAX_LINKS} at most", str(path)))
     tree = UrdfTree(str(path), root.attributes.get("name", path.stem))
     for node in root.all("link"):
         _add_link(tree, node)
@@ -249,7 +249,7 @@ def _add_joint(tree: UrdfTree, node: Node) -> None:
     if name in tree.edges:
         tree.fault(f"joint {name}: name stands already in line {tree.edges[name].line}", node.line)
         return
-    if type_ not in KINDS and type_ not in OTHER_TYPES:
+    if type_ not in KINDS and type_ not in UNSUPPORTED_TYPES:
         tree.fault(f"joint {name}: found type {shown(type_)}; allowed: {', '.join(KINDS)}", node.line)
     parent, child = (_link_of(tree, node, name, end) for end in ("parent", "child"))
     kind = KINDS.get(type_, "fixed")
@@ -257,7 +257,7 @@ def _add_joint(tree: UrdfTree, node: Node) -> None:
     joint = Joint(
         name,
         kind,
-        origin_of(tree, node, f"joint {name}"),
+        read_origin(tree, node, f"joint {name}"),
         (0.0, 0.0, 1.0) if kind == "fixed" else _axis(tree, node, name),
         lower=lower,
         upper=upper,
@@ -284,7 +284,7 @@ def _link_of(tree: UrdfTree, node: Node, joint: str, end: Literal["parent", "chi
     return link
 
 
-def origin_of(tree: UrdfTree, node: Node, place: str) -> Transform:
+def read_origin(tree: UrdfTree, node: Node, place: str) -> Transform:
     """Return the frame that an element's <origin> tells, the identity without one.
 
     Args:
@@ -295,8 +295,8 @@ def origin_of(tree: UrdfTree, node: Node, place: str) -> Transform:
     origin = node.first("origin")
     if origin is None:
         return Transform()
-    x, y, z = numbers_of(tree, origin, f"{place}: origin", "xyz", (0.0, 0.0, 0.0))
-    rx, ry, rz = numbers_of(tree, origin, f"{place}: origin", "rpy", (0.0, 0.0, 0.0))
+    x, y, z = read_numbers(tree, origin, f"{place}: origin", "xyz", (0.0, 0.0, 0.0))
+    rx, ry, rz = read_numbers(tree, origin, f"{place}: origin", "rpy", (0.0, 0.0, 0.0))
     return from_xyz_rpy((x, y, z), (rx, ry, rz), f"URDF {place}")
 
 
@@ -305,7 +305,7 @@ def _axis(tree: UrdfTree, node: Node, joint: str) -> tuple[float, float, float]:
     element = node.first("axis")
     if element is None:
         return (1.0, 0.0, 0.0)
-    x, y, z = numbers_of(tree, element, f"joint {joint}: axis", "xyz", (1.0, 0.0, 0.0))
+    x, y, z = read_numbers(tree, element, f"joint {joint}: axis", "xyz", (1.0, 0.0, 0.0))
     length = math.hypot(x, y, z)
     if length == 0.0:
         tree.fault(f"joint {joint}: axis is zero; allowed: a direction", element.line)
@@ -326,7 +326,7 @@ def _limits(tree: UrdfTree, node: Node, joint: str, type_: str) -> tuple[float, 
     )
     if type_ == "continuous" or not limit.attributes.keys() & {"lower", "upper"}:
         return -math.inf, math.inf, velocity, acceleration, effort
-    (lower,), (upper,) = (numbers_of(tree, limit, place, end, (0.0,)) for end in ("lower", "upper"))
+    (lower,), (upper,) = (read_numbers(tree, limit, place, end, (0.0,)) for end in ("lower", "upper"))
     if lower > upper:
         tree.fault(f"{place}: lower {lower:g} above upper {upper:g}", limit.line)
     return lower, upper, velocity, acceleration, effort
@@ -334,7 +334,7 @@ def _limits(tree: UrdfTree, node: Node, joint: str, type_: str) -> tuple[float, 
 
 def _largest(tree: UrdfTree, limit: Node, place: str, attribute: str) -> float:
     """Return the largest speed, acceleration or effort; 0 is no limit."""
-    (value,) = numbers_of(tree, limit, place, attribute, (math.inf,))
+    (value,) = read_numbers(tree, limit, place, attribute, (math.inf,))
     if value < 0.0:
         tree.fault(f"{place} {attribute}: found {value:g}; allowed: 0 (not known) or more", limit.line)
     return value or math.inf
@@ -346,12 +346,12 @@ def _mimic(tree: UrdfTree, node: Node, joint: str) -> Mimic | None:
     if element is None:
         return None
     place = f"joint {joint}: mimic"
-    (multiplier,) = numbers_of(tree, element, place, "multiplier", (1.0,))
-    (offset,) = numbers_of(tree, element, place, "offset", (0.0,))
+    (multiplier,) = read_numbers(tree, element, place, "multiplier", (1.0,))
+    (offset,) = read_numbers(tree, element, place, "offset", (0.0,))
     return Mimic(element.attributes.get("joint", ""), multiplier, offset)
 
 
-def numbers_of(
+def read_numbers(
     tree: UrdfTree, node: Node, place: str, attribute: str, default: Sequence[float]
 ) -> tuple[float, ...]:
     """Return the numbers of an attribute, as many as the default has; only limits may be infinite.

@@ -20,7 +20,7 @@ from urmpipe_models.arm.chain import (
     Sphere,
     Visual,
 )
-from urmpipe_models.arm.solids import solids_of
+from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.errors import RobotError, in_xml
 from urmpipe_models.files import EXPORT_MARK, replace_text
 from urmpipe_models.math3d import rpy_of, translation
@@ -53,10 +53,10 @@ def urdf_text(chain: Chain) -> str:
     chain's base, tip and tool. Point p_k is where joint k + 1 sits on link k, so the origin of link k + 1
     if that joint does not slide; the last one is the origin of tool0. A revolute joint without limits is
     `continuous`; elsewhere the largest double stands for infinity. Limits of acceleration make it URDF 1.2,
-    which has them. An arm without visuals gets those of `solids_of`, which `read_urdf` leaves out again; as
-    URDF has no capsules, each is a cylinder and two spheres. A link has one mass; further ones of a joint
-    are links of their own, fixed to it by joints whose names begin with `urmpipe_mass_`. URDF has no
-    gravity, no drives and no sources of masses.
+    which has them. An arm without visuals gets those of `build_placeholder_solids`, which
+    `read_urdf` leaves out again; as URDF has no capsules, each is a cylinder and two spheres. A link has one
+    mass; further ones of a joint are separate links, fixed to it by joints whose names begin with
+    `urmpipe_mass_`. URDF has no gravity, no drives and no sources of masses.
 
     Raises:
         RobotError: If a joint has one of these names.
@@ -134,7 +134,7 @@ def _attributes(values: Mapping[str, float]) -> str:
 
 def _without_capsules(chain: Chain) -> Iterator[Visual]:
     """Yield the solids of an arm; a capsule as a cylinder and a sphere at each end."""
-    for solid in solids_of(chain):
+    for solid in build_placeholder_solids(chain):
         if not isinstance(solid.shape, Capsule):
             yield solid
             continue

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.errors import Hint
-from urmpipe_models.kinematics.identification import Twist, changed_frames
+from urmpipe_models.kinematics.identification import Twist, apply_twists_to_frames
 from urmpipe_models.math3d import Transform
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import as_option, placed
@@ -266,7 +266,7 @@ def _corrected_frames(causes: Sequence[Cause], base: Transform, tool: Transform)
                 for axis, value in zip(axes, cause.value, strict=True)
             ]
             changes += reversed(added) if turns else added  # rx, ry, rz of Rz Ry Rx
-    return changed_frames((base, tool), changes)[0]
+    return apply_twists_to_frames((base, tool), changes)[0]
 
 
 def _given(frame: Transform) -> list[float]:

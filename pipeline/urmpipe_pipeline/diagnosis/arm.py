@@ -12,7 +12,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import BoolArray, Element, FloatArray, IntArray, Vector, scale, spread_rows
 from urmpipe_models.hand_eye import hand_eye
 from urmpipe_models.kinematics.forward import jacobian, poses_over_log, tip_pose
-from urmpipe_models.kinematics.identification import Twist, changed, sensitivities
+from urmpipe_models.kinematics.identification import Twist, apply_twists, sensitivities
 from urmpipe_models.math3d import Transform
 from urmpipe_pipeline.diagnosis.arm_groups import cause_groups
 from urmpipe_pipeline.diagnosis.fit import Positions
@@ -64,7 +64,7 @@ class ArmModel(Positions):
         """
         chain, values = self._robot(state.edits), state.values.tolist()
         twists = [one for one in self._twists_of(chain, state.edits) if values[one[1]] or one[1] in wanted]
-        there, located = changed(chain, [(twist, values[c]) for twist, c in twists])
+        there, located = apply_twists(chain, [(twist, values[c]) for twist, c in twists])
         return there, [(twist, c) for twist, (_, c) in zip(located, twists, strict=True)]
 
     def _twists_of(self, chain: Chain, edits: Edits) -> list[tuple[Twist, int]]:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, Vector, add, cross
-from urmpipe_models.kinematics.identification import changed_frames, columns_of
+from urmpipe_models.kinematics.identification import apply_twists_to_frames, sensitivity_columns
 from urmpipe_models.math3d import Transform
 from urmpipe_pipeline.diagnosis.arm import (
     add_columns,
@@ -100,14 +100,14 @@ class PlaceModel(Positions):
         ordered = ordered_twists(self.groups)
         changes = [(twist, float(state.values[c])) for twist, c in ordered]
         turned = Transform(axes_of(state.edits, "base_rotation") or IDENTITY)
-        (base, tool), located = changed_frames((turned, Transform()), changes)
+        (base, tool), located = apply_twists_to_frames((turned, Transform()), changes)
         before = base @ pose
         there = before @ tool
         rotation = None if self.rotation is None else self.rotation[:, :, rows]
         left = pose_residual(there, state.edits, self.position[:, rows], rotation, inside, "reference")
         wanted = {c for group in taken for c in group.columns}
         twists = [(twist, c) for twist, (_, c) in zip(located, ordered, strict=True) if c in wanted]
-        found = columns_of((Transform(), before), there.translation, [twist for twist, _ in twists])
+        found = sensitivity_columns((Transform(), before), there.translation, [twist for twist, _ in twists])
         moved = {c: column for (_, c), column in zip(twists, found, strict=True)}
         columns = np.zeros((len(wanted), *left.shape))
         turning = base.rotate(spin)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import Hint
-from urmpipe_models.robots.catalogue import load_robot, moving_differently
+from urmpipe_models.robots.catalogue import kinematically_distinct_names, load_robot
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.units.evidence import Fit, single_out
 from urmpipe_pipeline.sources.units.kinematic_units import Recorded, fits
@@ -21,10 +21,12 @@ def infer_robot(recorded: Recorded) -> tuple[Chain, Inference] | None:
     the units that are told or in others.
     """
     words = _shared_words(recorded.names)
-    if not recorded.names or (not recorded.lengths and not words & set(moving_differently())):
+    if not recorded.names or (not recorded.lengths and not words & set(kinematically_distinct_names())):
         return None
     robots = [
-        robot for robot in map(load_robot, moving_differently()) if len(robot.moving) == len(recorded.names)
+        robot
+        for robot in map(load_robot, kinematically_distinct_names())
+        if len(robot.moving) == len(recorded.names)
     ]
     named = [robot for robot in robots if robot.name in words]
     if len(named) == 1:

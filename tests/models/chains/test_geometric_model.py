@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from direct_geometric_model import geometric_model
-from urmpipe_models.arm.geometric_models import GeometricRow, geometric_chain
+from urmpipe_models.arm.geometric_models import GeometricModelRow, geometric_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import forward
@@ -22,11 +22,11 @@ ROUNDING = 2e-14
 """Up to seven products of matrices and sums of vectors of up to 14 m."""
 
 TRTTR1 = (
-    GeometricRow("T", "z", (0.0, 0.0, 0.4)),
-    GeometricRow("R", "z", (0.0, 0.1, 0.2)),
-    GeometricRow("T", "y", (0.05, 0.3, 0.0)),
-    GeometricRow("T", "x", (0.1, 0.0, -0.2)),
-    GeometricRow("R", "x", (0.0, 0.25, 0.0)),
+    GeometricModelRow("T", "z", (0.0, 0.0, 0.4)),
+    GeometricModelRow("R", "z", (0.0, 0.1, 0.2)),
+    GeometricModelRow("T", "y", (0.05, 0.3, 0.0)),
+    GeometricModelRow("T", "x", (0.1, 0.0, -0.2)),
+    GeometricModelRow("R", "x", (0.0, 0.25, 0.0)),
 )
 """Translations along all axes and rotations about two; its lengths are made up."""
 
@@ -34,7 +34,7 @@ TIP = (0.0, 0.12, 0.03)
 
 lengths = st.floats(-1.0, 1.0, allow_subnormal=False)
 geometric_rows = st.builds(
-    GeometricRow,
+    GeometricModelRow,
     st.sampled_from(["R", "T"]),
     st.sampled_from(["x", "y", "z"]),
     st.tuples(lengths, lengths, lengths),
@@ -55,7 +55,7 @@ def products(rows: Any, q: Any, tip: Any) -> tuple[list[FloatArray], list[FloatA
 
 @pytest.mark.slow
 @given(st.lists(geometric_rows, min_size=1, max_size=7), st.data())
-def test_it_is_matrix_products_and_the_chain(rows: list[GeometricRow], data: st.DataObject) -> None:
+def test_it_is_matrix_products_and_the_chain(rows: list[GeometricModelRow], data: st.DataObject) -> None:
     q = data.draw(st.lists(st.floats(-4.0, 4.0), min_size=len(rows), max_size=len(rows)))
     tip = data.draw(st.tuples(lengths, lengths, lengths))
     model = geometric_model(rows, q, tip)
@@ -94,7 +94,7 @@ def test_an_arm_that_slides_by_hand() -> None:
 
 
 def test_a_chain_of_rows_names_its_joints_and_keeps_their_kinds() -> None:
-    rows = (GeometricRow("T", "x", name="slide"), GeometricRow("R", "y"))
+    rows = (GeometricModelRow("T", "x", name="slide"), GeometricModelRow("R", "y"))
     chain = geometric_chain("arm", rows, start=(0.1, 0.2), description="two joints", source="a test")
     assert [(joint.name, joint.kind, joint.axis) for joint in chain.joints] == [
         ("slide", "prismatic", (1.0, 0.0, 0.0)),

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from asserting import refusal
 from urmpipe_models.arm.chain import GRAVITY, Chain, Inertial, Joint, Mimic
-from urmpipe_models.drives import Drive, DrivenJoint, Gains, HeldJoint
+from urmpipe_models.drives import Drive, DrivenJoint, Gains, PassiveJoint
 from urmpipe_models.errors import RobotError
 
 BALL = (0.1, 0.1, 0.1, 0.0, 0.0, 0.0)
@@ -69,9 +69,9 @@ def test_a_chain_says_all_that_is_wrong_with_masses_and_drives_at_once() -> None
     drive = Drive(2500.0, 5.0, 100.0, 0.0, 0.5, 0.001, 0.5)
     inertials = (Inertial("j", -1.0), Inertial("k", 1.0), Inertial(None, 0.0, inertia=BALL))
     drives = (
-        HeldJoint("j", 0.0, -1.0),
+        PassiveJoint("j", 0.0, -1.0),
         DrivenJoint("j", drive, 0.005, Gains(1.0, float("nan"), 0.0), 48.0),
-        HeldJoint("frame", 1.0, 0.0),
+        PassiveJoint("frame", 1.0, 0.0),
     )
     joints = (Joint("j", effort=-2.0), Joint("frame", "fixed"))
     said = refusal(RobotError, Chain, "arm", joints, inertials=inertials, drives=drives)

@@ -15,7 +15,7 @@ from hypothesis.strategies import SearchStrategy
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.arm.geometric_models import (
     DHRow,
-    GeometricRow,
+    GeometricModelRow,
     articulated_6r,
     dh_chain,
     geometric_chain,
@@ -113,7 +113,7 @@ def test_names_and_sources_are_those_of_the_description() -> None:
     assert " ".join(one.name for one in craig) == "a_1 alpha_1 theta_1 d_1 a_2 alpha_2 theta_2 d_2"
     assert [(one.place, one.source) for one in craig[3:5]] == [("turn", "DH row 1"), ("q2", "DH row 2")]
     assert names_of(articulated_6r(0.1, 0.2, 0.3, 0.4, 0.05))[6:-6] == ["l0", "l1", "l2", "l3", "l4"]
-    shifts = geometric_chain("one", [GeometricRow("T", "y")])
+    shifts = geometric_chain("one", [GeometricModelRow("T", "y")])
     assert names_of(shifts)[6:-6] == ["r1.x", "r1.y", "r1.z", "r2.x", "r2.y", "r2.z"]
 
 
@@ -167,7 +167,7 @@ DESCRIBED: dict[str, tuple[Callable[..., Chain], str]] = {
     ),
     "articulated_6r": (articulated_6r, "l0 l1 l2 l3 l4"),
     "geometric": (
-        lambda *v: geometric_chain("a", [GeometricRow("R", "y", v[:3])], tip=(v[3], v[4], 0.1)),
+        lambda *v: geometric_chain("a", [GeometricModelRow("R", "y", v[:3])], tip=(v[3], v[4], 0.1)),
         "r1.x r1.y r1.z r2.x r2.y",
     ),
 }

@@ -15,7 +15,7 @@ from hypothesis.strategies import SearchStrategy
 
 from urmpipe_models.arm.chain import Box, Capsule, Chain, Cylinder, Joint, JointKind, Mesh, Sphere, Visual
 from urmpipe_models.arm.geometric_models import DHRow, dh_chain, modified_dh_chain
-from urmpipe_models.arm.solids import solids_of
+from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.elementwise import FloatArray, Vector
 from urmpipe_models.kinematics.forward import frames_over_log, positions_over_log
 from urmpipe_models.math3d import Transform, from_offset, translation
@@ -35,7 +35,7 @@ def ends_of(visual: Visual) -> FloatArray:
 
 def on(chain: Chain, joint: str | None) -> tuple[Visual, ...]:
     """Return the solids on a joint or on the base."""
-    return tuple(one for one in solids_of(chain) if one.joint == joint)
+    return tuple(one for one in build_placeholder_solids(chain) if one.joint == joint)
 
 
 def pieces(solids: Sequence[Visual]) -> list[FloatArray]:
@@ -64,7 +64,7 @@ def test_solids_of_any_arm_can_be_drawn_and_hang_on_moving_joints(
     chains: SearchStrategy[Chain], data: st.DataObject
 ) -> None:
     chain = data.draw(chains)
-    solids = solids_of(chain)
+    solids = build_placeholder_solids(chain)
     moving = [joint.name for joint in chain.joints if joint.kind != "fixed"]
     assert {one.joint for one in solids} <= {None, *moving}
     assert len(solids) <= 2 + 5 * len(moving) + 5
@@ -118,7 +118,9 @@ def test_no_link_goes_astray(alpha: float, d: float, a: float) -> None:
 @pytest.mark.parametrize("name", ["urm6", "ur5e", "panda"])
 def test_solids_are_as_large_as_their_arm(name: str, factor: float) -> None:
     small = load_robot(name).placed(tool=translation(0.0, 0.02, 0.1))
-    for one, large in zip(solids_of(small), solids_of(scaled(small, factor)), strict=True):
+    for one, large in zip(
+        build_placeholder_solids(small), build_placeholder_solids(scaled(small, factor)), strict=True
+    ):
         np.testing.assert_allclose(ends_of(large), factor * ends_of(one), rtol=1e-6, atol=1e-9 * factor)
         assert type(large.shape) is type(one.shape)
         if isinstance(one.shape, (Capsule, Cylinder)) and isinstance(large.shape, (Capsule, Cylinder)):
@@ -135,9 +137,9 @@ def test_links_are_longer_than_they_are_thick_however_many(joints: int) -> None:
 
 
 def test_an_arm_without_any_length_is_a_joint_on_a_plate() -> None:
-    shapes = [one.shape for one in solids_of(Chain("arm", (Joint("j"),)))]
+    shapes = [one.shape for one in build_placeholder_solids(Chain("arm", (Joint("j"),)))]
     assert all(isinstance(shape, Cylinder) and 0.01 < shape.radius < 0.1 for shape in shapes)
-    assert [one.joint for one in solids_of(Chain("arm", (Joint("j"),)))] == [None, "j", "j"]
+    assert [one.joint for one in build_placeholder_solids(Chain("arm", (Joint("j"),)))] == [None, "j", "j"]
 
 
 # --- joints ----------------------------------------------------------------------------------------
@@ -146,7 +148,7 @@ def test_an_arm_without_any_length_is_a_joint_on_a_plate() -> None:
 def coloured(chain: Chain) -> dict[str, Visual]:
     """Return the solids of the joints that are drawn, by name."""
     colours = {joint.name: (0.1, 0.2, 0.3, 1.0) for joint in chain.joints}
-    found = [one for one in solids_of(chain, colours) if one.colour is not None]
+    found = [one for one in build_placeholder_solids(chain, colours) if one.colour is not None]
     return {one.joint: one for one in found if one.joint is not None}
 
 
@@ -205,7 +207,9 @@ def test_a_gantry_of_rails_alone_is_as_thick_as_they_are_long() -> None:
         Joint(f"q{k}", SLIDING, axis=(float(x), float(y), float(z)), lower=0.0, upper=0.8)
         for k, (x, y, z) in enumerate(axes)
     )
-    rails = [one.shape for one in solids_of(Chain("gantry", joints)) if isinstance(one.shape, Box)]
+    rails = [
+        one.shape for one in build_placeholder_solids(Chain("gantry", joints)) if isinstance(one.shape, Box)
+    ]
     assert all(0.01 < min(rail.size) < 0.1 for rail in rails)
 
 
@@ -220,7 +224,7 @@ def test_the_tool_centre_point_is_in_no_solid(name: str) -> None:
     position, rotation = frames_over_log(chain, q)
     (tcp,) = positions_over_log(chain, q)
     carriers = [None, *(joint.name for joint in chain.joints)]
-    for one in solids_of(chain):
+    for one in build_placeholder_solids(chain):
         k = carriers.index(one.joint)
         local = np.array(one.origin.inverse().point(tuple(rotation[0, k].T @ (tcp - position[0, k]))), float)
         assert isinstance(one.shape, (Cylinder, Capsule))
@@ -233,8 +237,8 @@ def test_the_tool_centre_point_is_in_no_solid(name: str) -> None:
 def test_a_thin_rod_leads_from_the_flange_to_the_tool_centre_point() -> None:
     chain = load_robot("ur5e")
     tool = translation(0.05, 0.0, 0.2)
-    *bare, rod = solids_of(chain.placed(tool=tool))
-    assert tuple(bare) == solids_of(chain)
+    *bare, rod = build_placeholder_solids(chain.placed(tool=tool))
+    assert tuple(bare) == build_placeholder_solids(chain)
     last = chain.coordinates[-1]
     flange = [one for one in bare if one.joint == last][-1]
     assert rod.joint == last and isinstance(rod.shape, Cylinder) and isinstance(flange.shape, Cylinder)

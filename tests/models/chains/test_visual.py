@@ -25,7 +25,7 @@ from urmpipe_models.arm.chain import (
     Shape,
     Sphere,
     Visual,
-    mesh_file,
+    resolve_mesh_path,
 )
 from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import frames_over_log
@@ -167,17 +167,17 @@ def test_meshes_are_looked_up_from_the_description(tmp_path: Path) -> None:
     folder = package(ws / "my_arm") / "urdf"
     (folder / "tools").mkdir(parents=True)
     package(ws / "other")
-    assert mesh_file("meshes/a.stl", folder) == f"{folder}/meshes/a.stl"
-    assert mesh_file(f"{folder}/a.stl", folder) == f"{folder}/a.stl"
-    assert mesh_file(f"file://{ws}/my_arm/urdf/a%20b.stl", folder) == f"{folder}/a b.stl"
-    assert mesh_file("../meshes/a.stl", folder) == f"{folder}/../meshes/a.stl"
-    assert mesh_file("package://my_arm/meshes/a.stl", folder) == f"{ws}/my_arm/meshes/a.stl"
-    assert mesh_file("package://other/meshes/a.stl", folder) == f"{ws}/other/meshes/a.stl"
-    assert mesh_file("package://tools/a.stl", folder) == f"{folder}/tools/a.stl"
+    assert resolve_mesh_path("meshes/a.stl", folder) == f"{folder}/meshes/a.stl"
+    assert resolve_mesh_path(f"{folder}/a.stl", folder) == f"{folder}/a.stl"
+    assert resolve_mesh_path(f"file://{ws}/my_arm/urdf/a%20b.stl", folder) == f"{folder}/a b.stl"
+    assert resolve_mesh_path("../meshes/a.stl", folder) == f"{folder}/../meshes/a.stl"
+    assert resolve_mesh_path("package://my_arm/meshes/a.stl", folder) == f"{ws}/my_arm/meshes/a.stl"
+    assert resolve_mesh_path("package://other/meshes/a.stl", folder) == f"{ws}/other/meshes/a.stl"
+    assert resolve_mesh_path("package://tools/a.stl", folder) == f"{folder}/tools/a.stl"
     for gone in ("package://nowhere/a.stl", "package://", "package://../a.stl", "package://./a.stl"):
-        assert mesh_file(gone, folder) == gone
-    assert mesh_file("a\0.stl", folder) == "a\0.stl"
-    assert mesh_file("https://example.org/a.stl", folder) == f"{folder}/https:/example.org/a.stl"
+        assert resolve_mesh_path(gone, folder) == gone
+    assert resolve_mesh_path("a\0.stl", folder) == "a\0.stl"
+    assert resolve_mesh_path("https://example.org/a.stl", folder) == f"{folder}/https:/example.org/a.stl"
 
 
 def test_a_description_takes_no_mesh_from_elsewhere_unless_it_is_told(
@@ -206,16 +206,16 @@ def test_a_description_takes_no_mesh_from_elsewhere_unless_it_is_told(
         "package://there/a.stl": f"{url}/my_arm/there/a.stl",
         "package://kept/../home/a.stl": f"{kept.as_uri()}/../home/a.stl",
     }
-    assert {one: mesh_file(one, folder) for one in asked} == asked
-    assert mesh_file("package://kept/a.stl", folder) == f"{kept}/a.stl"
+    assert {one: resolve_mesh_path(one, folder) for one in asked} == asked
+    assert resolve_mesh_path("package://kept/a.stl", folder) == f"{kept}/a.stl"
 
     monkeypatch.setenv("ROS_PACKAGE_PATH", f"{tmp_path / 'gone'}{os.pathsep}{home}{os.pathsep}")
-    assert mesh_file("../a.stl", folder) == f"{folder}/../a.stl"
-    assert mesh_file(f"{url}/b%20c.stl", folder) == f"{home}/b c.stl"
-    assert mesh_file("package://there/a.stl", folder) == f"{folder}/there/a.stl"
-    assert mesh_file("circle.stl", folder) == f"{url}/my_arm/circle.stl"
+    assert resolve_mesh_path("../a.stl", folder) == f"{folder}/../a.stl"
+    assert resolve_mesh_path(f"{url}/b%20c.stl", folder) == f"{home}/b c.stl"
+    assert resolve_mesh_path("package://there/a.stl", folder) == f"{folder}/there/a.stl"
+    assert resolve_mesh_path("circle.stl", folder) == f"{url}/my_arm/circle.stl"
     far = tmp_path / "far"
-    assert mesh_file("package://my_arm/a.stl", far) == f"{folder}/a.stl"
+    assert resolve_mesh_path("package://my_arm/a.stl", far) == f"{folder}/a.stl"
 
 
 def test_a_visual_hangs_on_a_joint_of_the_chain() -> None:

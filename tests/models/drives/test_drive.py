@@ -11,8 +11,8 @@ from scipy.integrate import solve_ivp
 from urmpipe_models.drives import (
     Drive,
     current_rate,
-    driving_torque,
     load_acceleration,
+    motor_torque,
     shaft_acceleration,
     shaft_torque,
 )
@@ -63,7 +63,7 @@ def system_matrix(drive: Drive) -> FloatArray:
 def test_eq_14_to_18_at_values_that_can_be_done_by_hand() -> None:
     # Sums and products of short decimals: equal but for their rounding.
     assert shaft_torque(DRIVE, 0.3, 2.0, 0.1, 1.0) == pytest.approx(2500.0 * 0.2 + 5.0 * 1.0, rel=1e-15)
-    assert driving_torque(DRIVE, 4.0) == pytest.approx(100.0 * 0.05 * 4.0, rel=1e-15)
+    assert motor_torque(DRIVE, 4.0) == pytest.approx(100.0 * 0.05 * 4.0, rel=1e-15)
     assert shaft_acceleration(DRIVE, 4.0, 5.0) == pytest.approx((20.0 - 5.0) / 0.5, rel=1e-15)
     assert current_rate(DRIVE, 24.0, 2.0, 4.0) == pytest.approx((24.0 - 10.0 - 2.0) / 1e-3, rel=1e-15)
     assert load_acceleration(2.0, 0.5, 4.0, 5.0, 7.0) == pytest.approx((5.0 + 7.0 - 2.0) / 2.0, rel=1e-15)

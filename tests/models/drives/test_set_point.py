@@ -13,8 +13,8 @@ from urmpipe_models.drives import (
     STEP,
     TRAPEZOID,
     JointMotion,
+    evaluate_setpoint,
     ramp,
-    set_point,
     step,
     trapezoid,
 )
@@ -142,7 +142,7 @@ def test_the_kind_chooses_the_form_for_columns_and_numbers_alike(kind: int) -> N
     t = np.linspace(0.0, 2.0, 41)
     arguments = (0.1, 0.5, 1.5, 2.0, 10.0)
     forms: list[JointMotion] = [step(t, *arguments[:3]), ramp(t, *arguments[:4]), trapezoid(t, *arguments)]
-    found = set_point(kind, t, *arguments)
+    found = evaluate_setpoint(kind, t, *arguments)
     np.testing.assert_array_equal(found, forms[kind])
-    one = set_point(float(kind), float(t[9]), *arguments)
+    one = evaluate_setpoint(float(kind), float(t[9]), *arguments)
     assert [float(value) for value in one] == [column[9] for column in found]

@@ -36,7 +36,7 @@ from urmpipe_models.dynamics.links import (
 )
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import RobotError
-from urmpipe_models.kinematics.forward import motions
+from urmpipe_models.kinematics.forward import point_motions
 from urmpipe_models.math3d import from_offset
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -134,7 +134,7 @@ def test_centres_move_as_points_of_the_chain_do(seed: int) -> None:
     last = chain.joints[-1].name
     tool = (chain.tip @ chain.tool).translation
     carrying = replace(chain, inertials=(Inertial(last, 1.0, tool),))
-    *_, motion = motions(chain, q, qd, [0.0] * len(q))
+    *_, motion = point_motions(chain, q, qd, [0.0] * len(q))
     (found,) = mass_motions(carrying, q, qd)
     np.testing.assert_allclose(found.centre, motion.pose.translation, rtol=0.0, atol=ROUNDED)
     np.testing.assert_allclose(found.velocity, motion.velocity, rtol=0.0, atol=ROUNDED)

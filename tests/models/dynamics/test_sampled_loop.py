@@ -9,7 +9,7 @@ import pytest
 
 from made_masses import driven
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
-from urmpipe_models.drives import DrivenJoint, Gains, HeldJoint, ReliefSpring
+from urmpipe_models.drives import CounterbalanceSpring, DrivenJoint, Gains, PassiveJoint
 from urmpipe_models.dynamics.driven_arm import spectral_radius
 
 PERIOD = 5e-3
@@ -20,7 +20,7 @@ EXACT = 1e-7
 """Of values of about 1: eigenvalues of rates up to 1e3 / s; differences of gravity, 1e-16 / 1e-5."""
 
 
-def two_slides(held: HeldJoint, *periods: float) -> Chain:
+def two_slides(held: PassiveJoint, *periods: float) -> Chain:
     """Return slides along x, y and z, a drive on the last two: none moves the others."""
     axes = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
     drives = (replace(driven(joint), period=one) for joint, one in zip("yz", periods, strict=True))
@@ -37,14 +37,14 @@ def test_what_a_damper_alone_calms_dies_away_with_half_its_damping_over_the_mass
     periods: tuple[float, float],
 ) -> None:
     """A sample is one of the shortest period, whatever the others are."""
-    chain = two_slides(HeldJoint("x", 800.0, 0.5), *periods)
+    chain = two_slides(PassiveJoint("x", 800.0, 0.5), *periods)
     expected = np.exp(-0.5 / (2.0 * MASS) * PERIOD)
     assert spectral_radius(chain, np.zeros(3)) == pytest.approx(expected, abs=EXACT)
-    calmer = two_slides(HeldJoint("x", 800.0, 1e3), *periods)  # now a drive is the slowest
+    calmer = two_slides(PassiveJoint("x", 800.0, 1e3), *periods)  # now a drive is the slowest
     assert spectral_radius(calmer, np.zeros(3)) < expected - 1e-4
 
 
-def upright(*drives: DrivenJoint | HeldJoint) -> Chain:
+def upright(*drives: DrivenJoint | PassiveJoint) -> Chain:
     """Return a pendulum that stands up at q = 0; with two drives a slide along its axis carries it."""
     joints = Joint("s", "prismatic", axis=(0.0, 1.0, 0.0)), Joint("q", axis=(0.0, 1.0, 0.0))
     return Chain(
@@ -59,10 +59,10 @@ def upright(*drives: DrivenJoint | HeldJoint) -> Chain:
 @pytest.mark.parametrize("stiffness", [1.0, 9.0])
 def test_a_pendulum_that_stands_up_falls_as_its_weight_and_spring_let_it(stiffness: float) -> None:
     rate = np.sqrt(GRAVITY / RADIUS - stiffness / (MASS * RADIUS**2))
-    found = spectral_radius(upright(driven("s"), HeldJoint("q", stiffness, 0.0)), np.zeros(2))
+    found = spectral_radius(upright(driven("s"), PassiveJoint("q", stiffness, 0.0)), np.zeros(2))
     assert found == pytest.approx(np.exp(rate * PERIOD), abs=EXACT)
     assert found > 1.005
-    hanging = spectral_radius(upright(driven("s"), HeldJoint("q", stiffness, 0.1)), np.array([0.0, np.pi]))
+    hanging = spectral_radius(upright(driven("s"), PassiveJoint("q", stiffness, 0.1)), np.array([0.0, np.pi]))
     assert hanging == pytest.approx(np.exp(-0.1 / (2.0 * MASS * RADIUS**2) * PERIOD), abs=EXACT)
 
 
@@ -70,7 +70,7 @@ def test_of_a_drive_a_spring_beside_it_takes_the_weight() -> None:
     """k_spring = m g r leaves what the drive has without gravity; without it the radius is another."""
     weight = MASS * GRAVITY * RADIUS
     own = driven("q")
-    relieved = upright(replace(own, spring=ReliefSpring(weight, 0.0)))
+    relieved = upright(replace(own, spring=CounterbalanceSpring(weight, 0.0)))
     weightless = replace(upright(own), gravity=(0.0, 0.0, 0.0))
     radii = [spectral_radius(one, np.zeros(1)) for one in (relieved, weightless, upright(own))]
     assert radii[0] == pytest.approx(radii[1], abs=EXACT)

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from urmpipe_models.arm.chain import Chain, Joint, Mimic
-from urmpipe_models.kinematics.forward import frames, joint_values
+from urmpipe_models.kinematics.forward import iter_frames, joint_values
 from urmpipe_models.math3d import Transform, translation
 
 ARM = Chain(
@@ -32,11 +32,11 @@ def test_there_is_a_value_for_each_coordinate_no_more_and_no_less(q: list[float]
     with pytest.raises(ValueError, match="zip"):
         joint_values(ARM, q)
     with pytest.raises(ValueError, match="zip"):
-        list(frames(ARM, q))
+        list(iter_frames(ARM, q))
 
 
 def test_frames_are_the_base_and_what_each_joint_moves() -> None:
-    found = list(frames(ARM, [0.5, 0.0]))
+    found = list(iter_frames(ARM, [0.5, 0.0]))
     assert found[0] == ARM.base
     assert [frame.translation for frame in found] == [
         (1.0, 2.0, 3.0),
@@ -50,7 +50,7 @@ def test_frames_are_the_base_and_what_each_joint_moves() -> None:
 
 
 def test_a_revolute_joint_turns_and_does_not_shift() -> None:
-    *_, turned, flange = frames(ARM, [0.5, math.pi / 2])
+    *_, turned, flange = iter_frames(ARM, [0.5, math.pi / 2])
     assert turned.translation == (0.25, 2.0, 3.0)
     assert turned.rotation == ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
     assert flange.translation == (0.375, 2.0, 3.0)  # z of the flange is x of the world

@@ -14,7 +14,7 @@ from sliding_arm import sliding_arm
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.kinematics.identification import BASE, Twist, changed, sensitivities
+from urmpipe_models.kinematics.identification import BASE, Twist, apply_twists, sensitivities
 from urmpipe_models.math3d import Transform, from_offset
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -43,14 +43,14 @@ def pose_after(
 ) -> FloatArray:
     """Position and rotation of an arm, shape (n, 4, 3), one of whose changes is h larger."""
     more = [(twist, value + h * (i == k)) for i, (twist, value) in enumerate(changes)]
-    position, rotation = poses_over_log(changed(chain, more)[0], q)
+    position, rotation = poses_over_log(apply_twists(chain, more)[0], q)
     return np.concatenate((position[:, np.newaxis], rotation), axis=1)
 
 
 def assert_sensitive(chain: Chain, changes: Changes) -> None:
     """Hold the sensitivities of a changed arm against differences of the pose: p' = v, R' = [w] R."""
     q = q_of(chain)
-    there, located = changed(chain, changes)
+    there, located = apply_twists(chain, changes)
     rotation = poses_over_log(there, q)[1]
     for k, (velocity, turn) in enumerate(sensitivities(there, list(q.T), located)):
         v, w = (np.array(np.broadcast_arrays(*one, q[:, 0])[:3]).T for one in (velocity, turn))
@@ -75,7 +75,7 @@ def test_they_are_so_at_large_changes_too(chain: Chain) -> None:
 def test_a_base_that_is_turned_turns_all_poses() -> None:
     chain, q = ARMS[0], q_of(ARMS[0])
     turn = Twist(BASE, "about", (0.0, 0.0, 1.0), Transform())
-    position, _ = poses_over_log(changed(chain, [(turn, 0.3)])[0], q)
+    position, _ = poses_over_log(apply_twists(chain, [(turn, 0.3)])[0], q)
     x, y, z = poses_over_log(chain, q)[0].T
     c, s = np.cos(0.3), np.sin(0.3)
     np.testing.assert_allclose(
@@ -87,7 +87,7 @@ def test_the_first_of_two_changes_of_a_frame_is_the_outermost() -> None:
     chain, q = ARMS[0], q_of(ARMS[0])
     turn, shift = (Twist(BASE, kind, (1.0, 0.0, 0.0), Transform()) for kind in ("about", "along"))
     lift = Twist(BASE, "along", (0.0, 0.0, 1.0), Transform())
-    there = changed(chain, [(turn, np.pi / 2), (lift, 0.1), (shift, 0.2)])[0]
+    there = apply_twists(chain, [(turn, np.pi / 2), (lift, 0.1), (shift, 0.2)])[0]
     x, y, z = poses_over_log(chain, q)[0].T
     wanted = np.column_stack([x + 0.2, -(z + 0.1), y])
     np.testing.assert_allclose(poses_over_log(there, q)[0], wanted, atol=1e-15 * REACH)
@@ -96,6 +96,6 @@ def test_the_first_of_two_changes_of_a_frame_is_the_outermost() -> None:
 def test_no_change_gives_the_arm_itself() -> None:
     chain = ARMS[0]
     twists = twists_of(chain)
-    there, located = changed(chain, [(twist, 0.0) for twist in twists])
+    there, located = apply_twists(chain, [(twist, 0.0) for twist in twists])
     assert there is chain
     assert located == twists

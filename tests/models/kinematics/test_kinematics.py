@@ -23,7 +23,7 @@ from urmpipe_models.kinematics.forward import (
     jacobian,
     jacobian_over_log,
     joint_values,
-    motions,
+    point_motions,
     point_over_log,
     points_over_log,
     poses_over_log,
@@ -225,7 +225,7 @@ def test_motion_and_jacobian_of_every_point_are_pinocchios(
     pin.forwardKinematics(model, peers, q, qd, qdd)
     pin.updateFramePlacements(model, peers)
     pin.computeJointJacobians(model, peers, q)
-    for k, (frame, motion) in enumerate(zip(peer.frames, motions(chain, q, qd, qdd), strict=True)):
+    for k, (frame, motion) in enumerate(zip(peer.frames, point_motions(chain, q, qd, qdd), strict=True)):
         velocity = pin.getFrameVelocity(model, peers, frame, aligned).vector
         acceleration = pin.getFrameClassicalAcceleration(model, peers, frame, aligned).vector
         J = pin.getFrameJacobian(model, peers, frame, aligned).reshape(6, -1)
@@ -277,12 +277,12 @@ def test_motions_are_the_differences_of_poses_and_of_each_other(
     def at(t: float) -> tuple[FloatArray, ...]:
         """Return position, rotation, velocity and omega of every point at a time."""
         values = q + qd * t + 0.5 * qdd * t * t
-        moved, poses = motions(chain, values, qd + qdd * t, qdd), forward(chain, values)
+        moved, poses = point_motions(chain, values, qd + qdd * t, qdd), forward(chain, values)
         parts = ([one.translation for one in poses], [one.rotation for one in poses])
         rates = ([one.velocity for one in moved], [one.omega for one in moved])
         return tuple(np.array(one, dtype=float) for one in (*parts, *rates))
 
-    here = motions(chain, q, qd, qdd)
+    here = point_motions(chain, q, qd, qdd)
     spins = [np.cross(matrix(one.omega), matrix(one.pose.rotation), axisb=0, axisc=0) for one in here]
     # levers of up to 10 m, each derivative times speeds of up to 7
     assert_slope(lambda t: at(t)[0], [one.velocity for one in here], third=1e4, size=10.0)
@@ -309,11 +309,11 @@ def test_a_mimic_moves_with_its_leader_and_has_no_coordinate() -> None:
     np.testing.assert_allclose(tip, [0.1 + 0.2 + 0.1, 0.0, 0.0], atol=1e-15)  # rounding
     J = np.array(jacobian(chain, [0.0, 0.2]), dtype=float)
     np.testing.assert_allclose(J[1], [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    (motion,) = motions(chain, [0.0, 0.2], [0.0, 1.0], [0.0, 0.0])[-1:]
+    (motion,) = point_motions(chain, [0.0, 0.2], [0.0, 1.0], [0.0, 0.0])[-1:]
     np.testing.assert_allclose(motion.velocity, [-1.0, 0.0, 0.0])
     for qd, qdd in (([0.0], [0.0, 0.0]), ([0.0, 0.0], [0.0]), ([0.0] * 3, [0.0, 0.0])):
         with pytest.raises(ValueError, match=r"zip\(\) argument 2 is (shorter|longer) than argument 1"):
-            motions(chain, [0.0, 0.2], qd, qdd)
+            point_motions(chain, [0.0, 0.2], qd, qdd)
 
 
 # --- logs: whole arrays are the single poses -------------------------------------------------------
@@ -332,7 +332,7 @@ def test_a_log_is_its_rows_in_blocks(count: int) -> None:
     assert skeleton.shape == (count, 8, 3)
     assert J.shape == (count, 6, 6)
     for k in {0, count // 2, BLOCK - 1, BLOCK, count - 1} & set(range(count)):
-        poses, motion = forward(chain, q[k].tolist()), motions(chain, q[k], qd[k], qdd[k])[3]
+        poses, motion = forward(chain, q[k].tolist()), point_motions(chain, q[k], qd[k], qdd[k])[3]
         tip = tip_pose(chain, q[k].tolist())
         np.testing.assert_array_equal(position[k], tip.translation)
         np.testing.assert_array_equal(rotation[k], tip.rotation)

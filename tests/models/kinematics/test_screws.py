@@ -13,7 +13,7 @@ from hypothesis.strategies import SearchStrategy
 from asserting import there
 from urmpipe_models.arm.chain import Chain, Joint, Mimic
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.kinematics.forward import Screws, chain_of, poses_over_log, screws
+from urmpipe_models.kinematics.forward import Screws, chain_to_screws, poses_over_log, screws_to_chain
 from urmpipe_models.math3d import from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 
@@ -66,7 +66,7 @@ def test_the_product_of_exponentials_is_the_tip(robot: str) -> None:
     chain = load_robot(robot).placed(
         from_offset((0.1, -0.2, 0.3, 0.4, 0.5, 0.6)), from_offset((0.0, 0.1, 0.15))
     )
-    arm = there(screws(chain))
+    arm = there(chain_to_screws(chain))
     assert_kinematics(chain, arm)
 
 
@@ -77,19 +77,19 @@ def test_so_it_is_of_any_chain_without_mimics_and_of_the_chain_made_of_its_screw
 ) -> None:
     chain = data.draw(chains)
     chain = replace(chain, joints=tuple(replace(joint, mimic=None) for joint in chain.joints), start=())
-    arm = there(screws(chain))
+    arm = there(chain_to_screws(chain))
     assert_kinematics(chain, arm)
-    assert_kinematics(chain_of(arm, chain.coordinates), arm)
+    assert_kinematics(screws_to_chain(arm, chain.coordinates), arm)
 
 
 def test_a_chain_whose_joints_follow_others_has_none() -> None:
-    assert screws(Chain("follows", (Joint("a"), Joint("b", mimic=Mimic("a", 2.0, 0.0))))) is None
+    assert chain_to_screws(Chain("follows", (Joint("a"), Joint("b", mimic=Mimic("a", 2.0, 0.0))))) is None
 
 
 def test_the_size_is_the_way_from_axis_to_axis_to_the_tip_and_never_0() -> None:
-    arm = screws(
+    arm = chain_to_screws(
         Chain("l", (Joint("a"), Joint("b", origin=translation(0.3, 0.0, 0.4))), translation(0, 2, 0))
     )
     assert there(arm).size == 2.5
-    point = there(screws(Chain("point", (Joint("a"),))))
+    point = there(chain_to_screws(Chain("point", (Joint("a"),))))
     assert point.size == 1.0

@@ -9,7 +9,7 @@ import pytest
 
 from asserting import there
 from urmpipe_models.arm.chain import Chain, Joint, JointKind, Mimic
-from urmpipe_models.kinematics.forward import chain_of, screws, tip_pose
+from urmpipe_models.kinematics.forward import chain_to_screws, screws_to_chain, tip_pose
 from urmpipe_models.math3d import Transform, from_offset, rotation_x, rotation_z, translation
 
 ARM = Chain(
@@ -28,7 +28,7 @@ WHOLE = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
 def test_screws_stand_in_the_world_base_and_tool_included() -> None:
-    found = there(screws(ARM))
+    found = there(chain_to_screws(ARM))
     # The base turns x to y and y to -x; the slide's frame lies on its side, so that its -z is y before.
     np.testing.assert_array_equal(found.direction, [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
     np.testing.assert_array_equal(found.point, [[1.0, 0.0, 0.5], [1.0, 2.0, 0.5]])
@@ -39,26 +39,26 @@ def test_screws_stand_in_the_world_base_and_tool_included() -> None:
 
 
 def test_an_arm_whose_axes_meet_in_its_tip_has_the_size_1() -> None:
-    found = there(screws(Chain("wrist", (Joint("a"), Joint("b", axis=(1.0, 0.0, 0.0))))))
+    found = there(chain_to_screws(Chain("wrist", (Joint("a"), Joint("b", axis=(1.0, 0.0, 0.0))))))
     assert found.size == 1.0
 
 
 def test_a_joint_that_follows_another_is_no_screw() -> None:
-    assert screws(Chain("arm", (Joint("a"), Joint("b", mimic=Mimic("a"))))) is None
+    assert chain_to_screws(Chain("arm", (Joint("a"), Joint("b", mimic=Mimic("a"))))) is None
 
 
 def test_screws_are_floats_whatever_numbers_describe_the_arm() -> None:
     whole = Chain("arm", (Joint("a", origin=translation(1, 2, 3), axis=(0, 0, 1)),), base=Transform(WHOLE))
-    found = there(screws(whole))
+    found = there(chain_to_screws(whole))
     for one in (found.direction, found.point, found.rotation, found.position):
         assert one.dtype == np.float64
 
 
 def test_each_screw_of_a_chain_has_a_name() -> None:
-    found = there(screws(ARM))
+    found = there(chain_to_screws(ARM))
     for names in (("a",), ("a", "b", "c")):
         with pytest.raises(ValueError, match="zip"):
-            chain_of(found, names)
+            screws_to_chain(found, names)
 
 
 def random_arm(rng: np.random.Generator) -> Chain:
@@ -80,9 +80,9 @@ def test_a_chain_of_the_screws_is_the_same_arm() -> None:
     rng = np.random.default_rng(21)
     for _ in range(30):
         chain = random_arm(rng)
-        found = there(screws(chain))
+        found = there(chain_to_screws(chain))
         names = tuple(f"n{k}" for k in range(len(chain.coordinates)))
-        again = chain_of(found, names)
+        again = screws_to_chain(found, names)
         assert (again.name, again.coordinates) == ("screws", names)
         q = rng.uniform(-3.0, 3.0, len(names)).tolist()
         expected, got = tip_pose(chain, q), tip_pose(again, q)

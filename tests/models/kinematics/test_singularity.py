@@ -14,10 +14,14 @@ from hypothesis import strategies as st
 from arm6 import Arm6Lengths, arm6_determinant
 from asserting import there
 from urmpipe_models.arm.chain import Chain, Joint, Mimic
-from urmpipe_models.arm.geometric_models import DHRow, GeometricRow, dh_chain, geometric_chain
+from urmpipe_models.arm.geometric_models import DHRow, GeometricModelRow, dh_chain, geometric_chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import jacobian_over_log
-from urmpipe_models.kinematics.singularity import PARALLEL, characteristic_length, singularity_over_log
+from urmpipe_models.kinematics.singularity import (
+    MAX_PARALLEL_SINE,
+    characteristic_length,
+    singularity_over_log,
+)
 from urmpipe_models.math3d import Transform, from_offset, rotation_z, translation
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 
@@ -175,12 +179,12 @@ def test_they_are_what_numpy_says_pose_by_pose(name: str, orientation: bool) -> 
 @given(st.floats(0.01, 100.0), st.integers(0, 2**32 - 1))
 def test_a_scale_model_is_as_near_to_singular(factor: float, seed: int) -> None:
     rows = (
-        GeometricRow("R", "z", (0.0, 0.0, 0.3)),
-        GeometricRow("T", "y", (0.1, 0.2, 0.0)),
-        GeometricRow("R", "x", (0.2, 0.0, 0.4)),
-        GeometricRow("R", "y", (0.0, 0.3, 0.1)),
-        GeometricRow("R", "z", (0.1, 0.0, 0.0)),
-        GeometricRow("R", "x", (0.0, 0.1, 0.2)),
+        GeometricModelRow("R", "z", (0.0, 0.0, 0.3)),
+        GeometricModelRow("T", "y", (0.1, 0.2, 0.0)),
+        GeometricModelRow("R", "x", (0.2, 0.0, 0.4)),
+        GeometricModelRow("R", "y", (0.0, 0.3, 0.1)),
+        GeometricModelRow("R", "z", (0.1, 0.0, 0.0)),
+        GeometricModelRow("R", "x", (0.0, 0.1, 0.2)),
     )
     larger = [replace(row, r=tuple(factor * value for value in row.r)) for row in rows]
     q = np.random.default_rng(seed).uniform(-1.0, 1.0, (3, 6))
@@ -311,7 +315,7 @@ def test_axes_that_were_meant_to_be_parallel_are() -> None:
 
 def test_axes_are_parallel_below_a_sine_of_a_tenth_not_from_it_on() -> None:
     """At 0.1 the axes meet 3 m down the first one: the way to the tip is longer than the 0.3 m across."""
-    for lean, length in ((PARALLEL, 3.0), (PARALLEL - 1e-9, 0.3)):
+    for lean, length in ((MAX_PARALLEL_SINE, 3.0), (MAX_PARALLEL_SINE - 1e-9, 0.3)):
         axis = (lean, 0.0, math.sqrt(1.0 - lean * lean))
         turns = (Joint("first"), Joint("second", origin=translation(0.3, 0.0, 0.0), axis=axis))
         assert characteristic_length(Chain("leaning", turns)) == pytest.approx(length, rel=0.02)

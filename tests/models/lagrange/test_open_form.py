@@ -16,7 +16,7 @@ from urmpipe_models.arm.chain import Chain, Inertial, Joint, Mimic
 from urmpipe_models.dynamics.equations import inverse_dynamics, mass_matrix, torque_terms
 from urmpipe_models.dynamics.links import Wrench
 from urmpipe_models.errors import OptionError, RobotError
-from urmpipe_models.kinematics.forward import frames
+from urmpipe_models.kinematics.forward import iter_frames
 from urmpipe_models.lagrange.derivation import TERMS
 from urmpipe_models.lagrange.formulas import OpenForm, c_code, equations_text, open_form
 from urmpipe_models.math3d import from_offset
@@ -40,7 +40,7 @@ def seeded_form(count: int, seed: int) -> OpenForm:
 def parallel_neighbours(chain: Chain) -> int:
     """How many pairs of turning joints that follow each other have parallel axes, wherever they stand."""
     q = random_motion(np.random.default_rng(7), chain)[0].tolist()
-    placed = zip(chain.joints, list(frames(chain, q))[1:], strict=True)
+    placed = zip(chain.joints, list(iter_frames(chain, q))[1:], strict=True)
     axes = [np.array(frame.rotate(one.axis), float) for one, frame in placed if one.kind == "revolute"]
     return sum(float(np.linalg.norm(np.cross(*pair))) < 1e-9 for pair in pairwise(axes))
 
@@ -104,7 +104,7 @@ def test_the_work_of_the_drives_is_the_change_of_energy(count: int, seed: int) -
         q, qd, _ = motion(t)
         kinetic = 0.5 * qd @ terms((q, qd, qd), [0.0] * 6)["inertia"]
         placed = dict(
-            zip((None, *(one.name for one in chain.joints)), frames(chain, q.tolist()), strict=True)
+            zip((None, *(one.name for one in chain.joints)), iter_frames(chain, q.tolist()), strict=True)
         )
         heights = (
             one.mass * np.dot(chain.gravity, placed[one.joint].point(one.centre)) for one in chain.inertials

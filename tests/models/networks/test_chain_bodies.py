@@ -13,7 +13,7 @@ from hypothesis.strategies import DataObject, SearchStrategy
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.kinematics.forward import frames
+from urmpipe_models.kinematics.forward import iter_frames
 from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.elements import chain_parts, control_name
 from urmpipe_models.networks.file import Network, load_network
@@ -27,7 +27,7 @@ EXACT = 1e-12
 
 def expected_poses(name: str, chain: Chain, q: FloatArray) -> Iterator[tuple[str, Transform]]:
     """The moving frame of each joint, and the tool."""
-    *_, last = moving = [*frames(chain, list(q))][1:]
+    *_, last = moving = [*iter_frames(chain, list(q))][1:]
     for joint, frame in zip(chain.joints, moving, strict=True):
         yield f"{name}.{joint.name}", frame
     yield f"{name}.tool", last @ chain.tip @ chain.tool

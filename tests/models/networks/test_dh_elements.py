@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from urmpipe_models.arm.geometric_models import DHRow, modified_dh_chain
 from urmpipe_models.elementwise import FloatArray, cross
-from urmpipe_models.kinematics.forward import frames
+from urmpipe_models.kinematics.forward import iter_frames
 from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.elements import DHElement, element_frame, joint_of
 from urmpipe_models.networks.file import Network, load_network
@@ -76,7 +76,7 @@ def test_an_element_is_a_row_of_modified_parameters(rows: list[tuple[float, floa
     axes = Transform(((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
     craig = modified_dh_chain("arm", [DHRow(theta, s, a, alpha) for a, alpha, s, theta in rows])
     here = Transform()
-    for row, frame in zip(rows, [*frames(craig, [0.0] * len(rows))][1:], strict=True):
+    for row, frame in zip(rows, [*iter_frames(craig, [0.0] * len(rows))][1:], strict=True):
         here = here @ element_frame(*row)
         np.testing.assert_allclose(matrix(axes.inverse() @ here @ axes), matrix(frame), rtol=0, atol=EXACT)
 

@@ -15,7 +15,7 @@ from hypothesis.strategies import SearchStrategy
 
 from asserting import refusal
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
-from urmpipe_models.drives import NO_SPRING, Drive, DrivenJoint, Gains, HeldJoint, ReliefSpring
+from urmpipe_models.drives import NO_SPRING, CounterbalanceSpring, Drive, DrivenJoint, Gains, PassiveJoint
 from urmpipe_models.errors import RobotError
 from urmpipe_models.robots.toml import chain_from_dict, chain_to_dict, read_robot_file, robot_toml
 from urmpipe_models.robots.urdf_writer import urdf_text
@@ -84,7 +84,7 @@ def test_masses_and_drives_are_si_and_centres_in_the_unit_of_the_file(robot: Rea
     )
     drive = Drive(2500.0, 5.0, 100.0, 0.05, 0.5, 0.001, 0.4)
     assert chain.drives == (
-        DrivenJoint("turn", drive, 0.005, Gains(7.5, 0.75, -0.01), 48.0), HeldJoint("slide", 3000.0, 0.0),
+        DrivenJoint("turn", drive, 0.005, Gains(7.5, 0.75, -0.01), 48.0), PassiveJoint("slide", 3000.0, 0.0),
     )  # fmt: skip
 
 
@@ -192,7 +192,7 @@ def test_a_spring_beside_a_drive_is_in_si_whatever_the_units_of_the_file(robot: 
     (turn, slide), (own, other) = given.drives, plain.drives
     assert isinstance(turn, DrivenJoint)
     assert isinstance(own, DrivenJoint)
-    assert (turn.spring, own.spring) == (ReliefSpring(1150.0, -0.1), NO_SPRING)
+    assert (turn.spring, own.spring) == (CounterbalanceSpring(1150.0, -0.1), NO_SPRING)
     assert (replace(turn, spring=NO_SPRING), slide) == (own, other)
     for chain, keys in ((given, {"k_spring", "rest_spring"}), (plain, set())):
         written = chain_to_dict(chain)["drives"]["turn"]

@@ -14,7 +14,7 @@ from hypothesis.strategies import SearchStrategy
 
 from urmpipe_models.arm.chain import Capsule, Chain, Cylinder, Joint, Sphere
 from urmpipe_models.arm.geometric_models import DHRow, dh_chain
-from urmpipe_models.arm.solids import solids_of
+from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.errors import OutputError, RobotError
 from urmpipe_models.kinematics.forward import forward, joint_values
 from urmpipe_models.math3d import from_offset
@@ -118,7 +118,7 @@ def test_an_arm_that_shows_nothing_gets_solids_in_shapes_that_urdf_has(chain: Ch
     assert "<capsule" not in text
     path.write_text(text.replace('material name="urmpipe"', 'material name="mine"'), encoding="utf-8")
     found = iter(read_urdf(path).visuals)
-    for solid in solids_of(chain):
+    for solid in build_placeholder_solids(chain):
         one, origin = next(found), solid.origin
         shape = solid.shape
         if isinstance(shape, Capsule):

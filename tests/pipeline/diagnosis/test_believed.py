@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 import urmpipe
-from urmpipe_models.arm.chain import FARTHEST, Chain
+from urmpipe_models.arm.chain import MAX_COORDINATE, Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
@@ -127,7 +127,7 @@ def test_a_joint_whose_rows_do_not_show_its_acceleration_is_not_asked_for_compli
 
 @pytest.mark.slow
 def test_a_step_beyond_the_bounds_of_an_arm_is_shortened(arm: Chain) -> None:
-    q, far = joints(600), FARTHEST - 0.004
+    q, far = joints(600), MAX_COORDINATE - 0.004
     path = poses_over_log(arm, q)[0] + [far + 0.005, 0.0, 0.0] + white(1, 600, 1e-4)
     found = diagnosed(arm, path, q, base=(far, 0.0, 0.0))
     (cause,) = found.causes

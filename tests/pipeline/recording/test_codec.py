@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from same_results import assert_same
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.drives import Drive, DrivenJoint, Gains, HeldJoint
+from urmpipe_models.drives import Drive, DrivenJoint, Gains, PassiveJoint
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, TextArray
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.robots.catalogue import load_robot, robot_names
@@ -241,7 +241,7 @@ def test_masses_gravity_and_drives_come_back() -> None:
         Gains(7.5, 0.75, 0.01),
         48.0,
     )
-    held = HeldJoint(arm.coordinates[1], 3000.0, 0.0)
+    held = PassiveJoint(arm.coordinates[1], 3000.0, 0.0)
     heavy = replace(arm, gravity=(0.0, 9.81, 0.0), left_out=("finger",), drives=(drive, held))
     back = round_trip(heavy)
     assert (back, back.drives[0].drive.ratio, back.inertials[0].mass) == (heavy, 100.0, 2.0)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from made_plans import FAILED, SMALL, limited, planned
 from toys import eye_of
-from urmpipe_models.arm.solids import solids_of
+from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import Targets
 from urmpipe_models.kinematics.forward import frames_over_log
@@ -281,7 +281,7 @@ def test_the_arm_stands_where_its_kinematics_project_it(
     robot = run.robot
     assert robot is not None
 
-    solids = solids_of(robot, dict.fromkeys(robot.coordinates, (0.0, 0.0, 0.0, 1.0)))
+    solids = build_placeholder_solids(robot, dict.fromkeys(robot.coordinates, (0.0, 0.0, 0.0, 1.0)))
     middles = np.array([one.origin.translation for one in solids if one.colour is not None], float)
 
     def joints(q: FloatArray) -> FloatArray:

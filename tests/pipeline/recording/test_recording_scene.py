@@ -14,7 +14,7 @@ import pytest
 from recorded import columns, entities, static, times_of, views
 from toys import STEP_NS, eye_of, recorded, shown, toy
 from urmpipe_models.arm.chain import Box, Chain, Inertial, Joint, Mesh, Sphere, Visual
-from urmpipe_models.arm.solids import solids_of
+from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.dynamics.equations import mass_centres_over_log
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
@@ -280,7 +280,7 @@ def test_an_arm_that_shows_nothing_is_drawn_in_solids_that_its_frames_move(
     run = make_run(rows=200)
     path = write_recording(run, tmp_path / "run.rrd")
     assert run.robot is not None
-    solids = solids_of(run.robot)
+    solids = build_placeholder_solids(run.robot)
     carriers = ["base", *(f"joint/{name}" for name in run.robot.coordinates)]
     on = [sum(one.joint == joint for one in solids) for joint in (None, *run.robot.coordinates)]
     shapes = {
@@ -337,7 +337,7 @@ def test_a_mark_is_seen_around_the_solid_that_it_marks(make_run: MakeRun) -> Non
     arm = drawn_arm(scene_of(make_run(rows=5)).arms[0])
     assert arm is not None
     for k, joint in enumerate(arm.chain.coordinates, start=1):
-        housing = solids_of(arm.chain)
+        housing = build_placeholder_solids(arm.chain)
         radii = [
             one.shape.radius
             for one in housing

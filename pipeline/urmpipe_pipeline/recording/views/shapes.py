@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from urmpipe_models.arm.chain import Box, Capsule, Chain, Colour, Cylinder, Mesh, Visual
-from urmpipe_models.arm.solids import solids_of
+from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import frames_over_log
 from urmpipe_models.math3d import quaternions
@@ -65,7 +65,7 @@ def bodies_over_log(
         q: Joint values in [rad] or [m], shape (m, coordinates).
         colours: Of its joints, by name; the solids of joints have them.
     """
-    shown, solids = own_shapes(robot), solids_of(robot, colours)
+    shown, solids = own_shapes(robot), build_placeholder_solids(robot, colours)
     if shown:
         moving = np.cumsum([joint.kind != "fixed" for joint in robot.joints]).tolist()
         link = dict(zip((None, *(joint.name for joint in robot.joints)), (0, *moving), strict=True))

@@ -29,7 +29,12 @@ from urmpipe_models.ik.solutions import Solutions, Targets, misses, targets_of
 from urmpipe_models.ik.solve import solve
 from urmpipe_models.ik.spherical import spherical_wrist
 from urmpipe_models.ik.trigonometric import wrapped
-from urmpipe_models.kinematics.forward import chain_of, jacobian_over_log, poses_over_log, screws
+from urmpipe_models.kinematics.forward import (
+    chain_to_screws,
+    jacobian_over_log,
+    poses_over_log,
+    screws_to_chain,
+)
 from urmpipe_models.math3d import from_offset, translation
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf import read_urdf
@@ -181,13 +186,13 @@ def test_a_branch_that_is_lost_beside_a_singular_pose_says_so() -> None:
 
 def idealised(chain: Chain) -> Chain:
     """Return the arm whose closed form an arm has nearly."""
-    found, names = screws(chain), chain.coordinates
+    found, names = chain_to_screws(chain), chain.coordinates
     assert found is not None
     ideals = (
         *(one for one in with_spherical_wrist(found) if spherical_wrist(one, names)),
         *(one for one in with_parallel_axes(found) if parallel_axes(one, names)),
     )
-    return chain_of(ideals[0], names)
+    return screws_to_chain(ideals[0], names)
 
 
 @pytest.mark.parametrize("name", ["arm6", "ur5e"])
@@ -235,7 +240,7 @@ def test_arms_that_are_truly_different_are_not_taken(name: str) -> None:
 
 
 def test_frames_far_along_their_axes_change_nothing() -> None:
-    found = there(screws(as_built(load_robot("ur5e"), 1e-4)))
+    found = there(chain_to_screws(as_built(load_robot("ur5e"), 1e-4)))
     far = replace(found, point=found.point + found.direction * np.array([[3, -50, 20, 70, 9, 1]]).T)
     one, other = compact(found), compact(far)
     np.testing.assert_allclose(one.point, other.point, atol=1e-9)  # feet on lines 1e-4 from parallel
@@ -244,9 +249,9 @@ def test_frames_far_along_their_axes_change_nothing() -> None:
 
 def test_a_chain_of_screws_has_these_screws() -> None:
     chain = random_arm(np.random.default_rng(4), kinds="RPR")
-    found = there(screws(chain))
+    found = there(chain_to_screws(chain))
     q = random_joints(np.random.default_rng(1), chain, 20)
-    other = chain_of(found, chain.coordinates)
+    other = screws_to_chain(found, chain.coordinates)
     assert other.coordinates == chain.coordinates
     for mine, theirs in zip(poses_over_log(other, q), poses_over_log(chain, q), strict=True):
         np.testing.assert_allclose(mine, theirs, atol=1e-13)

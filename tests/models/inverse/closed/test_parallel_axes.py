@@ -15,7 +15,7 @@ from parallel_arms import EXACT, UR, WRISTS, apart, assert_every_solution_meets,
 from urmpipe_models.errors import OptionError
 from urmpipe_models.ik.parallel import parallel_axes
 from urmpipe_models.ik.solutions import Targets
-from urmpipe_models.kinematics.forward import screws
+from urmpipe_models.kinematics.forward import chain_to_screws
 from urmpipe_models.robots.catalogue import load_robot
 
 
@@ -56,7 +56,7 @@ def test_axes_5_and_6_that_pass_each_other_closely_leave_all_digits() -> None:
 
 @pytest.mark.parametrize("passing", [1e-3, 1e-4, 1e-5, 1e-7, 1e-9])
 def test_axes_5_and_6_that_all_but_meet_are_left_to_the_iterative_solver(passing: float) -> None:
-    of_chain = there(screws(load_robot("ur5e")))
+    of_chain = there(chain_to_screws(load_robot("ur5e")))
     point = of_chain.point.copy()
     point[5] += passing * np.cross(of_chain.direction[4], of_chain.direction[5])
     assert parallel_axes(replace(of_chain, point=point), ("a",) * 6) is None
@@ -86,7 +86,7 @@ def test_positions_alone_are_refused() -> None:
     "fault", ["axis 3 tilted", "axis 4 tilted", "links of no length", "axis 1 parallel", "axis 5 parallel"]
 )
 def test_what_has_another_geometry_is_not_recognised(fault: str) -> None:
-    of_chain = there(screws(load_robot("ur5e")))
+    of_chain = there(chain_to_screws(load_robot("ur5e")))
     direction, point = of_chain.direction.copy(), of_chain.point.copy()
     if fault in {"axis 3 tilted", "axis 4 tilted"}:  # a calibrated arm: 1e-6 rad is 1 um at 1 m
         tilted = int(fault.split()[1]) - 1

@@ -15,7 +15,7 @@ from parallel_arms import WRISTS, form_of, poses, random_arm
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import Targets, targets_of
-from urmpipe_models.kinematics.forward import screws
+from urmpipe_models.kinematics.forward import chain_to_screws
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.math3d import rotation_about
 from urmpipe_models.robots.catalogue import load_robot
@@ -35,7 +35,7 @@ def test_reasons_say_what_was_found_and_what_is_allowed() -> None:
 
 def turned_range(chain: Chain) -> tuple[float, float]:
     """Return the least and the largest angle between axes 4 and 6 in [rad], over a turn of joint 5."""
-    of_chain = there(screws(chain))
+    of_chain = there(chain_to_screws(chain))
     k4, k5, k6 = of_chain.direction[3:]
     axis6 = Rotation.from_rotvec(np.linspace(-math.pi, math.pi, 20_001)[:, None] * k5).apply(k6)
     angles = np.arccos(axis6 @ k4 * np.sign(k4 @ of_chain.direction[1]))
@@ -48,7 +48,7 @@ def test_the_limits_that_reasons_tell_are_those_of_the_arm() -> None:
     told: set[str] = set()
     for number in range(10):
         chain = random_arm(rng, "meet", ((1, 1), (-1, 1), (1, -1), (-1, -1))[number % 4])
-        of_chain = there(screws(chain))
+        of_chain = there(chain_to_screws(chain))
         z, p = of_chain.direction[1], of_chain.point
         upper, fore = (float(np.linalg.norm(np.cross(z, p[k + 1] - p[k]))) for k in (1, 2))
         bounds = {"from axis 2": (abs(upper - fore), upper + fore), "to axis 4": turned_range(chain)}
@@ -90,7 +90,7 @@ def test_where_axes_5_and_6_are_parallel_right_is_where_axis_6_points() -> None:
     rng = np.random.default_rng(23)
     for number in range(4):
         chain = random_arm(rng, "parallel", ((1, 1), (1, -1), (-1, 1), (-1, -1))[number])
-        of_chain = screws(chain)
+        of_chain = chain_to_screws(chain)
         _, targets = poses(chain, 50, number)
         solutions = form_of(chain).solve(targets)
         assert of_chain is not None and targets.rotation is not None

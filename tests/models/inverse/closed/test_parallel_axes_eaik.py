@@ -12,13 +12,13 @@ from parallel_arms import UR, WRISTS, form_of, poses, random_arm
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import Targets
-from urmpipe_models.kinematics.forward import screws
+from urmpipe_models.kinematics.forward import chain_to_screws
 from urmpipe_models.robots.catalogue import load_robot
 
 
 def eaik_solutions(chain: Chain, targets: Targets, row: int) -> FloatArray:
     """Return what EAIK finds and its own forward kinematics confirms, shape (k, 6)."""
-    of_chain = screws(chain)
+    of_chain = chain_to_screws(chain)
     assert of_chain is not None and targets.rotation is not None
     offsets = np.diff(np.vstack((np.zeros(3), of_chain.point, of_chain.position)), axis=0)
     robot = HPRobot(of_chain.direction, offsets)

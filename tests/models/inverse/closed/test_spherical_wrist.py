@@ -26,7 +26,7 @@ from urmpipe_models.arm.chain import Chain, Joint, Mimic
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import Targets, targets_of
 from urmpipe_models.ik.spherical import spherical_wrist
-from urmpipe_models.kinematics.forward import Screws, screws
+from urmpipe_models.kinematics.forward import Screws, chain_to_screws
 from urmpipe_models.math3d import from_offset, rotation_about, translation
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -37,7 +37,7 @@ FOUR = "right, elbow down", "right, elbow up", "left, elbow up", "left, elbow do
 
 
 def screws_of(chain: Chain) -> Screws:
-    return there(screws(chain))
+    return there(chain_to_screws(chain))
 
 
 def kr3() -> Chain:
@@ -313,7 +313,7 @@ def test_a_joint_that_follows_another_is_no_screw() -> None:
         else joint
         for joint in chain.joints
     )
-    assert screws(Chain("following", joints, tip=chain.tip)) is None
+    assert chain_to_screws(Chain("following", joints, tip=chain.tip)) is None
 
 
 def test_unreachable_tilt_of_a_wrist_that_is_not_square_is_told_with_figures() -> None:

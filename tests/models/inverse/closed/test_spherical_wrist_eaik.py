@@ -12,7 +12,7 @@ from spherical_arms import SPECIAL, inverse_of, random_arm, random_joints
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import targets_of
-from urmpipe_models.kinematics.forward import jacobian_over_log, screws
+from urmpipe_models.kinematics.forward import chain_to_screws, jacobian_over_log
 from urmpipe_models.robots.catalogue import load_robot
 
 CLEAR = 1e-2
@@ -31,7 +31,7 @@ def clear_poses(chain: Chain, generator: np.random.Generator, count: int) -> Flo
 def assert_agreement(chain: Chain, q: FloatArray) -> None:
     """Hold our solutions of the poses at q against those of EAIK, both ways."""
     hp = pytest.importorskip("eaik.IK_HP", reason="needs eaik")
-    found = there(screws(chain))
+    found = there(chain_to_screws(chain))
     links = np.vstack((found.point[:1], np.diff(found.point, axis=0), found.position - found.point[-1]))
     peer = hp.HPRobot(found.direction, links)
     assert peer.hasSphericalWrist()
