@@ -31,7 +31,7 @@ from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.closure import closure_of, descend
 from urmpipe_models.networks.driving import drive_rows, find_driven
 from urmpipe_models.networks.file import load_network
-from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.mobility import mobility_of
 
 CLOSED = 1e-9
@@ -112,7 +112,7 @@ def alone(mechanism: Mechanism, x: FloatArray, *, slopes: bool) -> float:
 
 def batches(count: int, solves: int) -> tuple[list[str], list[Bound]]:
     """Return the table of RCCC, and what is held."""
-    mechanism = mechanism_of(load_network("rccc"))
+    mechanism = build_mechanism(load_network("rccc"))
     x = turned(mechanism, solves)
     few = x[:, :: max(1, solves // ALONE)][:, :ALONE]
     single = few.shape[1]
@@ -187,7 +187,7 @@ def by_script(mechanism: Mechanism, seed: int, starts: int, box: float) -> Searc
 
 def platforms(seeds: int, box: float) -> tuple[list[str], list[Bound]]:
     """Return the table of the Stewart-Gough platform, and what is held."""
-    mechanism = mechanism_of(load_network("stewart-gough"))
+    mechanism = build_mechanism(load_network("stewart-gough"))
     lines = [
         f"All assemblies of Dietmaier's Stewart-Gough platform, which has {POSTURES}. The script takes as"
         f" many random starts as urmpipe, and {box:g} s at most.",
@@ -225,7 +225,7 @@ def hexapod_rows(mechanism: Mechanism, rows: int) -> tuple[FloatArray, FloatArra
 def motions(rows: int, few: int = 2000) -> tuple[list[str], list[Bound]]:
     """Return the results for a hexapod that a log drives, and their bounds."""
     network = load_network("stewart-gough-driven")
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     pose, lengths = hexapod_rows(mechanism, rows)
     table = pd.DataFrame(lengths, columns=[f"leg{k + 1} (m)" for k in range(6)])
     table.insert(0, "t (s)", 0.005 * np.arange(rows))
@@ -284,7 +284,7 @@ def counts(count: int) -> list[str]:
         "|---|---|---|---|---|---|---|---|",
     ]
     for name in COUNTED:
-        mechanism = mechanism_of(load_network(name))
+        mechanism = build_mechanism(load_network(name))
         x = assemble(mechanism).x_nearest
         moves = mobility_of(mechanism, x)
         taken = [timed(lambda at=x, one=mechanism: mobility_of(one, at)) for _ in range(count)]  # type: ignore[misc]

@@ -15,7 +15,12 @@ from urmpipe.main import run
 from urmpipe_models.errors import NetworkError
 from urmpipe_models.networks.assembly import CLOSED, MANY, RESTARTS, SAME
 from urmpipe_models.networks.mobility import RANK
-from urmpipe_models.networks.parts import ALLOWED, FREEDOMS, LONGEST, ElementKind
+from urmpipe_models.networks.parts import (
+    ALLOWED_ARITHMETIC,
+    JOINT_UNITS,
+    MAX_LETTERS,
+    ElementKind,
+)
 from urmpipe_pipeline.networks.finding import ROUNDED
 
 PAGE = text_of("docs/networks.md")
@@ -76,7 +81,7 @@ def test_the_keys_of_all_kinds_are_those_that_are_read(folder: Path, table: str)
 
 def test_every_kind_is_on_the_page() -> None:
     rows = re.findall(r"^\| `([a-z]+)`[^|]* \| [^|]", PAGE, re.MULTILINE)
-    assert set(rows) >= {*FREEDOMS, *get_args(ElementKind)}
+    assert set(rows) >= {*JOINT_UNITS, *get_args(ElementKind)}
 
 
 @pytest.mark.slow
@@ -113,7 +118,7 @@ def test_numbers_of_the_page_are_those_of_the_code() -> None:
     assert f"A gap of {CLOSED:g}".replace("e-0", "e-") in PAGE
     assert f"within {SAME:g}".replace("e-0", "e-") in PAGE
     assert f"At most {MANY} are listed" in PAGE
-    assert f"{LONGEST} letters at most" in " ".join(PAGE.split())
+    assert f"{MAX_LETTERS} letters at most" in " ".join(PAGE.split())
     assert ROUNDED == 1e-4
-    functions = re.findall(r"[a-z]\w+", ALLOWED.partition("brackets")[2])
+    functions = re.findall(r"[a-z]\w+", ALLOWED_ARITHMETIC.partition("brackets")[2])
     assert all(re.search(rf"\b{name}\b", PAGE) for name in functions)

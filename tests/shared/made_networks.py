@@ -10,7 +10,7 @@ from itertools import pairwise
 from urmpipe_models.elementwise import ZERO, Vector
 from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.file import Network, load_network
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_of
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_from_axes
 from urmpipe_pipeline.networks.finding import Search, find_network
 from urmpipe_pipeline.networks.result import NetworkResult
 
@@ -19,7 +19,7 @@ X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 def at(a: Vector, n: Vector = Y) -> Transform:
     """Return a frame at a point in [m] whose n is given, y or z."""
-    return frame_of(X, n, a)
+    return frame_from_axes(X, n, a)
 
 
 def hinge(name: str, bodies: tuple[str, str], first: Vector, start: float) -> Joint:

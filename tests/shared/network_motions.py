@@ -10,7 +10,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.networks.assembly import poses_at
 from urmpipe_models.networks.closure import descend
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.mechanism import build_mechanism
 
 
 class DrivenNetwork(NamedTuple):
@@ -36,7 +36,7 @@ class DrivenNetwork(NamedTuple):
 
 def drive(network: Network, values: FloatArray, step_ns: int = 20_000_000) -> DrivenNetwork:
     """Return a network at values of its first control, shape (n,), each assembled from the one before."""
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     x, poses, lengths = mechanism.start[:, np.newaxis], [], []
     for value in values.tolist():
         x = x.copy()

@@ -20,7 +20,7 @@ from urmpipe_models.measure_units import WRITTEN, quantity
 from urmpipe_models.networks.assembly import CLOSED, assemble, assembled_at, start_with
 from urmpipe_models.networks.driving import move_to
 from urmpipe_models.networks.file import Network, load_network
-from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.mobility import network_tables, with_start
 from urmpipe_models.networks.parts import POSE_UNITS
 from urmpipe_models.networks.rates import changes, close_network, largest_residual, predict_variables
@@ -80,7 +80,7 @@ def network_motion(
         if not (isinstance(number, str) or is_number(number)):
             message = f"found {name} = {shown(number)}, allowed: a number, or a text with a unit"
             raise _option_error("controls", message)
-    mechanism = mechanism_of(_at_joint_values(loaded, start or {}))
+    mechanism = build_mechanism(_at_joint_values(loaded, start or {}))
     values = {name: loaded.control_value(name, value) for name, value in (controls or {}).items()}
     assembled = assemble(mechanism, {} if start is None else values)
     if start is None and values and assembled.assemblies:  # on the branch of the network's own start
@@ -106,7 +106,7 @@ def from_tables(network: str, points: Mapping[str, Any], newton: int) -> Unit:
 def _unit(network: Network, points: Any, newton: int) -> Unit:
     """Return the unit of a network whose start is assembled."""
     whole_number("network_motion", "newton", newton)
-    model = _Model(network, mechanism_of(network), _read_points(network, points), newton)
+    model = _Model(network, build_mechanism(network), _read_points(network, points), newton)
     if not model.inputs:
         raise _option_error("network", f"found {network.name} without a control to set, allowed: one or more")
     remembers = len(model.mechanism.free) > 0
@@ -191,7 +191,7 @@ class _Model:
         inputs = []
         for k in self.mechanism.controls:
             control = self.mechanism.variables[k].owner
-            unit, factor = self.network.unit_of(control) or ("", 1)
+            unit, factor = self.network.control_unit(control) or ("", 1)
             inputs.append(_Control(self._names[control], control, unit, float(factor)))
         return tuple(inputs)
 
@@ -257,7 +257,7 @@ class _Model:
             if joint.units
         }
         for name in mechanism.graph.roots[1:]:
-            first = mechanism.places[name, 0]
+            first = mechanism.variable_index[name, 0]
             values[name] = x[first : first + len(POSE_UNITS)]
         results: dict[str, Any] = {"residual": largest_residual(mechanism, x)}
         for group in self.groups:

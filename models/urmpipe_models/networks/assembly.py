@@ -19,8 +19,8 @@ from urmpipe_models.networks.closure import (
     spinning_parts,
     unspun,
 )
-from urmpipe_models.networks.faults import value_faults
-from urmpipe_models.networks.joint_motion import rotation_of
+from urmpipe_models.networks.faults import validate_values
+from urmpipe_models.networks.joint_motion import exp3
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.mobility import Assembly, Gap, mobility_at, mobility_nearby
 from urmpipe_models.networks.parts import POSE_UNITS
@@ -113,10 +113,10 @@ def assemble(
     """
     begin = start_with(mechanism, controls or {})
     named = [
-        (mechanism.places[name, index], value)
+        (mechanism.variable_index[name, index], value)
         for name, values in (start or {}).items()
         for index, value in enumerate(values)
-        if (name, index) in mechanism.places
+        if (name, index) in mechanism.variable_index
     ]
     for place, value in named:
         begin[place] = value
@@ -175,12 +175,12 @@ def start_with(mechanism: Mechanism, controls: Mapping[str, float]) -> FloatArra
         parts = mechanism.network.as_parts()
         set_ones = (replace(one, start=controls.get(one.name, one.start)) for one in parts.controls)
         at = "at " + ", ".join(f"{name} = {value:g}" for name, value in controls.items())
-        faults += value_faults(replace(parts, controls=tuple(set_ones)), at)
+        faults += validate_values(replace(parts, controls=tuple(set_ones)), at)
     if faults:
         raise NetworkError(*faults)
     start = np.array(mechanism.start)
     for name, value in controls.items():
-        start[mechanism.places[name, 0]] = value
+        start[mechanism.variable_index[name, 0]] = value
     return start
 
 
@@ -293,7 +293,7 @@ class _Found:
         turned = self.mechanism.angles
         apart[turned] -= 2.0 * np.pi * np.round(apart[turned] / (2.0 * np.pi))
         for some in self.mechanism.rotations:
-            turn = rotation_of(tuple(start[some])).inverse() @ rotation_of(tuple(x[some]))
+            turn = exp3(tuple(start[some])).inverse() @ exp3(tuple(x[some]))
             apart[some] = gap_of(turn, x.shape[1])[3:]
         return np.asarray(np.linalg.norm(apart[self._counted], axis=0))
 
@@ -354,13 +354,13 @@ def poses_at(mechanism: Mechanism, x: FloatArray) -> FloatArray:
 
 def assembly_at(mechanism: Mechanism, x: FloatArray) -> Assembly:
     """Return a configuration, its variables in [m], [rad] and as controls are given, shape (variables,)."""
-    controls = mechanism.control_slopes(x)
+    controls = mechanism.control_values(x)
     values: dict[str, tuple[float, ...]] = {name: (float(one.value),) for name, one in controls.items()}
     for joint in mechanism.network.joints:
         if joint.units:
             values[joint.name] = tuple(float(one.value) for one in mechanism.joint_values(joint, x))
     for name in mechanism.graph.roots[1:]:
-        first = mechanism.places[name, 0]
+        first = mechanism.variable_index[name, 0]
         values[name] = tuple(x[first : first + len(POSE_UNITS)].tolist())
     residual = closure_of(mechanism, x[:, np.newaxis]).residual
     return Assembly(

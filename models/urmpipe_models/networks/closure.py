@@ -29,26 +29,26 @@ from urmpipe_models.ik.numeric import FIRST_GAIN, GAINS, LEAST_RATIO, STATIONARY
 from urmpipe_models.ik.task import column_squares, dot_product, product, transposed_product
 from urmpipe_models.math3d import Transform, quaternions, rotation_vectors
 from urmpipe_models.networks.joint_motion import (
-    MEASURES,
-    SMALL,
-    Screws,
-    forbidden,
+    MEASURED_QUANTITIES,
+    SMALL_ANGLE_SQUARED,
+    Twists,
+    constraint_twists,
+    exp3,
     joint_frame,
-    joint_screws,
-    measure,
-    rotation_of,
-    turning_of,
-    untwisted,
+    joint_twists,
+    left_jacobian,
+    left_jacobian_inverse,
+    measure_element,
     wrap_rotation_vector,
 )
 from urmpipe_models.networks.mechanism import (
     Configuration,
-    Given,
     Mechanism,
+    Placements,
     Pose,
-    Posed,
-    of_controls,
-    parts_without,
+    ValueWithGradient,
+    components_without,
+    evaluate_expression,
 )
 from urmpipe_models.networks.parts import ConstraintElement, Joint
 
@@ -104,7 +104,7 @@ def closure_of(mechanism: Mechanism, x: FloatArray) -> Closure:
         x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
     """
     n = x.shape[1]
-    posed, controls = mechanism.posed(x), mechanism.control_slopes(x)
+    posed, controls = mechanism.placements(x), mechanism.control_values(x)
     screws = _screws(mechanism, x, posed, controls)
     residual = np.zeros((mechanism.rows, n))
     jacobian = np.zeros((mechanism.rows, len(mechanism.variables), n))
@@ -140,13 +140,13 @@ def released(mechanism: Mechanism, x: FloatArray) -> Iterator[tuple[str, str, Fl
         x: The variables, shape (variables,), in [m], [rad] and as controls are given.
     """
     at = x[:, np.newaxis]
-    posed, controls = mechanism.posed(at), mechanism.control_slopes(at)
+    posed, controls = mechanism.placements(at), mechanism.control_values(at)
     equations = list(_equations(mechanism, at, posed, controls))
     for joint in mechanism.network.joints:
-        values = [one.value for one in mechanism.values(joint, at, controls)]
+        values = [one.value for one in mechanism.joint_values(joint, at, controls)]
         frame = posed.joints[joint.name]
         driven = iter([k for k, drive in enumerate(joint.drives) if drive is not None])
-        for constraint, unit, (w, v) in forbidden(joint, values, frame):
+        for constraint, unit, (w, v) in constraint_twists(joint, values, frame):
             size = mechanism.length if unit == "m" else 1.0
             twist = _stacked((*w, *v), 1)[:, 0] * size
             column, value = np.zeros(mechanism.rows), -1
@@ -157,17 +157,17 @@ def released(mechanism: Mechanism, x: FloatArray) -> Iterator[tuple[str, str, Fl
                 column[one.rows] += one.values.get((joint.name, value), 0.0) * size
             yield joint.name, constraint, column * mechanism.row_scales
     for row, element in enumerate(mechanism.network.elements, 6 * len(mechanism.graph.cuts)):
-        yield element.name, MEASURES[element.kind], np.eye(mechanism.rows)[row]
+        yield element.name, MEASURED_QUANTITIES[element.kind], np.eye(mechanism.rows)[row]
 
 
 def _equations(
-    mechanism: Mechanism, x: FloatArray, posed: Posed, controls: dict[str, Given]
+    mechanism: Mechanism, x: FloatArray, posed: Placements, controls: dict[str, ValueWithGradient]
 ) -> Iterator[_Equation]:
     """Yield what closes each loop, and what holds each element."""
     n = x.shape[1]
     for k, cut in enumerate(mechanism.graph.cuts):
         joint = mechanism.network.joints[cut]
-        moved = joint_frame(joint, [one.value for one in mechanism.values(joint, x, controls)])
+        moved = joint_frame(joint, [one.value for one in mechanism.joint_values(joint, x, controls)])
         here = posed.joints[joint.name] @ moved
         gap = gap_of(here.inverse() @ posed.bodies[joint.bodies[1]].frame @ joint.frames[1], n)
         movers = relative_movers(posed.bodies, joint.bodies, joint.name)
@@ -176,20 +176,20 @@ def _equations(
     for row, element in enumerate(mechanism.network.elements, first):
         if element.is_pair:
             error, rates = mechanism.pair_error(element, x, controls)
-            slopes = {place: -slope for place, slope in error.slopes.items()}
+            slopes = {place: -slope for place, slope in error.gradient.items()}
             values, no_wrench = _stacked((error.value,), n), np.zeros((1, 6, n))
             yield _Equation(slice(row, row + 1), values, no_wrench, {}, slopes, rates)
             continue
-        length = of_controls(element.length, controls)
-        measured = measure(element, *(posed.bodies[name].frame for name in element.bodies))
+        length = evaluate_expression(element.length, controls)
+        measured = measure_element(element, *(posed.bodies[name].frame for name in element.bodies))
         wrench = _stacked((*measured.moment, *measured.force), n)[np.newaxis]
         excess = _stacked((measured.distance - length.value,), n)
         movers = relative_movers(posed.bodies, element.bodies)
-        yield _Equation(slice(row, row + 1), excess, wrench, movers, length.slopes)
+        yield _Equation(slice(row, row + 1), excess, wrench, movers, length.gradient)
 
 
 def _screws(
-    mechanism: Mechanism, x: FloatArray, posed: Posed, controls: dict[str, Given]
+    mechanism: Mechanism, x: FloatArray, posed: Placements, controls: dict[str, ValueWithGradient]
 ) -> dict[str, tuple[IndexArray, FloatArray]]:
     """Return of each mover the numbers of variables that move it, and their twists.
 
@@ -199,20 +199,20 @@ def _screws(
     n = x.shape[1]
     found = {}
     for joint in mechanism.network.joints:
-        values = mechanism.values(joint, x, controls)
-        twists = joint_screws(joint, [one.value for one in values], posed.joints[joint.name])
+        values = mechanism.joint_values(joint, x, controls)
+        twists = joint_twists(joint, [one.value for one in values], posed.joints[joint.name])
         found[joint.name] = _combined(twists, values, n)
     for name in mechanism.graph.roots[1:]:
-        first = mechanism.places[name, 0]
-        values = [Given(None, {first + k: 1.0}) for k in range(6)]
+        first = mechanism.variable_index[name, 0]
+        values = [ValueWithGradient(None, {first + k: 1.0}) for k in range(6)]
         vector = (x[first + 3], x[first + 4], x[first + 5])
         p = posed.bodies[name].frame.translation
-        turning = [(axis, cross(p, axis)) for axis in turning_of(vector)]
+        turning = [(axis, cross(p, axis)) for axis in left_jacobian(vector)]
         found[name] = _combined([*SLIDING_SCREWS, *turning], values, n)
     return found
 
 
-SLIDING_SCREWS: Screws = [
+SLIDING_SCREWS: Twists = [
     ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
     ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
     ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
@@ -246,7 +246,7 @@ def _carrier(here: Transform, gap: FloatArray) -> FloatArray:
     carried = np.zeros((6, 6, n))
     carried[:3, :3] = np.einsum("ijn,jkn->ikn", R, lever)
     carried[:3, 3:] = R
-    carried[3:, :3] = np.einsum("ijn,jkn->ikn", untwisted(gap[3:]), R)
+    carried[3:, :3] = np.einsum("ijn,jkn->ikn", left_jacobian_inverse(gap[3:]), R)
     return carried
 
 
@@ -259,13 +259,13 @@ def relative_movers(posed: dict[str, Pose], bodies: tuple[str, str], cut: str = 
     return {name: sign for name, sign in signs.items() if sign}
 
 
-def _combined(screws: Screws, values: Sequence[Given], n: int) -> tuple[IndexArray, FloatArray]:
+def _combined(screws: Twists, values: Sequence[ValueWithGradient], n: int) -> tuple[IndexArray, FloatArray]:
     """Return the twists a unit of each variable from those a unit of each value."""
-    places = list(dict.fromkeys(k for one in values for k in one.slopes))
+    places = list(dict.fromkeys(k for one in values for k in one.gradient))
     twists = np.zeros((6, len(places), n))
     for (w, v), one in zip(screws, values, strict=True):
         twist = _stacked((*w, *v), n)
-        for k, slope in one.slopes.items():
+        for k, slope in one.gradient.items():
             twists[:, places.index(k)] += slope * twist
     return np.array(places, dtype=np.intp), twists
 
@@ -287,7 +287,7 @@ def body_twists(mechanism: Mechanism, x: FloatArray) -> dict[str, FloatArray]:
         mechanism: The network.
         x: The variables, shape (variables, n), in [m], [rad] and as controls are given.
     """
-    posed, controls = mechanism.posed(x), mechanism.control_slopes(x)
+    posed, controls = mechanism.placements(x), mechanism.control_values(x)
     screws = _screws(mechanism, x, posed, controls)
     twists = {}
     for name, pose in posed.bodies.items():
@@ -312,7 +312,7 @@ def wrench_carriers(
     """
     cuts = [mechanism.network.joints[cut] for cut in mechanism.graph.cuts]
     ties: list[Joint | ConstraintElement] = [*cuts, *mechanism.network.elements]
-    equations = _equations(mechanism, x, mechanism.posed(x), mechanism.control_slopes(x))
+    equations = _equations(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
     for tie, equation in zip(ties, equations, strict=True):
         yield tie, equation.rows, equation.carrier
 
@@ -444,7 +444,7 @@ def idle_spins(mechanism: Mechanism) -> tuple[IdleSpin, ...]:
     free = [one for one in network.joints if one.kind == "global" and not any(one.drives)]
     found: list[IdleSpin] = []
     for pair in combinations(free, 2):
-        for part in parts_without(network, [one.name for one in pair]):
+        for part in components_without(network, [one.name for one in pair]):
             hangs = all(len(part & set(one.bodies)) == 1 for one in pair)
             if hangs and network.ground not in part:
                 found.append(IdleSpin(pair, tuple(name for name in network.body_names if name in part)))
@@ -466,7 +466,7 @@ def spinning_parts(mechanism: Mechanism, x: FloatArray) -> tuple[str, ...]:
         ends = [_part_frame(joint, spin, frames).translation for joint in spin.joints]
         loose = (one for one in joints if one.name not in mechanism.network.coupled_joints)
         apart = [one.name for one in loose if _turns_about(one, frames, ends, mechanism.length)]
-        pieces = parts_without(mechanism.network, [one.name for one in spin.joints] + apart)
+        pieces = components_without(mechanism.network, [one.name for one in spin.joints] + apart)
         inner = (piece for piece in pieces if piece <= set(spin.bodies))
         found += [" + ".join(name for name in spin.bodies if name in piece) for piece in inner]
     return tuple(found)
@@ -512,14 +512,14 @@ def unspun(mechanism: Mechanism, spins: Sequence[IdleSpin], x: FloatArray, start
         line: Vector = scale(1.0 / np.maximum(length, 1e-300), apart)
         turn: FloatArray | None = None
         for joint, frame in zip(spin.joints, centres, strict=True):
-            first = mechanism.places[joint.name, 0]
+            first = mechanism.variable_index[joint.name, 0]
             inverted = joint.bodies[0] in spin.bodies
             own = _turned(joint, x[first : first + 3], inverted)
             along = Transform(frame.columns).rotate(line)
             if turn is None:
                 before = _turned(joint, start[first : first + 3, np.newaxis], inverted)
                 turn = _twist(before, along, x.shape[1]) - _twist(own, along, x.shape[1])
-            held = own @ rotation_of(scale(turn, along))
+            held = own @ exp3(scale(turn, along))
             x[first : first + 3] = gap_of(held.inverse() if inverted else held, x.shape[1])[3:]
     return x
 
@@ -541,12 +541,12 @@ def spin_angles(mechanism: Mechanism, spins: Sequence[IdleSpin], x: Configuratio
         first, second = (_part_frame(joint, spin, frames) for joint in spin.joints)
         joint, distance = spin.joints[0], subtract(second.translation, first.translation)
         line = scale(1.0 / np.maximum(np.sqrt(dot(distance, distance)), 1e-300), distance)
-        place = mechanism.places[joint.name, 0]
+        place = mechanism.variable_index[joint.name, 0]
         q: Vector = (x[place], x[place + 1], x[place + 2])
         square = dot(q, q)
-        angle = np.sqrt(np.where(square < SMALL, 1.0, square))
-        sine = np.where(square < SMALL, 0.5 - square / 48.0, np.sin(0.5 * angle) / angle)
-        cosine = np.where(square < SMALL, 1.0 - square / 8.0, np.cos(0.5 * angle))
+        angle = np.sqrt(np.where(square < SMALL_ANGLE_SQUARED, 1.0, square))
+        sine = np.where(square < SMALL_ANGLE_SQUARED, 0.5 - square / 48.0, np.sin(0.5 * angle) / angle)
+        cosine = np.where(square < SMALL_ANGLE_SQUARED, 1.0 - square / 8.0, np.cos(0.5 * angle))
         along = dot(q, Transform(first.columns).rotate(line))
         sign = -1.0 if joint.bodies[0] in spin.bodies else 1.0
         angles.append(2.0 * np.arctan2(sign * sine * along, cosine))

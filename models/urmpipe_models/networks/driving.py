@@ -108,8 +108,8 @@ def find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
         if fault:
             faults.append(Finding(fault, parameter="drives"))
         else:
-            places.append(mechanism.places[owner, index or 0])
-            unit = mechanism.network.unit_of(name) if name in controls else None
+            places.append(mechanism.variable_index[owner, index or 0])
+            unit = mechanism.network.control_unit(name) if name in controls else None
             units.append(unit[0] if unit else "" if name in controls else joints[owner].units[index or 0])
     repeated = [name for k, name in enumerate(names) if len(places) == len(names) and places[k] in places[:k]]
     faults += [Finding(f"{name} is driven twice, allowed: once", parameter="drives") for name in repeated]

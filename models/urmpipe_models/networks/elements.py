@@ -14,7 +14,7 @@ With the angle q_1 of the first joint, the variable q_2 of the second joint, and
 
 The variables are not reduced by full turns: a gear keeps the count of its turns.
 
-1. `transmitted`: f and its derivative, elementwise.
+1. `transmission`: f and its derivative, elementwise.
 2. `read_pair`: a pair from its table of a file, with the profile of a cam from a CSV file.
 3. `pair_faults`: the errors of a pair.
 """
@@ -37,9 +37,15 @@ from urmpipe_models.arm.chain import Joint as ChainJoint
 from urmpipe_models.elementwise import ZERO, Element, FloatArray, Vector, cross
 from urmpipe_models.errors import Finding, OptionError, RobotError, not_among, shown
 from urmpipe_models.math3d import Transform, rotation_x, rotation_y, translation
-from urmpipe_models.networks.file_values import STILL, expression, in_si, read_drives, read_expression
+from urmpipe_models.networks.file_values import (
+    IDENTITY_MOTION,
+    parse_expression,
+    read_drives,
+    read_expression,
+    to_si,
+)
 from urmpipe_models.networks.parts import (
-    FREEDOMS,
+    JOINT_UNITS,
     PAIR_JOINTS,
     Body,
     ConstraintElement,
@@ -49,7 +55,7 @@ from urmpipe_models.networks.parts import (
     Joint,
     JointKind,
     Parts,
-    frame_of,
+    frame_from_axes,
     pair_bodies,
 )
 from urmpipe_models.robots.catalogue import load_robot
@@ -110,7 +116,7 @@ def element_frame(a: Element, alpha: Element, s: Element, theta: Element) -> Tra
     return normal @ translation(s, 0.0, 0.0) @ rotation_x(theta)
 
 
-def joint_of(element: DHElement, ends: tuple[str, str]) -> Joint:
+def element_to_joint(element: DHElement, ends: tuple[str, str]) -> Joint:
     """Return the joint of an element: A_1 T A_2^-1 is the frame of eq. 3-5 to 3-7.
 
     With P = (e2, e1, -e3) as columns, P Ry(theta) P^-1 = Rx(theta) and P Ty(s) P^-1 = Tx(s), so that
@@ -172,7 +178,7 @@ def _read_joint(name: str, row: Table, units: Units, ends: tuple[str, str]) -> J
     many = len(row.faults)
     kind = row.choice("kind", tuple(DH_KINDS))
     if len(row.faults) > many:  # its keys are those of no kind
-        return Joint(name, "user", ends, motion=STILL)
+        return Joint(name, "user", ends, motion=IDENTITY_MOTION)
     keys = ("a", "alpha", "theta") if kind == "H" else ("a", "alpha", "s", "theta")
     numbers = {key: row.number(key, 0.0) for key in keys}
     element = DHElement(
@@ -180,10 +186,10 @@ def _read_joint(name: str, row: Table, units: Units, ends: tuple[str, str]) -> J
         kind,
         **{key: (units.length if key in {"a", "s"} else units.angle)(one) for key, one in numbers.items()},
         pitch=units.length(row.number("pitch")) if kind == "H" else 0.0,
-        values=read_drives(row, FREEDOMS[DH_KINDS[kind]], units),
+        values=read_drives(row, JOINT_UNITS[DH_KINDS[kind]], units),
     )
     row.close()
-    return joint_of(element, ends)
+    return element_to_joint(element, ends)
 
 
 FILES = {".toml", ".urdf", ".xacro"}
@@ -205,7 +211,7 @@ class ChainParts:
     controls: list[Control] = field(default_factory=list)
 
 
-def chain_parts(
+def chain_to_parts(
     name: str, chain: Chain, carrier: str, start: Sequence[float], values: Mapping[str, Expression]
 ) -> ChainParts:
     """Return a chain as parts of a network: its bodies are the moving frames of `kinematics.frames.frames`.
@@ -279,7 +285,7 @@ def _along(axis: Vector) -> Transform:
     least = min(range(3), key=lambda k: abs(axis[k]))
     x, y, z = cross(_AXES[least], axis)
     length = (x * x + y * y + z * z) ** 0.5
-    return frame_of((x / length, y / length, z / length), axis, ZERO)
+    return frame_from_axes((x / length, y / length, z / length), axis, ZERO)
 
 
 def _fixed(ends: tuple[str, str], frame: Transform) -> Joint:
@@ -308,7 +314,7 @@ def read_chain(
         return None
     start, values = _start(table, chain, units), _values(table, chain, units)
     table.close()
-    parts = chain_parts(name, chain, carrier, start, values)
+    parts = chain_to_parts(name, chain, carrier, start, values)
     places |= {f"joints.{one.name}": place for one in parts.joints}
     places |= {f"bodies.{one.name}": place for one in parts.bodies}
     places |= {f"controls.{one.name}": place for one in parts.controls}
@@ -359,7 +365,7 @@ def _values(table: Table, chain: Chain, units: Units) -> dict[str, Expression]:
     for key, value in given.items() if isinstance(given, Mapping) else ():
         if key in kinds:
             unit = "m" if kinds[key] == "prismatic" else "rad"
-            found[key] = expression(inner, key, value, unit, units)
+            found[key] = parse_expression(inner, key, value, unit, units)
         else:
             inner.fault(key, f"coordinate {not_among(key, kinds)}")
     return found
@@ -373,7 +379,7 @@ MAX_VALUE = 1e9  # no radius or lift of a mechanism is larger, in [m] or [rad]
 Profile = tuple[tuple[float, float], ...]
 
 
-def transmitted(element: ConstraintElement, angle: Element) -> tuple[Element, Element]:
+def transmission(element: ConstraintElement, angle: Element) -> tuple[Element, Element]:
     """Return f of the angle of the first joint, and its derivative.
 
     Args:
@@ -482,7 +488,7 @@ def _read_profile(table: Table, unit: str, units: Units, folder: Path) -> Profil
             text = "nothing" if value is None else shown(value)
             table.fault("profile", f"found {text}, allowed: a list of [angle, lift], or a .csv file")
         rows = [] if unreadable else rows
-    return tuple((in_si(float(a), "rad", units), in_si(float(b), unit, units)) for a, b in rows)
+    return tuple((to_si(float(a), "rad", units), to_si(float(b), unit, units)) for a, b in rows)
 
 
 def _read_csv(table: Table, file: str, folder: Path) -> list[tuple[float, float]]:

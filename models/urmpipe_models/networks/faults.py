@@ -14,10 +14,10 @@ import numpy as np
 from urmpipe_models.elementwise import Element, FloatArray, Vector, cross, dot, subtract
 from urmpipe_models.errors import Finding, nearest, not_among, shown
 from urmpipe_models.networks.elements import pair_faults
-from urmpipe_models.networks.mechanism import graph_of, mechanism_of
+from urmpipe_models.networks.mechanism import build_graph, build_mechanism
 from urmpipe_models.networks.parts import (
-    FREEDOMS,
-    ORTHONORMAL,
+    AXES_TOLERANCE,
+    JOINT_UNITS,
     POSE_UNITS,
     ConstraintElement,
     Control,
@@ -25,8 +25,8 @@ from urmpipe_models.networks.parts import (
     Joint,
     Parts,
     control_faults,
-    ordered_controls,
-    ranged,
+    sample_range,
+    sort_controls,
 )
 
 if TYPE_CHECKING:
@@ -36,27 +36,27 @@ MOST = 500
 """Joints and elements of a network at most: the search for an assembly solves for all of them at once."""
 
 
-def faults_of(parts: Parts) -> Iterator[Finding]:
+def validate_parts(parts: Parts) -> Iterator[Finding]:
     """Yield what is wrong with the parts of a network.
 
     What may follow from something that could not be read has a kind: "untied", a body that nothing ties,
     "idle", a control that drives nothing, "parallel", two lines, and "coupled", a joint of a pair.
     """
-    found = [*_structure_faults(parts), *value_faults(parts)]
+    found = [*_structure_faults(parts), *validate_values(parts)]
     yield from found or lines_faults(parts)
 
 
 def _structure_faults(parts: Parts) -> Iterator[Finding]:
     """Yield what is wrong whatever the values of controls are."""
-    if not parts.ties:
+    if not parts.constraints:
         message = "found none, and no elements; allowed: at least one of them"
         yield Finding(message, about="joints", kind="untied")
-    if len(parts.ties) > MOST:
-        message = f"found {len(parts.ties)} with elements and those of chains, allowed: {MOST} at most"
+    if len(parts.constraints) > MOST:
+        message = f"found {len(parts.constraints)} with elements and those of chains, allowed: {MOST} at most"
         yield Finding(message, about="joints")
     yield from _name_faults(parts)
     yield from _body_faults(parts)
-    for where, tie in parts.ties:
+    for where, tie in parts.constraints:
         if isinstance(tie, Joint) or not tie.is_pair:
             yield from _tie_faults(where, tie, parts.body_names)
     for joint in parts.joints:
@@ -76,7 +76,7 @@ def _name_faults(parts: Parts) -> Iterator[Finding]:
     A body may have the name of the joint that carries it, as those of a chain, unless it has freedoms of its
     own: these would be called like the joint's.
     """
-    known, free = set(parts.body_names), set(graph_of(parts).roots)
+    known, free = set(parts.body_names), set(build_graph(parts).roots)
     carriers = (one for one in parts.joints if one.name == one.bodies[1])
     carried = {one.name for one in carriers if one.name not in free or one.bodies[0] not in known}
     named = [("bodies", name) for name in parts.body_names if name not in carried]
@@ -95,7 +95,7 @@ def _name_faults(parts: Parts) -> Iterator[Finding]:
 
 def _body_faults(parts: Parts) -> Iterator[Finding]:
     """Yield bodies that nothing ties, and starts that are not allowed."""
-    tied = {name for _, tie in parts.ties for name in tie.bodies}
+    tied = {name for _, tie in parts.constraints for name in tie.bodies}
     tied |= {nearest(name, parts.body_names) or "" for name in tied - set(parts.body_names)}
     for body in parts.bodies:
         where = f"bodies.{body.name}"
@@ -112,7 +112,7 @@ def _body_faults(parts: Parts) -> Iterator[Finding]:
 def _start_faults(parts: Parts) -> Iterator[Finding]:
     """Yield starts of bodies whose pose joints give."""
     started = {one.name for one in parts.bodies if one.start}
-    for cluster in graph_of(parts).clusters:
+    for cluster in build_graph(parts).clusters:
         if cluster[0] == parts.ground:
             reason, others = f"joints tie it to {parts.ground}", started.intersection(cluster)
         else:  # a root is a body with a start, if there is one
@@ -136,8 +136,8 @@ def _tie_faults(where: str, tie: Joint | ConstraintElement, names: tuple[str, ..
 
 def _joint_faults(where: str, joint: Joint) -> Iterator[Finding]:
     """Yield what is wrong with a joint by itself."""
-    if joint.kind not in FREEDOMS:
-        yield Finding(not_among(joint.kind, FREEDOMS), about=f"{where}.kind")
+    if joint.kind not in JOINT_UNITS:
+        yield Finding(not_among(joint.kind, JOINT_UNITS), about=f"{where}.kind")
         return
     if joint.kind == "user":
         yield from _user_faults(where, joint)
@@ -185,14 +185,14 @@ def _frame_faults(where: str, frames: tuple[Transform, Transform]) -> Iterator[F
         m, n, k = frame.columns
         off = math.sqrt(dot(m, m)) - 1.0, math.sqrt(dot(n, n)) - 1.0, dot(m, n)
         of = f" in the {body} body" if frames[0] != frames[1] else ""
-        if all(abs(one) <= ORTHONORMAL for one in off[:2]) and abs(off[2]) > ORTHONORMAL:
-            allowed = f"{ORTHONORMAL:g} at most, or no m: then one perpendicular to n is taken"
+        if all(abs(one) <= AXES_TOLERANCE for one in off[:2]) and abs(off[2]) > AXES_TOLERANCE:
+            allowed = f"{AXES_TOLERANCE:g} at most, or no m: then one perpendicular to n is taken"
             message = f"m is not perpendicular to n{of}: m . n = {off[2]:.3g}; allowed: {allowed}"
             yield Finding(message, about=f"{where}.m")
-        elif not all(abs(one) <= ORTHONORMAL for one in off):
-            key = "m" if all(abs(one) <= ORTHONORMAL for one in off[1:]) else "n"
+        elif not all(abs(one) <= AXES_TOLERANCE for one in off):
+            key = "m" if all(abs(one) <= AXES_TOLERANCE for one in off[1:]) else "n"
             yield Finding(not_orthonormal(off, of), about=f"{where}.{key}")
-        elif not all(abs(one) <= ORTHONORMAL for one in subtract(cross(m, n), k)):
+        elif not all(abs(one) <= AXES_TOLERANCE for one in subtract(cross(m, n), k)):
             yield Finding(f"the third axis{of} is not m x n", about=where)
         yield from _finite_faults(f"{where}.a", frame.translation)
 
@@ -206,8 +206,8 @@ def _element_faults(where: str, element: ConstraintElement) -> Iterator[Finding]
     normals: tuple[Vector, ...] = {"gg": (), "crc": element.normals}.get(element.kind, element.normals[:1])
     for n in dict.fromkeys(normals):
         off = math.sqrt(dot(n, n)) - 1.0
-        if not abs(off) <= ORTHONORMAL:
-            message = f"is not a unit vector: |n| - 1 = {off:.3g}; allowed: {ORTHONORMAL:g} at most"
+        if not abs(off) <= AXES_TOLERANCE:
+            message = f"is not a unit vector: |n| - 1 = {off:.3g}; allowed: {AXES_TOLERANCE:g} at most"
             yield Finding(message, about=f"{where}.n")
     for point in element.points[element.kind == "eg" :]:
         yield from _finite_faults(f"{where}.a", point)
@@ -231,7 +231,7 @@ SAMPLES = 11
 """At so many values of a control, from its least to its largest, a user joint is looked at."""
 
 
-def value_faults(parts: Parts, at: str = "where controls start") -> Iterator[Finding]:
+def validate_values(parts: Parts, at: str = "where controls start") -> Iterator[Finding]:
     """Yield what is wrong with the values of functions, where controls start and over their ranges.
 
     Args:
@@ -240,7 +240,7 @@ def value_faults(parts: Parts, at: str = "where controls start") -> Iterator[Fin
     """
     values = control_values(parts.controls, {})
     finite = {name: float(value) for name, value in values.items() if math.isfinite(value)}
-    for where, one in (*parts.between_controls, *parts.functions, *parts.lengths):
+    for where, one in (*parts.control_functions, *parts.joint_functions, *parts.length_functions):
         value = float(one.value(finite)) if one.names <= finite.keys() else 0.0
         if not abs(value) <= LARGEST:
             allowed = f"{LARGEST:g} at most, in m or rad" if math.isfinite(value) else "a finite number"
@@ -259,14 +259,14 @@ def control_values(controls: tuple[Control, ...], given: Mapping[str, Element]) 
         given: Values of some that can be set, any elements; the others have their starts.
     """
     found: dict[str, Element] = {}
-    for one in ordered_controls(controls):
+    for one in sort_controls(controls):
         found[one.name] = given.get(one.name, one.start) if one.value is None else one.value.value(found)
     return found
 
 
 def _length_faults(parts: Parts, values: Mapping[str, float], at: str) -> Iterator[Finding]:
     """Yield lengths that are too small where controls start; h and offsets may be less than 0."""
-    for element, (where, function) in zip(parts.elements, parts.lengths, strict=True):
+    for element, (where, function) in zip(parts.elements, parts.length_functions, strict=True):
         if element.length_key == "d" and function.names <= values.keys():
             length, lines = float(function.value(values)), element.kind == "crc"
             if length < 0.0 or (length == 0.0 and not lines):
@@ -279,15 +279,15 @@ def _motion_faults(joint: Joint, controls: tuple[Control, ...], at: str) -> Iter
     """Yield where m and n of a user joint are not orthonormal: at the start, or along each control."""
     where = f"joints.{joint.name}.n"
     worst = _worst(joint, control_values(controls, {}))[1]
-    if not np.max(np.abs(worst)) <= ORTHONORMAL:
+    if not np.max(np.abs(worst)) <= AXES_TOLERANCE:
         yield Finding(not_orthonormal(worst, f" {at}"), about=where)
         return
     for one in controls:
         if one.value is None:
-            low, high = ranged(one)
+            low, high = sample_range(one)
             sampled = np.linspace(low, high, SAMPLES)
             k, worst = _worst(joint, control_values(controls, {one.name: sampled}))
-            if not np.max(np.abs(worst)) <= ORTHONORMAL:
+            if not np.max(np.abs(worst)) <= AXES_TOLERANCE:
                 message = not_orthonormal(worst, f" at {one.name} = {sampled[k]:.6g}")
                 yield Finding(message, about=where)
 
@@ -318,7 +318,7 @@ def not_orthonormal(off: Sequence[float] | FloatArray, place: str) -> str:
     """
     m, n, both = off
     found = f"|m| - 1 = {m:.3g}, |n| - 1 = {n:.3g}, m . n = {both:.3g}"
-    return f"m and n are not orthonormal{place}: {found}; allowed: {ORTHONORMAL:g} at most"
+    return f"m and n are not orthonormal{place}: {found}; allowed: {AXES_TOLERANCE:g} at most"
 
 
 def lines_faults(parts: Parts) -> Iterator[Finding]:
@@ -326,7 +326,7 @@ def lines_faults(parts: Parts) -> Iterator[Finding]:
     skew = [one for one in parts.elements if one.kind == "crc"]
     if not skew:
         return
-    mechanism = mechanism_of(parts)
+    mechanism = build_mechanism(parts)
     with np.errstate(all="ignore"):  # starts as large as 1e300
         poses = mechanism.poses(mechanism.start)
     for element in skew:

@@ -18,12 +18,11 @@ from urmpipe_models.elementwise import ZERO
 from urmpipe_models.errors import Finding, NetworkError, did_you_mean, in_html, shown
 from urmpipe_models.files import placed
 from urmpipe_models.networks.elements import read_chain, read_dh, read_pair
-from urmpipe_models.networks.faults import faults_of
+from urmpipe_models.networks.faults import validate_parts
 from urmpipe_models.networks.file_values import (
-    STILL,
-    Form,
-    N,
-    in_si,
+    DEFAULT_N,
+    IDENTITY_MOTION,
+    VectorCount,
     read_drives,
     read_expression,
     read_frames,
@@ -32,10 +31,11 @@ from urmpipe_models.networks.file_values import (
     read_points,
     read_start,
     read_vectors,
+    to_si,
 )
 from urmpipe_models.networks.parts import (
-    FREEDOMS,
-    GROUND,
+    DEFAULT_GROUND,
+    JOINT_UNITS,
     PAIR_JOINTS,
     POSE_UNITS,
     Body,
@@ -74,7 +74,7 @@ class Network(Parts, Shown):
     angle_unit: str = field(default="rad", compare=False)
 
     def __post_init__(self) -> None:
-        if found := tuple(dict.fromkeys(faults_of(self))):
+        if found := tuple(dict.fromkeys(validate_parts(self))):
             raise NetworkError(*found)
 
     def _headline(self) -> str:
@@ -92,7 +92,7 @@ class Network(Parts, Shown):
         rows = "".join(
             f"<tr><td>{in_html(one.name)}</td><td>{one.kind}</td><td>{in_html(one.bodies[0])}</td>"
             f"<td>{in_html(one.bodies[1])}</td></tr>"
-            for _, one in self.ties
+            for _, one in self.constraints
         )
         return f"<table><tr><th>name</th><th>kind</th><th>body</th><th>body</th></tr>{rows}</table>"
 
@@ -195,7 +195,7 @@ class _Reader:
             self.table.choice("length_unit", ("m", "mm"), "m") == "mm",
             self.table.choice("angle_unit", ("rad", "deg"), "rad") == "deg",
         )
-        self.ground = self.table.text("ground", GROUND)
+        self.ground = self.table.text("ground", DEFAULT_GROUND)
 
     def parts(self) -> Parts:
         """Return what the tables describe; what is wrong is in `faults`."""
@@ -226,7 +226,7 @@ class _Reader:
     def further(self, parts: Parts) -> Iterator[Finding]:
         """Yield what is wrong with the parts, unless it follows from what is wrong with the tables."""
         unread = {re.sub(r"\[\d+\]$", "", one.about or "") for one in self.faults}
-        for one in faults_of(parts):
+        for one in validate_parts(parts):
             fault = replace(one, about=self._place(one.about or ""))
             if not _follows(fault, unread):
                 yield fault
@@ -254,7 +254,7 @@ class _Reader:
             else:
                 numbers = table.numbers("start", len(POSE_UNITS)) if table.has("start") else ()
                 pairs = zip(numbers, POSE_UNITS, strict=False)
-                yield Body(name, tuple(in_si(one, unit, self.units) for one, unit in pairs))
+                yield Body(name, tuple(to_si(one, unit, self.units) for one, unit in pairs))
             table.close()
 
     def _control(self, name: str, table: Table) -> Control:
@@ -276,16 +276,16 @@ class _Reader:
     def _joint(self, name: str, table: Table) -> Joint:
         """Read a joint; one whose kind is none holds its bodies together."""
         ends = _ends(table)
-        kind = cast("JointKind", self._kind(table, tuple(FREEDOMS)))
+        kind = cast("JointKind", self._kind(table, tuple(JOINT_UNITS)))
         if not kind:
-            return Joint(name, "user", ends, motion=STILL)
+            return Joint(name, "user", ends, motion=IDENTITY_MOTION)
         if kind == "user":
             joint = Joint(name, kind, ends, motion=read_motion(table, self.units))
         else:
-            frames, start = read_frames(table, self.units), read_start(table, FREEDOMS[kind], self.units)
-            values = read_drives(table, FREEDOMS[kind], self.units)
+            frames, start = read_frames(table, self.units), read_start(table, JOINT_UNITS[kind], self.units)
+            values = read_drives(table, JOINT_UNITS[kind], self.units)
             pitch = self.units.length(table.number("pitch")) if kind == "helical" else 0.0
-            limits = () if kind == "global" else read_limits(table, FREEDOMS[kind], self.units)
+            limits = () if kind == "global" else read_limits(table, JOINT_UNITS[kind], self.units)
             joint = Joint(name, kind, ends, frames, start, values, pitch, limits=limits)
             self._check_start(table, joint)
             if table.has("driven"):
@@ -300,7 +300,7 @@ class _Reader:
         if any(lower > upper for lower, upper in joint.limits):
             return
         for unit, value, end, limit in exceeded_limits(joint, free, is_coupled=False):
-            size = in_si(1.0, unit, self.units)
+            size = to_si(1.0, unit, self.units)
             allowed = "at least lower" if end == "lower" else "at most upper"
             table.fault("start", f"found {value / size:.6g}, allowed: {allowed}, {limit / size:.6g}")
 
@@ -318,10 +318,10 @@ class _Reader:
         kind = cast("ElementKind", self._kind(table, get_args(ElementKind)))
         if not kind:
             return ConstraintElement(name, "gg", ends, Expression("1.0"))
-        normals = (N, N)
+        normals = (DEFAULT_N, DEFAULT_N)
         if kind != "gg":
             first, second = read_vectors(table, "n", "one or two" if kind == "crc" else "one")
-            normals = (first, second if kind == "crc" else N)
+            normals = (first, second if kind == "crc" else DEFAULT_N)
         points = read_points(table, self.units, POINTS[kind])
         length = read_expression(table, "h" if kind == "eg" else "d", "m", self.units)
         table.close()
@@ -330,7 +330,7 @@ class _Reader:
         )
 
 
-POINTS: dict[ElementKind, Form] = {"gg": "one or two", "eg": "one", "crc": "one or two", "gc": "two"}
+POINTS: dict[ElementKind, VectorCount] = {"gg": "one or two", "eg": "one", "crc": "one or two", "gc": "two"}
 """Of which bodies an element has points."""
 
 

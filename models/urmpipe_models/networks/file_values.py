@@ -9,32 +9,37 @@ from typing import Any, Literal, TypeAlias
 from urmpipe_models.elementwise import ZERO, Vector, dot, scale, subtract
 from urmpipe_models.errors import shown
 from urmpipe_models.math3d import Transform
-from urmpipe_models.networks.parts import ORTHONORMAL, Expression, frame_of, is_name
+from urmpipe_models.networks.parts import (
+    AXES_TOLERANCE,
+    Expression,
+    frame_from_axes,
+    is_control_name,
+)
 from urmpipe_models.robots.toml import Units
 from urmpipe_models.toml_tables import Table, are_numbers, is_number
 
-Form: TypeAlias = Literal["one", "two", "one or two"]
+VectorCount: TypeAlias = Literal["one", "two", "one or two"]
 """Whether a key holds a vector, one for each body, or either."""
 
-FORMS: dict[Form, str] = {
+FORMS: dict[VectorCount, str] = {
     "one": "3 finite numbers",
     "two": "two lists of 3 finite numbers, one for each body",
     "one or two": "3 finite numbers, or two lists of 3",
 }
 
 
-M: Vector = (1.0, 0.0, 0.0)
-N: Vector = (0.0, 1.0, 0.0)
+DEFAULT_M: Vector = (1.0, 0.0, 0.0)
+DEFAULT_N: Vector = (0.0, 1.0, 0.0)
 """m and n of a body in a joint where its table has none."""
 
 ALONG_X = 1.0 - 1e-6  # |n . x| of an n that lies along x: within 1.4e-3 rad its projection loses digits
 
-STILL = tuple(map(Expression, ("1.0", "0.0", "0.0", "0.0", "1.0", "0.0", "0.0", "0.0", "0.0")))
+IDENTITY_MOTION = tuple(map(Expression, ("1.0", "0.0", "0.0", "0.0", "1.0", "0.0", "0.0", "0.0", "0.0")))
 """The motion of a user joint that stands in for one whose kind is none."""
 
 
 def read_vectors(
-    table: Table, key: str, form: Form = "one or two", default: Vector | None = None
+    table: Table, key: str, form: VectorCount = "one or two", default: Vector | None = None
 ) -> tuple[Vector, Vector]:
     """Return the vectors of both bodies in the file's unit, twice the same where the key holds one.
 
@@ -56,7 +61,7 @@ def read_vectors(
     return default or ZERO, default or ZERO
 
 
-def read_points(table: Table, units: Units, form: Form = "one or two") -> tuple[Vector, Vector]:
+def read_points(table: Table, units: Units, form: VectorCount = "one or two") -> tuple[Vector, Vector]:
     """Return the points `a` of both bodies in [m], their origins where the key is missing."""
     first, second = read_vectors(table, "a", form, ZERO)
     return _metres(first, units), _metres(second, units)
@@ -65,13 +70,13 @@ def read_points(table: Table, units: Units, form: Form = "one or two") -> tuple[
 def read_frames(table: Table, units: Units) -> tuple[Transform, Transform]:
     """Return A_1 and A_2 of a joint; not turned where its m or n are no vectors."""
     many = len(table.faults)
-    m, n = read_vectors(table, "m", default=M), read_vectors(table, "n", default=N)
+    m, n = read_vectors(table, "m", default=DEFAULT_M), read_vectors(table, "n", default=DEFAULT_N)
     if len(table.faults) > many:
-        m, n = (M, M), (N, N)
+        m, n = (DEFAULT_M, DEFAULT_M), (DEFAULT_N, DEFAULT_N)
     elif not table.has("m"):
         m = perpendicular(n[0]), perpendicular(n[1])
     first, second = read_points(table, units)
-    return frame_of(m[0], n[0], first), frame_of(m[1], n[1], second)
+    return frame_from_axes(m[0], n[0], first), frame_from_axes(m[1], n[1], second)
 
 
 def perpendicular(n: Vector) -> Vector:
@@ -80,9 +85,9 @@ def perpendicular(n: Vector) -> Vector:
     Args:
         n: The axis of the joint, a unit vector [-].
     """
-    if not abs(n[0]) > ORTHONORMAL:
-        return M
-    axis = M if abs(n[0]) < ALONG_X else N
+    if not abs(n[0]) > AXES_TOLERANCE:
+        return DEFAULT_M
+    axis = DEFAULT_M if abs(n[0]) < ALONG_X else DEFAULT_N
     across = subtract(axis, scale(dot(axis, n), n))
     return scale(1.0 / max(math.sqrt(dot(across, across)), 1e-300), across)
 
@@ -102,7 +107,7 @@ def read_start(table: Table, of: Sequence[str], units: Units) -> tuple[float, ..
     if not are_numbers(values, len(of)):
         _refuse(table, "start", value, "a finite number" if len(of) == 1 else f"{len(of)} finite numbers")
         return ()
-    return tuple(in_si(float(one), unit, units) for one, unit in zip(values, of, strict=True))
+    return tuple(to_si(float(one), unit, units) for one, unit in zip(values, of, strict=True))
 
 
 def read_limits(table: Table, of: Sequence[str], units: Units) -> tuple[tuple[float, float], ...]:
@@ -121,7 +126,7 @@ def read_limits(table: Table, of: Sequence[str], units: Units) -> tuple[tuple[fl
             _refuse(table, key, value, "a number" if len(of) == 1 else f"{len(of)} numbers")
         is_right = are_numbers(values, len(of), infinite=True)
         numbers = values if is_right else [default] * len(of)
-        ends.append([in_si(float(one), unit, units) for one, unit in zip(numbers, of, strict=True)])
+        ends.append([to_si(float(one), unit, units) for one, unit in zip(numbers, of, strict=True)])
     limits = tuple(zip(*ends, strict=True))
     return limits if any(map(math.isfinite, (*ends[0], *ends[1]))) else ()
 
@@ -152,8 +157,8 @@ def _drive(table: Table, key: str, value: Any, unit: str, units: Units) -> Expre
     """Return what drives a variable; None where that is "", or no name of a control under `driven`."""
     if value == "":
         return None
-    if key == "value" or (isinstance(value, str) and is_name(value)):
-        return expression(table, key, value, unit, units)
+    if key == "value" or (isinstance(value, str) and is_control_name(value)):
+        return parse_expression(table, key, value, unit, units)
     _refuse(table, key, value, "the name of a control; a function of controls is a `value`")
     return None
 
@@ -163,7 +168,7 @@ def read_motion(table: Table, units: Units) -> tuple[Expression, ...]:
     many = len(table.faults)
     turned = [*_three(table, "m", "", units), *_three(table, "n", "", units)]
     if len(table.faults) > many:  # which might not be orthonormal
-        turned = [*STILL[:6]]
+        turned = [*IDENTITY_MOTION[:6]]
     return (*turned, *_three(table, "a", "m", units))
 
 
@@ -171,9 +176,9 @@ def _three(table: Table, key: str, unit: str, units: Units) -> list[Expression]:
     """Return three numbers or functions of controls in SI."""
     value = table.value(key)
     if isinstance(value, (list, tuple)) and len(value) == 3:
-        return [expression(table, key, one, unit, units) for one in value]
+        return [parse_expression(table, key, one, unit, units) for one in value]
     _refuse(table, key, value, "a list of 3 numbers or expressions")
-    return [*STILL[6:]]
+    return [*IDENTITY_MOTION[6:]]
 
 
 def read_expression(table: Table, key: str, unit: str, units: Units) -> Expression:
@@ -185,13 +190,13 @@ def read_expression(table: Table, key: str, unit: str, units: Units) -> Expressi
         unit: The unit of the value: m, rad or "" of a number without.
         units: The units of the file.
     """
-    return expression(table, key, table.value(key), unit, units)
+    return parse_expression(table, key, table.value(key), unit, units)
 
 
-def expression(table: Table, key: str, value: Any, unit: str, units: Units) -> Expression:
+def parse_expression(table: Table, key: str, value: Any, unit: str, units: Units) -> Expression:
     """Return a number or text of a file as a function of controls in SI; 1 where it is no arithmetic."""
     if is_number(value):
-        return Expression(repr(in_si(float(value), unit, units)))
+        return Expression(repr(to_si(float(value), unit, units)))
     if not isinstance(value, str):
         _refuse(table, key, value, "a finite number, or an expression as a text")
         return Expression("1.0")
@@ -204,7 +209,7 @@ def expression(table: Table, key: str, value: Any, unit: str, units: Units) -> E
         return Expression("1.0")
 
 
-def in_si(value: float, unit: str, units: Units) -> float:
+def to_si(value: float, unit: str, units: Units) -> float:
     """Return a number of the file in [m] or [rad]; without a unit as it is."""
     return {"m": units.length, "rad": units.angle}.get(unit, float)(value)
 

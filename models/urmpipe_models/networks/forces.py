@@ -20,7 +20,7 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray, IndexArray, Vector, cross, dot, subtract
 from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.closure import body_twists, closure_of, wrench_carriers
-from urmpipe_models.networks.mechanism import Mechanism, Posed
+from urmpipe_models.networks.mechanism import Mechanism, Placements
 from urmpipe_models.networks.motion import Slopes, iter_chunks
 from urmpipe_models.networks.parts import Joint
 
@@ -124,7 +124,7 @@ class _Equilibrium:
         for joint in mechanism.network.joints:
             if joint.name in torques:
                 value = mechanism.joint_values(joint, x)[0]
-                for place, slope in value.slopes.items():
+                for place, slope in value.gradient.items():
                     forces[place] += torques[joint.name] * slope
         self.forces = forces
         jacobian = closure_of(mechanism, x).jacobian * mechanism.row_scales[:, np.newaxis, np.newaxis]
@@ -168,7 +168,7 @@ class _Equilibrium:
             ground_wrenches[tie.name] = wrench
             if len(carrier) == 1:
                 reactions[tie.name] = multipliers[rows]
-        posed = self.mechanism.posed(self.x)
+        posed = self.mechanism.placements(self.x)
         cut_names = {network.joints[cut].name for cut in self.mechanism.graph.cuts}
         for joint, wrench in self._pair_wrenches(multipliers, posed):
             if joint.name in cut_names:  # a cut joint, whose multipliers hold its variable, too
@@ -185,14 +185,14 @@ class _Equilibrium:
             reactions[joint.name] = _at_frame(ground_wrenches[joint.name], posed.joints[joint.name])
         return reactions
 
-    def _pair_wrenches(self, multipliers: FloatArray, posed: Posed) -> list[tuple[Joint, FloatArray]]:
+    def _pair_wrenches(self, multipliers: FloatArray, posed: Placements) -> list[tuple[Joint, FloatArray]]:
         """Return what pairs exert along the variables of their joints, on second bodies, in the ground.
 
         The moment about n of an angle, the force along n of a length, as wrenches, shape (6, n).
         """
         mechanism, wrenches = self.mechanism, []
         joints = {joint.name: joint for joint in mechanism.network.joints}
-        controls = mechanism.control_slopes(self.x)
+        controls = mechanism.control_values(self.x)
         for row, element in enumerate(mechanism.network.elements, 6 * len(mechanism.graph.cuts)):
             rates = mechanism.pair_error(element, self.x, controls)[1] if element.is_pair else {}
             for (name, index), rate in rates.items():

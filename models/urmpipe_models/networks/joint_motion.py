@@ -14,13 +14,13 @@ import numpy as np
 
 from urmpipe_models.elementwise import ZERO, Element, FloatArray, Vector, add, cross, dot, scale, subtract
 from urmpipe_models.math3d import Transform, rotation_y, translation
-from urmpipe_models.networks.parts import ConstraintElement, Joint, frame_of
+from urmpipe_models.networks.parts import ConstraintElement, Joint, frame_from_axes
 
-SMALL = 1e-8
+SMALL_ANGLE_SQUARED = 1e-8
 """Below this square of an angle in [rad^2] series stand for quotients of which both parts vanish."""
 
 
-def rotation_of(q: Vector) -> Transform:
+def exp3(q: Vector) -> Transform:
     """Return exp([q]x) = cos(a) I + (sin(a) / a) [q]x + ((1 - cos(a)) / a^2) q q^T, a = |q|.
 
     Args:
@@ -39,7 +39,7 @@ def rotation_of(q: Vector) -> Transform:
     )
 
 
-def turning_of(q: Vector) -> tuple[Vector, Vector, Vector]:
+def left_jacobian(q: Vector) -> tuple[Vector, Vector, Vector]:
     """Return the angular velocities in the outer frame with which exp([q]x) turns as q_1, q_2, q_3 change.
 
     The columns of I + ((1 - cos(a)) / a^2) [q]x + ((a - sin(a)) / a^3) [q]x^2, a = |q|.
@@ -62,7 +62,7 @@ def turning_of(q: Vector) -> tuple[Vector, Vector, Vector]:
 
 def _quotients(square: Element) -> tuple[Element, Element, Element, Element]:
     """Return cos(a), sin(a) / a, (1 - cos(a)) / a^2 and (a - sin(a)) / a^3 of a^2 in [rad^2]."""
-    small = square < SMALL
+    small = square < SMALL_ANGLE_SQUARED
     safe = np.where(small, 1.0, square)
     a = np.sqrt(safe)
     c, s = np.cos(a), np.sin(a)
@@ -75,10 +75,10 @@ def _quotients(square: Element) -> tuple[Element, Element, Element, Element]:
     )
 
 
-def untwisted(vector: FloatArray) -> FloatArray:
+def left_jacobian_inverse(vector: FloatArray) -> FloatArray:
     """Return what makes the rate of a rotation vector of an angular velocity in the outer frame.
 
-    I - [v]x / 2 + ((1 - (a / 2) cot(a / 2)) / a^2) [v]x^2, a = |v|: the inverse of `turning_of`.
+    I - [v]x / 2 + ((1 - (a / 2) cot(a / 2)) / a^2) [v]x^2, a = |v|: the inverse of `left_jacobian`.
 
     Args:
         vector: v in [rad], shape (3, n).
@@ -87,7 +87,7 @@ def untwisted(vector: FloatArray) -> FloatArray:
         [-], shape (3, 3, n).
     """
     square = np.einsum("kn,kn->n", vector, vector)
-    small = square < SMALL
+    small = square < SMALL_ANGLE_SQUARED
     a = np.sqrt(np.where(small, 1.0, square))
     factor = np.where(small, 1.0 / 12.0 + square / 720.0, (1.0 - 0.5 * a / np.tan(0.5 * a)) / (a * a))
     skew = _skew(vector)
@@ -113,7 +113,7 @@ def wrap_rotation_vector(vector: Vector) -> Vector:
     return scale(np.where(turns > 0.0, 1.0 - 2.0 * np.pi * turns / np.maximum(angle, 1.0), 1.0), vector)
 
 
-Screws: TypeAlias = list[tuple[Vector, Vector]]
+Twists: TypeAlias = list[tuple[Vector, Vector]]
 """Angular velocity [rad] and velocity [m] of the point at the ground's origin, a unit of each value."""
 
 
@@ -134,9 +134,9 @@ def joint_frame(joint: Joint, values: Sequence[Element]) -> Transform:
     Source: [KinematicSystems]_ section 3.2.2, with its errata.
     """
     if joint.kind == "user":
-        return frame_of(_three(values, 0), _three(values, 3), _three(values, 6))
+        return frame_from_axes(_three(values, 0), _three(values, 3), _three(values, 6))
     if joint.kind == "global":
-        return rotation_of(_three(values, 0))
+        return exp3(_three(values, 0))
     if joint.kind == "prismatic":
         return translation(0.0, values[0], 0.0)
     turned = rotation_y(values[0])
@@ -144,7 +144,7 @@ def joint_frame(joint: Joint, values: Sequence[Element]) -> Transform:
     return Transform(turned.rotation, (0.0, slid, 0.0))
 
 
-def joint_screws(joint: Joint, values: Sequence[Element], at: Transform) -> Screws:
+def joint_twists(joint: Joint, values: Sequence[Element], at: Transform) -> Twists:
     """Return the twists of the second body against the first in the ground, one a value.
 
     Of theta: (n, p x n); of s: (0, n); of a helical joint: (n, p x n + pitch n); of the rotation vector:
@@ -167,12 +167,12 @@ def joint_screws(joint: Joint, values: Sequence[Element], at: Transform) -> Scre
     if joint.kind == "helical":
         return [(n, add(turning[1], scale(joint.pitch, n)))]
     if joint.kind == "global":
-        axes = [at.rotate(axis) for axis in turning_of(_three(values, 0))]
+        axes = [at.rotate(axis) for axis in left_jacobian(_three(values, 0))]
         return [(axis, cross(p, axis)) for axis in axes]
     return _user_screws(values, at)
 
 
-def forbidden(
+def constraint_twists(
     joint: Joint, values: Sequence[Element], at: Transform
 ) -> Iterator[tuple[str, str, tuple[Vector, Vector]]]:
     """Yield what a joint does not let its bodies do: in words, in which unit, and as a twist in the ground.
@@ -192,20 +192,20 @@ def forbidden(
             yield f"rotation about {name}", "rad", (axis, cross(origin, axis))
         if not (k == 1 and joint.kind in SLIDING):
             yield f"translation along {name}", "m", (ZERO, axis)
-    screws = joint_screws(joint, values, at)
+    screws = joint_twists(joint, values, at)
     for drive, unit, screw in zip(joint.drives, joint.units, screws, strict=False):
         if drive is not None:
             yield "drive", unit, screw
 
 
-def _user_screws(values: Sequence[Element], at: Transform) -> Screws:
+def _user_screws(values: Sequence[Element], at: Transform) -> Twists:
     """Return the twists of the nine entries of a user joint.
 
     w = (m x m' + n x n' + k x k') / 2 with k = m x n, whose rate is m' x n + m x n'.
     """
     m, n, a = (_three(values, 3 * i) for i in range(3))
     k = cross(m, n)
-    screws: Screws = []
+    screws: Twists = []
     for axis in _AXES:
         screws.append(_about(add(cross(m, axis), cross(k, cross(axis, n))), a, at))
     for axis in _AXES:
@@ -226,7 +226,7 @@ def _three(values: Sequence[Element], first: int) -> Vector:
     return values[first], values[first + 1], values[first + 2]
 
 
-MEASURES = {
+MEASURED_QUANTITIES = {
     "gg": "length",
     "eg": "height",
     "crc": "distance",
@@ -242,7 +242,7 @@ PARALLEL = 1e-12
 """Below this sine of their angle two lines have no common normal: their distance is none then."""
 
 
-class Measured(NamedTuple):
+class ElementMeasurement(NamedTuple):
     """What an element measures between its bodies.
 
     Attributes:
@@ -257,7 +257,7 @@ class Measured(NamedTuple):
     force: Vector
 
 
-def measure(element: ConstraintElement, first: Transform, second: Transform) -> Measured:
+def measure_element(element: ConstraintElement, first: Transform, second: Transform) -> ElementMeasurement:
     """Return what an element measures: a distance of points, of a point from a plane or a line, or of lines.
 
     gg: |p_2 - p_1|. eg: n . (p_2 - g_1). crc: |(p_2 - p_1) . u|, u the unit vector of n_1 x n_2. gc: the
@@ -274,28 +274,28 @@ def measure(element: ConstraintElement, first: Transform, second: Transform) -> 
     apart = subtract(q, p)
     n = first.rotate(element.normals[0])
     if element.kind == "eg":
-        return Measured(dot(n, subtract(q, first.translation)), cross(q, n), n)
+        return ElementMeasurement(dot(n, subtract(q, first.translation)), cross(q, n), n)
     if element.kind == "gg":
         distance, u = _length_and_unit(apart)
-        return Measured(distance, cross(p, u), u)
+        return ElementMeasurement(distance, cross(p, u), u)
     if element.kind == "gc":
         distance, u = _length_and_unit(subtract(apart, scale(dot(apart, n), n)))
-        return Measured(distance, cross(q, u), u)
+        return ElementMeasurement(distance, cross(q, u), u)
     return _between_lines(element, p, apart, n, second.rotate(element.normals[1]))
 
 
 def _between_lines(
     element: ConstraintElement, p: Vector, apart: Vector, n: Vector, other: Vector
-) -> Measured:
+) -> ElementMeasurement:
     """Return the distance of two lines: p + n a, and the line through p + apart along other."""
     sine, u = _length_and_unit(cross(n, other))
     distance = dot(apart, u)
     # where on the first line the second is nearest: nowhere in particular if they are parallel
     along = np.where(sine > PARALLEL, dot(cross(apart, other), u) / np.maximum(sine, PARALLEL), 0.0)
-    if not element.meeting:
+    if not element.has_zero_length:
         sign = np.where(distance < 0.0, -1.0, 1.0)
         distance, u = sign * distance, scale(sign, u)
-    return Measured(distance, cross(add(p, scale(along, n)), u), u)
+    return ElementMeasurement(distance, cross(add(p, scale(along, n)), u), u)
 
 
 def _length_and_unit(vector: Vector) -> tuple[Element, Vector]:

@@ -15,17 +15,17 @@ import numpy as np
 
 from urmpipe_models.elementwise import Element, FloatArray, IndexArray, Vector, subtract
 from urmpipe_models.math3d import Transform
-from urmpipe_models.networks.elements import transmitted
-from urmpipe_models.networks.joint_motion import joint_frame, rotation_of
+from urmpipe_models.networks.elements import transmission
+from urmpipe_models.networks.joint_motion import exp3, joint_frame
 from urmpipe_models.networks.parts import (
     POSE_UNITS,
     ConstraintElement,
     Expression,
+    Gradient,
     Joint,
     Parts,
-    Slopes,
-    ordered_controls,
-    ranged,
+    sample_range,
+    sort_controls,
 )
 
 Structure = Literal["tree", "loops", "closed chain"]
@@ -88,12 +88,12 @@ class Graph:
         """Tree, closed chain (loops, and at each body two joints or elements or more), or loops."""
         if not self.loops:
             return "tree"
-        ends = [name for _, one in self.network.ties for name in one.bodies]
+        ends = [name for _, one in self.network.constraints for name in one.bodies]
         least = min(ends.count(name) for name in self.network.body_names)
         return "closed chain" if least >= 2 else "loops"
 
 
-def graph_of(network: Parts) -> Graph:
+def build_graph(network: Parts) -> Graph:
     """Return the graph of a network, its spanning forest grown joint by joint in breadth."""
     placed = [one.name for one in network.bodies if one.start]
     roots: list[str] = []
@@ -141,10 +141,10 @@ def _way(tree: Sequence[tuple[str, str, str]], start: str, end: str) -> tuple[st
     return ways.get(end, ())
 
 
-def parts_without(network: Parts, left_out: Iterable[str]) -> list[set[str]]:
+def components_without(network: Parts, left_out: Iterable[str]) -> list[set[str]]:
     """Return the sets of bodies that hang together by joints and elements without some of these, by name."""
     out = set(left_out)
-    edges = [one.bodies for _, one in network.ties if one.name not in out]
+    edges = [one.bodies for _, one in network.constraints if one.name not in out]
     parts: list[set[str]] = [{name} for name in network.body_names]
     for first, second in edges:
         a, b = (next(part for part in parts if name in part) for name in (first, second))
@@ -179,16 +179,16 @@ class Variable:
 
 
 @dataclass(frozen=True, slots=True)
-class Given:
+class ValueWithGradient:
     """A value that is a variable or a function of controls.
 
     Attributes:
         value: The value, any element.
-        slopes: Its derivatives by the number of each variable.
+        gradient: Its derivatives by the number of each variable.
     """
 
     value: Element
-    slopes: dict[int, Element] = field(default_factory=dict)
+    gradient: dict[int, Element] = field(default_factory=dict)
 
 
 class Pose(NamedTuple):
@@ -203,7 +203,7 @@ class Pose(NamedTuple):
     movers: dict[str, int]
 
 
-class Posed(NamedTuple):
+class Placements(NamedTuple):
     """Where everything is.
 
     Attributes:
@@ -247,7 +247,7 @@ class Mechanism:
         return (*controls, *joints, *bodies)
 
     @cached_property
-    def places(self) -> dict[tuple[str, int], int]:
+    def variable_index(self) -> dict[tuple[str, int], int]:
         """The number of each variable by its owner and its number there."""
         return {(one.owner, one.index): k for k, one in enumerate(self.variables)}
 
@@ -355,7 +355,7 @@ class Mechanism:
             x[k] = self._sampled(self.variables[k].owner)
             moved = np.zeros(SAMPLES)
             for given, unit in self._driven(x):
-                slope = np.nan_to_num(np.asarray(given.slopes.get(k, 0.0)), posinf=0.0, neginf=0.0)
+                slope = np.nan_to_num(np.asarray(given.gradient.get(k, 0.0)), posinf=0.0, neginf=0.0)
                 moved += (slope / (self.length if unit == "m" else 1.0)) ** 2
             scales[k] = 1.0 / np.sqrt(moved.max()) if moved.max() > 0.0 else 1.0
         return scales
@@ -363,57 +363,62 @@ class Mechanism:
     def _sampled(self, name: str) -> FloatArray:
         """Return values of a control, shape (SAMPLES,): over its range, else from its start - 1 to + 1."""
         (one,) = (one for one in self.network.controls if one.name == name)
-        return np.linspace(*ranged(one), SAMPLES)
+        return np.linspace(*sample_range(one), SAMPLES)
 
-    def _driven(self, x: FloatArray) -> Iterator[tuple[Given, str]]:
+    def _driven(self, x: FloatArray) -> Iterator[tuple[ValueWithGradient, str]]:
         """Yield what controls make of joints and elements, and the unit."""
-        controls = self.control_slopes(x)
+        controls = self.control_values(x)
         for joint in self.network.joints:
             for drive, unit in zip(joint.drives, joint.units, strict=True):
                 if drive is not None:
-                    yield of_controls(drive, controls), unit
+                    yield evaluate_expression(drive, controls), unit
             for k, part in enumerate(joint.motion):
-                yield of_controls(part, controls), "m" if k >= 6 else "rad"
+                yield evaluate_expression(part, controls), "m" if k >= 6 else "rad"
         yield from zip(self.lengths(x), self.network.element_units, strict=True)
 
-    def control_slopes(self, x: Configuration) -> dict[str, Given]:
+    def control_values(self, x: Configuration) -> dict[str, ValueWithGradient]:
         """Return the value of each control, and its derivatives by the variables.
 
         Args:
             x: The variables, one element each.
         """
-        found: dict[str, Given] = {}
-        for one in ordered_controls(self.network.controls):
+        found: dict[str, ValueWithGradient] = {}
+        for one in sort_controls(self.network.controls):
             if one.value is None:
-                k = self.places[one.name, 0]
-                found[one.name] = Given(x[k], {k: 1.0})
+                k = self.variable_index[one.name, 0]
+                found[one.name] = ValueWithGradient(x[k], {k: 1.0})
             else:
-                found[one.name] = of_controls(one.value, found)
+                found[one.name] = evaluate_expression(one.value, found)
         return found
 
-    def lengths(self, x: Configuration) -> list[Given]:
+    def lengths(self, x: Configuration) -> list[ValueWithGradient]:
         """Return the length of each element in [m] or [rad], and its derivatives."""
-        controls = self.control_slopes(x)
-        return [of_controls(one.length, controls) for one in self.network.elements]
+        controls = self.control_values(x)
+        return [evaluate_expression(one.length, controls) for one in self.network.elements]
 
-    def joint_values(self, joint: Joint, x: Configuration) -> list[Given]:
-        """Return the value of each variable of a joint, free or driven, and its derivatives."""
-        return self.values(joint, x, self.control_slopes(x))
+    def joint_values(
+        self, joint: Joint, x: Configuration, controls: dict[str, ValueWithGradient] | None = None
+    ) -> list[ValueWithGradient]:
+        """Return the value of each variable of a joint, and its derivatives; of a user joint m, n and a.
 
-    def values(self, joint: Joint, x: Configuration, controls: dict[str, Given]) -> list[Given]:
-        """Return the same where `control_slopes` is known; of a user joint the entries of m, n and a."""
+        Args:
+            joint: The joint.
+            x: The variables, one element each.
+            controls: The result of `control_values`, if it is known.
+        """
+        controls = self.control_values(x) if controls is None else controls
         found = []
         for index, drive in enumerate(joint.drives):
             if drive is None:
-                k = self.places[joint.name, index]
-                found.append(Given(x[k], {k: 1.0}))
+                k = self.variable_index[joint.name, index]
+                found.append(ValueWithGradient(x[k], {k: 1.0}))
             else:
-                found.append(of_controls(drive, controls))
-        return found or [of_controls(one, controls) for one in joint.motion]
+                found.append(evaluate_expression(drive, controls))
+        return found or [evaluate_expression(one, controls) for one in joint.motion]
 
     def pair_error(
-        self, element: ConstraintElement, x: Configuration, controls: dict[str, Given]
-    ) -> tuple[Given, dict[tuple[str, int], Element]]:
+        self, element: ConstraintElement, x: Configuration, controls: dict[str, ValueWithGradient]
+    ) -> tuple[ValueWithGradient, dict[tuple[str, int], Element]]:
         """Return q_2 - f(q_1) - offset of a pair, in [rad] or [m], see `higher_pairs`.
 
         Then, its derivatives by the values of its joints: by the joint and the value's number.
@@ -421,17 +426,17 @@ class Mechanism:
         Args:
             element: The pair.
             x: The variables, one element each.
-            controls: What `control_slopes` returns.
+            controls: What `control_values` returns.
         """
-        (first, j), (second, k) = self.network.coupled(element)
-        angle, follower = self.values(first, x, controls)[j], self.values(second, x, controls)[k]
-        offset = of_controls(element.length, controls)
-        value, rate = transmitted(element, angle.value)
+        (first, j), (second, k) = self.network.pair_variables(element)
+        angle, follower = self.joint_values(first, x, controls)[j], self.joint_values(second, x, controls)[k]
+        offset = evaluate_expression(element.length, controls)
+        value, rate = transmission(element, angle.value)
         slopes: dict[int, Element] = {}
         for factor, given in ((-rate, angle), (1.0, follower), (-1.0, offset)):
-            for place, slope in given.slopes.items():
+            for place, slope in given.gradient.items():
                 slopes[place] = slopes.get(place, 0.0) + factor * slope
-        error = Given(follower.value - value - offset.value, slopes)
+        error = ValueWithGradient(follower.value - value - offset.value, slopes)
         return error, {(first.name, j): -rate, (second.name, k): 1.0}
 
     def poses(self, x: Configuration) -> dict[str, Transform]:
@@ -440,22 +445,22 @@ class Mechanism:
         Args:
             x: The variables, one element each: floats, arrays of shape (n,), or symbols.
         """
-        return {name: one.frame for name, one in self.posed(x).bodies.items()}
+        return {name: one.frame for name, one in self.placements(x).bodies.items()}
 
-    def posed(self, x: Configuration) -> Posed:
+    def placements(self, x: Configuration) -> Placements:
         """Return the pose of each body, what moves it, and where the joints are."""
-        controls, joints = self.control_slopes(x), {}
+        controls, joints = self.control_values(x), {}
         bodies = {self.network.ground: Pose(Transform(), {})}
         for name in self.graph.roots[1:]:
-            first = self.places[name, 0]
+            first = self.variable_index[name, 0]
             position, vector = (
                 (x[first], x[first + 1], x[first + 2]),
                 (x[first + 3], x[first + 4], x[first + 5]),
             )
-            bodies[name] = Pose(Transform(rotation_of(vector).rotation, position), {name: 1})
+            bodies[name] = Pose(Transform(exp3(vector).rotation, position), {name: 1})
         for branch, back in zip(self.graph.branches, self._backs, strict=True):
             joint, parent = self.network.joints[branch.joint], bodies[branch.parent]
-            moved = joint_frame(joint, [one.value for one in self.values(joint, x, controls)])
+            moved = joint_frame(joint, [one.value for one in self.joint_values(joint, x, controls)])
             if branch.sign > 0:
                 at = parent.frame @ joint.frames[0]
                 child = at @ moved @ back
@@ -466,7 +471,7 @@ class Mechanism:
             bodies[branch.child] = Pose(child, {**parent.movers, joint.name: branch.sign})
         for joint in (self.network.joints[cut] for cut in self.graph.cuts):
             joints[joint.name] = bodies[joint.bodies[0]].frame @ joint.frames[0]
-        return Posed(bodies, joints)
+        return Placements(bodies, joints)
 
     @cached_property
     def _backs(self) -> list[Transform]:
@@ -475,21 +480,21 @@ class Mechanism:
         return [pair[one.sign > 0].inverse() for pair, one in zip(frames, self.graph.branches, strict=True)]
 
 
-def mechanism_of(network: Parts) -> Mechanism:
+def build_mechanism(network: Parts) -> Mechanism:
     """Return a network in numbers."""
-    return Mechanism(network, graph_of(network))
+    return Mechanism(network, build_graph(network))
 
 
-def of_controls(expression: Expression, controls: dict[str, Given]) -> Given:
+def evaluate_expression(expression: Expression, controls: dict[str, ValueWithGradient]) -> ValueWithGradient:
     """Return the value of a function of controls, and its derivatives by the variables."""
-    value, slopes = expression.with_slopes({name: one.value for name, one in controls.items()})
-    return Given(value, _chained(slopes, controls))
+    value, slopes = expression.value_and_gradient({name: one.value for name, one in controls.items()})
+    return ValueWithGradient(value, _chained(slopes, controls))
 
 
-def _chained(slopes: Slopes, controls: dict[str, Given]) -> dict[int, Element]:
+def _chained(slopes: Gradient, controls: dict[str, ValueWithGradient]) -> dict[int, Element]:
     """Return derivatives by variables from those by controls."""
     found: dict[int, Element] = {}
     for name, slope in slopes.items():
-        for k, inner in controls[name].slopes.items():
+        for k, inner in controls[name].gradient.items():
             found[k] = found.get(k, 0.0) + slope * inner
     return found

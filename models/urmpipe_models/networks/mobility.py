@@ -21,7 +21,7 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray, IndexArray, Vector
 from urmpipe_models.networks.closure import descend, released, scaled_closure, spinning_parts
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.parts import (
     POSE_UNITS,
     Body,
@@ -276,8 +276,8 @@ def with_start(network: Network, x: Sequence[float]) -> Network:
         network: The network.
         x: The variables of its mechanism in [m], [rad] and as controls are given, shape (variables,).
     """
-    mechanism = mechanism_of(network)
-    places = mechanism.places
+    mechanism = build_mechanism(network)
+    places = mechanism.variable_index
 
     def start_of(owner: str, old: Sequence[float], count: int) -> tuple[float, ...]:
         """Return the variables of an owner, and the old start of those that are driven."""

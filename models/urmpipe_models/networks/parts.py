@@ -23,18 +23,20 @@ from urmpipe_models.errors import Finding, OptionError, nearest, not_among, show
 from urmpipe_models.math3d import Transform
 from urmpipe_models.measure_units import DEGREE, NAMES, WRITTEN, quantity
 
-LONGEST = 1000
+MAX_LETTERS = 1000
 """Letters of an expression: more are no formula that a person wrote."""
 
-DEEPEST = 50
+MAX_DEPTH = 50
 """Brackets and operators within each other."""
 
-ALLOWED = "numbers, names of controls, pi, + - * / ** and brackets, sin, cos, tan, atan2, sqrt, exp"
+ALLOWED_ARITHMETIC = (
+    "numbers, names of controls, pi, + - * / ** and brackets, sin, cos, tan, atan2, sqrt, exp"
+)
 
-Slopes: TypeAlias = dict[str, Element]
+Gradient: TypeAlias = dict[str, Element]
 """The partial derivative by each name that there is one of, in the expression's unit a unit of the name."""
 
-Valued: TypeAlias = tuple[Element, Slopes]
+Valued: TypeAlias = tuple[Element, Gradient]
 
 
 @dataclass(frozen=True)
@@ -59,9 +61,9 @@ class Expression:
 
     def value(self, values: Mapping[str, Element]) -> Element:
         """Return its value at values of its names, any elements."""
-        return self.with_slopes(values)[0]
+        return self.value_and_gradient(values)[0]
 
-    def with_slopes(self, values: Mapping[str, Element]) -> Valued:
+    def value_and_gradient(self, values: Mapping[str, Element]) -> Valued:
         """Return its value and its partial derivatives at values of its names, any elements.
 
         By the rules of differentiation along its tree, so that they are exact to rounding.
@@ -77,16 +79,16 @@ class Expression:
 @cache
 def _parsed(text: str) -> ast.expr:
     """Return the tree of an expression whose parts are all arithmetic; raise a `ValueError` of any other."""
-    if len(text) > LONGEST:
-        raise ValueError(f"found {shown(text)} of {len(text)} letters, allowed: {LONGEST} at most")
-    if (nested := _nested(text)) > DEEPEST:
-        raise ValueError(f"found {shown(text)}, nested {nested} deep; allowed: {DEEPEST}")
+    if len(text) > MAX_LETTERS:
+        raise ValueError(f"found {shown(text)} of {len(text)} letters, allowed: {MAX_LETTERS} at most")
+    if (nested := _nested(text)) > MAX_DEPTH:
+        raise ValueError(f"found {shown(text)}, nested {nested} deep; allowed: {MAX_DEPTH}")
     try:
         if "#" in text:  # the rest would be a remark
             raise SyntaxError("a remark")
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise ValueError(f"found {shown(text)}, no arithmetic; allowed: {ALLOWED}") from error
+        raise ValueError(f"found {shown(text)}, no arithmetic; allowed: {ALLOWED_ARITHMETIC}") from error
     _refuse(tree, text, 0)
     return tree
 
@@ -99,8 +101,8 @@ def _nested(text: str) -> int:
 
 def _refuse(node: ast.expr, text: str, depth: int) -> None:
     """Raise a `ValueError` if a tree holds anything but arithmetic, or is nested too deep."""
-    if depth > DEEPEST:
-        raise ValueError(f"found {shown(text)}, nested {depth} deep; allowed: {DEEPEST}")
+    if depth > MAX_DEPTH:
+        raise ValueError(f"found {shown(text)}, nested {depth} deep; allowed: {MAX_DEPTH}")
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool) and _finite(value):
             parts: list[ast.expr] = []
@@ -122,7 +124,7 @@ def _refuse(node: ast.expr, text: str, depth: int) -> None:
             hint = (
                 "; a power is **" if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor) else ""
             )
-            raise ValueError(f"found {shown(found)}, no arithmetic; allowed: {ALLOWED}{hint}")
+            raise ValueError(f"found {shown(found)}, no arithmetic; allowed: {ALLOWED_ARITHMETIC}{hint}")
     for part in parts:
         _refuse(part, text, depth + 1)
 
@@ -158,12 +160,12 @@ def _valued(node: ast.expr, values: Mapping[str, Element]) -> Valued:
     raise TypeError(f"{ast.dump(node)} was let through")
 
 
-def _by(slopes: Slopes, factor: Element) -> Slopes:
+def _by(slopes: Gradient, factor: Element) -> Gradient:
     """Return derivatives times a factor."""
     return {name: times(factor, slope) for name, slope in slopes.items()}
 
 
-def _sum(first: Slopes, second: Slopes) -> Slopes:
+def _sum(first: Gradient, second: Gradient) -> Gradient:
     """Return the sums of derivatives."""
     return {name: plus(first.get(name, 0.0), second.get(name, 0.0)) for name in {**first, **second}}
 
@@ -242,13 +244,13 @@ _FUNCTIONS: dict[str, Callable[..., Valued]] = {
 }
 
 
-GROUND = "ground"
+DEFAULT_GROUND = "ground"
 """What the body that stands still is called by default."""
 
 JointKind = Literal["revolute", "prismatic", "cylindrical", "helical", "global", "user"]
 ElementKind = Literal["gg", "eg", "crc", "gc", "gear", "rack", "cam"]
 
-FREEDOMS: dict[JointKind, tuple[str, ...]] = {
+JOINT_UNITS: dict[JointKind, tuple[str, ...]] = {
     "revolute": ("rad",),
     "prismatic": ("m",),
     "cylindrical": ("rad", "m"),
@@ -269,7 +271,7 @@ PAIR_JOINTS: dict[ElementKind, tuple[tuple[JointKind, ...], tuple[JointKind, ...
     "cam": (_ANGLES, ("prismatic", "revolute")),
 }  # of a pair, the kinds of its first joint, whose angle counts, and of its second: a rack moves s of it
 
-ORTHONORMAL = 1e-9  # of lengths and products of unit vectors: rounding, not a forgotten normalisation
+AXES_TOLERANCE = 1e-9  # of lengths and products of unit vectors: rounding, not a forgotten normalisation
 
 LIMIT_TOLERANCE = 1e-6  # [m], [rad]: assemblies that differ by less are the same
 
@@ -301,7 +303,7 @@ class Joint:
             user: T is any function of controls.
         bodies: The first and the second body.
         frames: A_1 and A_2: the columns of their rotations are m, n and m x n, their translations are a.
-        start: The variables from where assembly starts, in [rad] and [m] by `FREEDOMS`.
+        start: The variables from where assembly starts, in [rad] and [m] by `JOINT_UNITS`.
         values: What drives each variable, in [rad] and [m]; None where it is free; empty: all are.
         pitch: Of a helical joint in [m/rad].
         motion: Of a user joint: m, n (unit vectors) and a in [m], each three functions of controls.
@@ -323,7 +325,7 @@ class Joint:
     @property
     def units(self) -> tuple[str, ...]:
         """The unit of each of its variables, rad or m."""
-        return FREEDOMS[self.kind]
+        return JOINT_UNITS[self.kind]
 
     @property
     def drives(self) -> tuple[Expression | None, ...]:
@@ -379,7 +381,7 @@ class ConstraintElement:
         return "offset" if self.is_pair else "h" if self.kind == "eg" else "d"
 
     @cached_property
-    def meeting(self) -> bool:
+    def has_zero_length(self) -> bool:
         """Whether its length is the constant 0: two lines that meet have a distance with a sign."""
         return not self.length.names and float(self.length.value({})) == 0.0
 
@@ -405,7 +407,7 @@ class Control:
     value: Expression | None = None
 
 
-Placed: TypeAlias = tuple[str, Expression]
+PlacedExpression: TypeAlias = tuple[str, Expression]
 """A function of controls with its place in a file, such as joints.A.value."""
 
 
@@ -427,7 +429,7 @@ class Parts:
     joints: tuple[Joint, ...] = ()
     elements: tuple[ConstraintElement, ...] = ()
     controls: tuple[Control, ...] = ()
-    ground: str = GROUND
+    ground: str = DEFAULT_GROUND
 
     def as_parts(self) -> Parts:
         """Return the parts of a network alone: others may take their places, right or wrong."""
@@ -439,26 +441,26 @@ class Parts:
         return (self.ground, *(one.name for one in self.bodies))
 
     @cached_property
-    def ties(self) -> tuple[tuple[str, Joint | ConstraintElement], ...]:
+    def constraints(self) -> tuple[tuple[str, Joint | ConstraintElement], ...]:
         """The joints and elements, each with its place, such as joints.A."""
         joints = ((f"joints.{one.name}", one) for one in self.joints)
         return (*joints, *((f"elements.{one.name}", one) for one in self.elements))
 
     @cached_property
-    def functions(self) -> tuple[Placed, ...]:
+    def joint_functions(self) -> tuple[PlacedExpression, ...]:
         """The functions of joints."""
-        found: list[Placed] = []
+        found: list[PlacedExpression] = []
         for joint in self.joints:
             found += [(f"joints.{joint.name}.value", one) for one in joint.values if one is not None]
             found += [(f"joints.{joint.name}.{'mna'[k // 3]}", one) for k, one in enumerate(joint.motion[:9])]
         return tuple(found)
 
     @cached_property
-    def lengths(self) -> tuple[Placed, ...]:
+    def length_functions(self) -> tuple[PlacedExpression, ...]:
         """The lengths of elements: h of eg, the offset of a pair, d of the others."""
         return tuple((f"elements.{one.name}.{one.length_key}", one.length) for one in self.elements)
 
-    def coupled(self, element: ConstraintElement) -> tuple[tuple[Joint, int], ...]:
+    def pair_variables(self, element: ConstraintElement) -> tuple[tuple[Joint, int], ...]:
         """Return the joints of a pair that there are, each with the number of its variable."""
         joints = {joint.name: joint for joint in self.joints}
         known = [joints[name] for name in element.joints if name in joints]
@@ -475,10 +477,10 @@ class Parts:
     @cached_property
     def element_units(self) -> tuple[str, ...]:
         """The unit of each element's length: m, or rad of a pair whose second joint turns."""
-        seconds = (self.coupled(one)[1:] for one in self.elements)
+        seconds = (self.pair_variables(one)[1:] for one in self.elements)
         return tuple(some[0][0].units[some[0][1]] if some else "m" for some in seconds)
 
-    def unit_of(self, control: str) -> tuple[str, Decimal] | None:
+    def control_unit(self, control: str) -> tuple[str, Decimal] | None:
         """Return what a control is, m or rad, and how many of these one of it is.
 
         None where it drives neither a joint nor a length by itself, or both, or in several units.
@@ -489,7 +491,7 @@ class Parts:
         found = {(unit, alone[one.text]) for unit, one in driven if one is not None and one.text in alone}
         return found.pop() if len(found) == 1 else None
 
-    def control_alone(self, text: str) -> str | None:
+    def sole_control(self, text: str) -> str | None:
         """Return the control that a function consists of, whatever the units of its file; None of others."""
         names = (control.name for control in self.controls)
         return next((name for name in names if text in spellings(name)), None)
@@ -506,7 +508,7 @@ class Parts:
         """
         if not isinstance(value, str):
             return value
-        si, factor = self.unit_of(control) or ("", Decimal(1))
+        si, factor = self.control_unit(control) or ("", Decimal(1))
         units = {unit: in_si / factor for unit, in_si in WRITTEN.get(si, {}).items()} | {"": Decimal(1)}
         number = quantity(value, units)
         if not math.isfinite(number):
@@ -515,7 +517,7 @@ class Parts:
         return number
 
     @cached_property
-    def between_controls(self) -> tuple[Placed, ...]:
+    def control_functions(self) -> tuple[PlacedExpression, ...]:
         """The controls that are functions of others."""
         return tuple(
             (f"controls.{one.name}.value", one.value) for one in self.controls if one.value is not None
@@ -531,7 +533,7 @@ def spellings(control: str) -> dict[str, Decimal]:
     }
 
 
-def frame_of(m: Vector, n: Vector, a: Vector) -> Transform:
+def frame_from_axes(m: Vector, n: Vector, a: Vector) -> Transform:
     """Return A, whose rotation has the columns m, n and m x n [-], and whose translation is a in [m].
 
     Source: [KinematicSystems]_ section 3.2.2.
@@ -539,7 +541,7 @@ def frame_of(m: Vector, n: Vector, a: Vector) -> Transform:
     return Transform(Transform((m, n, cross(m, n))).columns, a)
 
 
-def ordered_controls(controls: Sequence[Control]) -> list[Control]:
+def sort_controls(controls: Sequence[Control]) -> list[Control]:
     """Return controls, each after those that it is a function of; those of a cycle are left out."""
     ordered: list[Control] = []
     known: set[str] = set()
@@ -551,7 +553,7 @@ def ordered_controls(controls: Sequence[Control]) -> list[Control]:
     return ordered
 
 
-def ranged(control: Control) -> tuple[float, float]:
+def sample_range(control: Control) -> tuple[float, float]:
     """Return where a control is looked at: its range, where that is open at most 1 from its start."""
     if math.isfinite(control.upper - control.lower):
         return control.lower, control.upper
@@ -595,9 +597,9 @@ def control_faults(parts: Parts) -> Iterator[Finding]:
     for one in parts.controls:
         yield from _own_faults(f"controls.{one.name}", one)
     names = sorted({one.name for one in parts.controls})
-    driving = (*parts.functions, *parts.lengths)
+    driving = (*parts.joint_functions, *parts.length_functions)
     unknown: set[str] = set()
-    for where, function in (*parts.between_controls, *driving):
+    for where, function in (*parts.control_functions, *driving):
         for name in sorted(function.names.difference(names)):
             unknown.add(name)
             yield Finding(f"control {not_among(name, names)}", about=where)
@@ -610,7 +612,7 @@ def control_faults(parts: Parts) -> Iterator[Finding]:
 
 def _own_faults(where: str, control: Control) -> Iterator[Finding]:
     """Yield what is wrong with the name, the limits and the start of a control."""
-    if not is_name(control.name):
+    if not is_control_name(control.name):
         allowed = "a letter, then letters, digits, _; not pi, a function or a word of Python"
         yield Finding(f"found {shown(control.name)} as a name, allowed: {allowed}", about=where)
     if control.value is not None:
@@ -625,7 +627,7 @@ def _own_faults(where: str, control: Control) -> Iterator[Finding]:
         yield Finding(f"found {start:g}, allowed: {lower:g} to {upper:g}", about=f"{where}.start")
 
 
-def is_name(text: str) -> bool:
+def is_control_name(text: str) -> bool:
     """Return whether an expression can have a text as the name of a control."""
     try:
         return text.isidentifier() and Expression(text).names == {text}
@@ -650,7 +652,9 @@ def _cycles(controls: tuple[Control, ...]) -> Iterator[list[str]]:
                 del needs[name]
 
 
-def _idle(controls: tuple[Control, ...], driving: Sequence[Placed], unknown: set[str]) -> Iterator[Finding]:
+def _idle(
+    controls: tuple[Control, ...], driving: Sequence[PlacedExpression], unknown: set[str]
+) -> Iterator[Finding]:
     """Yield controls that drive nothing, but for those that a name which is none may have meant."""
     names = [one.name for one in controls]
     found = {name for _, function in driving for name in function.names}

@@ -71,14 +71,14 @@ from urmpipe_models.networks.closure import (
     spin_angles,
 )
 from urmpipe_models.networks.joint_motion import (
-    Screws,
+    Twists,
     joint_frame,
-    joint_screws,
-    measure,
-    turning_of,
+    joint_twists,
+    left_jacobian,
+    measure_element,
     wrap_rotation_vector,
 )
-from urmpipe_models.networks.mechanism import Given, Mechanism, Posed, of_controls
+from urmpipe_models.networks.mechanism import Mechanism, Placements, ValueWithGradient, evaluate_expression
 from urmpipe_models.networks.motion import Slopes, iter_chunks
 
 
@@ -255,7 +255,7 @@ def close_network(mechanism: Mechanism, x: Sequence[Element], steps: int) -> lis
     closed = list(x)
     scales = mechanism.column_scales
     for _ in range(steps if len(mechanism.free) else 0):
-        posed, controls = mechanism.posed(closed), mechanism.control_slopes(closed)
+        posed, controls = mechanism.placements(closed), mechanism.control_values(closed)
         residual = _residual(mechanism, closed, posed, controls)
         columns = _jacobian(mechanism, closed, posed, controls)
         step = damped_normal_step(columns, residual)
@@ -322,7 +322,7 @@ def closure_residual(mechanism: Mechanism, x: Sequence[Element]) -> Column:
         mechanism: The network.
         x: The variables in [m], [rad] and as controls are given, one element each.
     """
-    return _residual(mechanism, x, mechanism.posed(x), mechanism.control_slopes(x))
+    return _residual(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
 
 
 def largest_residual(mechanism: Mechanism, x: Sequence[Element]) -> Element:
@@ -338,7 +338,7 @@ def closure_jacobian(mechanism: Mechanism, x: Sequence[Element]) -> list[Column]
         mechanism: The network.
         x: The variables in [m], [rad] and as controls are given, one element each.
     """
-    return _jacobian(mechanism, x, mechanism.posed(x), mechanism.control_slopes(x))
+    return _jacobian(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
 
 
 def damped_normal_step(columns: Sequence[Column], residual: Column, damping: float = FLOOR) -> Column:
@@ -374,7 +374,9 @@ def damped_normal_step(columns: Sequence[Column], residual: Column, damping: flo
     return step
 
 
-def _residual(mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls: dict[str, Given]) -> Column:
+def _residual(
+    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
+) -> Column:
     per_length = 1.0 / mechanism.length
     rows: Column = []
     for first, second in cut_frames(mechanism, x, posed, controls):
@@ -388,13 +390,13 @@ def _residual(mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls
             rows.append(times(per_unit, mechanism.pair_error(element, x, controls)[0].value))
             continue
         frames = (posed.bodies[name].frame for name in element.bodies)
-        length = of_controls(element.length, controls).value
-        rows.append(times(per_length, minus(measure(element, *frames).distance, length)))
+        length = evaluate_expression(element.length, controls).value
+        rows.append(times(per_length, minus(measure_element(element, *frames).distance, length)))
     return rows
 
 
 def _jacobian(
-    mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls: dict[str, Given]
+    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
 ) -> list[Column]:
     per_length, scales = 1.0 / mechanism.length, mechanism.column_scales
     screws = _free_screws(mechanism, x, posed, controls)
@@ -412,11 +414,11 @@ def _jacobian(
     for row, element in enumerate(mechanism.network.elements, 6 * len(cut_joints)):
         if element.is_pair:
             error, _ = mechanism.pair_error(element, x, controls)
-            for k in error.slopes.keys() & set(mechanism.free.tolist()):
+            for k in error.gradient.keys() & set(mechanism.free.tolist()):
                 factor = float(scales[k] * mechanism.row_scales[row])
-                columns[k - first_free][row] = times(factor, error.slopes[k])
+                columns[k - first_free][row] = times(factor, error.gradient[k])
             continue
-        measured = measure(element, *(posed.bodies[name].frame for name in element.bodies))
+        measured = measure_element(element, *(posed.bodies[name].frame for name in element.bodies))
         for mover, sign in relative_movers(posed.bodies, element.bodies).items():
             for k, w, v in screws[mover]:
                 rate = plus(dot(measured.moment, w), dot(measured.force, v))
@@ -425,35 +427,35 @@ def _jacobian(
 
 
 def cut_frames(
-    mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls: dict[str, Given]
+    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
 ) -> Iterator[tuple[Transform, Transform]]:
     """Yield the frame of each cut joint in the ground, once from each of its two bodies."""
     for cut in mechanism.graph.cuts:
         joint = mechanism.network.joints[cut]
-        moved = joint_frame(joint, [value.value for value in mechanism.values(joint, x, controls)])
+        moved = joint_frame(joint, [value.value for value in mechanism.joint_values(joint, x, controls)])
         yield posed.joints[joint.name] @ moved, posed.bodies[joint.bodies[1]].frame @ joint.frames[1]
 
 
 def _free_screws(
-    mechanism: Mechanism, x: Sequence[Element], posed: Posed, controls: dict[str, Given]
+    mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
 ) -> dict[str, list[tuple[int, Vector, Vector]]]:
     """Return the free variables of each mover by number, with the twist in the ground of one unit of each."""
     twists: dict[str, list[tuple[int, Vector, Vector]]] = {}
     for joint in mechanism.network.joints:
         drives = joint.drives
-        screws: Screws = []
+        screws: Twists = []
         if any(drive is None for drive in drives):
-            values = [value.value for value in mechanism.values(joint, x, controls)]
-            screws = joint_screws(joint, values, posed.joints[joint.name])
+            values = [value.value for value in mechanism.joint_values(joint, x, controls)]
+            screws = joint_twists(joint, values, posed.joints[joint.name])
         twists[joint.name] = [
-            (mechanism.places[joint.name, index], *screw)
+            (mechanism.variable_index[joint.name, index], *screw)
             for index, (drive, screw) in enumerate(zip(drives, screws, strict=False))
             if drive is None
         ]
     for name in mechanism.graph.roots[1:]:
-        first = mechanism.places[name, 0]
+        first = mechanism.variable_index[name, 0]
         p = posed.bodies[name].frame.translation
-        axes = turning_of((x[first + 3], x[first + 4], x[first + 5]))
+        axes = left_jacobian((x[first + 3], x[first + 4], x[first + 5]))
         screws = [*SLIDING_SCREWS, *((axis, cross(p, axis)) for axis in axes)]
         twists[name] = [(first + index, *screw) for index, screw in enumerate(screws)]
     return twists
@@ -580,7 +582,7 @@ def point_motion(
 def _in_joint_frames(mechanism: Mechanism, x: FloatArray, rows: FloatArray) -> FloatArray:
     """Return rows of `closure_residual`, along the axes of the ground, along those of `scaled_closure`."""
     turned = np.array(rows)
-    frames = cut_frames(mechanism, list(x), mechanism.posed(x), mechanism.control_slopes(x))
+    frames = cut_frames(mechanism, list(x), mechanism.placements(x), mechanism.control_values(x))
     for k, (here, _) in enumerate(frames):
         for first in (6 * k, 6 * k + 3):
             for axis, column in enumerate(here.columns):

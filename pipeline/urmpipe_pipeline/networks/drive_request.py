@@ -32,7 +32,7 @@ from urmpipe_models.networks.driving import (
 )
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.forces import Wrench, compute_forces
-from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.motion import LimitStop, SingularPose
 from urmpipe_models.networks.rates import Rates, compute_rates
 from urmpipe_pipeline import text
@@ -163,7 +163,7 @@ def drive_network(
     Raises:
         UrmpipeError: With everything that is wrong with the request.
     """
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     columns = _log_columns(network, request, log) if log is not None else {}
     holds = {name: value for name, value in request.drives.items() if log is None or not is_word(value)}
     columns = {name: column for name, column in columns.items() if name not in holds}
@@ -276,7 +276,7 @@ def _log_columns(network: Network, request: DriveRequest, log: Run) -> dict[str,
     named = {name: columns[name.casefold()] for name in controls if name.casefold() in columns}
     single = [joint for joint in network.joints if len(joint.units) == 1]
     for joint in single:
-        control = network.control_alone(joint.drives[0].text) if joint.drives[0] is not None else None
+        control = network.sole_control(joint.drives[0].text) if joint.drives[0] is not None else None
         if control is not None and joint.name.casefold() in columns:
             named.setdefault(control, columns[joint.name.casefold()])
     free = [joint.name for joint in single if joint.drives[0] is None]
@@ -425,7 +425,7 @@ def _events(
     if moved.stop is not None:
         stop = moved.stop
         control = stop.name if stop.name in {item.name for item in mechanism.network.controls} else ""
-        unit = (mechanism.network.unit_of(control) or ("",))[0] if control else stop.unit
+        unit = (mechanism.network.control_unit(control) or ("",))[0] if control else stop.unit
         limit = stop.limit * (drive_factor(mechanism.network, control) if control else 1.0)
         words = text.in_words(limit, unit) if unit else f"{limit:.6g}"
         words = f"{stop.name} reaches its limit {words} at {{at}}"
@@ -451,7 +451,7 @@ def _transmissions(
         variable = mechanism.variables[k]
         unit, factor = variable.unit, 1.0
         if variable.kind == "control":  # that follows a joint driven in its place
-            unit, decimal = mechanism.network.unit_of(variable.owner) or ("1", 1)
+            unit, decimal = mechanism.network.control_unit(variable.owner) or ("1", 1)
             factor = float(decimal)
         if variable.kind == "body":
             continue

@@ -21,7 +21,7 @@ from urmpipe_models.networks.assembly import (
 )
 from urmpipe_models.networks.driving import move_to
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.mobility import Assembly, Mobility, mobility_of, stuck_controls
 from urmpipe_models.networks.motion import Trace
 from urmpipe_models.networks.parts import exceeded_limits
@@ -95,7 +95,7 @@ def find_network(
     Raises:
         NetworkError: If a control is not of the network, or its value out of its range.
     """
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     parts: tuple[Callable[[], Any], ...] = (
         lambda: for_each(lambda pair: network.control_value(*pair), search.controls.items()),
         lambda: parse_start(network, search.start),
@@ -209,7 +209,7 @@ def _assemble(
     ends = [pose for pose, _ in branch.singular if pose.passage == "turns back"]
     why = ""
     if ends:
-        places = [f"{name} = {ends[0].x[mechanism.places[name, 0]]:.6g}" for name in moved]
+        places = [f"{name} = {ends[0].x[mechanism.variable_index[name, 0]]:.6g}" for name in moved]
         why = f": it turns back at {', '.join(places)}"
     message = (
         f"no motion from the start of the network leads to {at}{why}; the assembly is the nearest to the"

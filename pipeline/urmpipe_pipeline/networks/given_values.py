@@ -19,7 +19,7 @@ from urmpipe_models.errors import Finding, OptionError, for_each, not_among, sho
 from urmpipe_models.measure_units import MEASURES, NAMES, QUANTITY, WRITTEN, quantity
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.forces import Wrench
-from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_models.networks.parts import POSE_UNITS, Parts
 
 Quantity: TypeAlias = float | str
@@ -31,7 +31,7 @@ Range: TypeAlias = Quantity | Sequence[Quantity]
 
 def drive_factor(network: Parts, name: str) -> float:
     """Return how many SI units one of a drive is: of a control in deg or mm; 1 for all others."""
-    unit = network.unit_of(name)
+    unit = network.control_unit(name)
     return float(unit[1]) if unit and name in {control.name for control in network.controls} else 1.0
 
 
@@ -69,7 +69,7 @@ def is_word(value: Any) -> bool:
 def _find_unit(network: Network, name: str) -> tuple[str, Decimal]:
     """Return the SI unit of a drive and its factor from the unit of the file; "" and 1 of other names."""
     if name in {control.name for control in network.controls}:
-        return network.unit_of(name) or ("", Decimal(1))
+        return network.control_unit(name) or ("", Decimal(1))
     for joint in network.joints:
         for k, unit in enumerate(joint.units, 1):
             if name in (joint.name, f"{joint.name}[{k}]"):
@@ -106,7 +106,7 @@ def parse_start(network: Network, start: Mapping[str, Any]) -> dict[str, tuple[f
     Values of controls, as an assembly has them, are left out: drives and controls say where these are.
     """
     joints = {joint.name: joint.units for joint in network.joints if joint.units}
-    bodies = dict.fromkeys(mechanism_of(network).graph.roots[1:], POSE_UNITS)
+    bodies = dict.fromkeys(build_mechanism(network).graph.roots[1:], POSE_UNITS)
     units: dict[str, tuple[str, ...]] = {**bodies, **joints}
     controls = {control.name for control in network.controls}
 

@@ -20,7 +20,7 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Voice
 from urmpipe_models.math3d import quaternions
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.motion import Passage, iter_chunks
 from urmpipe_models.networks.rates import Taylor, point_motion
 from urmpipe_pipeline import text
@@ -226,7 +226,7 @@ class NetworkMotion(Result):
     @cached_property
     def mechanism(self) -> Mechanism:
         """The network in numbers."""
-        return mechanism_of(self.network)
+        return build_mechanism(self.network)
 
     @cached_property
     def joints(self) -> tuple[str, ...]:
@@ -371,13 +371,13 @@ def _joint_columns(mechanism: Mechanism) -> Iterator[tuple[str, str, Any]]:
     """Yield name, unit and value, a function of the variables, of joint variables and controls of lengths."""
     network = mechanism.network
     drives = [drive for joint in network.joints for drive in joint.drives if drive is not None]
-    shown = {network.control_alone(drive.text) for drive in drives}
+    shown = {network.sole_control(drive.text) for drive in drives}
     for joint in network.joints:
         for k, unit in enumerate(joint.units):
             name = joint.name if len(joint.units) == 1 else f"{joint.name}_{k + 1}"
             yield name, unit, partial(_joint_value, mechanism, joint, k)
     for control in network.controls:
-        unit_factor = network.unit_of(control.name)
+        unit_factor = network.control_unit(control.name)
         if unit_factor is not None and control.name not in shown:
             value = partial(_control_value, mechanism, control.name, float(unit_factor[1]))
             yield control.name, unit_factor[0], value
@@ -388,7 +388,7 @@ def _joint_value(mechanism: Mechanism, joint: Any, k: int, x: Any) -> Any:
 
 
 def _control_value(mechanism: Mechanism, name: str, factor: float, x: Any) -> Any:
-    return mechanism.control_slopes(x)[name].value * factor
+    return mechanism.control_values(x)[name].value * factor
 
 
 def motion_run(motion: NetworkMotion) -> Run:

@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.elementwise import FloatArray, Vector
 from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_models.networks.mobility import Assembly
 from urmpipe_models.networks.parts import ConstraintElement, Joint
 from urmpipe_pipeline.networks.drives import is_driven
@@ -135,7 +135,7 @@ class Placed:
 
 def placed(network: Network, assembly: Assembly, sides: int = SIDES) -> Placed:
     """Return where everything is in an assembly, to be drawn with so many sides of what is round."""
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     x = np.array(
         [
             assembly.values.get(one.owner, ())[one.index : one.index + 1] or (0.0,)
@@ -156,7 +156,7 @@ def placed_at(network: Network, poses: FloatArray, lengths: FloatArray, sides: i
         lengths: Of the elements in [m], shape (elements,).
         sides: Of what is round.
     """
-    mechanism, by_name = mechanism_of(network), dict(zip(network.body_names, poses, strict=True))
+    mechanism, by_name = build_mechanism(network), dict(zip(network.body_names, poses, strict=True))
     known = tuple(lengths.tolist())
     unscaled = Placed(network, by_name, mechanism.points, known, 1.0)
     points = np.concatenate([body_points(unscaled, name) for name in network.body_names])
@@ -173,7 +173,7 @@ def find_plane(at: Placed) -> PlaneView | None:
     """
     network = at.network
     axes = [at.axes(one.bodies[0], one.frames[0])[:, 1] for one in network.joints if one.kind == "revolute"]
-    if not axes or len(mechanism_of(network).graph.roots) > 1:
+    if not axes or len(build_mechanism(network).graph.roots) > 1:
         return None
     normal = axes[0] * np.sign(axes[0][np.argmax(np.abs(axes[0]))])
     planar = all(_is_planar_joint(at, one, normal) for one in network.joints)
@@ -372,7 +372,7 @@ def element_lines(at: Placed, element: ConstraintElement, length: float) -> tupl
 
 def _pair_lines(at: Placed, pair: ConstraintElement) -> tuple[FloatArray, ...]:
     """Return the line between the joints of a pair, and the pitch circles of a gear or a pinion."""
-    first, second = (joint for joint, _ in at.network.coupled(pair))
+    first, second = (joint for joint, _ in at.network.pair_variables(pair))
     p, q = at.point(first.bodies[0], first.frames[0].translation), _joint(at, second).at
     axes = [at.axes(joint.bodies[0], joint.frames[0])[:, 1] for joint in (first, second)]
     lines = [np.array([p, q])]

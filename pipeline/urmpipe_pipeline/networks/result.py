@@ -13,7 +13,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Voice
 from urmpipe_models.math3d import quaternions
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.mechanism import Structure, mechanism_of
+from urmpipe_models.networks.mechanism import Structure, build_mechanism
 from urmpipe_models.networks.mobility import Assembly, Gap, Mobility
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
@@ -84,12 +84,12 @@ class NetworkResult(Result):
     @property
     def variables(self) -> int:
         """Controls that can be set, free variables of joints, and six of each body that floats: how many."""
-        return len(mechanism_of(self.network).variables)
+        return len(build_mechanism(self.network).variables)
 
     @property
     def kutzbach(self) -> int:
         """6 (bodies - 1) - sum of (6 - f) - elements - what controls take: variables less equations."""
-        return self.variables - mechanism_of(self.network).rows
+        return self.variables - build_mechanism(self.network).rows
 
     def _headline(self) -> str:
         """Return its verdict, what it is and how much of it moves, and how many assemblies there are."""

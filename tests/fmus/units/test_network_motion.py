@@ -19,8 +19,8 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError, UrmpipeError
 from urmpipe_models.networks.closure import descend
 from urmpipe_models.networks.file import load_network
-from urmpipe_models.networks.joint_motion import rotation_of
-from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.joint_motion import exp3
+from urmpipe_models.networks.mechanism import build_mechanism
 
 Backend = Literal["native", "python"]
 
@@ -106,7 +106,7 @@ def converged(
 ) -> dict[str, FloatArray]:
     """Return the outputs that close to the last digit, found by many steps from those of a unit."""
     parts = load_network(network)
-    mechanism = mechanism_of(parts)
+    mechanism = build_mechanism(parts)
     kinds = {joint.name: joint.kind for joint in parts.joints}
     suffixes = {
         "cylindrical": ("_theta", "_s"),
@@ -117,7 +117,7 @@ def converged(
     for one in mechanism.variables:
         suffix = suffixes.get(kinds.get(one.owner, one.kind), ("",))[one.index]
         scalars.append(f"{one.owner.replace('.', '_')}{suffix}")
-        factors.append(float((parts.unit_of(one.owner) or ("", 1))[1]) if one.kind == "control" else 1.0)
+        factors.append(float((parts.control_unit(one.owner) or ("", 1))[1]) if one.kind == "control" else 1.0)
     x = np.array([{**found, **inputs}[name] / factor for name, factor in zip(scalars, factors, strict=True)])
     exact = descend(mechanism, x, mechanism.free)
     assert exact.gap.max() < 1e-13  # rounding
@@ -152,7 +152,7 @@ def test_an_fmu_follows_its_control_as_closely_as_a_converged_solution(name: str
     for scalar, values in exact.items():
         np.testing.assert_allclose(found[scalar], values, rtol=0.0, atol=CLOSED, err_msg=scalar)
     network, control, way = CASES[name]
-    factor = float((load_network(network).unit_of(control) or ("", 1))[1])
+    factor = float((load_network(network).control_unit(control) or ("", 1))[1])
     start = float(inputs[control][0])
     drives = {control: (start / factor, (start + way) / factor)}
     driven = network_drive(network, drives, steps=POINTS)
@@ -212,9 +212,9 @@ def test_a_rotation_vector_follows_three_turns_and_stays_within_half_a_turn() ->
     turn = np.linspace(0.0, 3.0 * TURN, 601, dtype=np.float64)
     found = run(make_unit("network_motion", network=parts), turn, {"turn": turn})["S"]
     assert np.linalg.norm(found, axis=1).max() <= math.pi + 1e-9
-    rotation: FloatArray = np.array(rotation_of((found[:, 0], found[:, 1], found[:, 2])).rotation)
+    rotation: FloatArray = np.array(exp3((found[:, 0], found[:, 1], found[:, 2])).rotation)
     # T of S is given in m, n and m x n of its frames, which are those of the ground: x, y, z
-    np.testing.assert_allclose(rotation, rotation_of(tuple(np.outer(axis, turn))).rotation, atol=1e-9)
+    np.testing.assert_allclose(rotation, exp3(tuple(np.outer(axis, turn))).rotation, atol=1e-9)
 
 
 def test_a_jump_of_a_control_is_closed_after_some_points_and_stays_on_its_branch() -> None:

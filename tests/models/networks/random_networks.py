@@ -15,7 +15,7 @@ from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.parts import (
-    FREEDOMS,
+    JOINT_UNITS,
     Body,
     ConstraintElement,
     ElementKind,
@@ -87,7 +87,7 @@ def motion(kind: JointKind, q: Sequence[float] | FloatArray, pitch: float = 0.0)
 
 def random_values(kind: JointKind, rng: np.random.Generator) -> tuple[float, ...]:
     """Return variables in [rad] and [m] away from half a turn."""
-    return tuple(float(one) for one in rng.uniform(-1.2, 1.2, len(FREEDOMS[kind])))
+    return tuple(float(one) for one in rng.uniform(-1.2, 1.2, len(JOINT_UNITS[kind])))
 
 
 def joint_between(

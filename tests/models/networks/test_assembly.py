@@ -43,9 +43,9 @@ from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.assembly import Assembled, assemble
 from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.file import Network, load_network
-from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.mobility import mobility_of
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_of
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_from_axes
 
 CLOSED = 1e-9
 """The largest gap of an assembly in [m] and [rad], of mechanisms of some metres."""
@@ -58,7 +58,7 @@ def every(
     network: Network, controls: dict[str, float] | None = None, seed: int = 0, restarts: int = 500
 ) -> Assembled:
     """Return every assembly; all close, are apart, and have angles within -pi and pi."""
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     found = assemble(mechanism, controls or {}, every=True, restarts=restarts, seed=seed)
     assert found.continuum == 0
     assert len(found.assemblies) == found.x.shape[1]
@@ -309,7 +309,7 @@ def test_one_seed_gives_the_same_bits_another_the_same_set(build: Callable[..., 
 def test_the_nearest_assembly_is_the_first_of_all() -> None:
     for build in (four_bar, rssr, coupled_loops):
         network = build(drive="s")
-        one = assemble(mechanism_of(network), {"s": 0.05})
+        one = assemble(build_mechanism(network), {"s": 0.05})
         assert len(one.assemblies) == 1
         np.testing.assert_array_equal(one.x[:, 0], every(network, {"s": 0.05}).x[:, 0])
         assert (one.elsewhere, one.reason) == (False, "the start closes")
@@ -355,7 +355,7 @@ def test_the_assembly_is_the_nearer_one_of_both_of_a_four_bar(
             "joints": {name: {"kind": "revolute", "n": [0, 0, 1]} | one for name, one in joints.items()},
         }
     )
-    (found,) = assemble(mechanism_of(network)).assemblies
+    (found,) = assemble(build_mechanism(network)).assemblies
     nearer = both[int(np.argmin(way))]
     off = [
         math.remainder(found.values[name][0] - one, math.tau) for name, one in zip("ABC", nearer, strict=True)
@@ -387,7 +387,7 @@ def rough(network: Network, size: float, seed: int) -> Mechanism:
         Body(one.name, tuple((size * rng.normal(size=6)).tolist()) if one.start else ())
         for one in network.bodies
     )
-    return mechanism_of(replace(network, joints=joints, bodies=bodies))
+    return build_mechanism(replace(network, joints=joints, bodies=bodies))
 
 
 @pytest.mark.slow
@@ -439,7 +439,7 @@ def two_links(length: float, distance: float) -> Network:
 @pytest.mark.slow
 @pytest.mark.parametrize("length", [1e-6, 1e-3, 1.0, 1e3, 1e6])
 def test_two_links_that_are_too_short_are_open_by_what_is_missing(length: float) -> None:
-    found = assemble(mechanism_of(two_links(length, 1.1 * length)), restarts=50)
+    found = assemble(build_mechanism(two_links(length, 1.1 * length)), restarts=50)
     assert found.assemblies == ()
     assert found.nearest is not None
     (gap,) = found.gaps
@@ -454,7 +454,7 @@ def test_two_links_that_are_too_short_are_open_by_what_is_missing(length: float)
 @pytest.mark.slow
 @pytest.mark.parametrize("length", [1e-6, 1e-3, 1.0, 1e3, 1e6])
 def test_a_millionth_too_short_is_open_at_every_size(length: float) -> None:
-    found = assemble(mechanism_of(two_links(length, (1.0 + 1e-6) * length)), restarts=50)
+    found = assemble(build_mechanism(two_links(length, (1.0 + 1e-6) * length)), restarts=50)
     assert found.assemblies == ()
     assert found.gaps[0].metres == pytest.approx(1e-6 * length, rel=1e-5)
 
@@ -467,7 +467,7 @@ def test_an_angle_that_does_not_close_is_open_at_every_size(size: float) -> None
     second = matrix(last.frames[1])
     second[:3, :3] = second[:3, :3] @ Rotation.from_rotvec([0.0, 1e-5, 0.0]).as_matrix()
     joints = (*network.joints[:2], replace(last, frames=(last.frames[0], transform(second))))
-    found = assemble(mechanism_of(replace(network, joints=joints)), restarts=50)
+    found = assemble(build_mechanism(replace(network, joints=joints)), restarts=50)
     assert found.assemblies == ()
     assert found.gaps[0].radians == pytest.approx(1e-5, rel=1e-4)
     assert found.gaps[0].metres < 1e-6 * size
@@ -479,7 +479,7 @@ def test_a_rod_that_is_too_short_is_named_with_what_is_missing() -> None:
         "R", "gg", ("a", "ground"), Expression("0.4"), ((1.0, 0.0, 0.0), (2.0, 0.0, 0.0))
     )
     found = assemble(
-        mechanism_of(Network("short", (Body("a"),), (replace(link, start=(1.0,)),), (short,))), restarts=50
+        build_mechanism(Network("short", (Body("a"),), (replace(link, start=(1.0,)),), (short,))), restarts=50
     )
     (gap,) = found.gaps
     assert (gap.name, gap.loop, gap.radians) == ("R", ("R",), 0.0)
@@ -489,7 +489,7 @@ def test_a_rod_that_is_too_short_is_named_with_what_is_missing() -> None:
 @pytest.mark.slow
 def test_the_gap_of_the_nearest_is_the_least_whatever_the_seed() -> None:
     gaps = [
-        assemble(mechanism_of(two_links(1.0, 1.1)), seed=seed, restarts=30).gaps[0].metres
+        assemble(build_mechanism(two_links(1.0, 1.1)), seed=seed, restarts=30).gaps[0].metres
         for seed in range(5)
     ]
     np.testing.assert_allclose(gaps, 0.1, rtol=1e-9)
@@ -502,7 +502,7 @@ def test_the_gap_of_the_nearest_is_the_least_whatever_the_seed() -> None:
 def test_a_control_out_of_its_range_is_refused(value: float) -> None:
     network = replace(four_bar(drive="s"), controls=(Control("s", 0.0, -1.0, 1.0),))
     with pytest.raises(NetworkError) as caught:
-        assemble(mechanism_of(network), {"s": value})
+        assemble(build_mechanism(network), {"s": value})
     assert "s = " in str(caught.value)
     assert "-1 to 1" in str(caught.value)
 
@@ -513,20 +513,20 @@ def test_every_control_that_is_wrong_is_named_at_once() -> None:
     controls = (Control("s", 0.0, -1.0, 1.0), Control("t", value=Expression("2 * s")))
     network = replace(free, joints=joints, controls=controls)
     with pytest.raises(NetworkError) as caught:
-        assemble(mechanism_of(network), {"s": 2.0, "t": 0.0, "u": 0.0})
+        assemble(build_mechanism(network), {"s": 2.0, "t": 0.0, "u": 0.0})
     assert len(caught.value.findings) == 3
 
 
 def test_limits_themselves_are_allowed() -> None:
     network = replace(four_bar(drive="s"), controls=(Control("s", 0.0, -1.0, 1.0),))
     for value in (-1.0, 1.0):
-        assert assemble(mechanism_of(network), {"s": value}).assemblies[0].values["s"] == (value,)
+        assert assemble(build_mechanism(network), {"s": value}).assemblies[0].values["s"] == (value,)
 
 
 @pytest.mark.parametrize("value", [math.inf, -math.inf])
 def test_an_infinite_control_is_refused(value: float) -> None:
     with pytest.raises(NetworkError):
-        assemble(mechanism_of(four_bar(drive="s")), {"s": value}, restarts=5)
+        assemble(build_mechanism(four_bar(drive="s")), {"s": value}, restarts=5)
 
 
 def test_a_length_that_is_no_number_at_a_control_is_refused() -> None:
@@ -536,7 +536,7 @@ def test_a_length_that_is_no_number_at_a_control_is_refused() -> None:
     )
     network = Network("root", (Body("a"),), (link,), (root,), (Control("s", 1.0),))
     with pytest.raises(NetworkError):
-        assemble(mechanism_of(network), {"s": -1.0}, restarts=5)
+        assemble(build_mechanism(network), {"s": -1.0}, restarts=5)
 
 
 # --- continua, doubles and edges
@@ -545,7 +545,7 @@ def test_a_length_that_is_no_number_at_a_control_is_refused() -> None:
 @pytest.mark.slow
 def test_forty_assemblies_of_the_stewart_gough_platform_for_another_seed() -> None:
     """Dietmaier's geometry has 40, which is the most that there can be; test_shipped.py has seed 0."""
-    found = assemble(mechanism_of(load_network("stewart-gough")), every=True, seed=1)
+    found = assemble(build_mechanism(load_network("stewart-gough")), every=True, seed=1)
     assert len(found.assemblies) == 40
     assert max(one.residual for one in found.assemblies) < 1e-9
 
@@ -558,7 +558,7 @@ def sliding_rods(drive: str) -> Network:
     ends = [one.frames[one.bodies.index(rod)].translation for one in (first, last)]
     along = unit(np.subtract(ends[1], ends[0]))
     across = unit(np.cross(along, (0.3, 0.5, 0.7)))
-    at = frame_of(tuple(across), tuple(along), ends[0])
+    at = frame_from_axes(tuple(across), tuple(along), ends[0])
     a, b = ("rod2" if one == rod else one for one in last.bodies)
     slide = Joint("C", "cylindrical", (rod, "rod2"), (at, at), values=(None, Expression(drive)))
     joints = tuple(replace(one, bodies=(a, b)) if one is last else one for one in network.joints)
@@ -567,9 +567,9 @@ def sliding_rods(drive: str) -> Network:
 
 def test_pieces_of_a_rod_spin_apart() -> None:
     """Of a driven length: both branches, whatever the two spins are; the same as of a rod of one piece."""
-    mechanism = mechanism_of(sliding_rods("0 * s"))
+    mechanism = build_mechanism(sliding_rods("0 * s"))
     found = assemble(mechanism, {"s": 0.3}, every=True, restarts=60)
-    whole = assemble(mechanism_of(rssr("s")), {"s": 0.3}, every=True, restarts=60)
+    whole = assemble(build_mechanism(rssr("s")), {"s": 0.3}, every=True, restarts=60)
     assert (len(found.assemblies), found.continuum) == (2, 0)
     moves = mobility_of(mechanism, found.x[:, 0])
     rods = next(one.bodies for one in mechanism.network.joints if one.name == "C")
@@ -594,7 +594,7 @@ def networks_that_move() -> Iterator[tuple[Network, int]]:
 
 @pytest.mark.parametrize(("network", "ways"), networks_that_move())
 def test_what_moves_with_its_controls_held_is_a_continuum(network: Network, ways: int) -> None:
-    found = assemble(mechanism_of(network), every=True)
+    found = assemble(build_mechanism(network), every=True)
     assert found.continuum == ways
     assert len(found.assemblies) == 1
     assert str(ways) in found.reason
@@ -609,7 +609,7 @@ def test_what_moves_with_its_controls_held_is_a_continuum(network: Network, ways
     ],
 )
 def test_a_shaky_structure_is_no_continuum(network: Network, modes: int) -> None:
-    found = assemble(mechanism_of(network), every=True, restarts=200)
+    found = assemble(build_mechanism(network), every=True, restarts=200)
     assert found.continuum == 0
     assert len(found.assemblies) == modes
 
@@ -636,7 +636,7 @@ def test_lines_that_a_control_makes_parallel_are_no_crash() -> None:
     """At s = 0 the lines have no common normal: that is no configuration, and has to be said."""
     crc = ConstraintElement("E", "crc", ("ground", "b"), Expression("0.3"), (ORIGIN, (0.0, 0.3, 0.0)), (X, X))
     hinge = driven(tied("A", "revolute", ("ground", "b"), Z, ORIGIN), "s")
-    mechanism = mechanism_of(Network("lines", (Body("b"),), (hinge,), (crc,), (Control("s", 1.0),)))
+    mechanism = build_mechanism(Network("lines", (Body("b"),), (hinge,), (crc,), (Control("s", 1.0),)))
     assert assemble(mechanism, {"s": 0.0}, restarts=20).assemblies == ()
 
 
@@ -644,7 +644,7 @@ def test_loops_whose_joints_are_all_driven_close_or_not() -> None:
     """No variable is left to find: at s = 0 it closes as it is drawn, elsewhere it does not."""
     network = four_bar()
     joints = tuple(driven(one, "s") for one in network.joints)
-    mechanism = mechanism_of(replace(network, joints=joints, controls=(Control("s"),)))
+    mechanism = build_mechanism(replace(network, joints=joints, controls=(Control("s"),)))
     assert len(assemble(mechanism, every=True, restarts=20).assemblies) == 1
     assert assemble(mechanism, {"s": 0.3}, restarts=20).assemblies == ()
 
@@ -653,7 +653,7 @@ def test_a_user_joint_alone_is_where_its_control_puts_it() -> None:
     motion = tuple(map(Expression, ("1", "0", "0", "0", "cos(s)", "sin(s)", "s", "0.1", "0.2")))
     joint = Joint("U", "user", ("b", "ground"), motion=motion)  # the ground seen from the body
     found = assemble(
-        mechanism_of(Network("user", (Body("b"),), (joint,), controls=(Control("s"),))), {"s": 0.7}
+        build_mechanism(Network("user", (Body("b"),), (joint,), controls=(Control("s"),))), {"s": 0.7}
     )
     assert found.continuum == 0
     expected = np.eye(4)
@@ -663,14 +663,14 @@ def test_a_user_joint_alone_is_where_its_control_puts_it() -> None:
 
 
 def test_zero_restarts_leave_what_the_start_came_to() -> None:
-    found = assemble(mechanism_of(four_bar(drive="s")), {"s": 0.3}, every=True, restarts=0)
+    found = assemble(build_mechanism(four_bar(drive="s")), {"s": 0.3}, every=True, restarts=0)
     assert len(found.assemblies) == 1
     assert found.tried == 1
 
 
 def test_progress_ends_at_one() -> None:
     shares: list[float] = []
-    assemble(mechanism_of(four_bar(drive="s")), every=True, progress=shares.append)
+    assemble(build_mechanism(four_bar(drive="s")), every=True, progress=shares.append)
     assert shares[-1] == 1.0
     assert all(0.0 <= one <= 1.0 for one in shares)
 
@@ -682,7 +682,7 @@ def test_a_network_far_from_the_ground_assembles_as_one_at_it(far: float) -> Non
     away = far * np.array([0.6, -0.5, 0.4])
     near = [matrix(one.frames[0])[:3, 3] for one in four_bar().joints]
     network = ring("rrrr", np.tile(Z, (4, 1)), np.array(near) + away, "s")
-    found = assemble(mechanism_of(network), {"s": 0.7}, every=far < 1e6, restarts=100)
+    found = assemble(build_mechanism(network), {"s": 0.7}, every=far < 1e6, restarts=100)
     expected = every(four_bar(drive="s"), {"s": 0.7})
     assert not found.elsewhere
     ours, theirs = (values(one, "j3")[-1:] if far == 1e6 else values(one, "j3") for one in (found, expected))

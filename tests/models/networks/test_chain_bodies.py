@@ -15,9 +15,9 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import iter_frames
 from urmpipe_models.math3d import Transform
-from urmpipe_models.networks.elements import chain_parts, control_name
+from urmpipe_models.networks.elements import chain_to_parts, control_name
 from urmpipe_models.networks.file import Network, load_network
-from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.parts import Body, Control, Expression
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 
@@ -41,7 +41,7 @@ def variables(mechanism: Mechanism, name: str, chain: Chain, q: FloatArray) -> F
 
 
 def check_poses(network: Network, name: str, chain: Chain, q: FloatArray) -> None:
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     poses = mechanism.poses(variables(mechanism, name, chain, q))
     for body, frame in expected_poses(name, chain, q):
         pairs = zip(
@@ -69,7 +69,7 @@ def test_a_robot_of_the_catalogue_moves_as_its_chain(robot: str) -> None:
 @given(st.data())
 def test_any_chain_moves_as_its_frames(chains: SearchStrategy[Chain], data: DataObject) -> None:
     chain = data.draw(chains)
-    parts = chain_parts("arm", chain, "ground", chain.start, {})
+    parts = chain_to_parts("arm", chain, "ground", chain.start, {})
     network = Network("arm", tuple(parts.bodies), tuple(parts.joints), (), tuple(parts.controls))
     rows = st.lists(st.floats(-3.0, 3.0), min_size=len(chain.coordinates), max_size=len(chain.coordinates))
     check_poses(network, "arm", chain, np.array([data.draw(rows)]).T)
@@ -151,7 +151,7 @@ def test_a_control_drives_a_joint_and_those_that_follow_it(folder: Path) -> None
     }
     assert {one.name: one.start for one in network.joints}["g.wrist"] == (np.pi / 2.0,)
     assert {one.name: one.bodies for one in network.joints}["g.wrist"] == ("carriage", "g.wrist")
-    mechanism, chain = mechanism_of(network), load_robot(folder / "gripper.toml")
+    mechanism, chain = build_mechanism(network), load_robot(folder / "gripper.toml")
     x = dict(zip([one.owner for one in mechanism.variables], (0.05, 0.3, 0.7), strict=True))
     assert x == {"g_left": 0.05, "rail": 0.3, "g.wrist": 0.7}
     poses = mechanism.poses([*x.values()])

@@ -14,10 +14,10 @@ from urmpipe_models.arm.geometric_models import DHRow, modified_dh_chain
 from urmpipe_models.elementwise import FloatArray, cross
 from urmpipe_models.kinematics.forward import iter_frames
 from urmpipe_models.math3d import Transform
-from urmpipe_models.networks.elements import DHElement, element_frame, joint_of
+from urmpipe_models.networks.elements import DHElement, element_frame, element_to_joint
 from urmpipe_models.networks.file import Network, load_network
 from urmpipe_models.networks.joint_motion import joint_frame
-from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_models.networks.parts import Body, Joint
 
 EXACT = 1e-14
@@ -54,20 +54,20 @@ def test_the_joint_of_each_kind_moves_by_the_printed_frame(
 ) -> None:
     a, alpha, s, theta = row
     moved = {
-        "R": across(joint_of(DHElement("J", "R", a, alpha, s), ("b", "c")), theta),
-        "P": across(joint_of(DHElement("J", "P", a, alpha, theta=theta), ("b", "c")), s),
-        "C": across(joint_of(DHElement("J", "C", a, alpha), ("b", "c")), theta, s),
+        "R": across(element_to_joint(DHElement("J", "R", a, alpha, s), ("b", "c")), theta),
+        "P": across(element_to_joint(DHElement("J", "P", a, alpha, theta=theta), ("b", "c")), s),
+        "C": across(element_to_joint(DHElement("J", "C", a, alpha), ("b", "c")), theta, s),
     }
     for frame in moved.values():
         np.testing.assert_allclose(matrix(frame), matrix(printed(*row)), rtol=0, atol=EXACT)
-    helix = across(joint_of(DHElement("J", "H", a, alpha, pitch=pitch), ("b", "c")), theta)
+    helix = across(element_to_joint(DHElement("J", "H", a, alpha, pitch=pitch), ("b", "c")), theta)
     expected = printed(a, alpha, pitch * theta, theta)
     np.testing.assert_allclose(matrix(helix), matrix(expected), rtol=0, atol=EXACT)
 
 
 def test_the_given_number_of_a_variable_is_its_start() -> None:
     rows = [DHElement("J", kind, s=0.1, theta=0.2) for kind in "RPCH"]
-    assert [joint_of(row, ("b", "c")).start for row in rows] == [(0.2,), (0.1,), (0.2, 0.1), (0.2,)]
+    assert [element_to_joint(row, ("b", "c")).start for row in rows] == [(0.2,), (0.1,), (0.2, 0.1), (0.2,)]
 
 
 @given(st.lists(values, min_size=1, max_size=5))
@@ -105,7 +105,7 @@ def expected_frames() -> list[Transform]:
 def test_an_open_chain_of_all_kinds() -> None:
     network = dh_network(closed=False)
     assert network.bodies == tuple(map(Body, ("A.body", "B.body", "hand", "D.body")))
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     poses = mechanism.poses(mechanism.start)
     for body, expected in zip(network.bodies, expected_frames(), strict=True):
         np.testing.assert_allclose(matrix(poses[body.name]), matrix(expected), rtol=0, atol=EXACT)
@@ -134,8 +134,8 @@ def test_parameters_are_in_the_units_of_the_file() -> None:
     network = load_network({"length_unit": "mm", "angle_unit": "deg", "dh": {"elements": rows}})
     right = math.pi / 2.0
     assert network.joints == (
-        joint_of(DHElement("A", "R", 0.1, right, 0.02, right / 2.0), ("ground", "A.body")),
-        joint_of(DHElement("B", "H", 0.0, -right, theta=math.pi, pitch=0.005), ("A.body", "B.body")),
+        element_to_joint(DHElement("A", "R", 0.1, right, 0.02, right / 2.0), ("ground", "A.body")),
+        element_to_joint(DHElement("B", "H", 0.0, -right, theta=math.pi, pitch=0.005), ("A.body", "B.body")),
     )
 
 

@@ -28,8 +28,8 @@ from random_networks import (
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.joint_motion import measure
-from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.joint_motion import measure_element
+from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_models.networks.mobility import mobility_of
 from urmpipe_models.networks.parts import Body, ConstraintElement, Control, ElementKind, Expression, Joint
 
@@ -166,7 +166,7 @@ def both(kind: ElementKind, others: int, seed: int) -> tuple[Network, Network, C
 def test_an_element_equals_its_joints_on_a_hundred_networks(kind: ElementKind, others: int) -> None:
     for seed in range(NETWORKS):
         first, second, built = both(kind, others, seed)
-        of_element, of_joints = mechanism_of(first), mechanism_of(second)
+        of_element, of_joints = build_mechanism(first), build_mechanism(second)
         x, y = of_element.start, of_joints.start
         for mechanism, at in ((of_element, x), (of_joints, y)):
             assert np.abs(closure_of(mechanism, at[:, np.newaxis]).residual).max(initial=0.0) < CLOSES
@@ -192,11 +192,11 @@ def test_an_element_holds_wherever_its_joints_move(kind: ElementKind) -> None:
     for seed in range(NETWORKS):
         first, second, _ = both(kind, 0, seed)
         element = first.elements[0]
-        mechanism = mechanism_of(second)
+        mechanism = build_mechanism(second)
         for _ in range(5):
             x = rng.uniform(-2.0, 2.0, len(mechanism.variables))
             poses = mechanism.poses(x.tolist())
-            distance = float(measure(element, *(poses[name] for name in element.bodies)).distance)
+            distance = float(measure_element(element, *(poses[name] for name in element.bodies)).distance)
             # points up to some 4 m away, eps each; crc's distance has no sign
             assert distance == pytest.approx(float(element.length.value({})), abs=1e-12)
 
@@ -212,7 +212,7 @@ def meeting_lines(d: float) -> Network:
 def test_lines_that_meet_have_a_twist_space_of_five_as_well() -> None:
     """d = 0: the joints' composition has no perpendicular of its own there, the lines' normal serves."""
     network = meeting_lines(0.0)
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     x = mechanism.start
     assert np.abs(closure_of(mechanism, x[:, np.newaxis]).residual).max() == 0.0
     found = mobility_of(mechanism, x)
@@ -221,7 +221,7 @@ def test_lines_that_meet_have_a_twist_space_of_five_as_well() -> None:
     pose = matrix(mechanism.poses(x.tolist())["b"])
     poses = {"ground": np.eye(4), "b": pose, "sleeve": random_pose(rng), "cross": random_pose(rng)}
     built = as_lines(network.elements[0], poses, rng)
-    composed = mechanism_of(Network("joints", (Body("b"), Body("sleeve"), Body("cross")), built.joints))
+    composed = build_mechanism(Network("joints", (Body("b"), Body("sleeve"), Body("cross")), built.joints))
     assert_same_space(twist_space(mechanism, x, "b"), twist_space(composed, composed.start, "b"), SAME)
 
 
@@ -235,7 +235,7 @@ def test_the_driven_length_of_an_element_is_followed() -> None:
     rod = ConstraintElement(
         "R", "gg", ("b", "ground"), Expression("2 * s"), ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0))
     )
-    mechanism = mechanism_of(Network("rod", (Body("b"),), (slide,), (rod,), (Control("s", 0.25),)))
+    mechanism = build_mechanism(Network("rod", (Body("b"),), (slide,), (rod,), (Control("s", 0.25),)))
     x = np.array([0.25, 0.4])  # 0.5^2 = 0.4^2 + 0.3^2
     closure = closure_of(mechanism, x[:, np.newaxis])
     assert abs(closure.residual[0, 0]) < 1e-15
@@ -251,7 +251,7 @@ def test_points_and_lines_of_elements_are_fixed_to_their_bodies() -> None:
         for _ in range(5):
             step = random_pose(rng, 3.0) @ motion("helical", (1.0,), 0.3)
             moved = (transform(step @ poses["a"]), transform(step @ poses["b"]))
-            assert float(measure(element, *moved).distance) == pytest.approx(
+            assert float(measure_element(element, *moved).distance) == pytest.approx(
                 float(element.length.value({})), abs=1e-13
             )
     assert into(np.eye(4), np.array([1.0, 2.0, 3.0])).tolist() == list(vec(np.array([1.0, 2.0, 3.0])))

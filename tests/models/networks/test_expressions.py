@@ -61,7 +61,7 @@ def evaluated(text: str, of: dict[str, Any], **values: complex) -> complex:
 @given(formulas, numbers, numbers)
 def test_value_and_slopes_are_those_of_python_and_of_a_complex_step(text: str, x: float, y: float) -> None:
     formula = Expression(text)
-    value, slopes = formula.with_slopes({"x": x, "y": y})
+    value, slopes = formula.value_and_gradient({"x": x, "y": y})
     assume(np.isfinite(value))
     expected = evaluated(text, REAL, x=x, y=y)
     by = {
@@ -98,7 +98,7 @@ def test_operators_bind_as_those_of_python(text: str) -> None:
 
 def test_arrays_go_through_as_numbers_do() -> None:
     x, y = np.linspace(-1.0, 1.0, 5), np.linspace(1.0, 2.0, 5)
-    value, slopes = Expression("sqrt(y) * x ** 3 + atan2(x, y)").with_slopes({"x": x, "y": y})
+    value, slopes = Expression("sqrt(y) * x ** 3 + atan2(x, y)").value_and_gradient({"x": x, "y": y})
     # 1e-15: a rounding or two of numbers of 1
     np.testing.assert_allclose(value, np.sqrt(y) * x**3 + np.arctan2(x, y), atol=1e-15)
     np.testing.assert_allclose(slopes["x"], 3.0 * np.sqrt(y) * x**2 + y / (x**2 + y**2), atol=1e-15)

@@ -11,7 +11,7 @@ from asserting import refusal
 from urmpipe_models.errors import NetworkError
 from urmpipe_models.math3d import Transform, translation
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_of
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_from_axes
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 A = Joint("A", "revolute", ("ground", "b"))
@@ -137,15 +137,15 @@ def test_a_start_is_of_a_body_that_has_freedoms(bodies: tuple[Body, ...], lines:
             "joints.B.n: m and n are not orthonormal where controls start:"
             " |m| - 1 = 0.732, |n| - 1 = 0.732, m . n = 3; allowed: 1e-09 at most",
         ]),
-        ({"frames": (frame_of(X, (0.0, 1.0 + 1e-8, 0.0), X), Transform())}, [
+        ({"frames": (frame_from_axes(X, (0.0, 1.0 + 1e-8, 0.0), X), Transform())}, [
             "joints.B.n: m and n are not orthonormal in the first body:"
             " |m| - 1 = 0, |n| - 1 = 1e-08, m . n = 0; allowed: 1e-09 at most",
         ]),
-        ({"frames": (frame_of((0.6, 0.8, 0.0), Y, X),) * 2}, [
+        ({"frames": (frame_from_axes((0.6, 0.8, 0.0), Y, X),) * 2}, [
             "joints.B.m: m is not perpendicular to n: m . n = 0.8;"
             " allowed: 1e-09 at most, or no m: then one perpendicular to n is taken",
         ]),
-        ({"frames": (Transform(), frame_of((NAN, 0.0, 0.0), Y, X))}, [
+        ({"frames": (Transform(), frame_from_axes((NAN, 0.0, 0.0), Y, X))}, [
             "joints.B.m: m and n are not orthonormal in the second body:"
             " |m| - 1 = nan, |n| - 1 = 0, m . n = 0; allowed: 1e-09 at most",
         ]),
@@ -162,7 +162,7 @@ def test_what_is_wrong_with_a_joint(changes: dict[str, Any], lines: list[str]) -
 
 
 def test_axes_that_are_rounded_are_orthonormal() -> None:
-    frames = (frame_of(X, (0.0, 1.0 + 5e-10, 0.0), X), Transform())
+    frames = (frame_from_axes(X, (0.0, 1.0 + 5e-10, 0.0), X), Transform())
     assert Network("net", (Body("b"),), (Joint("A", "revolute", ("ground", "b"), frames),)).joints
 
 
@@ -314,7 +314,7 @@ def test_a_user_joint_follows_controls_of_controls_and_is_looked_at_near_an_open
 
 
 def test_names_that_nobody_sees_and_numbers_of_no_mechanism_are_refused() -> None:
-    far = Joint("A", "revolute", ("ground", "b"), (frame_of(X, Y, (1e10, 0.0, 0.0)),) * 2)
+    far = Joint("A", "revolute", ("ground", "b"), (frame_from_axes(X, Y, (1e10, 0.0, 0.0)),) * 2)
     assert complaints(far, Joint(" ", "revolute", ("b", "c"))) == [
         "joints. : found ' ' as a name, allowed: one that can be seen",
         "joints.A.a: found 1e+10, allowed: 1e+09 at most, in m or rad",

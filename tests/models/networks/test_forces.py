@@ -50,7 +50,7 @@ def test_drives_and_loads_do_no_work_together(name: str) -> None:
     assert moved.forces is not None
     rates = dict(zip(moved.joints, moved.joint_motion[1].T, strict=True))
     factors = [1.0 if one.unit == "m" or name != "geared-five-bar" else np.pi / 180 for one in moved.drives]
-    places = [moved.mechanism.places[one.name, 0] for one in moved.drives]
+    places = [moved.mechanism.variable_index[one.name, 0] for one in moved.drives]
     powers = list(moved.forces.drives.T * moved.xd[:, places].T * np.array(factors)[:, np.newaxis])
     powers.append(velocity(moved, load.body, load.point) @ load.force)
     axes = moved.poses()[:, moved.network.body_names.index(load.body), :3, :3]

@@ -19,9 +19,9 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import NetworkError
 from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.closure import closure_of, released
-from urmpipe_models.networks.elements import transmitted
+from urmpipe_models.networks.elements import transmission
 from urmpipe_models.networks.forces import Wrench, compute_forces
-from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.mechanism import build_mechanism
 
 ROUNDING = 1e-12  # [m], [rad]: relations of numbers near 1, solved by Newton steps
 
@@ -111,7 +111,7 @@ def oracle(profile: list[list[float]]) -> CubicSpline:
 def test_a_cam_lifts_by_the_periodic_spline_of_its_profile() -> None:
     (cam,) = load_network(CAM).elements
     angles = np.linspace(-20.0, 20.0, 4001)
-    lift, slope = transmitted(cam, angles)
+    lift, slope = transmission(cam, angles)
     spline = oracle(UNEVEN)
     np.testing.assert_allclose(lift, spline(angles), atol=1e-15)  # lifts of 1e-2 m: rounding
     np.testing.assert_allclose(slope, spline(angles, 1), atol=1e-14)
@@ -129,13 +129,13 @@ def test_numbers_columns_and_symbols_pass_through_the_same_lines() -> None:
 
     (cam,) = load_network(CAM).elements
     angles = np.linspace(-10.0, 10.0, 41)
-    columns = transmitted(cam, angles)
+    columns = transmission(cam, angles)
     symbol = ca.SX.sym("q")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FutureWarning)  # CasADi's notice of how it takes NumPy's functions
-        traced = ca.Function("cam", [symbol], [*transmitted(cam, symbol)])
+        traced = ca.Function("cam", [symbol], [*transmission(cam, symbol)])
     for k, angle in enumerate(angles.tolist()):
-        for column, number, symbolic in zip(columns, transmitted(cam, angle), traced(angle), strict=True):
+        for column, number, symbolic in zip(columns, transmission(cam, angle), traced(angle), strict=True):
             assert number == column[k]
             assert float(symbolic) == pytest.approx(number, abs=1e-15)  # sums in another order
 
@@ -180,7 +180,7 @@ MANY: dict[str, Any] = {
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_jacobian_is_that_of_differences(seed: int) -> None:
-    mechanism = mechanism_of(load_network(MANY))
+    mechanism = build_mechanism(load_network(MANY))
     x = mechanism.start + np.random.default_rng(seed).normal(size=len(mechanism.start))
 
     def pairs(at: FloatArray) -> FloatArray:
@@ -220,7 +220,7 @@ def test_a_drive_that_repeats_a_gear_is_redundant() -> None:
 
 def test_a_drive_set_free_turns_its_wheel() -> None:
     both = {**GEARED, "joints": {**GEARED["joints"], "B": shaft(("ground", "b"), 300, value="30 - turn / 2")}}
-    mechanism = mechanism_of(load_network(both))
+    mechanism = build_mechanism(load_network(both))
     found = {name: column for name, what, column in released(mechanism, mechanism.start) if what == "drive"}
     assert {name: column.tolist() for name, column in found.items()} == {"A": [0.5], "B": [1.0]}
 
@@ -250,7 +250,7 @@ def test_a_load_on_a_wheel_is_held_by_the_drive_through_the_gear(is_cut: bool) -
     if is_cut:  # a second hinge in line with the first closes a loop
         tables["joints"]["C"] = shaft(("ground", "b"), 300)
         tables["elements"] = {"pair": {**GEARED["elements"]["pair"], "joints": ["A", "C"]}}
-    mechanism = mechanism_of(load_network(tables))
+    mechanism = build_mechanism(load_network(tables))
     x, driven = assemble(mechanism).x, mechanism.controls
     free = np.setdiff1d(np.arange(len(x)), driven)
     forces = compute_forces(mechanism, x, driven, free, [Wrench("b", moment=(0.0, 0.0, 5.0))])

@@ -21,7 +21,7 @@ from test_joint_motion import user_motion
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.parts import Body, Control, Expression, Joint
 
 RELATIVE = 1e-8
@@ -86,7 +86,7 @@ def assert_right(mechanism: Mechanism, x: FloatArray) -> int:
 def test_random_networks_far_from_closing(seed: int) -> None:
     rng = np.random.default_rng(seed)
     network = driven_at_random(random_network(rng, bodies=4, extra=2, elements=3), rng)
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     x = mechanism.start
     held = [assert_right(mechanism, x + rng.normal(size=len(x)) * step) for step in (0.0, 0.3, 1.0, 1.0)]
     assert sum(held) > len(residual_of(mechanism, x))  # of four times as many
@@ -96,7 +96,7 @@ def test_random_networks_far_from_closing(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(20))
 def test_random_networks_where_they_close(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    mechanism = mechanism_of(random_network(rng, bodies=4, extra=2, elements=3))
+    mechanism = build_mechanism(random_network(rng, bodies=4, extra=2, elements=3))
     assert np.abs(residual_of(mechanism, mechanism.start)).max() < 1e-13
     assert assert_right(mechanism, mechanism.start) == mechanism.rows
 
@@ -123,7 +123,7 @@ def test_clusters_of_bodies_of_their_own(seed: int) -> None:
     bodies = (
         Body("a1", (0.1, 0.2, 0.3, vector, 0.0, -vector)), Body("a2"), Body("b1"), Body("b2"),
     )  # fmt: skip
-    mechanism = mechanism_of(Network("clusters", bodies, tuple(joints), (*elements, *bridges)))
+    mechanism = build_mechanism(Network("clusters", bodies, tuple(joints), (*elements, *bridges)))
     assert len(mechanism.graph.roots) == 3
     for step in (0.0, 0.3, 1.0):
         assert_right(mechanism, mechanism.start + step * rng.normal(size=len(mechanism.variables)))
@@ -132,7 +132,7 @@ def test_clusters_of_bodies_of_their_own(seed: int) -> None:
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_known_mechanisms_and_many_configurations_at_once(name: str) -> None:
     """A block of configurations gives what each gives alone."""
-    mechanism = mechanism_of(MECHANISMS[name](drive="s"))
+    mechanism = build_mechanism(MECHANISMS[name](drive="s"))
     rng = np.random.default_rng(0)
     x = mechanism.start[:, np.newaxis] + 0.3 * rng.normal(size=(len(mechanism.variables), 7))
     together = closure_of(mechanism, x)

@@ -25,9 +25,9 @@ from random_networks import (
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.joint_motion import forbidden, joint_frame, joint_screws
-from urmpipe_models.networks.mechanism import mechanism_of
-from urmpipe_models.networks.parts import FREEDOMS, Body, Control, Expression, Joint, JointKind
+from urmpipe_models.networks.joint_motion import constraint_twists, joint_frame, joint_twists
+from urmpipe_models.networks.mechanism import build_mechanism
+from urmpipe_models.networks.parts import JOINT_UNITS, Body, Control, Expression, Joint, JointKind
 
 ROUNDING = 1e-13
 """Products of some ten matrices with entries near 1, and scipy's expm."""
@@ -38,8 +38,8 @@ def joint_of(kind: JointKind, rng: np.random.Generator) -> Joint:
 
 
 def twists_of(joint: Joint, q: FloatArray, at: FloatArray) -> FloatArray:
-    """Return what `joint_screws` says, shape (6, k)."""
-    return np.array([(*w, *v) for w, v in joint_screws(joint, list(q), transform(at))]).T
+    """Return what `joint_twists` returns, shape (6, k)."""
+    return np.array([(*w, *v) for w, v in joint_twists(joint, list(q), transform(at))]).T
 
 
 def moved_from(at: FloatArray, joint: Joint, q: FloatArray) -> FloatArray:
@@ -102,7 +102,7 @@ def user_motion() -> tuple[Expression, ...]:
 def test_a_user_joint_moves_as_its_formulas_say() -> None:
     """Its pose, and its derivatives by both controls, against the rotations typed in as exponentials."""
     joint = Joint("U", "user", ("ground", "b"), motion=user_motion())
-    arm = mechanism_of(Network("user", (Body("b"),), (joint,), controls=(Control("s"), Control("t"))))
+    arm = build_mechanism(Network("user", (Body("b"),), (joint,), controls=(Control("s"), Control("t"))))
 
     def expected(x: FloatArray) -> FloatArray:
         s, t = x
@@ -116,7 +116,7 @@ def test_a_user_joint_moves_as_its_formulas_say() -> None:
         screws = twists_of(joint, np.array([float(one.value) for one in values]), np.eye(4))
         rates = difference(one_by_one(expected), x, 1e-2)
         for k in range(2):
-            twist = screws @ np.array([float(one.slopes.get(k, 0.0)) for one in values])
+            twist = screws @ np.array([float(one.gradient.get(k, 0.0)) for one in values])
             # truncation of step 1e-2 with seventh derivatives up to 1.5^7 = 17
             np.testing.assert_allclose(
                 generator(twist[:3], twist[3:]),
@@ -132,13 +132,13 @@ def test_what_a_joint_allows_and_forbids_is_all_that_there_is(kind: JointKind) -
     rng = np.random.default_rng(4)
     for _ in range(10):
         joint, q, at = joint_of(kind, rng), np.array(random_values(kind, rng)), random_pose(rng)
-        names, _, refused = zip(*forbidden(joint, list(q), transform(at)), strict=True)
+        names, _, refused = zip(*constraint_twists(joint, list(q), transform(at)), strict=True)
         assert len(set(names)) == len(names)
         every = np.column_stack([twists_of(joint, q, at), *(np.array((*w, *v)) for w, v in refused)])
         assert every.shape == (6, 6)
         # points and axes near 1: of a joint that allowed what it forbids the least would be 1e-16
         assert np.linalg.svd(every, compute_uv=False)[-1] > 1e-2
-        assert len(q) == len(FREEDOMS[kind])
+        assert len(q) == len(JOINT_UNITS[kind])
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -146,12 +146,17 @@ def test_a_driven_joint_forbids_what_it_is_driven_by(kind: JointKind) -> None:
     rng = np.random.default_rng(5)
     free = joint_of(kind, rng)
     joint = Joint(
-        "J", kind, free.bodies, free.frames, values=(Expression("s"),) * len(FREEDOMS[kind]), pitch=free.pitch
+        "J",
+        kind,
+        free.bodies,
+        free.frames,
+        values=(Expression("s"),) * len(JOINT_UNITS[kind]),
+        pitch=free.pitch,
     )
     at, q = random_pose(rng), np.array(random_values(kind, rng))
-    found = list(forbidden(joint, list(q), transform(at)))
+    found = list(constraint_twists(joint, list(q), transform(at)))
     drives = np.array([(*w, *v) for name, _, (w, v) in found if name == "drive"]).T
-    assert [unit for name, unit, _ in found if name == "drive"] == list(FREEDOMS[kind])
+    assert [unit for name, unit, _ in found if name == "drive"] == list(JOINT_UNITS[kind])
     np.testing.assert_array_equal(drives, twists_of(free, q, at))
     assert len(found) == 6
 
@@ -198,10 +203,10 @@ def test_poses_and_gaps_of_random_networks_are_those_of_matrices(seed: int) -> N
     """Trees in either direction, loops cut at any joint, closed at the start and open elsewhere."""
     rng = np.random.default_rng(seed)
     closed = random_network(rng, bodies=5, extra=3)
-    mechanism = mechanism_of(closed)
+    mechanism = build_mechanism(closed)
     assert np.abs(closure_of(mechanism, mechanism.start[:, np.newaxis]).residual).max() < ROUNDING
     network = apart(closed, rng)
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     tree = {network.joints[one.joint].name for one in mechanism.graph.branches}
     expected = poses_by_matrices(network, tree)
     found = mechanism.poses(mechanism.start.tolist())

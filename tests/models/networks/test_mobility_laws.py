@@ -48,7 +48,7 @@ from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_models.networks.mobility import mobility_of, stuck_controls
 from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, JointKind
 
@@ -73,7 +73,7 @@ class Facts(NamedTuple):
 
 
 def facts_of(network: Network) -> Facts:
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     x = mechanism.start
     gap = np.abs(closure_of(mechanism, x[:, np.newaxis]).residual) * mechanism.row_scales[:, np.newaxis]
     assert gap.max(initial=0.0) < 1e-12  # every variant closes at its start, in lengths of the mechanism
@@ -215,7 +215,7 @@ def test_which_constraints_are_redundant_does_not_depend_on_the_unit_of_length()
     for build in (four_bar, bennett, coupled_loops):
         found = []
         for factor in (1e-3, 1.0, 1e3):
-            mechanism = mechanism_of(scaled(build(), factor))
+            mechanism = build_mechanism(scaled(build(), factor))
             found.append(mobility_of(mechanism, mechanism.start).redundant)
         assert found[0] == found[1] == found[2]
 
@@ -235,7 +235,7 @@ def test_random_networks_do_not_depend_on_how_they_are_written(seed: int) -> Non
 
 def poses_in(network: Network, held: dict[str, float]) -> dict[str, FloatArray]:
     """Return the poses of the assembly nearest to the start, translations in lengths of the mechanism."""
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     found = assemble(mechanism, held)
     assert not found.elsewhere
     assert found.continuum == 0
@@ -269,9 +269,9 @@ def test_the_motions_do_not_depend_on_where_loops_are_cut(name: str) -> None:
     places = [(one.name, k) for one in network.joints for k in range(len(one.units))]
     spaces = []
     for k in range(len(network.joints)):
-        mechanism = mechanism_of(replace(network, joints=(*network.joints[k:], *network.joints[:k])))
+        mechanism = build_mechanism(replace(network, joints=(*network.joints[k:], *network.joints[:k])))
         ways = null_space(closure_of(mechanism, mechanism.start[:, np.newaxis]).jacobian[:, :, 0])
-        spaces.append(ways[[mechanism.places[one] for one in places]])
+        spaces.append(ways[[mechanism.variable_index[one] for one in places]])
     for one, other in pairwise(spaces):
         assert_same_space(one, other, 1e-9)  # rounding times a condition of the Jacobian below 1e5
 
@@ -310,7 +310,7 @@ def user_slide() -> Joint:
     ],
 )
 def test_the_formula_of_kutzbach_by_hand(network: Network, figure: int) -> None:
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     assert by_hand(network) == figure
     assert mobility_of(mechanism, mechanism.start).kutzbach == figure
 
@@ -319,7 +319,7 @@ def test_the_formula_of_kutzbach_by_hand(network: Network, figure: int) -> None:
 @pytest.mark.parametrize("seed", range(20))
 def test_the_formula_of_kutzbach_on_random_networks(seed: int) -> None:
     network = random_network(np.random.default_rng(seed), bodies=5, extra=3, elements=2)
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     found = mobility_of(mechanism, mechanism.start)
     assert found.kutzbach == by_hand(network)
     assert found.mobility - found.kutzbach == len(found.redundant)
@@ -362,7 +362,7 @@ def test_redundant_constraints_can_be_set_free_together(build: Callable[..., Net
     The mechanisms are drawn at q = 0, so that frames of both bodies are one.
     """
     network = shuffled(build(), np.random.default_rng(seed))
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     found = mobility_of(mechanism, mechanism.start)
     assert len(found.redundant) == found.mobility - found.kutzbach
     joints = {one.name: one for one in network.joints}
@@ -375,7 +375,7 @@ def test_redundant_constraints_can_be_set_free_together(build: Callable[..., Net
         bodies.append(Body(f"between{k}"))
         joints[f"extra{k}"] = replace(extra, name=f"extra{k}", bodies=(extra.bodies[0], f"between{k}"))
         joints[one.joint] = replace(behind, bodies=(f"between{k}", behind.bodies[1]))
-    freed = mechanism_of(replace(network, bodies=tuple(bodies), joints=tuple(joints.values())))
+    freed = build_mechanism(replace(network, bodies=tuple(bodies), joints=tuple(joints.values())))
     after = mobility_of(freed, freed.start)
     assert after.mobility == found.mobility == after.kutzbach
     assert after.redundant == ()
@@ -404,7 +404,7 @@ def test_joints_of_a_kind_with_the_freedom_leave_the_mobility(
     """A revolute joint of which "translation along n" is redundant may be cylindrical."""
     network = shuffled(build(), np.random.default_rng(seed))
     before = facts_of(network)
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     for one in mobility_of(mechanism, mechanism.start).redundant:
         if one.constraint == "translation along n":
             after = facts_of(with_kind(network, "cylindrical", {one.joint}))
@@ -418,7 +418,7 @@ def wedges() -> Network:
 
 def test_a_slide_may_turn_about_its_axis_where_that_is_redundant() -> None:
     network = wedges()
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     found = mobility_of(mechanism, mechanism.start)
     assert (found.mobility, found.kutzbach, len(found.redundant)) == (1, -3, 4)
     turning = [one for one in found.redundant if one.constraint == "rotation about n"]
@@ -431,7 +431,7 @@ def test_a_rod_too_many_is_redundant() -> None:
     """A rod beside the crank of a four-bar, from pivot to pivot, forbids nothing new."""
     network = four_bar()
     more = rod("R", ("ground", "b2"), (0.0, 0.0, 0.0), (0.4 * math.cos(0.9), 0.4 * math.sin(0.9), 0.0))
-    mechanism = mechanism_of(replace(network, elements=(more,)))
+    mechanism = build_mechanism(replace(network, elements=(more,)))
     found = mobility_of(mechanism, mechanism.start)
     assert (found.mobility, len(found.redundant)) == (1, 4)
     assert ("R", "length") in {(one.joint, one.constraint) for one in found.redundant}
@@ -444,7 +444,7 @@ def test_a_drive_too_many_is_redundant() -> None:
     network = four_bar(1.0, 2.0, 1.0, 2.0, 0.9)
     first, *middle, last = network.joints
     both = (driven(first, "s"), *middle, driven(last, "-s"))
-    mechanism = mechanism_of(replace(network, joints=both, controls=(Control("s"),)))
+    mechanism = build_mechanism(replace(network, joints=both, controls=(Control("s"),)))
     found = mobility_of(mechanism, mechanism.start)
     assert (found.mobility, found.kutzbach, len(found.redundant)) == (1, -3, 4)
     one_drive = replace(network, joints=(both[0], *middle, last), controls=(Control("s"),))
@@ -464,7 +464,7 @@ class Special(NamedTuple):
 
 
 def special_of(network: Network) -> Special:
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     found = mobility_of(mechanism, mechanism.start)
     assert found.special == (found.nearby < found.mobility)
     return Special(found.mobility, found.nearby, found.kind)
@@ -522,11 +522,11 @@ def slider_crank(crank: float, drive: str | None = None) -> Network:
 def test_at_a_dead_centre_the_slide_is_stuck_but_the_mechanism_is_not_special(crank: float) -> None:
     """The crank still moves it one way; a control of the slide cannot."""
     assert special_of(slider_crank(crank)) == Special(1, 1, "mechanism")
-    mechanism = mechanism_of(slider_crank(crank, "s"))
+    mechanism = build_mechanism(slider_crank(crank, "s"))
     found = mobility_of(mechanism, mechanism.start)
     assert (found.mobility, found.special) == (1, False)
     assert stuck_controls(mechanism, mechanism.start) == ("s",)
-    regular = mechanism_of(slider_crank(1.0, "s"))
+    regular = build_mechanism(slider_crank(1.0, "s"))
     assert stuck_controls(regular, regular.start) == ()
 
 
@@ -569,7 +569,7 @@ def test_a_spherical_four_bar_moves_although_its_lengths_are_none() -> None:
     axes = np.array([unit(one) for one in ((0, 0, 1), (0.6, 0, 1), (0.5, 0.9, 0.8), (-0.4, 0.7, 1))])
     network = ring("rrrr", axes, np.zeros((4, 3)))
     assert facts_of(network) == Facts(1, -2, 3, (), False, "mechanism", "closed chain")
-    moved = assemble(mechanism_of(ring("rrrr", axes, np.zeros((4, 3)), "s")), {"s": 0.2})
+    moved = assemble(build_mechanism(ring("rrrr", axes, np.zeros((4, 3)), "s")), {"s": 0.2})
     poses = moved.assemblies[0].poses
     np.testing.assert_allclose(poses[:, :3, 3], 0.0, rtol=0.0, atol=1e-12)  # the point stays where it is
 
@@ -591,7 +591,7 @@ def test_frames_far_from_the_mechanism_do_not_matter(name: str, far: float) -> N
         )
         for one in network.joints
     )
-    mechanism = mechanism_of(replace(network, joints=joints))
+    mechanism = build_mechanism(replace(network, joints=joints))
     found = mobility_of(mechanism, mechanism.start)
     expected = EXPECTED[name]
     assert (found.mobility, found.kutzbach, found.nearby) == (
@@ -610,7 +610,7 @@ def test_a_plane_far_from_its_bodys_origin_does_not_matter() -> None:
     plane = ConstraintElement(
         "E", "eg", ("ground", "b2"), Expression("0"), (ORIGIN, (far + 0.8, far + 0.5, 0.0)), (Z, Z)
     )
-    mechanism = mechanism_of(replace(network, elements=(plane,)))
+    mechanism = build_mechanism(replace(network, elements=(plane,)))
     assert mobility_of(mechanism, mechanism.start).mobility == 1
 
 
@@ -618,7 +618,7 @@ def test_a_plane_far_from_its_bodys_origin_does_not_matter() -> None:
 def test_a_control_whose_effect_stands_still_at_its_start_does_not_hide_the_others(start: float) -> None:
     """0.1 cos(s) starts at s = pi with a slope of 1e-17; at s = 2 it is 0.09."""
     network = slider_crank(1.0, "0.1 * cos(s) + 0.1")
-    mechanism = mechanism_of(replace(network, controls=(Control("s", start),)))
+    mechanism = build_mechanism(replace(network, controls=(Control("s", start),)))
     found = assemble(mechanism, {"s": 2.0})
     assert mobility_of(mechanism, found.x[:, 0]).mobility == 1
 
@@ -644,7 +644,7 @@ def test_helices_of_one_pitch_on_one_axis_move_together() -> None:
 
 def test_the_twists_of_the_coupler_of_sarrus_are_one_shift() -> None:
     network = sarrus()
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     space = twist_space(mechanism, mechanism.start, "b3")
     expected = np.zeros((6, 1))
     expected[5] = 1.0

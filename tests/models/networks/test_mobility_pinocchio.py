@@ -14,7 +14,7 @@ from random_networks import assert_same_space, matrix, null_space, random_networ
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.closure import closure_of
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_models.networks.mobility import mobility_of
 from urmpipe_models.networks.parts import Joint, JointKind
 
@@ -122,7 +122,7 @@ def row_space(jacobian: FloatArray) -> FloatArray:
 
 def assert_as_pinocchio(network: Network) -> int:
     """Hold mobility and the row space of the Jacobian to Pinocchio's; return the mobility."""
-    mechanism, oracle = mechanism_of(network), oracle_of(network)
+    mechanism, oracle = build_mechanism(network), oracle_of(network)
     theirs = constraint_jacobian(oracle)
     ours = closure_of(mechanism, mechanism.start[:, np.newaxis]).jacobian[:, :, 0]
     signs = signs_of(network, oracle)
@@ -189,6 +189,6 @@ def test_a_rigid_constraint_of_pinocchio_gives_the_same_rank() -> None:
     data, held = oracle.model.createData(), contact.createData()
     pin.computeJointJacobians(oracle.model, data, np.array(oracle.q))
     jacobian = pin.getConstraintJacobian(oracle.model, data, contact, held)
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     assert jacobian.shape == (6, 4)
     assert mobility_of(mechanism, mechanism.start).rank == np.linalg.matrix_rank(jacobian, tol=1e-8) == 3

@@ -262,7 +262,7 @@ def test_any_number_of_steps_gives_the_same_motion(name: str) -> None:
     network = load_network(name)
     drives: dict[str, Any] = {}
     for k, one in enumerate(network.controls):
-        unit = network.unit_of(one.name)
+        unit = network.control_unit(one.name)
         size = 60.0 if unit and float(unit[1]) < 0.1 else 0.8  # degrees
         if one.value is None:
             drives[one.name] = (one.start, one.start + (0.03 * (k + 1) if unit and unit[0] == "m" else size))

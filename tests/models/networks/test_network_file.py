@@ -13,7 +13,7 @@ import pytest
 from asserting import refusal
 from urmpipe_models.errors import NetworkError
 from urmpipe_models.networks.file import Network, load_network, network_names
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_of
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_from_axes
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.robots.urdf_writer import urdf_text
 
@@ -135,7 +135,7 @@ EXPECTED = Network(
             "R",
             "revolute",
             ("base", "b"),
-            (frame_of(Z, Y, (0.1, 0.0, 0.0)), frame_of(Z, X, (0.1, 0.0, 0.0))),
+            (frame_from_axes(Z, Y, (0.1, 0.0, 0.0)), frame_from_axes(Z, X, (0.1, 0.0, 0.0))),
             (RIGHT,),
         ),
         Joint("P", "prismatic", ("b", "c"), values=(Expression("(s) * 0.001"),)),

@@ -11,8 +11,8 @@ import pytest
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.file import load_network, network_names
-from urmpipe_models.networks.joint_motion import rotation_of, wrap_rotation_vector
-from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.joint_motion import exp3, wrap_rotation_vector
+from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.mobility import network_tables, with_start
 from urmpipe_models.networks.rates import (
     close_network,
@@ -49,7 +49,7 @@ def residual(mechanism: Mechanism, x: FloatArray) -> FloatArray:
 
 @pytest.mark.parametrize("network", NETWORKS, ids=lambda network: network.name)
 def test_the_jacobian_is_that_of_finite_differences_where_the_network_is_closed(network: Any) -> None:
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     x = assemble(mechanism, restarts=0).x[:, 0]
     assert (
         np.abs(np.array(closure_residual(mechanism, x.tolist()), dtype=np.float64)).max() < 1e-13
@@ -69,7 +69,7 @@ def test_the_jacobian_is_that_of_finite_differences_where_the_network_is_closed(
 
 @pytest.mark.parametrize("network", NETWORKS, ids=lambda network: network.name)
 def test_steps_converge_quadratically_and_columns_give_what_floats_give(network: Any) -> None:
-    mechanism, rng = mechanism_of(network), np.random.default_rng(3)
+    mechanism, rng = build_mechanism(network), np.random.default_rng(3)
     x = np.repeat(assemble(mechanism, restarts=0).x, 4, axis=1)
     scales = mechanism.column_scales[mechanism.free, np.newaxis]
     x[mechanism.free] += 1e-3 * scales * rng.uniform(-1.0, 1.0, (len(mechanism.free), 4))
@@ -105,9 +105,7 @@ def test_a_wrapped_rotation_vector_turns_the_same_and_by_half_a_turn_at_most() -
     for vector in np.random.default_rng(5).normal(size=(50, 3)) * 4.0:
         wrapped = wrap_rotation_vector(tuple(vector))
         assert float(np.linalg.norm(wrapped)) <= np.pi + 1e-12
-        np.testing.assert_allclose(
-            rotation_of(wrapped).rotation, rotation_of(tuple(vector)).rotation, atol=1e-12
-        )
+        np.testing.assert_allclose(exp3(wrapped).rotation, exp3(tuple(vector)).rotation, atol=1e-12)
 
 
 @pytest.mark.parametrize("network", NETWORKS, ids=lambda network: network.name)
@@ -117,9 +115,9 @@ def test_a_network_comes_back_from_its_tables_as_json_and_so_does_one_with_anoth
     tables = network_tables(network)
     again = load_network(json.loads(json.dumps(tables, allow_nan=False)))
     assert again == network
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     x = mechanism.start + 0.01
-    moved = mechanism_of(load_network(network_tables(with_start(network, x.tolist()))))
+    moved = build_mechanism(load_network(network_tables(with_start(network, x.tolist()))))
     assert moved.start.tolist() == x.tolist()
     assert (moved.graph.roots, moved.graph.cuts) == (mechanism.graph.roots, mechanism.graph.cuts)
 

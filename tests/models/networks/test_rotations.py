@@ -22,22 +22,22 @@ from random_networks import (
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.joint_motion import (
-    SMALL,
+    SMALL_ANGLE_SQUARED,
+    exp3,
     joint_frame,
-    rotation_of,
-    turning_of,
-    untwisted,
+    left_jacobian,
+    left_jacobian_inverse,
     wrap_rotation_vector,
 )
-from urmpipe_models.networks.mechanism import mechanism_of
+from urmpipe_models.networks.mechanism import build_mechanism
 from urmpipe_models.networks.parts import Body, Joint
 
 ROUNDING = 1e-14
 """Entries of rotations are sums of a few products of rounded numbers up to pi^2."""
 
 ANGLES = [
-    0.0, 1e-300, 1e-160, 1e-12, 0.99 * SMALL**0.5, SMALL**0.5, 1.01 * SMALL**0.5, 1e-3, 1.0,
-    np.pi - 1e-9, np.pi, np.pi + 1e-9, 5.0, 2.0 * np.pi, 40.0,
+    0.0, 1e-300, 1e-160, 1e-12, *(factor * SMALL_ANGLE_SQUARED**0.5 for factor in (0.99, 1.0, 1.01)),
+    1e-3, 1.0, np.pi - 1e-9, np.pi, np.pi + 1e-9, 5.0, 2.0 * np.pi, 40.0,
 ]  # fmt: skip
 
 
@@ -50,7 +50,7 @@ def vectors(angle: float) -> FloatArray:
 
 def rotations(q: FloatArray) -> FloatArray:
     """Return the rotations of rotation vectors, shape (n, 3, 3)."""
-    rows = rotation_of((q[0], q[1], q[2])).rotation
+    rows = exp3((q[0], q[1], q[2])).rotation
     return np.array(rows).transpose(2, 0, 1)
 
 
@@ -70,15 +70,15 @@ def test_rotations_are_orthogonal_and_equal_the_matrix_exponential(angle: float)
 
 def test_one_rotation_vector_of_floats_is_the_same() -> None:
     q = vectors(2.0)
-    rows: FloatArray = np.array(rotation_of((float(q[0, 7]), float(q[1, 7]), float(q[2, 7]))).rotation)
+    rows: FloatArray = np.array(exp3((float(q[0, 7]), float(q[1, 7]), float(q[2, 7]))).rotation)
     np.testing.assert_array_equal(rows, rotations(q)[7])
 
 
 def test_series_and_closed_form_meet_where_they_take_over() -> None:
     """Both neglect less than rounding: no step in the rotation, nor in what turns it, at the threshold."""
     axis = vectors(1.0)
-    below, above = ((1.0 + sign * 1e-15) * SMALL**0.5 * axis for sign in (-1, 1))
-    for function in (rotation_of, turning_of):
+    below, above = ((1.0 + sign * 1e-15) * SMALL_ANGLE_SQUARED**0.5 * axis for sign in (-1, 1))
+    for function in (exp3, left_jacobian):
         one, other = (
             np.array(getattr(found, "rotation", found))
             for found in (function((q[0], q[1], q[2])) for q in (below, above))
@@ -120,18 +120,18 @@ def test_the_printed_determinant_is_that_of_the_errata() -> None:
 def test_turning_is_the_derivative_of_the_rotation(angle: float) -> None:
     for q in vectors(angle).T:
         rates = difference(lambda at: rotations(at).transpose(1, 2, 0), q, 1e-2)
-        w = rates.transpose(2, 0, 1) @ np.array(rotation_of((q[0], q[1], q[2])).rotation).T
+        w = rates.transpose(2, 0, 1) @ np.array(exp3((q[0], q[1], q[2])).rotation).T
         expected = np.array([w[:, 2, 1], w[:, 0, 2], w[:, 1, 0]])
-        found: FloatArray = np.array(turning_of((q[0], q[1], q[2]))).T
+        found: FloatArray = np.array(left_jacobian((q[0], q[1], q[2]))).T
         # differences of step 1e-2: truncation 1e-12 / 140, rounding 1e-14
         np.testing.assert_allclose(found, expected, rtol=0.0, atol=2e-12)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-12, 0.99e-4, 1.01e-4, 1e-2, 1.0, 3.0, np.pi, 6.0])
-def test_untwisted_is_the_inverse_of_turning(angle: float) -> None:
+def test_left_jacobian_inverse_is_the_inverse(angle: float) -> None:
     q = vectors(angle)
-    turning: FloatArray = np.array(turning_of((q[0], q[1], q[2]))).transpose(2, 1, 0)
-    back = untwisted(q).transpose(2, 0, 1)
+    turning: FloatArray = np.array(left_jacobian((q[0], q[1], q[2]))).transpose(2, 1, 0)
+    back = left_jacobian_inverse(q).transpose(2, 0, 1)
     # near 2 pi the inverse grows like 1 / (2 pi - angle), here 1 / 0.28
     np.testing.assert_allclose(back @ turning, np.tile(np.eye(3), (20, 1, 1)), rtol=0.0, atol=1e-12)
 
@@ -156,7 +156,7 @@ def test_a_global_joint_is_three_revolutes_whose_axes_meet(seed: int) -> None:
     before, after = random_pose(rng), random_pose(rng)
     q = rng.normal(size=3)
     ball = Joint("G", "global", ("ground", "b1"), (transform(before), transform(after)))
-    ball_arm = mechanism_of(one_joint([ball], 1))
+    ball_arm = build_mechanism(one_joint([ball], 1))
 
     # R = R(n1, t1) R(n2, t2) R(n3, t3) with n2 across both others: angles of Davenport
     n2, seen = np.array([0.0, 1.0, 0.0]), rng.uniform(0.3, 1.2)
@@ -172,7 +172,7 @@ def test_a_global_joint_is_three_revolutes_whose_axes_meet(seed: int) -> None:
         hinges.append(
             Joint(f"R{k}", "revolute", (names[k], names[k + 1]), (transform(first), transform(second)))
         )
-    three = mechanism_of(one_joint(hinges, 3))
+    three = build_mechanism(one_joint(hinges, 3))
 
     np.testing.assert_allclose(
         pose_of(three, np.asarray(angles), "b3"), pose_of(ball_arm, q, "b1"), rtol=0.0, atol=1e-13
@@ -188,7 +188,7 @@ def test_a_global_joint_is_three_revolutes_whose_axes_meet(seed: int) -> None:
 def test_a_global_joint_keeps_its_centre() -> None:
     rng = np.random.default_rng(3)
     joint = Joint("G", "global", ("ground", "b1"), (transform(random_pose(rng)), transform(random_pose(rng))))
-    arm = mechanism_of(one_joint([joint], 1))
+    arm = build_mechanism(one_joint([joint], 1))
     centre = matrix(joint.frames[0])[:3, 3]
     for q in vectors(2.5).T:
         seen = pose_of(arm, q, "b1") @ matrix(joint.frames[1])

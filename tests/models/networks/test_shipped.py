@@ -15,7 +15,7 @@ from urmpipe_datasets import NETWORKS
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.assembly import Assembled, assemble
 from urmpipe_models.networks.file import load_network
-from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.mobility import Assembly, mobility_of
 
 CLOSED = 1e-9
@@ -74,7 +74,7 @@ def test_every_shipped_network_is_listed_here() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MOVES)
 def test_it_assembles_from_its_start_and_moves_as_expected(name: str) -> None:
-    mechanism = mechanism_of(load_network(name))
+    mechanism = build_mechanism(load_network(name))
     assembled = assemble(mechanism)
     assert not assembled.elsewhere
     assert assembled.assemblies[0].residual < CLOSED
@@ -203,7 +203,7 @@ def spherical(t1: complex, t4: complex, alpha: FloatArray) -> complex:
 def test_both_branches_have_the_printed_answers(name: str, joint: str, answers: tuple[float, float]) -> None:
     _, assembled = every_assembly(tables_of(name), {})
     expected: list[Answer] = [{joint: (value,)} for value in answers]
-    assert_same_answers(mechanism_of(load_network(name)), assembled, expected, ANSWER)
+    assert_same_answers(build_mechanism(load_network(name)), assembled, expected, ANSWER)
 
 
 def test_bennett_obeys_its_relation_and_does_not_close_with_a_longer_link() -> None:
@@ -214,13 +214,13 @@ def test_bennett_obeys_its_relation_and_does_not_close_with_a_longer_link() -> N
     tables = tables_of("bennett")
     for name in ("t1", "t3"):
         tables["dh"]["elements"][name]["a"] *= 1.05
-    longer = assemble(mechanism_of(load_network(tables)), restarts=200)
+    longer = assemble(build_mechanism(load_network(tables)), restarts=200)
     assert not longer.assemblies
     assert max(longer.gaps[0].metres, longer.gaps[0].radians) > 1e-3
 
 
 def test_a_turn_of_the_screw_lifts_by_the_pitch() -> None:
-    mechanism = mechanism_of(load_network("screw-jack"))
+    mechanism = build_mechanism(load_network("screw-jack"))
     heights = [
         assemble(mechanism, {"turn": turn}).assemblies[0].values["rise"][0]
         for turn in (1.5, 1.5 + 2 * math.pi, 1.5 + 10 * math.pi)
@@ -229,7 +229,7 @@ def test_a_turn_of_the_screw_lifts_by_the_pitch() -> None:
 
 
 def test_the_platform_of_sarrus_rises_upright() -> None:
-    mechanism = mechanism_of(load_network("sarrus"))
+    mechanism = build_mechanism(load_network("sarrus"))
     for tilt in np.linspace(0.5, 1.4, 10):
         pose = pose_of(mechanism, assemble(mechanism, {"tilt": tilt}).assemblies[0], "platform")
         height = 0.3 * np.sin(tilt) + np.sqrt(0.35**2 - (-0.08 - 0.3 * np.cos(tilt)) ** 2)
@@ -238,7 +238,7 @@ def test_the_platform_of_sarrus_rises_upright() -> None:
 
 
 def test_no_two_axes_of_the_nine_are_parallel() -> None:
-    mechanism = mechanism_of(load_network("nine-revolute"))
+    mechanism = build_mechanism(load_network("nine-revolute"))
     poses = assemble(mechanism).assemblies[0].poses
     names = mechanism.network.body_names
     axes = np.array(
@@ -266,7 +266,7 @@ def test_dietmaiers_platform_has_forty_assemblies_with_legs_of_the_given_lengths
 @pytest.mark.parametrize("kind", ["gg", "eg", "crc", "gc"])
 def test_elements_measure_what_the_file_gives(kind: str) -> None:
     tables = tables_of(f"cluster-{kind}")
-    mechanism = mechanism_of(load_network(tables))
+    mechanism = build_mechanism(load_network(tables))
     start = np.eye(4)
     x = tables["bodies"]["plate"]["start"]
     start[:3, :3], start[:3, 3] = Rotation.from_rotvec(x[3:]).as_matrix(), x[:3]
@@ -292,7 +292,9 @@ def test_the_tip_of_the_geared_five_bar_is_where_two_circles_meet(turn: float) -
 def test_the_cam_lifts_its_follower_by_the_cycloidal_law(turn: float) -> None:
     angle = turn % 360
     x = min(angle, 120) / 120 if angle < 180 else 1 - min(angle - 180, 120) / 120
-    found = assemble(mechanism_of(load_network("cam-follower")), {"turn": turn}).assemblies[0].values["lift"]
+    found = (
+        assemble(build_mechanism(load_network("cam-follower")), {"turn": turn}).assemblies[0].values["lift"]
+    )
     law = 0.02 * (x - math.sin(2 * math.pi * x) / (2 * math.pi))
     assert found[0] == pytest.approx(law, abs=1e-6)  # the file: the spline is within 0.001 mm of the law
 
@@ -320,7 +322,7 @@ def test_the_legs_of_a_pose_bring_the_driven_platform_there(seed: int) -> None:
     points = np.array([one["a"] for one in tables["elements"].values()])
     lengths = np.linalg.norm(p + points[:, 1] @ R.T - points[:, 0], axis=1)
     legs = {f"leg{k}": float(length) for k, length in enumerate(lengths, 1)}
-    mechanism = mechanism_of(load_network(tables))
+    mechanism = build_mechanism(load_network(tables))
     pose = pose_of(mechanism, assemble(mechanism, legs).assemblies[0], "platform")
     np.testing.assert_allclose(pose[:3, :3], R, rtol=0, atol=ANSWER)
     np.testing.assert_allclose(pose[:3, 3], p, rtol=0, atol=ANSWER)
@@ -455,7 +457,7 @@ def every_assembly(
     tables: Tables, controls: dict[str, float], restarts: int = 20
 ) -> tuple[Mechanism, Assembled]:
     """Return the mechanism of tables, and its assemblies."""
-    mechanism = mechanism_of(load_network(tables))
+    mechanism = build_mechanism(load_network(tables))
     return mechanism, assemble(mechanism, controls, every=True, restarts=restarts)
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.file import Network, load_network, network_names
-from urmpipe_models.networks.mechanism import Mechanism, mechanism_of
+from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.rates import (
     changes,
     close_network,
@@ -47,7 +47,7 @@ def entries(mechanism: Mechanism, x: Any) -> list[Any]:
 def test_poses_of_symbols_numbers_and_columns_are_the_same(network: Network) -> None:
     import casadi as ca
 
-    mechanism = mechanism_of(network)
+    mechanism = build_mechanism(network)
     x = np.random.default_rng(1).uniform(0.1, 0.9, (len(mechanism.variables), 5))
     x[mechanism.rotations[0] if mechanism.rotations else slice(0), 0] = (
         0.0  # where series stand for quotients
@@ -68,7 +68,7 @@ def test_poses_of_symbols_numbers_and_columns_are_the_same(network: Network) -> 
 def test_steps_that_close_a_network_are_the_same_of_symbols_and_numbers(name: str) -> None:
     import casadi as ca
 
-    mechanism = mechanism_of(load_network(name))
+    mechanism = build_mechanism(load_network(name))
     before = assemble(mechanism).x[:, 0]
     x = before + np.random.default_rng(2).normal(scale=1e-3, size=len(before))
 

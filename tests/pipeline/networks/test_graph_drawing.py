@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from made_networks import NAMES, found
-from urmpipe_models.networks.mechanism import graph_of
+from urmpipe_models.networks.mechanism import build_graph
 from urmpipe_models.networks.parts import Body
 from urmpipe_pipeline.networks.drives import caption, is_driven, ties
 from urmpipe_pipeline.networks.graph_drawing import graph_svg
@@ -121,7 +121,7 @@ def test_names_of_a_stranger_are_drawn_letter_by_letter() -> None:
         for one in result.network.joints
     ]
     network = replace(result.network, bodies=bodies, joints=tuple(joints))
-    svg = graph_svg(replace(result, network=network, clusters=graph_of(network).clusters))
+    svg = graph_svg(replace(result, network=network, clusters=build_graph(network).clusters))
     assert evil in words(svg, "body")
 
 

@@ -20,7 +20,7 @@ from toys import eye_of, recorded, shown
 from urmpipe_models.elementwise import ZERO, FloatArray, Vector
 from urmpipe_models.math3d import matrices
 from urmpipe_models.networks.file import Network, load_network
-from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_of
+from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_from_axes
 from urmpipe_pipeline.networks.finding import Search, find_network
 from urmpipe_pipeline.networks.motion_drawing import (
     MovingNetwork,
@@ -127,7 +127,7 @@ def slanted(n: Vector) -> Network:
     """Two links with joints about an axis."""
     m = tuple(np.cross(n, (0.0, 0.6, -0.8) if n != X else Y).tolist())
     m = tuple((np.array(m) / np.linalg.norm(m)).tolist())
-    frames = frame_of(m, n, ZERO), frame_of(m, n, tuple((0.4 * np.array(m)).tolist()))
+    frames = frame_from_axes(m, n, ZERO), frame_from_axes(m, n, tuple((0.4 * np.array(m)).tolist()))
     joints = (
         Joint("A", "revolute", ("ground", "a"), (frames[0], frames[0]), (0.5,)),
         Joint("B", "revolute", ("a", "b"), (frames[1], frames[0]), (0.7,)),
