@@ -18,7 +18,7 @@ from pairs import Bound, machine, timed, write_results
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.closed import ClosedForm, closed_form
-from urmpipe_models.ik.solutions import Targets, targets_of
+from urmpipe_models.ik.solutions import Targets, forward_targets
 from urmpipe_models.ik.solve import solve
 from urmpipe_models.kinematics.forward import chain_to_screws
 from urmpipe_models.robots.catalogue import load_robot
@@ -134,7 +134,7 @@ def main() -> None:
     form = closed_form(chain)
     assert form is not None
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (options.poses, 6))
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     rotation = targets.rotation
     assert rotation is not None
     robot, poses = peer(chain, targets)

@@ -25,7 +25,7 @@ from pairs import Bound, machine, write_results
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.restarts import refine, solve_iteratively
-from urmpipe_models.ik.solutions import Search, Targets, misses, targets_of
+from urmpipe_models.ik.solutions import SearchOptions, Targets, forward_targets, pose_errors
 from urmpipe_models.robots.catalogue import load_robot
 
 OURS_NEAR = "near: urmpipe, 1 thread"
@@ -66,7 +66,7 @@ class Problem:
 
     def met(self, found: FloatArray) -> float:
         """Return the share of the first targets that joint values meet."""
-        distance, turn = misses(self.chain, found, self.targets.rows(slice(len(found))))
+        distance, turn = pose_errors(self.chain, found, self.targets.rows(slice(len(found))))
         within = np.linalg.norm(distance, axis=1) <= TOLERANCE
         return float((within & (np.linalg.norm(turn, axis=1) <= TOLERANCE)).mean())
 
@@ -91,7 +91,7 @@ def problem(count: int) -> Problem:
     rng = np.random.default_rng(0)
     q = rng.uniform(-np.pi, np.pi, (count, 6))
     near, random = q + rng.normal(0.0, NOISE, q.shape), rng.uniform(-np.pi, np.pi, q.shape)
-    return Problem(chain, targets_of(chain, q), near, random)
+    return Problem(chain, forward_targets(chain, q), near, random)
 
 
 def our_jobs(given: Problem) -> dict[str, Callable[[], FloatArray]]:
@@ -113,7 +113,7 @@ def our_jobs(given: Problem) -> dict[str, Callable[[], FloatArray]]:
         ),
         "near: urmpipe, 1 thread, to 1e-10": lambda: refine(chain, targets, given.near, threads=1).q,
         OURS_RANDOM: lambda: solve_iteratively(
-            chain, targets, start=given.random, search=Search(restarts=RESTARTS)
+            chain, targets, start=given.random, search=SearchOptions(restarts=RESTARTS)
         ).q[:, 0],
     }
 

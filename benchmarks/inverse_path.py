@@ -24,8 +24,8 @@ from pairs import Bound, machine, write_results
 from urmpipe_datasets import LOGS
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.path import follow
-from urmpipe_models.ik.solutions import Targets, misses, targets_of
+from urmpipe_models.ik.path import solve_path
+from urmpipe_models.ik.solutions import Targets, forward_targets, pose_errors
 from urmpipe_models.math3d import Transform
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -69,7 +69,7 @@ def motion(robot: str, around: FloatArray, samples: int) -> Job:
         for _ in range(3)
     )
     chain = load_robot(robot)
-    return Job(chain, targets_of(chain, q), q[0])
+    return Job(chain, forward_targets(chain, q), q[0])
 
 
 def links(chain: Chain) -> FloatArray:
@@ -108,9 +108,9 @@ def peers_time(python: str, job: Job, folder: Path) -> dict[str, float]:
 def own_time(job: Job) -> dict[str, float]:
     """Return the same of `follow`, the whole call."""
     begin = time.perf_counter()
-    path = follow(job.chain, job.targets, job.t_ns, start=job.start)
+    path = solve_path(job.chain, job.targets, job.t_ns, start=job.start)
     seconds = time.perf_counter() - begin
-    distance, _ = misses(job.chain, path.q, job.targets)
+    distance, _ = pose_errors(job.chain, path.q, job.targets)
     miss = float(np.nanmax(np.linalg.norm(distance, axis=1)))
     return {"seconds": seconds, "solved": int(path.reached.sum()), "miss": miss}
 

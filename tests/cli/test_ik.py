@@ -11,7 +11,7 @@ from ik_runs import answer, write_path
 from urmpipe.main import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import pasted
-from urmpipe_models.ik.solutions import misses, targets_of
+from urmpipe_models.ik.solutions import forward_targets, pose_errors
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
@@ -175,7 +175,7 @@ def test_an_iterative_arm_lists_what_restarts_collect(capsys: Captured, folder: 
     assert len(one["targets"][0]["solutions"]) == 1
     solutions = np.array([found["q"] for found in every["targets"][0]["solutions"]])
     assert len(solutions) > 1
-    position, turn = misses(arm, solutions, targets_of(arm, np.repeat(q, len(solutions), axis=0)))
+    position, turn = pose_errors(arm, solutions, forward_targets(arm, np.repeat(q, len(solutions), axis=0)))
     assert np.abs(position).max() < 1e-9
     assert np.abs(turn).max() < 1e-9
     assert again == every
@@ -269,9 +269,9 @@ def test_all_of_a_path_records_the_branches_that_run_beside_it(capsys: Captured,
     assert isinstance(made, SolvedTargets)
     assert np.abs(made.q - q).max() < 1e-9
     assert {np.isfinite(one.q).all() for one in ghosts(made)} == {np.True_}
-    arm, targets = load_robot("arm6"), targets_of(load_robot("arm6"), q)
+    arm, targets = load_robot("arm6"), forward_targets(load_robot("arm6"), q)
     for ghost in ghosts(made):
-        position, turn = misses(arm, ghost.q, targets)
+        position, turn = pose_errors(arm, ghost.q, targets)
         assert np.abs(position).max() < 1e-10
         assert np.abs(turn).max() < 1e-10
 

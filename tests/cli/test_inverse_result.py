@@ -15,14 +15,14 @@ from hypothesis import strategies as st
 import urmpipe
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_models.ik.solutions import misses, targets_of
+from urmpipe_models.ik.solutions import forward_targets, pose_errors
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.math3d import quaternions
 from urmpipe_pipeline.json_values import json_ready
 
 Q = np.array([[0.3, 0.8, -0.6, 0.5, 0.7, 0.2], [-1.0, 0.5, -0.2, 1.0, -0.8, 2.0]])
 ARM = urmpipe.load_robot("arm6")
-TARGETS = targets_of(ARM, Q)
+TARGETS = forward_targets(ARM, Q)
 
 
 def matrices(targets: urmpipe.Targets) -> FloatArray:
@@ -67,7 +67,7 @@ def test_a_transposed_pose_is_none_and_stops_no_other() -> None:
 @given(st.integers(0, 10_000))
 def test_the_solution_nearest_to_the_start_is_the_start_itself(seed: int) -> None:
     q = np.random.default_rng(seed).uniform(-3.0, 3.0, 6)
-    found = urmpipe.ik(targets_of(ARM, q[None]), ARM, start=q.tolist())
+    found = urmpipe.ik(forward_targets(ARM, q[None]), ARM, start=q.tolist())
     distances = np.linalg.norm(found.solutions.q[0] - q, axis=1)
     assert found.chosen[0] == int(np.nanargmin(distances))
     assert np.nanmin(distances) < 1e-5  # near a singular pose rounding of 1e-16 leaves its root
@@ -92,7 +92,7 @@ def test_the_table_has_every_solution_and_why_there_is_none() -> None:
         assert part["nearest"].sum() == 1
         assert part["branch"].nunique() == count
         q = part[list(ARM.coordinates)].to_numpy()
-        position, turn = misses(ARM, q, TARGETS.rows(np.full(count, row - 1)))
+        position, turn = pose_errors(ARM, q, TARGETS.rows(np.full(count, row - 1)))
         assert np.abs(position).max() < 1e-10
         assert np.abs(turn).max() < 1e-10
     (last,) = frame[frame["row"] == 3].to_dict("records")
@@ -110,7 +110,7 @@ def test_progress_is_told_and_changes_nothing(robot: str, every: bool) -> None:
     arm = urmpipe.load_robot(robot)
     q = np.random.default_rng(3).uniform(-1.0, 1.0, (600, 6))
     q[550] = 0.0  # a wrist of arm6 that is aligned, in the second block
-    targets = targets_of(arm, q)
+    targets = forward_targets(arm, q)
     targets.position[7] = np.nan
     told: list[float] = []
     options = {"every": every, "restarts": 2}
@@ -142,7 +142,7 @@ def test_positions_take_any_orientation() -> None:
 
 def test_arrays_with_times_are_a_path() -> None:
     q = Q[0] + 0.2 * np.sin(np.outer(np.arange(30) / 30, np.arange(1, 7)))
-    poses = targets_of(ARM, q)
+    poses = forward_targets(ARM, q)
     with_times = urmpipe.ik(poses, ARM, t=0.01 * np.arange(30) + 5.0, start=q[0].tolist())
     by_period = urmpipe.ik(poses, ARM, tsp=0.01, start=q[0].tolist())
     assert np.abs(with_times.q - q).max() < 1e-9
@@ -156,7 +156,7 @@ def test_arrays_with_times_are_a_path() -> None:
 def test_a_path_tells_where_it_comes_nearest_to_a_singular_pose() -> None:
     q = np.tile(Q[0], (30, 1))
     q[:, 4] = 0.3 + np.abs(np.arange(30) - 11) / 30  # sigma falls with sin theta5
-    found = urmpipe.ik(targets_of(ARM, q), ARM, tsp=0.01, start=q[0].tolist()).to_dict()["singularity"]
+    found = urmpipe.ik(forward_targets(ARM, q), ARM, tsp=0.01, start=q[0].tolist()).to_dict()["singularity"]
     log = singularity_over_log(ARM, q)
     assert (found["row"], found["t"]) == (12, 0.11)
     assert found["smallest"] == pytest.approx(log.smallest[11], rel=1e-9)
@@ -181,7 +181,7 @@ def test_a_path_beyond_the_reach_stays_on_its_branch_at_the_nearest_points() -> 
 def test_joints_without_limits_can_be_written_within_pi() -> None:
     free = replace(ARM, joints=tuple(replace(one, lower=-np.inf, upper=np.inf) for one in ARM.joints))
     q = Q[0] + np.outer(np.linspace(0.0, 7.0, 200), [1.0, 0, 0, 0, 0, 0])
-    poses = targets_of(free, q)
+    poses = forward_targets(free, q)
     turned = urmpipe.ik(poses, free, tsp=0.01, start=q[0].tolist())
     within = urmpipe.ik(poses, free, tsp=0.01, start=q[0].tolist(), within_pi=True)
     assert turned.q[-1, 0] - turned.q[0, 0] == pytest.approx(7.0, abs=1e-9)

@@ -19,7 +19,7 @@ from flat_arm import lay_flat_arm
 from pages import lay, repeated_files
 from urmpipe.main import COMMANDS, cli, run
 from urmpipe_datasets import LOGS
-from urmpipe_models.ik.solutions import targets_of
+from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.delta_verdict import delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning
@@ -65,7 +65,7 @@ def test_each_key_of_inverse_kinematics_is_named() -> None:
     arm = replace(arm, joints=tuple(narrow))  # beyond 0.8 only the other arm goes on
     q = np.tile([0.1, -0.9, 1.2, -0.5, 0.7, 0.2], (20, 1))
     q[:, 0] += 0.6 + 0.01 * np.arange(20)
-    poses = targets_of(arm, q)
+    poses = forward_targets(arm, q)
     path = urmpipe.ik(poses, arm, tsp=0.01, start=q[0])
     found = path.to_dict()
     assert found["jumps"]

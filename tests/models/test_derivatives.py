@@ -18,8 +18,8 @@ from urmpipe_models.drives import RAMP, STEP, TRAPEZOID, evaluate_setpoint
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik import loop_equations as polishing
 from urmpipe_models.ik import trigonometric
-from urmpipe_models.ik.solutions import Targets, targets_of
-from urmpipe_models.ik.task import Task, task_of
+from urmpipe_models.ik.solutions import Targets, forward_targets
+from urmpipe_models.ik.task import Task, build_task
 from urmpipe_models.kinematics.forward import Screws, jacobian_over_log, screws_to_chain
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 
@@ -45,16 +45,16 @@ def test_the_gradient_of_the_squared_miss_is_minus_j_transposed_e_at_any_target(
     robot: str, pose: bool
 ) -> None:
     chain = load_robot(robot)
-    targets = targets_of(chain, columns(chain, 20, 1).T)
-    assert_gradients(task_of(chain, targets if pose else Targets(targets.position)), columns(chain, 20, 2))
+    targets = forward_targets(chain, columns(chain, 20, 1).T)
+    assert_gradients(build_task(chain, targets if pose else Targets(targets.position)), columns(chain, 20, 2))
 
 
 @settings(max_examples=20, deadline=None)
 @given(data=st.data(), pose=st.booleans())
 def test_so_it_is_of_any_chain(chains: SearchStrategy[Chain], data: st.DataObject, pose: bool) -> None:
     chain = data.draw(chains)
-    targets = targets_of(chain, columns(chain, 3, 1).T)
-    task = task_of(chain, targets if pose else Targets(targets.position))
+    targets = forward_targets(chain, columns(chain, 3, 1).T)
+    task = build_task(chain, targets if pose else Targets(targets.position))
     q = columns(chain, 3, 2)
     miss = task.miss(q)
     if np.sqrt(miss.turn2).max() < 3.0 * miss.length:  # at half a turn the axis leaps
@@ -65,7 +65,7 @@ def test_so_it_is_of_any_chain(chains: SearchStrategy[Chain], data: st.DataObjec
 def test_the_miss_changes_by_the_jacobian_and_its_turn_by_that_of_the_logarithm(robot: str) -> None:
     """-de = A J dq with A of `log_jacobian` for the turn, and A = 1 for the position."""
     chain = load_robot(robot)
-    task, q = task_of(chain, targets_of(chain, columns(chain, 40, 1).T)), columns(chain, 40, 2)
+    task, q = build_task(chain, forward_targets(chain, columns(chain, 40, 1).T)), columns(chain, 40, 2)
     miss = task.miss(q)
     regular = np.sqrt(miss.turn2) < 3.0 * miss.length
     task, q, miss = task.kept(np.flatnonzero(regular)), q[:, regular], miss.kept(np.flatnonzero(regular))

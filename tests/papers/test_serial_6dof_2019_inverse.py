@@ -14,7 +14,7 @@ import pytest
 from asserting import there
 from serial_6dof_rows import INVERSE
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.solutions import Solutions, Targets, misses
+from urmpipe_models.ik.solutions import Solutions, Targets, pose_errors
 from urmpipe_models.ik.spherical import SphericalWrist, spherical_wrist
 from urmpipe_models.kinematics.forward import chain_to_screws
 from urmpipe_models.math3d import from_rpy
@@ -54,7 +54,7 @@ def assert_rows(solutions: Solutions, first: int, rows: list[list[float]]) -> No
 
 def assert_reached(targets: Targets, q: FloatArray, within: float) -> None:
     """Hold joint values against a pose, in [m] and [rad], by forward kinematics."""
-    position, rotation = misses(ARM, np.atleast_2d(q), targets)
+    position, rotation = pose_errors(ARM, np.atleast_2d(q), targets)
     np.testing.assert_allclose(position, 0.0, rtol=0, atol=within)
     np.testing.assert_allclose(rotation, 0.0, rtol=0, atol=within)
 

@@ -12,7 +12,7 @@ import pytest
 from asserting import there
 from urmpipe.main import run
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.solutions import targets_of
+from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.math3d import quaternions
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -28,7 +28,7 @@ def answer(capsys: Captured, code: int, *arguments: str | Path) -> dict[str, Any
 
 def write_path(path: Path, robot: str, q: FloatArray, period: float = 0.01) -> None:
     """Write the poses of joint values as a path of poses."""
-    targets = targets_of(load_robot(robot), q)
+    targets = forward_targets(load_robot(robot), q)
     quat = quaternions(there(targets.rotation).reshape(-1, 9), "matrix")
     table = np.column_stack([period * np.arange(len(q)), targets.position, quat])
     np.savetxt(path, table, delimiter=",", header="t,x,y,z,qx,qy,qz,qw", comments="", fmt="%.16g")

@@ -11,7 +11,7 @@ from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.closed import ClosedForm
 from urmpipe_models.ik.parallel import parallel_axes
-from urmpipe_models.ik.solutions import Solutions, Targets, misses, targets_of
+from urmpipe_models.ik.solutions import Solutions, Targets, forward_targets, pose_errors
 from urmpipe_models.kinematics.forward import chain_to_screws
 from urmpipe_models.math3d import from_offset
 
@@ -28,12 +28,12 @@ def form_of(chain: Chain) -> ClosedForm:
 
 def poses(chain: Chain, count: int, seed: int = 0) -> tuple[FloatArray, Targets]:
     q = np.random.default_rng(seed).uniform(-math.pi, math.pi, (count, 6))
-    return q, targets_of(chain, q)
+    return q, forward_targets(chain, q)
 
 
 def assert_every_solution_meets(chain: Chain, targets: Targets, solutions: Solutions, within: float) -> None:
     row, column = np.nonzero(solutions.reached)
-    position, angle = misses(chain, solutions.q[row, column], targets.rows(row))
+    position, angle = pose_errors(chain, solutions.q[row, column], targets.rows(row))
     assert np.abs(position).max(initial=0.0) < within
     assert np.abs(angle).max(initial=0.0) < within
     assert ((solutions.reasons != "") == ~solutions.reached).all()

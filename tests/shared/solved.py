@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.ik.solutions import Solutions, Targets, targets_of
+from urmpipe_models.ik.solutions import Solutions, Targets, forward_targets
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
@@ -48,7 +48,7 @@ def solved(
     made = SolvedTargets(
         name=name, robot=chain, method="iterative", row=np.arange(1, n + 1),
         t_ns=None if t_ns is None else t_ns - start, clock_start_ns=start,
-        targets=targets_of(chain, q) if targets is None else targets,
+        targets=forward_targets(chain, q) if targets is None else targets,
         solutions=Solutions(every, ("chosen", *(others or {})), texts), chosen=np.zeros(n, dtype=np.intp),
         miss=np.zeros((n, k)), angle=np.zeros((n, k)), every=others is not None, branches=None, path=None,
         warnings=(), provenance=provenance("ik", {"robot": chain.name}, [FILE]),

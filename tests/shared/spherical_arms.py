@@ -11,7 +11,7 @@ from closed_forms import form_by
 from urmpipe_models.arm.chain import Chain, Joint, JointKind
 from urmpipe_models.arm.geometric_models import DHRow, dh_chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.solutions import Solutions, Targets, misses
+from urmpipe_models.ik.solutions import Solutions, Targets, pose_errors
 from urmpipe_models.ik.spherical import SphericalWrist, spherical_wrist
 from urmpipe_models.math3d import Transform, from_offset
 
@@ -89,7 +89,7 @@ def assert_reached(chain: Chain, targets: Targets, solutions: Solutions, within:
     """Hold every solution against its target by forward kinematics, in [m] and [rad]."""
     for slot in range(solutions.q.shape[1]):
         there = solutions.reached[:, slot]
-        position, rotation = misses(chain, solutions.q[there, slot], targets.rows(there))
+        position, rotation = pose_errors(chain, solutions.q[there, slot], targets.rows(there))
         np.testing.assert_allclose(position, 0.0, rtol=0, atol=within, err_msg=solutions.branches[slot])
         np.testing.assert_allclose(rotation, 0.0, rtol=0, atol=within, err_msg=solutions.branches[slot])
 

@@ -15,7 +15,7 @@ from urmpipe.output_files import output_kind
 from urmpipe.reading import Resolved, TableReading, map_files, resolved
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, for_each
-from urmpipe_models.ik.solutions import USUAL_SEARCH, Search
+from urmpipe_models.ik.solutions import DEFAULT_SEARCH, SearchOptions
 from urmpipe_models.ik.solve import Method
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.joint_log import LogWarning
@@ -31,7 +31,7 @@ from urmpipe_pipeline.tables.joint_file import write_joint_log
 SOLVING = 0.7
 """Share of the work that solving is where something is written, too."""
 
-RESTARTS = USUAL_SEARCH.restarts
+RESTARTS = DEFAULT_SEARCH.restarts
 """Random starts of the iterative solver for a target that it does not reach from the start."""
 
 
@@ -103,7 +103,7 @@ def ik(
     )
     arm, kind, given = for_each(lambda make: make(), parts)
     solving, writing = _parts(progress, path is not None)
-    search = Search(tolerance, restarts, seed)
+    search = SearchOptions(tolerance, restarts, seed)
     request = Request(arm, given, start_of(arm, start), every, within_pi, method, search)
     refuse_unsolvable(request, recorded=kind == "recording")
 

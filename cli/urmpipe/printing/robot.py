@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from urmpipe.printing.terminal import new_console, new_table
 from urmpipe_models.arm.chain import GRAVITY, Chain, Joint, Parameter, frame_to_steps
 from urmpipe_models.drives import PassiveJoint
-from urmpipe_models.ik.closed import closed_form, method_words
+from urmpipe_models.ik.closed import closed_form, format_method
 from urmpipe_models.kinematics.forward import forward, points_over_log
 from urmpipe_models.math3d import Transform, euler_zyx, rpy_of
 from urmpipe_models.robots.toml import chain_to_dict, drive_to_dict
@@ -113,7 +113,7 @@ def print_chain(posed: PosedChain) -> None:
     console.print(posed.title, soft_wrap=True)
     if chain.source:
         console.print(f"Source: {chain.source}", soft_wrap=True)
-    console.print(f"Inverse: {method_words(posed.inverse)}", soft_wrap=True)
+    console.print(f"Inverse: {format_method(posed.inverse)}", soft_wrap=True)
     if chain.gravity != GRAVITY:
         console.print(f"Gravity: {_figures(chain.gravity)} m/s²", soft_wrap=True)
     console.print(_parameters(chain))

@@ -28,19 +28,19 @@ from urmpipe_models.ik.solutions import (
     SingularFamily,
     Solutions,
     Targets,
-    limits_of,
-    within_limits,
+    joint_limits,
+    limit_solutions,
 )
 
 
-def stretches(where: BoolArray) -> list[tuple[int, int]]:
+def find_true_runs(where: BoolArray) -> list[tuple[int, int]]:
     """Return the first and last index of every run of true values of `where`, shape (n,), ascending."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], where, [False]))))
     return [(int(first), int(last) - 1) for first, last in edges.reshape(-1, 2)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Choices:
+class BranchCandidates:
     """The solutions of samples, and the whole turns that each joint may be off them.
 
     Attributes:
@@ -56,15 +56,15 @@ class Choices:
     most: FloatArray
 
     @classmethod
-    def of(cls, chain: Chain, found: Solutions) -> Choices:
+    def of(cls, chain: Chain, found: Solutions) -> BranchCandidates:
         """Return the choices that solutions within limits leave."""
-        lower, upper = limits_of(chain)
+        lower, upper = joint_limits(chain)
         q = np.where(found.reached[..., None], found.q, 0.0)
         least = np.ceil((lower - LIMIT_ROUNDING - q) / TURN)
         most = np.floor((upper + LIMIT_ROUNDING - q) / TURN)
         return cls(q, np.where(found.reached, 0.0, np.inf), least, most)
 
-    def put(self, rows: slice, other: Choices) -> None:
+    def put(self, rows: slice, other: BranchCandidates) -> None:
         """Put in the place of some samples what was found for them anew."""
         for mine, others in (
             (self.q, other.q),
@@ -118,7 +118,7 @@ FEW, MANY = 8, 1024
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Walked:
+class BranchPath:
     """The solutions taken along a path.
 
     Attributes:
@@ -134,7 +134,7 @@ class Walked:
     singular: dict[SingularFamily, BoolArray]
 
 
-def walk(chain: Chain, form: ClosedForm, targets: Targets, start: FloatArray) -> Walked:
+def follow_branches(chain: Chain, form: ClosedForm, targets: Targets, start: FloatArray) -> BranchPath:
     """Return the solutions that are taken along a path, limits kept.
 
     Args:
@@ -143,13 +143,13 @@ def walk(chain: Chain, form: ClosedForm, targets: Targets, start: FloatArray) ->
         targets: Poses, one a sample.
         start: Joint values in [rad] that the first sample shall be near to, shape (joints,).
     """
-    found = within_limits(chain, form.solve(targets))
+    found = limit_solutions(chain, form.solve(targets))
     way = _Way(chain, form, targets, found, start)
     for sample in np.flatnonzero(found.reached.any(axis=1)).tolist():
         if sample > way.at:
             way.step(sample)
             way.go_on()
-    return Walked(way.q, *_told(found, way.column))
+    return BranchPath(way.q, *_told(found, way.column))
 
 
 class _Way:
@@ -166,8 +166,8 @@ class _Way:
     ) -> None:
         """Stand before the first sample; the arguments are those of `walk`, and what it found."""
         self._chain, self._form, self._targets = chain, form, targets
-        self._choices = Choices.of(chain, found)
-        self._free = stretches(_left_free(found))
+        self._choices = BranchCandidates.of(chain, found)
+        self._free = find_true_runs(_left_free(found))
         self._last, self._many = start, FEW
         self.at = -1
         self.q = np.full((len(found), len(start)), np.nan)
@@ -203,7 +203,10 @@ class _Way:
     def _settle(self, rows: slice) -> None:
         """Leave the joints that are free at singular poses where they are."""
         found = self._form.solve(self._targets.rows(rows), self._last)
-        self._choices.put(rows, Choices.of(self._chain, within_limits(self._chain, found, self._last)))
+        self._choices.put(
+            rows,
+            BranchCandidates.of(self._chain, limit_solutions(self._chain, found, self._last)),
+        )
 
 
 def _left_free(found: Solutions) -> BoolArray:

@@ -24,9 +24,9 @@ from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray
 from urmpipe_models.ik.loop_equations import nearest_point
 from urmpipe_models.ik.parallel import ParallelAxes, parallel_axes
 from urmpipe_models.ik.restarts import refine
-from urmpipe_models.ik.solutions import Solutions, Targets, misses, targets_of
-from urmpipe_models.ik.spherical import TILT, SphericalWrist, meeting_point, spherical_wrist
-from urmpipe_models.ik.trigonometric import wrapped
+from urmpipe_models.ik.solutions import Solutions, Targets, forward_targets, pose_errors
+from urmpipe_models.ik.spherical import MIN_TILT_SINE, SphericalWrist, meeting_point, spherical_wrist
+from urmpipe_models.ik.trigonometric import wrap_angle
 from urmpipe_models.kinematics.forward import Screws, chain_to_screws, screws_to_chain
 from urmpipe_models.math3d import rotation_about
 
@@ -40,16 +40,16 @@ random pose in a hundred loses the branch that it was made of, all beside singul
 """
 
 
-def with_spherical_wrist(screws: Screws) -> Iterator[Screws]:
+def iter_spherical_wrists(screws: Screws) -> Iterator[Screws]:
     """Yield six joints whose last three axes are made to meet in one point, if they all but do.
 
     First with joints 1 to 3 ordered as well: axes 2 and 3, or else 1 and 2, made parallel or made to meet
     if they all but do, so that the branches have the names of the arm that was meant; then without.
     """
-    arm = compact(screws)
+    arm = compact_axis_points(screws)
     if len(arm.revolute) != 6 or not arm.revolute[3:].all():
         return
-    if np.linalg.norm(np.cross(arm.direction[3:5], arm.direction[4:]), axis=1).min() <= TILT:
+    if np.linalg.norm(np.cross(arm.direction[3:5], arm.direction[4:]), axis=1).min() <= MIN_TILT_SINE:
         return  # parallel axes meet nowhere, and no such wrist has a closed form
     centre = meeting_point(arm.direction[3:], arm.point[3:])
     passing = np.linalg.norm(np.cross(centre - arm.point[3:], arm.direction[3:]), axis=1)
@@ -64,12 +64,12 @@ def with_spherical_wrist(screws: Screws) -> Iterator[Screws]:
     yield met
 
 
-def with_parallel_axes(screws: Screws) -> Iterator[Screws]:
+def iter_parallel_axes(screws: Screws) -> Iterator[Screws]:
     """Yield six revolute joints with axes 2, 3, 4 made parallel, if they all but are.
 
     First with axes 5 and 6 as they are, then made to meet if they all but do.
     """
-    arm = compact(screws)
+    arm = compact_axis_points(screws)
     if len(arm.revolute) != 6 or not arm.revolute.all():
         return
     parallel = _made_parallel(arm, [1, 2, 3])
@@ -81,7 +81,7 @@ def with_parallel_axes(screws: Screws) -> Iterator[Screws]:
         yield met
 
 
-def compact(screws: Screws) -> Screws:
+def compact_axis_points(screws: Screws) -> Screws:
     """Return the same screws, each by the point of its axis that is nearest to the one before it.
 
     So an axis that is tilted is tilted where the arm is, and the arm's size is that of the arm: frames may
@@ -139,10 +139,10 @@ MET = 1e-11
 STEPS = 24
 """Two or three are enough where the pose is not nearly singular."""
 
-NUDGE = 2.0
+EDGE_SHIFT = 2.0
 """Targets on the edge of the idealised arm's reach are moved by so many times what the two arms are apart."""
 
-BLOCK = 4096
+BATCH_SIZE = 4096
 """Targets that are worked on at once."""
 
 FEW = 8
@@ -151,7 +151,7 @@ FEW = 8
 SAME = 1e-6
 """Solutions that differ by less than this in every joint, in [rad] or [m], are one."""
 
-LOST = (
+LOST_BRANCH_REASON = (
     "this branch of the arm with its axes made exact leads to no solution of the arm itself,"
     " as on the edge of its reach or beside a singular pose, allowed: one nearest to it"
 )
@@ -159,7 +159,7 @@ LOST = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class NearlyClosedForm:
+class NearClosedForm:
     """A closed form, see `ClosedForm`, of an arm that has it but for small deviations.
 
     Branches and singular families are those of the idealised arm, and so are the reasons why a branch does
@@ -201,22 +201,22 @@ class NearlyClosedForm:
         wish = None if near is None else np.broadcast_to(near, (count, len(self.chain.coordinates)))
         ideal = self.form.solve(targets, wish)
         q = np.full_like(ideal.q, np.nan)
-        for i in range(0, count, BLOCK):
-            rows = np.arange(i, min(i + BLOCK, count))
+        for i in range(0, count, BATCH_SIZE):
+            rows = np.arange(i, min(i + BATCH_SIZE, count))
             self._find(q, rows, targets.rows(rows), [ideal.q[rows]])
             rows = rows[np.isnan(q[rows, :, 0]).any(axis=1)]
             beside = list(self._nudged(targets.rows(rows)))
             starts = [self.form.solve(one, None if wish is None else wish[rows]).q for one in beside]
             self._find(q, rows, targets.rows(rows), starts)
             if wish is not None:
-                begun = ideal.q[i : i + BLOCK].copy()
+                begun = ideal.q[i : i + BATCH_SIZE].copy()
                 for one in starts:
                     begun[rows - i] = np.where(np.isnan(begun[rows - i]), one, begun[rows - i])
                 near_any = np.flatnonzero(np.isfinite(begun).any(axis=(1, 2)))
                 rows = i + near_any
                 self._find_near(q, rows, targets.rows(rows), begun[near_any], wish[rows])
         own = np.isfinite(q[:, :, 0])
-        reasons = np.where(own, "", np.where(ideal.reached, LOST, ideal.reasons))
+        reasons = np.where(own, "", np.where(ideal.reached, LOST_BRANCH_REASON, ideal.reasons))
         singular = (replace(one, where=one.where & own) for one in ideal.singular)
         kept = tuple(one for one in singular if one.where.any())
         return replace(ideal, q=q + 0.0, reasons=reasons, singular=kept)  # no -0.0
@@ -224,7 +224,7 @@ class NearlyClosedForm:
     def _nudged(self, targets: Targets) -> Iterator[Targets]:
         """Yield targets moved and turned by what the two arms are apart: one of them is in reach of both."""
         assert targets.rotation is not None
-        metres, radians = NUDGE * self.deviation[0], NUDGE * self.deviation[1]
+        metres, radians = EDGE_SHIFT * self.deviation[0], EDGE_SHIFT * self.deviation[1]
         for axis in (*np.eye(3), *-np.eye(3)):
             yield Targets(targets.position + metres * axis, targets.rotation)
             turn = np.array(rotation_about(axis.tolist(), radians).rotation, dtype=float)
@@ -302,10 +302,10 @@ class NearlyClosedForm:
     def _within_turn(self, q: FloatArray) -> FloatArray:
         """Return joint values with the angles in (-pi, pi]."""
         turning = np.array([joint.kind == "revolute" for joint in self.chain.moving])
-        return np.where(turning, wrapped(q), q)
+        return np.where(turning, wrap_angle(q), q)
 
 
-def nearly_closed_form(chain: Chain, screws: Screws) -> NearlyClosedForm | None:
+def near_closed_form(chain: Chain, screws: Screws) -> NearClosedForm | None:
     """Return the inverse of an arm that all but has a closed form; None of any other.
 
     Args:
@@ -313,11 +313,11 @@ def nearly_closed_form(chain: Chain, screws: Screws) -> NearlyClosedForm | None:
         screws: Of its joints.
     """
     names = chain.coordinates
-    wrists = ((ideal, spherical_wrist(ideal, names)) for ideal in with_spherical_wrist(screws))
-    planes = ((ideal, parallel_axes(ideal, names)) for ideal in with_parallel_axes(screws))
+    wrists = ((ideal, spherical_wrist(ideal, names)) for ideal in iter_spherical_wrists(screws))
+    planes = ((ideal, parallel_axes(ideal, names)) for ideal in iter_parallel_axes(screws))
     for ideal, form in (*wrists, *planes):
         if form is not None:
-            return NearlyClosedForm(_unlimited(chain), form, _deviation(chain, ideal))
+            return NearClosedForm(_unlimited(chain), form, _deviation(chain, ideal))
     return None
 
 
@@ -331,7 +331,7 @@ def _deviation(chain: Chain, ideal: Screws) -> tuple[float, float]:
     """Return the largest distance in [m] and angle in [rad] between two arms, of some random joint values."""
     q = np.random.default_rng(0).uniform(-np.pi, np.pi, (64, len(ideal.revolute)))
     q *= np.where(ideal.revolute, 1.0, ideal.size / np.pi)
-    apart = misses(chain, q, targets_of(screws_to_chain(ideal, chain.coordinates), q))
+    apart = pose_errors(chain, q, forward_targets(screws_to_chain(ideal, chain.coordinates), q))
     metres, radians = (float(np.linalg.norm(one, axis=1).max()) for one in apart)
     return metres, radians
 
@@ -374,15 +374,15 @@ def closed_form(chain: Chain) -> ClosedForm | None:
     three meet in a point, or those of joints 2, 3 and 4 are parallel: exactly (`exact_form`) or nearly
     (`nearly.NearlyClosedForm`).
     """
-    exact = exact_form(chain)
+    exact = exact_closed_form(chain)
     of_chain = chain_to_screws(chain)
     if exact is not None or of_chain is None:
         return exact
-    return nearly_closed_form(chain, of_chain)
+    return near_closed_form(chain, of_chain)
 
 
 @lru_cache(maxsize=32)
-def exact_form(chain: Chain) -> ClosedForm | None:
+def exact_closed_form(chain: Chain) -> ClosedForm | None:
     """Return the closed form of an arm that has it to the rounding; None if it has none.
 
     Paths are followed by these alone: beside singular poses the branches of an arm that only nearly has one
@@ -395,6 +395,6 @@ def exact_form(chain: Chain) -> ClosedForm | None:
     return spherical_wrist(of_chain, names) or parallel_axes(of_chain, names)
 
 
-def method_words(method: str) -> str:
+def format_method(method: str) -> str:
     """Return what solves targets: "closed form: spherical wrist", or "iterative"."""
     return method if method == "iterative" else f"closed form: {method}"

@@ -40,7 +40,7 @@ class Track:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class WristView:
     """A wrist centre w as joint 1 sees it, one column a target; lengths are in units of the arm's size.
 
     Attributes:
@@ -110,7 +110,7 @@ class LoopEquations:
             return np.stack((self.axis @ start, (start * start).sum(axis=0) + np.square(radius)))
         return np.asarray(self.across @ start)
 
-    def seen(self, wrist: FloatArray) -> Seen:
+    def seen(self, wrist: FloatArray) -> WristView:
         """Return wrist centres w, shape (3, n), in units of the arm's size, as joint 1 sees them."""
         away = wrist - self.base[:, None]
         height = self.first.axis @ away
@@ -121,7 +121,7 @@ class LoopEquations:
         else:
             radius, zero = np.zeros_like(height), height
             start = away - self.first.axis[:, None] * height
-        return Seen(start, self.invariants(start, radius), radius, zero, height)
+        return WristView(start, self.invariants(start, radius), radius, zero, height)
 
 
 def loop_equations(screws: Screws, wrist: FloatArray) -> LoopEquations:
@@ -214,14 +214,14 @@ def nearest_point(origin: FloatArray, axis: FloatArray, other: FloatArray, along
 PURE = 1e-6
 """A combination of the equations holds one of them alone if the other's share is smaller than this."""
 
-CLEAR = 1e-3
+MILLIMETRE = 1e-3
 """What is outside by more than this, in [m], is told to the millimetre."""
 
 NOT_FINITE = "the target is not finite, allowed: finite numbers"
 
 
 @dataclass(frozen=True, eq=False)
-class Reach:
+class ReachReasons:
     """What the loop equations allow.
 
     Attributes:
@@ -233,7 +233,7 @@ class Reach:
     size: float
 
     def tell_side(
-        self, reasons: TextArray, missed: BoolArray, seen: Seen, alpha: FloatArray, needed: FloatArray
+        self, reasons: TextArray, missed: BoolArray, seen: WristView, alpha: FloatArray, needed: FloatArray
     ) -> None:
         """Tell where joint 1 has no root of alpha . u1 = needed: the wrist centre is too near to axis 1.
 
@@ -268,7 +268,7 @@ class Reach:
         figures, which = np.unique(found, return_inverse=True)  # both elbows have one
         reasons[missed] = _outside_range(figures, float(least), float(most), what)[which]
 
-    def tell_place(self, reasons: TextArray, missed: BoolArray, seen: Seen) -> None:
+    def tell_place(self, reasons: TextArray, missed: BoolArray, seen: WristView) -> None:
         """Tell where a wrist centre is that no further posture reaches, by its cylinder coordinates.
 
         Args:
@@ -316,7 +316,7 @@ class Reach:
 
 def _outside_range(found: FloatArray, least: float, most: float, what: str) -> TextArray:
     """Return `_outside` of many figures and one range; what they share is written once."""
-    clear = np.isfinite(found) & (np.maximum(least - found, found - most) > CLEAR)
+    clear = np.isfinite(found) & (np.maximum(least - found, found - most) > MILLIMETRE)
     ending = f" m {what}, {_allowed(least, most, 3)}"
     texts: TextArray = np.empty(len(found), dtype=np.object_)
     texts[clear] = [f"the wrist centre is {one:.3f}{ending}" for one in found[clear].tolist()]
@@ -329,7 +329,7 @@ def _outside(found: float, least: float, most: float, what: str) -> str:
     if not math.isfinite(found):
         return NOT_FINITE
     away = max(least - found, found - most)
-    digits = 3 if away > CLEAR else min(13, 1 - math.floor(math.log10(max(away, 1e-12))))
+    digits = 3 if away > MILLIMETRE else min(13, 1 - math.floor(math.log10(max(away, 1e-12))))
     return f"the wrist centre is {found:.{digits}f} m {what}, {_allowed(least, most, digits)}"
 
 
@@ -340,11 +340,11 @@ def _allowed(least: float, most: float, digits: int) -> str:
     return f"allowed: {least:.{digits}f} to {most:.{digits}f} m"
 
 
-STEPS = 4
+NEWTON_STEPS = 4
 """From 1e-6, the worst that a loop equation may be off, two steps reach the rounding; near a fold four."""
 
 
-def polished(
+def refine_joints(
     screws: Screws, wrist: FloatArray, q: FloatArray, target: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return joints 1 to 3 that are nearer to a target of the wrist centre, and how far they still are.
@@ -360,7 +360,7 @@ def polished(
     """
     miss, columns = _miss(screws, wrist, q, target)
     left = np.sqrt((miss * miss).sum(axis=0))
-    for _ in range(STEPS):
+    for _ in range(NEWTON_STEPS):
         further = q + _solved(columns, miss)
         next_miss, next_columns = _miss(screws, wrist, further, target)
         next_left = np.sqrt((next_miss * next_miss).sum(axis=0))

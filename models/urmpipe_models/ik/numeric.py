@@ -29,14 +29,14 @@ import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray
 from urmpipe_models.ik.task import (
-    Miss,
     Task,
+    TaskError,
     column_squares,
     dot_product,
     factor,
     gram,
     product,
-    rows_of,
+    take_rows,
     transposed_product,
 )
 
@@ -53,10 +53,10 @@ GAINS = (1e-8, 1e8)
 STATIONARY = 1e-7
 """Where the cosine between e and what each free joint can change of it is less, e cannot be made less."""
 
-LEAST_RATIO = 1e-4
+MIN_GAIN_RATIO = 1e-4
 """A step that gains less of what was foreseen is not taken."""
 
-LONGEST_STEP = 0.5
+MAX_STEP = 0.5
 """Of damped least squares and the pseudoinverse, in [rad] or [m] of any joint."""
 
 RANK_CUTOFF = 1e-6
@@ -64,7 +64,7 @@ RANK_CUTOFF = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Settings:
+class DescentOptions:
     """How a descent steps and when it has arrived; see `iterative.refine`.
 
     Attributes:
@@ -96,7 +96,7 @@ class Settings:
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
+class DescentState:
     """How far every row of a batch has come.
 
     Attributes:
@@ -118,7 +118,7 @@ class Progress:
     ended: BoolArray
 
     @classmethod
-    def at(cls, q: FloatArray) -> Progress:
+    def at(cls, q: FloatArray) -> DescentState:
         """Return the progress of rows that have not moved from q in [rad] or [m], shape (n, joints)."""
         n = len(q)
         return cls(
@@ -133,7 +133,7 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rows:
+class ActiveRows:
     """The rows of a block that are still on their way.
 
     Attributes:
@@ -148,15 +148,17 @@ class Rows:
     task: Task
     q: FloatArray
     gain: FloatArray
-    miss: Miss
+    miss: TaskError
 
-    def kept(self, rows: IndexArray) -> Rows:
+    def kept(self, rows: IndexArray) -> ActiveRows:
         """Return some of the rows, indices of shape (m,)."""
-        task, q, miss = self.task.kept(rows), rows_of(self.q, rows), self.miss.kept(rows)
-        return Rows(self.index[rows], task, q, self.gain[rows], miss)
+        task, q, miss = self.task.kept(rows), take_rows(self.q, rows), self.miss.kept(rows)
+        return ActiveRows(self.index[rows], task, q, self.gain[rows], miss)
 
 
-def descend(progress: Progress, task: Task, index: IndexArray, settings: Settings, steps: int) -> None:
+def descend(
+    progress: DescentState, task: Task, index: IndexArray, settings: DescentOptions, steps: int
+) -> None:
     """Take some rows of a batch up to `steps` steps further; those that have arrived leave early.
 
     Args:
@@ -166,8 +168,8 @@ def descend(progress: Progress, task: Task, index: IndexArray, settings: Setting
         settings: How to step.
         steps: The most to take.
     """
-    q = rows_of(progress.q, index)
-    rows = Rows(index, task, q, progress.gain[index], task.miss(q))
+    q = take_rows(progress.q, index)
+    rows = ActiveRows(index, task, q, progress.gain[index], task.miss(q))
     rows = _parted(progress, rows, _ended(rows, settings), settings)
     for _ in range(steps):
         if not len(rows.index):
@@ -178,12 +180,12 @@ def descend(progress: Progress, task: Task, index: IndexArray, settings: Setting
     _store(progress, rows, np.arange(len(rows.index)), settings)
 
 
-def _under_way(miss: Miss, settings: Settings) -> BoolArray:
+def _under_way(miss: TaskError, settings: DescentOptions) -> BoolArray:
     """Return where the target is neither met nor not a number."""
     return np.asarray((miss.square < np.inf) & ~miss.within(settings.metres, settings.radians))
 
 
-def _ended(rows: Rows, settings: Settings) -> BoolArray:
+def _ended(rows: ActiveRows, settings: DescentOptions) -> BoolArray:
     """Return where the target is met, is no number, or cannot be come nearer to.
 
     The gradient of |e|^2 / 2 is -J^T e; joints that are held do not count.
@@ -195,7 +197,9 @@ def _ended(rows: Rows, settings: Settings) -> BoolArray:
     return np.asarray(~going | (rows.gain >= GAINS[1]))
 
 
-def _parted(progress: Progress, rows: Rows, leaving: BoolArray, settings: Settings) -> Rows:
+def _parted(
+    progress: DescentState, rows: ActiveRows, leaving: BoolArray, settings: DescentOptions
+) -> ActiveRows:
     """Store the rows that leave, and return the others."""
     if not leaving.any():
         return rows
@@ -205,7 +209,7 @@ def _parted(progress: Progress, rows: Rows, leaving: BoolArray, settings: Settin
     return rows.kept(np.flatnonzero(~leaving))
 
 
-def _store(progress: Progress, rows: Rows, which: IndexArray, settings: Settings) -> None:
+def _store(progress: DescentState, rows: ActiveRows, which: IndexArray, settings: DescentOptions) -> None:
     """Write how far some of the rows have come."""
     at, miss = rows.index[which], rows.miss
     progress.q[:, at] = rows.q[:, which]
@@ -215,7 +219,7 @@ def _store(progress: Progress, rows: Rows, which: IndexArray, settings: Settings
     progress.arrived[at] = miss.within(settings.metres, settings.radians)[which]
 
 
-def _free(rows: Rows, settings: Settings) -> FloatArray:
+def _free(rows: ActiveRows, settings: DescentOptions) -> FloatArray:
     """Return J without the joints that stand at a limit and would leave it downhill: J^T e points out."""
     J = rows.miss.jacobian
     if not settings.limited:
@@ -226,7 +230,7 @@ def _free(rows: Rows, settings: Settings) -> FloatArray:
     return np.where(held, 0.0, J)
 
 
-def _stepped(rows: Rows, settings: Settings) -> Rows:
+def _stepped(rows: ActiveRows, settings: DescentOptions) -> ActiveRows:
     """Return the rows after one step of the method, within limits."""
     J = _free(rows, settings)
     if settings.method == "lm":
@@ -235,12 +239,12 @@ def _stepped(rows: Rows, settings: Settings) -> Rows:
         step = damped_step(J, rows.miss.error, (settings.damping * rows.miss.length) ** 2)
     else:
         step = pseudoinverse_step(J, rows.miss.error)
-    step *= np.minimum(1.0, LONGEST_STEP / np.maximum(np.abs(step).max(axis=0), LONGEST_STEP))
+    step *= np.minimum(1.0, MAX_STEP / np.maximum(np.abs(step).max(axis=0), MAX_STEP))
     q = settings.within(rows.q + step)
     return replace(rows, q=q, miss=rows.task.miss(q))
 
 
-def _marquardt(rows: Rows, J: FloatArray, settings: Settings) -> Rows:
+def _marquardt(rows: ActiveRows, J: FloatArray, settings: DescentOptions) -> ActiveRows:
     """Return the rows after a Levenberg-Marquardt step, taken where it comes nearer as was foreseen.
 
     Foreseen is |e|^2 - |e - J dq|^2; the gain ratio is what was gained of it.
@@ -251,7 +255,7 @@ def _marquardt(rows: Rows, J: FloatArray, settings: Settings) -> Rows:
     foreseen = square - dot_product(left, left)
     new = rows.task.miss(q)
     gained = square - new.square
-    taken = (gained > LEAST_RATIO * foreseen) & (foreseen > 0.0)  # limits can make it less than 0
+    taken = (gained > MIN_GAIN_RATIO * foreseen) & (foreseen > 0.0)  # limits can make it less than 0
     good, poor = taken & (gained > 0.75 * foreseen), ~taken | (gained < 0.25 * foreseen)
     factors = np.where(good, 0.125, np.where(poor, 4.0, 1.0))
     refused = np.flatnonzero(~taken)
@@ -291,7 +295,7 @@ def pseudoinverse_step(J: FloatArray, error: FloatArray) -> FloatArray:
     return product(np.asarray(inverse, dtype=np.float64), error)
 
 
-LEAST_MOTION = 1e-6
+MOTION_TOLERANCE = 1e-6
 """A tangent t of at most this in every joint, in [rad] or [m], counts as none."""
 
 RANK_DAMPING = 1e-13
@@ -303,7 +307,7 @@ EXACT = 1e-13
 CORRECTIONS = 6
 """Newton steps to come back onto the target; a move from which more are needed was too long."""
 
-MOST_MOVES = 200
+MAX_MOVES = 200
 """Moves along the null space, those too that were not kept."""
 
 LENGTHS = (0.05, 16.0)
@@ -312,12 +316,12 @@ LENGTHS = (0.05, 16.0)
 SHORTEST = 1e-6
 """A step shorter than this many t that brings nothing is the last."""
 
-AT_LIMIT = 1e-9
+AT_LIMIT_TOLERANCE = 1e-9
 """A joint this near to its limit, in [rad] or [m], stands at it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tangent:
+class NullSpaceStep:
     """The way home that leaves the tool where it is.
 
     Attributes:
@@ -333,16 +337,16 @@ class Tangent:
         """The largest entry of t in [rad] or [m], shape (n,)."""
         return np.asarray(np.abs(self.t).max(axis=0))
 
-    def kept(self, rows: IndexArray) -> Tangent:
+    def kept(self, rows: IndexArray) -> NullSpaceStep:
         """Return some of the rows, indices of shape (m,)."""
-        return Tangent(rows_of(self.t, rows), self.free[:, rows])
+        return NullSpaceStep(take_rows(self.t, rows), self.free[:, rows])
 
-    def where(self, chosen: BoolArray, other: Tangent) -> Tangent:
+    def where(self, chosen: BoolArray, other: NullSpaceStep) -> NullSpaceStep:
         """Return the rows that are chosen, a mask of shape (n,), and the other's elsewhere."""
-        return Tangent(np.where(chosen, self.t, other.t), np.where(chosen, self.free, other.free))
+        return NullSpaceStep(np.where(chosen, self.t, other.t), np.where(chosen, self.free, other.free))
 
 
-def tangent(task: Task, q: FloatArray, home: FloatArray, settings: Settings) -> Tangent:
+def null_space_step(task: Task, q: FloatArray, home: FloatArray, settings: DescentOptions) -> NullSpaceStep:
     """Return the way home in the null space of the joints that are free to go it.
 
     Of the joints that stand at a limit the one that would most come off it is released.
@@ -354,15 +358,18 @@ def tangent(task: Task, q: FloatArray, home: FloatArray, settings: Settings) -> 
         settings: The limits.
     """
     J = task.miss(q).jacobian
-    low, high = q <= settings.lower[:, None] + AT_LIMIT, q >= settings.upper[:, None] - AT_LIMIT
+    low, high = (
+        q <= settings.lower[:, None] + AT_LIMIT_TOLERANCE,
+        q >= settings.upper[:, None] - AT_LIMIT_TOLERANCE,
+    )
     free = ~(low | high)
     left = _left(J, home - q, free)
     inward = np.where(low, np.maximum(left, 0.0), np.where(high, np.maximum(-left, 0.0), 0.0))
-    released = (inward == inward.max(axis=0)) & (inward > LEAST_MOTION)
+    released = (inward == inward.max(axis=0)) & (inward > MOTION_TOLERANCE)
     if released.any():
         free |= released
         left = _left(J, home - q, free)
-    return Tangent(np.where(free, left, 0.0), free)
+    return NullSpaceStep(np.where(free, left, 0.0), free)
 
 
 def _left(J: FloatArray, wish: FloatArray, free: BoolArray) -> FloatArray:
@@ -379,7 +386,9 @@ def _trace(J: FloatArray) -> FloatArray:
     return dot_product(entries, entries)
 
 
-def settle(task: Task, q: FloatArray, home: FloatArray, settings: Settings) -> tuple[FloatArray, FloatArray]:
+def minimise_motion(
+    task: Task, q: FloatArray, home: FloatArray, settings: DescentOptions
+) -> tuple[FloatArray, FloatArray]:
     """Return the joint values of least motion near solutions q, and what is left of t there.
 
     Args:
@@ -393,27 +402,32 @@ def settle(task: Task, q: FloatArray, home: FloatArray, settings: Settings) -> t
         `LEAST_MOTION` but where the arm is so near to a singular pose that its null space has no digits.
     """
     q = q.copy()
-    now = tangent(task, q, home, settings)
+    now = null_space_step(task, q, home, settings)
     size = now.size
-    rows = np.flatnonzero(size > LEAST_MOTION)
+    rows = np.flatnonzero(size > MOTION_TOLERANCE)
     now, task, length = now.kept(rows), task.kept(rows), np.ones(len(rows))
-    for _ in range(MOST_MOVES):
+    for _ in range(MAX_MOVES):
         if not len(rows):
             break
-        before, to = rows_of(q, rows), rows_of(home, rows)
+        before, to = take_rows(q, rows), take_rows(home, rows)
         after, kept = _moved(task, before, to, now, length, settings)
-        new = tangent(task, after, to, settings)
+        new = null_space_step(task, after, to, settings)
         length = np.where(kept, _length(after - before, now, new), 0.25 * length)
         now = new.where(kept, now)
         q[:, rows] = np.where(kept, after, before)
         size[rows] = now.size
-        going = np.flatnonzero((size[rows] > LEAST_MOTION) & (length > SHORTEST))
+        going = np.flatnonzero((size[rows] > MOTION_TOLERANCE) & (length > SHORTEST))
         rows, now, task, length = rows[going], now.kept(going), task.kept(going), length[going]
     return q, size
 
 
 def _moved(
-    task: Task, q: FloatArray, home: FloatArray, way: Tangent, length: FloatArray, settings: Settings
+    task: Task,
+    q: FloatArray,
+    home: FloatArray,
+    way: NullSpaceStep,
+    length: FloatArray,
+    settings: DescentOptions,
 ) -> tuple[FloatArray, BoolArray]:
     """Return joint values a step along t, back on the target, and where they are nearer to home."""
     after, met = _back(task, q + np.minimum(length, _room(q, way.t, settings)) * way.t, way.free, settings)
@@ -421,14 +435,16 @@ def _moved(
     return after, met & (gain > 0.0)
 
 
-def _room(q: FloatArray, t: FloatArray, settings: Settings) -> FloatArray:
+def _room(q: FloatArray, t: FloatArray, settings: DescentOptions) -> FloatArray:
     """Return how many times t may be gone until the first joint is at a limit, shape (n,)."""
     limit = np.where(t > 0.0, settings.upper[:, None], settings.lower[:, None])
     room = np.divide(limit - q, t, out=np.full(q.shape, np.inf), where=t != 0.0)
     return np.asarray(room.min(axis=0))
 
 
-def _back(task: Task, q: FloatArray, free: BoolArray, settings: Settings) -> tuple[FloatArray, BoolArray]:
+def _back(
+    task: Task, q: FloatArray, free: BoolArray, settings: DescentOptions
+) -> tuple[FloatArray, BoolArray]:
     """Return q back on the target by steps of its free joints, and where it is met."""
     for _ in range(CORRECTIONS):
         miss = task.miss(q)
@@ -441,7 +457,7 @@ def _back(task: Task, q: FloatArray, free: BoolArray, settings: Settings) -> tup
     return q, task.miss(q).within(settings.metres, settings.radians)
 
 
-def _length(moved: FloatArray, before: Tangent, after: Tangent) -> FloatArray:
+def _length(moved: FloatArray, before: NullSpaceStep, after: NullSpaceStep) -> FloatArray:
     """Return the next step in multiples of t: |dq|^2 / (dq . -dt), the inverse of the curvature met.
 
     It is the longest where |q - home|^2 is not convex, and 1 where other joints are held than before.

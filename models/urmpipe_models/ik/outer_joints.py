@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, Element, FloatArray, TextArray, Vector, cross, dot, subtract
-from urmpipe_models.ik.solutions import Singular, figures
-from urmpipe_models.ik.trigonometric import linear_roots, quadric_roots, wrapped
+from urmpipe_models.ik.solutions import SingularPoses, format_with_limits
+from urmpipe_models.ik.trigonometric import linear_roots, quadric_roots, wrap_angle
 from urmpipe_models.kinematics.forward import Screws
 from urmpipe_models.math3d import Transform, rotation_about
 
@@ -184,7 +184,7 @@ class OuterJoints:
     flip: BoolArray
     reasons: TextArray
     free: BoolArray
-    singular: tuple[Singular, ...]
+    singular: tuple[SingularPoses, ...]
 
 
 def outer_joints(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> OuterJoints:
@@ -203,7 +203,7 @@ def outer_joints(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> 
     return _passing(arm, motion) if _pass(arm) else _parallel(arm, motion)
 
 
-def outer_names(arm: ParallelGeometry) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def branch_names(arm: ParallelGeometry) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return what the values of q1, and those of q5 for each, are called; "" where there is only one."""
     if _pass(arm):
         return tuple(f"shoulder {number}" for number in range(1, 5)), ("",)
@@ -222,21 +222,21 @@ def _meeting(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> Oute
     theta = np.arctan2(np.hypot(axis6[0], axis6[1]), axis6[2])
     q5, folded, allowed = _fifth(arm, theta)
     sine = float(np.hypot(arm.k1[0], arm.k1[1]))
-    reasons = texts_where(
+    reasons = format_reasons(
         np.broadcast_to(np.isnan(q1), q5.shape),
         "the wrist is {} m from axis 1, allowed: at least {} m",
         r / sine,
         np.abs(c) / sine,
     )
-    reasons += texts_where(
+    reasons += format_reasons(
         np.isnan(q5) & ~np.isnan(q1),
         "axis 6 is at {} rad to axis 4, allowed: {} to {} rad",
         theta,
         *allowed,
     )
     singular = (
-        Singular("wrist beside axis 1", _everywhere(meet & ~free, q5)),
-        Singular("flips meet", folded & (np.sin(theta) > REACH)),
+        SingularPoses("wrist beside axis 1", _everywhere(meet & ~free, q5)),
+        SingularPoses("flips meet", folded & (np.sin(theta) > REACH)),
     )
     side = np.broadcast_to(np.array([1.0, -1.0])[:, None, None], q1.shape)
     return OuterJoints(q1, q5, side, np.array([False, True]), reasons, free, singular)
@@ -270,7 +270,7 @@ def _fifth(arm: ParallelGeometry, theta: FloatArray) -> tuple[FloatArray, BoolAr
     within = (theta >= delta - REACH) & (theta <= top + REACH)
     away = 2.0 * np.where(within, half, np.nan)
     _, cosine, sine = _turned(arm.k5, arm.k6)
-    q5 = wrapped(float(np.arctan2(sine, cosine)) + np.concatenate((away, -away), axis=1))
+    q5 = wrap_angle(float(np.arctan2(sine, cosine)) + np.concatenate((away, -away), axis=1))
     return q5, np.broadcast_to((low | high) & within, q5.shape), (delta, top)
 
 
@@ -287,21 +287,21 @@ def _parallel(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
     height, fold = _on_edge(np.full_like(height, reach), height, EDGE * arm.size, REACH * arm.size)
     falling, rising = linear_roots(np.full_like(height, cosine), np.full_like(height, sine), height)
     q5 = np.concatenate((rising, falling), axis=1)
-    reasons = texts_where(
+    reasons = format_reasons(
         np.broadcast_to(np.isnan(q1), q5.shape),
         "axis 6 cannot be turned into its direction: {} of its unit along axis 2, allowed: up to {}",
         np.abs(c),
         r,
     )
-    reasons += texts_where(
+    reasons += format_reasons(
         np.isnan(q5) & ~np.isnan(q1),
         "axis 6 is {} m along axis 2 from where axis 5 holds it, allowed: up to {} m",
         np.abs(height),
         np.full_like(height, reach),
     )
     singular = (
-        Singular("postures meet", _everywhere(meet, q5)),
-        Singular("flips meet", np.broadcast_to(fold, q5.shape)),
+        SingularPoses("postures meet", _everywhere(meet, q5)),
+        SingularPoses("flips meet", np.broadcast_to(fold, q5.shape)),
     )
     side = np.broadcast_to(np.array([1.0, -1.0])[:, None, None], q1.shape)
     return OuterJoints(q1, q5, side, np.array([False, True]), reasons, np.zeros(len(r), dtype=bool), singular)
@@ -334,9 +334,9 @@ def _passing(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
     for _ in range(2):
         q1, q5 = _newton_step(left, right[:, 1:], q1, q5)
     q1, q5 = _in_order(arm, motion, q1, q5)
-    q1, q5 = wrapped(q1)[:, None], wrapped(q5)[:, None]
+    q1, q5 = wrap_angle(q1)[:, None], wrap_angle(q5)[:, None]
     found = np.isfinite(q1).sum(axis=0)
-    reasons = texts_where(
+    reasons = format_reasons(
         np.isnan(q1),
         "joints 1 and 5 put axis 6 into its place in {} ways, allowed for this branch: at least {}",
         found,
@@ -344,8 +344,8 @@ def _passing(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
     )
     slope = left[0, 1] * np.cos(q1) - left[0, 0] * np.sin(q1)
     others = [np.roll(q1, shift, axis=0) for shift in (1, 2, 3)]
-    meet = np.any([np.abs(wrapped(q1 - other)) < NEAR_ROOTS for other in others], axis=0)
-    singular = (Singular("postures meet", meet),)
+    meet = np.any([np.abs(wrap_angle(q1 - other)) < NEAR_ROOTS for other in others], axis=0)
+    singular = (SingularPoses("postures meet", meet),)
     return OuterJoints(
         q1,
         q5,
@@ -389,7 +389,7 @@ def _in_order(
     the arm turns about axis 1.
     """
     cosine, sine, _ = _shoulder(arm.k1, subtract(motion.point(arm.p6), arm.p1), 0.0)
-    order = np.argsort(wrapped(q1 - np.arctan2(sine, cosine)), axis=0)  # NaN last
+    order = np.argsort(wrap_angle(q1 - np.arctan2(sine, cosine)), axis=0)  # NaN last
     return np.take_along_axis(q1, order, axis=0), np.take_along_axis(q5, order, axis=0)
 
 
@@ -429,7 +429,7 @@ def _everywhere(where: BoolArray, like: FloatArray) -> BoolArray:
     return np.broadcast_to(where, like.shape)
 
 
-def texts_where(where: BoolArray, text: str, found: FloatArray, *allowed: FloatArray | float) -> TextArray:
+def format_reasons(where: BoolArray, text: str, found: FloatArray, *allowed: FloatArray | float) -> TextArray:
     """Return a text with what was found and is allowed where it holds, empty elsewhere, shape (..., n).
 
     Args:
@@ -440,5 +440,5 @@ def texts_where(where: BoolArray, text: str, found: FloatArray, *allowed: FloatA
     """
     texts = np.full(where.shape, "", dtype=np.object_)
     spread = [np.broadcast_to(one, where.shape)[where].tolist() for one in (found, *allowed)]
-    texts[where] = [text.format(*figures(*each)) for each in zip(*spread, strict=True)]
+    texts[where] = [text.format(*format_with_limits(*each)) for each in zip(*spread, strict=True)]
     return texts

@@ -46,13 +46,13 @@ from urmpipe_models.ik.outer_joints import (
     REACH,
     OuterJoints,
     ParallelGeometry,
+    branch_names,
+    format_reasons,
     outer_joints,
-    outer_names,
     parallel_geometry,
-    texts_where,
 )
-from urmpipe_models.ik.solutions import Singular, Solutions, Targets
-from urmpipe_models.ik.trigonometric import wrapped
+from urmpipe_models.ik.solutions import SingularPoses, Solutions, Targets
+from urmpipe_models.ik.trigonometric import wrap_angle
 from urmpipe_models.kinematics.forward import Screws
 from urmpipe_models.math3d import Transform, rotation_about
 
@@ -107,7 +107,7 @@ def two_links(
     to_place = np.arctan2(place[1], place[0])
     bend = np.arctan2(fore * np.sin(psi), upper + fore * np.cos(psi))
     q2 = np.where(free, near, to_place - first - bend)
-    reasons = texts_where(
+    reasons = format_reasons(
         ~reached & np.isfinite(r),
         "axis 4 is {} m from axis 2, allowed: {} to {} m",
         r,
@@ -181,7 +181,7 @@ class ParallelAxes:
     @property
     def branches(self) -> tuple[str, ...]:
         """What its solutions are called, in their order."""
-        sides, flips = outer_names(self.arm)
+        sides, flips = branch_names(self.arm)
         return tuple(
             ", ".join(filter(None, (side, elbow, flip)))
             for side in sides
@@ -205,7 +205,7 @@ class ParallelAxes:
         q4 = wrist.phi - links.q2 - links.q3
         joints = np.broadcast_arrays(outer.q1, links.q2, links.q3, q4, outer.q5, wrist.q6)
         signs = np.array((1.0, *self.arm.signs, 1.0, 1.0))
-        q = wrapped(_by_target(np.stack(joints, axis=-1)) * signs) + 0.0  # no -0.0
+        q = wrap_angle(_by_target(np.stack(joints, axis=-1)) * signs) + 0.0  # no -0.0
         reasons = _by_target(outer.reasons + links.reasons)
         families = [
             replace(one, where=_by_target(_like(one.where, q4)))
@@ -220,28 +220,28 @@ class ParallelAxes:
 
     def _families(
         self, outer: OuterJoints, wrist: _Wrist, links: TwoLinks, at_zero: bool
-    ) -> tuple[Singular, ...]:
+    ) -> tuple[SingularPoses, ...]:
         """Return the families of singular poses, and what is free there."""
         q1, q2, q3, q4, _, q6 = self.names
         taken = "= 0" if at_zero else "as near"
         flipped = f"{q6} {taken}, and pi more for the flipped wrist, or the nearest value in reach"
         return (
-            Singular(
+            SingularPoses(
                 "wrist on axis 1",
                 outer.free,
                 f"{q1}: any value",
                 f"{q1} {taken}, and pi more for the left arm",
             ),
             *outer.singular,
-            Singular(
+            SingularPoses(
                 "wrist aligned",
                 wrist.free,
                 f"{q6}: any value in reach, and {q2}, {q3}, {q4} with it",
                 flipped,
             ),
-            Singular("arm stretched", links.stretched),
-            Singular("arm withdrawn", links.withdrawn & ~links.free),
-            Singular("arm withdrawn", links.free, f"{q2}: any value", f"{q2} {taken}"),
+            SingularPoses("arm stretched", links.stretched),
+            SingularPoses("arm withdrawn", links.withdrawn & ~links.free),
+            SingularPoses("arm withdrawn", links.free, f"{q2}: any value", f"{q2} {taken}"),
         )
 
 
@@ -305,7 +305,7 @@ def _in_reach(arm: ParallelGeometry, rest: Transform, held: Vector, wish: FloatA
     swing, middle = np.hypot(a, b), np.arctan2(b, a)
     upper, fore = link_lengths(arm)
     least, most = ((square - mean) / swing for square in ((upper - fore) ** 2, (upper + fore) ** 2))
-    away = wrapped(wish - middle)
+    away = wrap_angle(wish - middle)
     cosine = np.cos(away)
     allowed = np.clip(cosine, least, most)
     moved = wish + np.copysign(np.arccos(np.clip(allowed, -1.0, 1.0)), away) - away
@@ -323,7 +323,7 @@ def _tell_once(q: FloatArray, reasons: TextArray, branches: tuple[str, ...], whe
     """
     rows = np.flatnonzero(np.any(where, axis=0).any(axis=1))
     for first, second in combinations(range(len(branches)), 2) if len(rows) else ():
-        same = np.abs(wrapped(q[rows, first] - q[rows, second])).max(axis=1) < ONE
+        same = np.abs(wrap_angle(q[rows, first] - q[rows, second])).max(axis=1) < ONE
         q[rows[same], second] = np.nan
         reasons[rows[same], second] = f"the same as {branches[first]}: both meet here"
 

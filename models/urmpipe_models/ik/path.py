@@ -20,23 +20,23 @@ from numpy.typing import NDArray
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray, IntArray, TextArray
 from urmpipe_models.errors import Finding, OptionError
-from urmpipe_models.ik.branch_walk import stretches, walk
-from urmpipe_models.ik.closed import ClosedForm, exact_form
-from urmpipe_models.ik.path_numeric import LeastMotionPath, in_nearest_turns
+from urmpipe_models.ik.branch_walk import find_true_runs, follow_branches
+from urmpipe_models.ik.closed import ClosedForm, exact_closed_form
+from urmpipe_models.ik.path_numeric import LeastMotionPath, unwrap_within_limits
 from urmpipe_models.ik.solutions import (
+    DEFAULT_SEARCH,
     TURN,
-    USUAL_SEARCH,
-    Search,
+    SearchOptions,
     SingularFamily,
     Targets,
-    checked,
-    misses,
-    periods,
-    targets_of,
+    forward_targets,
+    joint_periods,
+    pose_errors,
+    validate_targets,
 )
-from urmpipe_models.ik.solutions import within_pi as within_pi_of
-from urmpipe_models.ik.solve import solve, too_far
-from urmpipe_models.ik.task import turn_length
+from urmpipe_models.ik.solutions import wrap_continuous_joints as within_pi_of
+from urmpipe_models.ik.solve import find_out_of_reach, solve
+from urmpipe_models.ik.task import orientation_length
 from urmpipe_models.kinematics.singularity import SingularityLog, singularity_over_log
 
 SMALL_STEP = 0.1
@@ -89,7 +89,7 @@ class Jump:
         return f"sample {self.sample} at {self.t:.3f} s, ({place}) m: a jump{gap}{branches}: {steps}"
 
 
-def jump_samples(chain: Chain, q: FloatArray, position_only: bool) -> IndexArray:
+def find_jumps(chain: Chain, q: FloatArray, position_only: bool) -> IndexArray:
     """Return the samples that a jump leads to, ascending, shape (jumps,).
 
     A step of `SMALL_STEP` or more is a jump if half of it leads off the path: the tool at the mean of the
@@ -111,7 +111,7 @@ def jump_samples(chain: Chain, q: FloatArray, position_only: bool) -> IndexArray
     return np.asarray(at[off > ends] + 1)
 
 
-def jumps_at(
+def build_jumps(
     chain: Chain,
     samples: IndexArray,
     before: IndexArray,
@@ -145,9 +145,9 @@ def jumps_at(
 
 def _apart(chain: Chain, one: FloatArray, other: FloatArray, position_only: bool) -> FloatArray:
     """Return |p - p'| + l angle(R, R') of the tool at joint values, shape (m,), in [m]."""
-    there = targets_of(chain, other)
-    distance, turn = misses(chain, one, Targets(there.position) if position_only else there)
-    length = turn_length(chain)
+    there = forward_targets(chain, other)
+    distance, turn = pose_errors(chain, one, Targets(there.position) if position_only else there)
+    length = orientation_length(chain)
     return np.asarray(np.linalg.norm(distance, axis=1) + length * np.linalg.norm(turn, axis=1))
 
 
@@ -156,7 +156,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class TooFast:
+class SpeedViolation:
     """A stretch of a path along which a joint would have to move faster than it can.
 
     Attributes:
@@ -186,7 +186,7 @@ class TooFast:
         )
 
 
-def too_fast(chain: Chain, q: FloatArray, seconds: FloatArray) -> tuple[TooFast, ...]:
+def find_speed_violations(chain: Chain, q: FloatArray, seconds: FloatArray) -> tuple[SpeedViolation, ...]:
     """Return where joints move faster than they can, |q_k - q_{k-1}| / (t_k - t_{k-1}), by sample and joint.
 
     Over samples without a solution it is the speed that the joint needs at least to be there in time.
@@ -199,7 +199,7 @@ def too_fast(chain: Chain, q: FloatArray, seconds: FloatArray) -> tuple[TooFast,
     reached = np.flatnonzero(np.isfinite(q).all(axis=1))
     speed = np.abs(np.diff(q[reached], axis=0)) / np.diff(seconds[reached])[:, None]
     found = [
-        TooFast(
+        SpeedViolation(
             joint.name,
             int(reached[first]),
             int(reached[last + 1]),
@@ -209,7 +209,7 @@ def too_fast(chain: Chain, q: FloatArray, seconds: FloatArray) -> tuple[TooFast,
             "m/s" if joint.kind == "prismatic" else "rad/s",
         )
         for k, joint in enumerate(chain.moving)
-        for first, last in stretches(speed[:, k] > joint.velocity * (1.0 + ROUNDING))
+        for first, last in find_true_runs(speed[:, k] > joint.velocity * (1.0 + ROUNDING))
     ]
     return tuple(sorted(found, key=lambda one: one.first))
 
@@ -270,7 +270,7 @@ class JointPath:
     reasons: TextArray
     shortfall: FloatArray
     jumps: tuple[Jump, ...]
-    too_fast: tuple[TooFast, ...]
+    too_fast: tuple[SpeedViolation, ...]
     singular: tuple[SingularStretch, ...]
 
     def __len__(self) -> int:
@@ -306,14 +306,14 @@ class _Found(NamedTuple):
     families: dict[SingularFamily, BoolArray]
 
 
-def follow(
+def solve_path(
     chain: Chain,
     targets: Targets,
     t_ns: IntArray,
     *,
     start: FloatArray | None = None,
     within_pi: bool = False,
-    search: Search = USUAL_SEARCH,
+    search: SearchOptions = DEFAULT_SEARCH,
     progress: Callable[[float], None] | None = None,
 ) -> JointPath:
     """Return joint values that lead the tool along a path, limits kept.
@@ -344,7 +344,7 @@ def follow(
     Raises:
         OptionError: With all that is wrong with the options.
     """
-    targets, reasons = checked(targets)
+    targets, reasons = validate_targets(targets)
     begin = np.array(chain.start if start is None else start, dtype=float)
     faults: list[Finding | str] = [
         *_time_faults(t_ns, len(targets)),
@@ -353,9 +353,9 @@ def follow(
     ]
     if faults:
         raise OptionError(*faults)
-    form = None if targets.rotation is None else exact_form(chain)
+    form = None if targets.rotation is None else exact_closed_form(chain)
     if form is None:
-        far = too_far(chain, targets, search.tolerance)
+        far = find_out_of_reach(chain, targets, search.tolerance)
         reasons = [fault or reason for fault, reason in zip(reasons, far, strict=True)]
     good = np.array([not reason for reason in reasons])
     asked = _Asked(chain, targets.rows(good), begin, search, progress or _untold)
@@ -375,7 +375,7 @@ class _Asked:
     chain: Chain
     targets: Targets
     start: FloatArray
-    search: Search
+    search: SearchOptions
     progress: Callable[[float], None]
 
     def by_least_motion(self) -> _Found:
@@ -385,7 +385,7 @@ class _Asked:
 
     def by_closed_form(self, form: ClosedForm) -> _Found:
         """Return what a closed form finds; what is out of reach approached from the sample before it."""
-        walked = walk(self.chain, form, self.targets, self.start)
+        walked = follow_branches(self.chain, form, self.targets, self.start)
         found = _Found(walked.q, walked.branch, walked.reasons, np.zeros(len(walked.q)), walked.singular)
         out = np.flatnonzero(walked.branch == "")
         if self.search.tolerance is None or not len(out):
@@ -394,9 +394,9 @@ class _Asked:
         near = solve(self.chain, self.targets.rows(out), start=before[out], search=self.search)
         met = out[near.reached[:, 0]]
         found.q[out], found.reasons[out] = near.q[:, 0], near.reasons[:, 0]
-        for first, last in stretches(walked.branch == ""):
+        for first, last in find_true_runs(walked.branch == ""):
             rows = slice(first, last + 1)
-            found.q[rows] = in_nearest_turns(self.chain, found.q[rows], before[first])
+            found.q[rows] = unwrap_within_limits(self.chain, found.q[rows], before[first])
         found.shortfall[out] = near.shortfall[:, 0]
         walked.branch[met] = near.labels[near.reached[:, 0], 0]
         return found
@@ -414,13 +414,13 @@ def _told(
     position_only = targets.rotation is None
     seconds = (t_ns - t_ns[0]) * 1e-9
     reached = np.flatnonzero(np.isfinite(found.q).all(axis=1))
-    jumping = jump_samples(chain, found.q[reached], position_only)
+    jumping = find_jumps(chain, found.q[reached], position_only)
     branch = found.branch
     if branch is None:
         branch = _numbered(len(found.q), reached, jumping)
     else:
         jumping = _with_gaps(chain, jumping, found.q, branch, reached)
-    jumps = jumps_at(
+    jumps = build_jumps(
         chain, reached[jumping], reached[jumping - 1], found.q, seconds, targets.position, branch
     )
     return JointPath(
@@ -428,16 +428,16 @@ def _told(
         position_only,
         LEAST_MOTION if form is None else form.name,
         t_ns,
-        within_pi_of(found.q, periods(chain)) if within_pi else found.q,
+        within_pi_of(found.q, joint_periods(chain)) if within_pi else found.q,
         branch,
         found.reasons,
         found.shortfall,
         jumps,
-        too_fast(chain, found.q, seconds),
+        find_speed_violations(chain, found.q, seconds),
         tuple(
             SingularStretch(family, first, last, float(seconds[first]), float(seconds[last]))
             for family, where in found.families.items()
-            for first, last in stretches(where)
+            for first, last in find_true_runs(where)
         ),
     )
 

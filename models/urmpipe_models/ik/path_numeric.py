@@ -52,12 +52,27 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import BoolArray, FloatArray, TextArray
-from urmpipe_models.ik.solutions import LIMIT_ROUNDING, Search, Targets, in_nearest_turn, limits_of
+from urmpipe_models.ik.solutions import (
+    LIMIT_ROUNDING,
+    SearchOptions,
+    Targets,
+    joint_limits,
+    shift_into_limits,
+)
 from urmpipe_models.ik.solve import solve
-from urmpipe_models.ik.task import Factor, Miss, Task, factor, gram, product, task_of, transposed_product
+from urmpipe_models.ik.task import (
+    LDLFactor,
+    Task,
+    TaskError,
+    build_task,
+    factor,
+    gram,
+    product,
+    transposed_product,
+)
 
 
-def in_nearest_turns(chain: Chain, q: FloatArray, last: FloatArray) -> FloatArray:
+def unwrap_within_limits(chain: Chain, q: FloatArray, last: FloatArray) -> FloatArray:
     """Return joint values with each joint in the allowed turn that is nearest to the sample before.
 
     Args:
@@ -70,7 +85,7 @@ def in_nearest_turns(chain: Chain, q: FloatArray, last: FloatArray) -> FloatArra
     """
     turned = q.copy()
     for sample in np.flatnonzero(np.isfinite(q).all(axis=1)).tolist():
-        turned[sample] = last = in_nearest_turn(chain, q[sample], last)[0]
+        turned[sample] = last = shift_into_limits(chain, q[sample], last)[0]
     return turned
 
 
@@ -78,7 +93,7 @@ INWARDS = 1e-10
 """A joint leaves its limit if it would move inwards by more, in [rad] or [m]: rounding lets none go."""
 
 
-def change(
+def next_limit_change(
     q: FloatArray, pull: FloatArray | None, held: FloatArray, lower: FloatArray, upper: FloatArray
 ) -> tuple[int, FloatArray]:
     """Return the first sample at which a joint meets or leaves its limit, and where joints are held then.
@@ -119,7 +134,7 @@ SHARE = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Swept:
+class SweepResult:
     """What a sweep found for the samples of a window.
 
     Attributes:
@@ -135,7 +150,9 @@ class Swept:
     pull: FloatArray | None
 
 
-def sweep(task: Task, guess: FloatArray, last: FloatArray, held: FloatArray, damping: FloatArray) -> Swept:
+def newton_sweep(
+    task: Task, guess: FloatArray, last: FloatArray, held: FloatArray, damping: FloatArray
+) -> SweepResult:
     """Return the next guess at the joint values of a window of samples.
 
     Args:
@@ -149,12 +166,12 @@ def sweep(task: Task, guess: FloatArray, last: FloatArray, held: FloatArray, dam
     free = np.isnan(held)
     J = miss.jacobian * free[:, None]
     system = factor(gram(J), damping)
-    columns = Factor(system.lower[:, :, None], system.inverse[:, None]).solve(J)
+    columns = LDLFactor(system.lower[:, :, None], system.inverse[:, None]).solve(J)
     null = np.eye(len(held)) - _rows(columns.transpose(1, 0, 2)) @ _rows(J)
     before = np.vstack((np.where(free, last, held), guess[:-1])) - guess
     q = guess + _in_turn(null, before, transposed_product(J, system.solve(miss.error)).T)
     pull = None if free.all() else _pull(system, miss, J, np.vstack((before[:1], q[:-1] - guess[1:])))
-    return Swept(q, np.sqrt(miss.square), pull)
+    return SweepResult(q, np.sqrt(miss.square), pull)
 
 
 def _in_turn(null: FloatArray, before: FloatArray, towards: FloatArray) -> FloatArray:
@@ -165,10 +182,10 @@ def _in_turn(null: FloatArray, before: FloatArray, towards: FloatArray) -> Float
         before: p_{k-1} - p_k, of the first sample q_0 - p_1, shape (w, joints).
         towards: J_k^# e_k, shape (w, joints).
     """
-    return recurrence(null, (null @ before[:, :, None])[:, :, 0] + towards)
+    return solve_recurrence(null, (null @ before[:, :, None])[:, :, 0] + towards)
 
 
-def recurrence(matrices: FloatArray, offsets: FloatArray) -> FloatArray:
+def solve_recurrence(matrices: FloatArray, offsets: FloatArray) -> FloatArray:
     """Return c_k = M_k c_{k-1} + a_k with c before the first 0, in any unit, shape (w, m).
 
     The samples are cut into sections. Side by side each section becomes one map from what it begins with:
@@ -194,7 +211,7 @@ def recurrence(matrices: FloatArray, offsets: FloatArray) -> FloatArray:
     return np.asarray((products @ begins + sums).reshape(-1, size)[:count])
 
 
-def _pull(system: Factor, miss: Miss, J: FloatArray, s: FloatArray) -> FloatArray:
+def _pull(system: LDLFactor, miss: TaskError, J: FloatArray, s: FloatArray) -> FloatArray:
     """Return J^T y of every joint, held ones too: y = (J J^T + lambda^2 1)^-1 (e - J s)."""
     y = system.solve(miss.error - product(J, np.ascontiguousarray(s.T)))
     return transposed_product(miss.jacobian, y).T
@@ -205,7 +222,7 @@ def _rows(matrices: FloatArray) -> FloatArray:
     return np.ascontiguousarray(matrices.transpose(2, 0, 1))
 
 
-LONGEST = 384
+WINDOW_SIZE = 384
 """Samples of a window: NumPy outweighs Python, and the samples at the back are still worth their sweeps.
 
 What is found depends on it by 1e-8 rad a step, and by 1e-5 rad near singular poses: what the nanometre leaves
@@ -256,12 +273,12 @@ class SlidingWindow:
 
     def __post_init__(self) -> None:
         self.q = np.full((len(self.targets), len(self.start)), np.nan)
-        self._lower, self._upper = limits_of(self.chain)
+        self._lower, self._upper = joint_limits(self.chain)
         self._held = np.full_like(self.start, np.nan)
         self._at = 0
         self._last = self.start
         self._rate = np.zeros_like(self.start)
-        self._reach = LONGEST
+        self._reach = WINDOW_SIZE
         self._empty()
 
     def slide(self, progress: Callable[[float], None]) -> FloatArray:
@@ -298,14 +315,16 @@ class SlidingWindow:
     def _advance(self) -> None:
         """Correct the window once, let out at the front what has converged, at the back what is far off."""
         window = self.targets.rows(slice(self._at, self._at + len(self._guess)))
-        swept = sweep(task_of(self.chain, window), self._guess, self._last, self._held, self._damping)
+        swept = newton_sweep(
+            build_task(self.chain, window), self._guess, self._last, self._held, self._damping
+        )
         correction = swept.q - self._guess
         size = np.abs(correction).max(axis=1)
         self._sweeps += 1
         self._lower_damping((size <= NEARLY_STILL) & (swept.miss > MET))
         converged = _leading((size <= STILL) & (swept.miss <= MET))
         trusted = max(1, _leading(size <= FAR))
-        self._reach = min(LONGEST, 2 * trusted)
+        self._reach = min(WINDOW_SIZE, 2 * trusted)
         self._guess = self._guess[:trusted] + correction[:trusted] * min(1.0, FAR / max(size[0], FAR))
         self._damping = self._damping[:trusted]
         self._let_out(converged, swept.pull)
@@ -317,7 +336,9 @@ class SlidingWindow:
     def _let_out(self, count: int, pull: FloatArray | None) -> None:
         """Take what is in front of the window as found, up to where a joint meets or leaves a limit."""
         found = self._guess[:count]
-        at, held = change(found, None if pull is None else pull[:count], self._held, self._lower, self._upper)
+        at, held = next_limit_change(
+            found, None if pull is None else pull[:count], self._held, self._lower, self._upper
+        )
         self._take(np.clip(found[:at], self._lower, self._upper))
         if at < count:
             sweeps = self._sweeps
@@ -382,7 +403,7 @@ class LeastMotionPath:
     chain: Chain
     targets: Targets
     start: FloatArray
-    search: Search
+    search: SearchOptions
     progress: Callable[[float], None]
     q: FloatArray = field(init=False)
     reasons: TextArray = field(init=False)
@@ -406,7 +427,7 @@ class LeastMotionPath:
         self._at_once = min(MOST_AT_ONCE, MORE * self._at_once) if alike == len(met) and not met[0] else 1
         self.reasons[sample : sample + alike] = found.reasons[:alike, 0]
         self.shortfall[sample : sample + alike] = found.shortfall[:alike, 0]
-        return in_nearest_turns(self.chain, found.q[:alike, 0], last)
+        return unwrap_within_limits(self.chain, found.q[:alike, 0], last)
 
 
 def _alike(met: BoolArray, reached: BoolArray) -> int:

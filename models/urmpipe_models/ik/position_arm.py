@@ -16,12 +16,12 @@ import numpy as np
 from urmpipe_models.elementwise import BoolArray, FloatArray, TextArray
 from urmpipe_models.ik.loop_equations import (
     LoopEquations,
-    Reach,
-    Seen,
+    ReachReasons,
     Track,
+    WristView,
     jacobian_determinant,
     loop_equations,
-    polished,
+    refine_joints,
 )
 from urmpipe_models.ik.solutions import SingularFamily
 from urmpipe_models.ik.trigonometric import (
@@ -32,14 +32,14 @@ from urmpipe_models.ik.trigonometric import (
     is_straight,
     parabola_roots,
     quadric_roots,
-    wrapped,
+    wrap_angle,
 )
 from urmpipe_models.kinematics.forward import Screws
 
 Meeting: TypeAlias = dict[SingularFamily, BoolArray]
 """Where two postures are one, by the family of such poses."""
 
-SAME = 1e-5
+DUPLICATE_TOLERANCE = 1e-5
 """Polished postures that differ by less than this, in [rad] or the arm's size, are one."""
 
 
@@ -60,7 +60,7 @@ class Postures:
     on_axis: tuple[BoolArray, BoolArray]
 
 
-def leave_out_equal(
+def mask_duplicates(
     q: FloatArray,
     turning: BoolArray,
     size: float,
@@ -81,8 +81,8 @@ def leave_out_equal(
     meet = np.zeros(q.shape[1:], dtype=bool)
     for first, second in combinations(range(q.shape[1]), 2):
         away = q[:, first] - q[:, second]
-        away = np.where(turning[:, None], wrapped(away), away / size)
-        same = np.abs(away).max(axis=0) < SAME
+        away = np.where(turning[:, None], wrap_angle(away), away / size)
+        same = np.abs(away).max(axis=0) < DUPLICATE_TOLERANCE
         meet[first] |= same
         q[:, second, same] = np.nan
         reasons[second, same] = f"the same as {branches[first]}: both meet here"
@@ -90,7 +90,7 @@ def leave_out_equal(
         meeting["postures meet"] = meet | meeting.get("postures meet", False)
 
 
-def leave_out_second(
+def mask_coincident(
     u1: FloatArray, u3: FloatArray, reasons: TextArray, meet: BoolArray, names: TextArray, axis: int
 ) -> None:
     """Leave out the second one of two postures that are one.
@@ -112,11 +112,11 @@ def leave_out_second(
     reasons[second] = np.where(where, same[:, None], reasons[second])
 
 
-FAR = 1e-3
+MIN_HALF_ANGLE_COSINE = 1e-3
 """A prismatic joint beyond 1 / FAR arm's sizes is a root at infinity, moved by rounding: none."""
 
 
-def quartic_roots(equations: LoopEquations, seen: Seen) -> tuple[FloatArray, FloatArray]:
+def quartic_roots(equations: LoopEquations, seen: WristView) -> tuple[FloatArray, FloatArray]:
     """Return u1 and u3 of A1 u1 + b1 = A3 u3 + b3, both on their tracks.
 
     The equations give one of the two as v = G u + g of the other, which put into |v|^2 = radius^2 (or v[1] =
@@ -154,7 +154,7 @@ def _both(
         u = radius * np.stack((np.cos(x), np.sin(x)))
     else:
         x = quadric_roots(_in_half_angle((c, b, a + e, d, f)))
-        t = np.where(np.abs(np.cos(x / 2)) > FAR, np.tan(x / 2), np.nan)
+        t = np.where(np.abs(np.cos(x / 2)) > MIN_HALF_ANGLE_COSINE, np.tan(x / 2), np.nan)
         u = np.stack((t, t * t))
     return np.asarray(np.tensordot(matrix, u, 1) + g[:, None]), u
 
@@ -182,20 +182,20 @@ def _from_largest(third: Track, u3: FloatArray) -> FloatArray:
     if not third.revolute:
         return np.asarray(u3[0])
     largest = float(np.arctan2(third.coefficients[1, 1], third.coefficients[1, 0]))
-    return wrapped(np.arctan2(u3[1], u3[0]) - largest)
+    return wrap_angle(np.arctan2(u3[1], u3[0]) - largest)
 
 
-RANK = 1e-6
+RANK_TOLERANCE = 1e-6
 """Axes count as meeting or as parallel where that changes a loop equation by this, relative to the others.
 
 The equations are then solved as if they did, and the joints are polished until the wrist is where it
 shall be. Only where axes are off by 1e-8 to 1e-6 a posture that lies next to a fold may be lost by this.
 """
 
-EXACT = 1e-14
+EXACT_TOLERANCE = 1e-14
 """Up to this the loop equations hold as they are, and nothing is left to polish."""
 
-LEFT = 2e-11
+MAX_RESIDUAL = 2e-11
 """Polished joints that leave the wrist centre off by more than this, in units of the arm's size, are none."""
 
 Order = Literal["first", "third", "both"]
@@ -283,19 +283,19 @@ class PositionArm:
         if self.order == "both":
             u1, u3 = quartic_roots(self.equations, seen)
             reasons: TextArray = np.full(u3[0].shape, "", dtype=np.object_)
-            Reach(self.equations, self.size).tell_place(reasons, np.isnan(u3[0]), seen)
+            ReachReasons(self.equations, self.size).tell_place(reasons, np.isnan(u3[0]), seen)
             meeting: Meeting = {}
         else:
             u1, u3, reasons, meeting = self._in_order(seen)
         q, on_axis = self._joints(seen, u1, u3, near)
         if not self.exact:
             q = self._polished(q, target, reasons)
-            leave_out_equal(q, self.screws.revolute[:3], self.size, self.branches, reasons, meeting)
+            mask_duplicates(q, self.screws.revolute[:3], self.size, self.branches, reasons, meeting)
         found = np.isfinite(q).all(axis=0)
         meeting = {family: where & found for family, where in meeting.items()}
         return Postures(q, reasons, meeting, (on_axis[0] & found, on_axis[1] & found))
 
-    def _in_order(self, seen: Seen) -> tuple[FloatArray, FloatArray, TextArray, Meeting]:
+    def _in_order(self, seen: WristView) -> tuple[FloatArray, FloatArray, TextArray, Meeting]:
         """Return u1, u3 of one joint after the other, shape (2, k, n), reasons and where postures meet."""
         equations, (first, third) = self.equations, self._combinations
         a1, a3 = equations.first.coefficients, equations.third.coefficients
@@ -312,7 +312,7 @@ class PositionArm:
             roots1 = _roots(equations.first, first @ a1, rest, seen.radius)
             u1, u3 = roots1.u, roots3.u[:, None]
             meet1, meet3 = roots1.meet[None], roots3.meet[None, None]
-        if equations.axis @ equations.third.axis < -RANK:
+        if equations.axis @ equations.third.axis < -RANK_TOLERANCE:
             u1, u3, meet1 = u1[:, :, ::-1], u3[:, :, ::-1], meet1[:, ::-1]
         u1, u3 = np.broadcast_arrays(u1, u3)
         reasons = self._reasons(seen, u1, u3)
@@ -321,11 +321,11 @@ class PositionArm:
         slots = {family: where.reshape(shape) for family, where in meeting.items()}
         return u1.reshape(2, *shape), u3.reshape(2, *shape), reasons.reshape(shape), slots
 
-    def _reasons(self, seen: Seen, u1: FloatArray, u3: FloatArray) -> TextArray:
+    def _reasons(self, seen: WristView, u1: FloatArray, u3: FloatArray) -> TextArray:
         """Return why there is no u1 or no u3, shape (sides, elbows, n), by the joint that comes first."""
         equations, reach, (first, third) = (
             self.equations,
-            Reach(self.equations, self.size),
+            ReachReasons(self.equations, self.size),
             self._combinations,
         )
         a1, a3 = equations.first.coefficients, equations.third.coefficients
@@ -354,30 +354,30 @@ class PositionArm:
         meeting: Meeting = {}
         if meet3.any():
             meeting = self._elbow_families(u3, meet3)
-            leave_out_second(u1, u3, reasons, meet3, names, 1)
+            mask_coincident(u1, u3, reasons, meet3, names, 1)
         if meet1.any():
             family = self._side_family
             meeting[family] = meet1 | meeting.get(family, np.zeros(shape, dtype=bool))
-            leave_out_second(u1, u3, reasons, meet1, names, 0)
+            mask_coincident(u1, u3, reasons, meet1, names, 0)
         return u1, u3, meeting
 
     @property
     def _side_family(self) -> SingularFamily:
         """The family of poses where both roots of joint 1 are one."""
         first, _ = self._combinations
-        sideways = abs(first[1]) <= RANK  # the way along axis 2 alone decides
+        sideways = abs(first[1]) <= RANK_TOLERANCE  # the way along axis 2 alone decides
         return "wrist beside axis 1" if sideways and self.equations.revolute else "postures meet"
 
     def _elbow_families(self, u3: FloatArray, meet: BoolArray) -> Meeting:
         """Return the families of poses where both roots of joint 3 are one."""
         _, third = self._combinations
-        if abs(third[0]) > RANK:  # what joint 3 is solved from is no distance alone
+        if abs(third[0]) > RANK_TOLERANCE:  # what joint 3 is solved from is no distance alone
             return {"postures meet": meet}
         far = np.tensordot(third @ self.equations.third.coefficients, u3, 1) > 0.0
         return {"arm stretched": meet & far, "arm withdrawn": meet & ~far}
 
     def _joints(
-        self, seen: Seen, u1: FloatArray, u3: FloatArray, near: FloatArray | None
+        self, seen: WristView, u1: FloatArray, u3: FloatArray, near: FloatArray | None
     ) -> tuple[FloatArray, tuple[BoolArray, BoolArray]]:
         """Return q1 to q3, shape (3, k, n), of u1 and u3, and where the wrist is on axes 1 and 2."""
         equations, chosen = self.equations, near
@@ -390,8 +390,8 @@ class PositionArm:
         if equations.first.revolute:
             on_first |= seen.radius <= ON_AXIS
             opposite = np.array([np.pi if name.startswith("left") else 0.0 for name in self.branches])
-            turned = wrapped(seen.zero - np.arctan2(u1[1], u1[0]))
-            q1 = np.where(on_first & np.isfinite(u1[0]), wrapped(chosen[0] + opposite[:, None]), turned)
+            turned = wrap_angle(seen.zero - np.arctan2(u1[1], u1[0]))
+            q1 = np.where(on_first & np.isfinite(u1[0]), wrap_angle(chosen[0] + opposite[:, None]), turned)
         else:
             q1 = (seen.zero + u1[0]) * self.size
         if equations.revolute:
@@ -399,11 +399,11 @@ class PositionArm:
             across = x - equations.axis[:, None, None] * along
             on_second |= (across * across).sum(axis=0) <= ON_AXIS**2
             turned = angle_about(equations.axis, y, x)
-            q2 = np.where(on_second, wrapped(np.broadcast_to(chosen[1], turned.shape)), turned)
+            q2 = np.where(on_second, wrap_angle(np.broadcast_to(chosen[1], turned.shape)), turned)
         else:
             q2 = np.tensordot(equations.axis, x - y, 1) * self.size
         q3 = (
-            wrapped(np.arctan2(u3[1], u3[0]))
+            wrap_angle(np.arctan2(u3[1], u3[0]))
             if equations.third.revolute
             else (u3[0] + equations.shift) * self.size
         )
@@ -414,14 +414,14 @@ class PositionArm:
         unit = np.where(self.screws.revolute[:3], 1.0, self.size)[:, None, None]
         whole = np.isfinite(q).all(axis=0)
         aim = np.broadcast_to(target[:, None], q.shape)
-        better, left = polished(self.screws, self.wrist, np.where(whole, q / unit, 0.0), aim)
-        missed = whole & ~(left <= LEFT)
+        better, left = refine_joints(self.screws, self.wrist, np.where(whole, q / unit, 0.0), aim)
+        missed = whole & ~(left <= MAX_RESIDUAL)
         for where in np.argwhere(missed):
             reasons[tuple(where)] = (
                 f"joints 1 to 3 leave the wrist centre off by {left[tuple(where)] * self.size:.3g} m at best,"
-                f" allowed: {LEFT * self.size:.3g} m"
+                f" allowed: {MAX_RESIDUAL * self.size:.3g} m"
             )
-        turned = np.where(self.screws.revolute[:3, None, None], wrapped(better), better * unit)
+        turned = np.where(self.screws.revolute[:3, None, None], wrap_angle(better), better * unit)
         return np.where(whole & ~missed, turned, np.nan)
 
 
@@ -445,10 +445,17 @@ def position_arm(screws: Screws, wrist: FloatArray) -> PositionArm | None:
     orders: tuple[tuple[Order, Track], ...] = (("first", equations.third), ("third", equations.first))
     for order, track in orders:
         vectors, sizes, _ = np.linalg.svd(track.coefficients)
-        if sizes[1] <= RANK * sizes[0]:
+        if sizes[1] <= RANK_TOLERANCE * sizes[0]:
             single, other = _oriented(vectors[:, 1])
             return PositionArm(
-                scaled, wrist, size, equations, order, single, other, bool(sizes[1] <= EXACT * sizes[0])
+                scaled,
+                wrist,
+                size,
+                equations,
+                order,
+                single,
+                other,
+                bool(sizes[1] <= EXACT_TOLERANCE * sizes[0]),
             )
     return PositionArm(scaled, wrist, size, equations, "both")
 
@@ -468,8 +475,12 @@ def _oriented(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     The larger role goes to the second equation, whose sign no choice of a point on axis 2 can turn.
     """
-    single = np.where(np.abs(vector) <= EXACT, 0.0, vector)
-    lead = single[1] if abs(single[1]) > RANK else single[0]
+    single = np.where(np.abs(vector) <= EXACT_TOLERANCE, 0.0, vector)
+    lead = single[1] if abs(single[1]) > RANK_TOLERANCE else single[0]
     single = single * np.sign(lead)
-    other = np.array([single[1], -single[0]]) if abs(single[1]) > RANK else np.array([-single[1], single[0]])
+    other = (
+        np.array([single[1], -single[0]])
+        if abs(single[1]) > RANK_TOLERANCE
+        else np.array([-single[1], single[0]])
+    )
     return single, other

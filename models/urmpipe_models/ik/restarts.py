@@ -31,27 +31,35 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import THREADS, BoolArray, FloatArray, IndexArray, row_blocks, side_by_side
 from urmpipe_models.errors import Finding, OptionError, shown
-from urmpipe_models.ik.numeric import METHODS, STATIONARY, Method, Progress, Settings, descend, settle
+from urmpipe_models.ik.numeric import (
+    METHODS,
+    STATIONARY,
+    DescentOptions,
+    DescentState,
+    Method,
+    descend,
+    minimise_motion,
+)
 from urmpipe_models.ik.solutions import (
+    DEFAULT_SEARCH,
     NEAREST_POINT,
     TURN,
-    USUAL_SEARCH,
-    Search,
-    Singular,
+    SearchOptions,
+    SingularPoses,
     Solutions,
     Targets,
-    limits_of,
-    misses,
-    nearest_to_limits,
-    periods,
-    turning,
-    within_limits,
+    is_periodic,
+    joint_limits,
+    joint_periods,
+    limit_solutions,
+    pose_errors,
+    shift_towards_limits,
 )
-from urmpipe_models.ik.task import redundancy, rows_of, task_of, turn_length
-from urmpipe_models.ik.trigonometric import wrapped
+from urmpipe_models.ik.task import build_task, orientation_length, redundancy, take_rows
+from urmpipe_models.ik.trigonometric import wrap_angle
 from urmpipe_models.kinematics.singularity import characteristic_length
 
-BLOCK = 4096
+BATCH_SIZE = 4096
 """Rows of a block: its hundred or so arrays stay in a core's cache."""
 
 ROUND = 6
@@ -59,7 +67,7 @@ ROUND = 6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Refined:
+class RefinementResult:
     """Where the rows of a batch came to.
 
     Attributes:
@@ -95,7 +103,7 @@ def refine(
     damping: float = 0.05,
     stationary: float = STATIONARY,
     threads: int = THREADS,
-) -> Refined:
+) -> RefinementResult:
     """Return joint values that bring the tool to its targets, or as near as can be come from the starts.
 
     Args:
@@ -115,17 +123,17 @@ def refine(
     Raises:
         OptionError: If the method or the shape of q is none of the above.
     """
-    lower, upper = limits_of(chain)
+    lower, upper = joint_limits(chain)
     begin = np.clip(_starts(chain, targets, q, method), lower, upper)
-    settings = Settings(lower, upper, method, metres, radians, damping, stationary)
-    progress = Progress.at(begin)
+    settings = DescentOptions(lower, upper, method, metres, radians, damping, stationary)
+    progress = DescentState.at(begin)
     _run(progress, chain, targets, settings, iterations, threads)
     slack = np.zeros(len(targets))
     if redundancy(chain, targets):
         goal = begin if home is None else np.clip(_starts(chain, targets, home, method), lower, upper)
         slack = _settled(progress, chain, targets, goal, settings, threads)
-    residual = np.hypot(progress.distance, turn_length(chain) * progress.angle)
-    return Refined(
+    residual = np.hypot(progress.distance, orientation_length(chain) * progress.angle)
+    return RefinementResult(
         progress.q.T, progress.arrived, progress.steps, progress.distance, progress.angle, residual, slack
     )
 
@@ -145,12 +153,17 @@ def _starts(chain: Chain, targets: Targets, q: FloatArray, method: str) -> Float
 
 
 def _run(
-    progress: Progress, chain: Chain, targets: Targets, settings: Settings, iterations: int, threads: int
+    progress: DescentState,
+    chain: Chain,
+    targets: Targets,
+    settings: DescentOptions,
+    iterations: int,
+    threads: int,
 ) -> None:
     """Take every row to its end, or as many steps as are allowed."""
     pending = np.flatnonzero(_finite(targets) & np.isfinite(progress.q).all(axis=0))
 
-    task = task_of(chain, targets)
+    task = build_task(chain, targets)
 
     def work(index: IndexArray) -> None:
         """Take the rows of a block some steps further."""
@@ -158,7 +171,7 @@ def _run(
 
     for done in range(0, iterations, ROUND):
         steps = min(ROUND, iterations - done)
-        side_by_side(work, [pending[rows] for rows in row_blocks(len(pending), BLOCK)], threads)
+        side_by_side(work, [pending[rows] for rows in row_blocks(len(pending), BATCH_SIZE)], threads)
         pending = pending[~progress.ended[pending]]
         if not len(pending):
             return
@@ -173,11 +186,11 @@ def _finite(targets: Targets) -> BoolArray:
 
 
 def _settled(
-    progress: Progress,
+    progress: DescentState,
     chain: Chain,
     targets: Targets,
     home: FloatArray,
-    settings: Settings,
+    settings: DescentOptions,
     threads: int,
 ) -> FloatArray:
     """Bring the rows that have arrived to the points of least motion; return what is left of t."""
@@ -187,29 +200,29 @@ def _settled(
 
     def work(index: IndexArray) -> None:
         """Settle the rows of a block."""
-        task = task_of(chain, targets.rows(index))
-        q, to = rows_of(progress.q, index), np.ascontiguousarray(home[index].T)
-        progress.q[:, index], slack[index] = settle(task, q, to, settings)
+        task = build_task(chain, targets.rows(index))
+        q, to = take_rows(progress.q, index), np.ascontiguousarray(home[index].T)
+        progress.q[:, index], slack[index] = minimise_motion(task, q, to, settings)
 
-    side_by_side(work, [arrived[rows] for rows in row_blocks(len(arrived), BLOCK)], threads)
+    side_by_side(work, [arrived[rows] for rows in row_blocks(len(arrived), BATCH_SIZE)], threads)
     return slack
 
 
 def _turns(chain: Chain, q: FloatArray, home: FloatArray) -> FloatArray:
     """Return the whole turns in [rad] that joints that turn without end are away from home."""
-    period = periods(chain)[:, None]
+    period = joint_periods(chain)[:, None]
     endless = np.isfinite(period)
     period = np.where(endless, period, 1.0)
     return np.where(endless, period * np.round((q - home) / period), 0.0)
 
 
-DISTINCT = 1e-3
+DISTINCT_TOLERANCE = 1e-3
 """Solutions are two if a joint differs by more than this in [rad] or [m], revolute joints by the shorter way.
 
 At a singular pose a miss of 1e-10 leaves 1e-5 rad: less would tell one solution for several.
 """
 
-ROUGH = 1e-2
+ATTEMPT_STATIONARY = 1e-2
 """An attempt of a search ends where the cosine between miss and motion is less (see `refine`).
 
 It would come no nearer worth the steps. The nearest of all is then brought to the nearest point near it.
@@ -235,7 +248,7 @@ def solve_iteratively(
     *,
     start: FloatArray | None = None,
     every: bool = False,
-    search: Search = USUAL_SEARCH,
+    search: SearchOptions = DEFAULT_SEARCH,
 ) -> Solutions:
     """Return joint values within limits that bring the tool to its targets, found from several starts.
 
@@ -328,7 +341,7 @@ class _Attempts:
         rows = np.flatnonzero(self.pending | every)
         count, joints = len(starts), self.begin.shape[1]
         q = np.broadcast_to(starts, (count, *self.begin.shape))[:, rows].reshape(-1, joints)
-        refined = self._refine(rows, q, count, ROUGH, ATTEMPT_STEPS)
+        refined = self._refine(rows, q, count, ATTEMPT_STATIONARY, ATTEMPT_STEPS)
         self._keep_nearest(rows, refined, count, CLEARLY)
 
     def finish(self) -> None:
@@ -338,7 +351,9 @@ class _Attempts:
             refined = self._refine(rows, self.q[rows], 1, STATIONARY, LAST_STEPS)
             self._keep_nearest(rows, refined, 1, 1.0)
 
-    def _refine(self, rows: IndexArray, q: FloatArray, count: int, stationary: float, steps: int) -> Refined:
+    def _refine(
+        self, rows: IndexArray, q: FloatArray, count: int, stationary: float, steps: int
+    ) -> RefinementResult:
         """Solve the targets at `rows` in as many attempts, from q, shape (count * rows, joints)."""
         targets, home = self.targets.rows(np.tile(rows, count)), np.tile(self.begin[rows], (count, 1))
         refined = refine(self.chain, targets, q, home=home, stationary=stationary, iterations=steps)
@@ -350,7 +365,7 @@ class _Attempts:
         self.pending[rows] &= ~refined.converged.reshape(count, -1).any(axis=0)
         return refined
 
-    def _keep_nearest(self, rows: IndexArray, refined: Refined, count: int, share: float) -> None:
+    def _keep_nearest(self, rows: IndexArray, refined: RefinementResult, count: int, share: float) -> None:
         """Keep where the tool came nearer to the targets at `rows` than `share` of the least miss so far."""
         residual = np.where(np.isnan(refined.residual), np.inf, refined.residual).reshape(count, -1)
         best = np.argmin(residual, axis=0)
@@ -363,7 +378,7 @@ class _Attempts:
 def _solutions(attempts: _Attempts, every: bool) -> Solutions:
     """Return what was found, each joint in the allowed turn nearest to the start, nearest solution first."""
     chain, begin = attempts.chain, attempts.begin
-    shifted = within_limits(chain, _listed(np.stack(attempts.found, axis=1)), begin).q
+    shifted = limit_solutions(chain, _listed(np.stack(attempts.found, axis=1)), begin).q
     found = _nearest_first(shifted, begin, None if every else 1)
     return _listed(_distinct(chain, found) if every else found)
 
@@ -385,7 +400,7 @@ def _distinct(chain: Chain, found: FloatArray) -> FloatArray:
     """Return each solution once, shape (n, k, joints), in the order they have, NaN where fewer."""
     new = np.asarray(np.isfinite(found).all(axis=2))
     for k in range(1, found.shape[1]):
-        apart = np.abs(_apart(chain, found[:, :k], found[:, k : k + 1])).max(axis=2) > DISTINCT
+        apart = np.abs(_apart(chain, found[:, :k], found[:, k : k + 1])).max(axis=2) > DISTINCT_TOLERANCE
         new[:, k] &= (apart | ~new[:, :k]).all(axis=1)
     found = np.where(new[..., None], found, np.nan)
     order = np.argsort(~new, axis=1, kind="stable")[:, : max(1, int(new.sum(axis=1).max(initial=1)))]
@@ -395,17 +410,17 @@ def _distinct(chain: Chain, found: FloatArray) -> FloatArray:
 def _apart(chain: Chain, a: FloatArray, b: FloatArray) -> FloatArray:
     """Return a - b, joints that a whole turn leaves where they were by the shorter way."""
     apart = np.asarray(a - b)
-    turns = turning(chain)
+    turns = is_periodic(chain)
     apart[..., turns] -= TURN * np.round(apart[..., turns] / TURN)
     return apart
 
 
-def _told(attempts: _Attempts, solutions: Solutions, search: Search) -> Solutions:
+def _told(attempts: _Attempts, solutions: Solutions, search: SearchOptions) -> Solutions:
     """Return solutions with the nearest points within the tolerance, and why there are no others."""
     near = _near_enough(attempts, search.tolerance)
     q, reasons, labels = solutions.q.copy(), solutions.reasons.copy(), solutions.labels.copy()
     shortfall = np.zeros(q.shape[:2])
-    turned = within_limits(attempts.chain, _listed(attempts.q[near][:, None]), attempts.begin[near])
+    turned = limit_solutions(attempts.chain, _listed(attempts.q[near][:, None]), attempts.begin[near])
     q[near, 0], labels[near, 0], shortfall[near, 0] = turned.q[:, 0], NEAREST_POINT, attempts.distance[near]
     lacking = np.asarray(~np.isfinite(q).all(axis=2))
     reasons[lacking] = f"no further solution {_tries(search.restarts)}"
@@ -419,13 +434,13 @@ def _near_enough(attempts: _Attempts, tolerance: float | None) -> BoolArray:
     near = np.asarray(attempts.pending & np.isfinite(attempts.residual))
     if tolerance is None or not near.any():
         return np.zeros(len(near), np.bool_)
-    position, turn = misses(attempts.chain, attempts.q[near], attempts.targets.rows(near))
+    position, turn = pose_errors(attempts.chain, attempts.q[near], attempts.targets.rows(near))
     within = np.abs(position).max(axis=1) <= tolerance
-    near[near] = within & (np.linalg.norm(turn, axis=1) <= tolerance / turn_length(attempts.chain))
+    near[near] = within & (np.linalg.norm(turn, axis=1) <= tolerance / orientation_length(attempts.chain))
     return near
 
 
-def _reason(attempts: _Attempts, row: int, search: Search) -> str:
+def _reason(attempts: _Attempts, row: int, search: SearchOptions) -> str:
     """Say that a target has no solution and how near the tool comes."""
     if not np.isfinite(attempts.residual[row]):
         return "the target is not finite, allowed: finite numbers"
@@ -452,9 +467,7 @@ SAME = 1e-4
 """What is found within this of another branch, in [rad] or [m] of every joint, is that branch."""
 
 
-def within_limits_by_choice(
-    chain: Chain, targets: Targets, solutions: Solutions, near: FloatArray
-) -> Solutions:
+def choose_free_joints(chain: Chain, targets: Targets, solutions: Solutions, near: FloatArray) -> Solutions:
     """Return solutions within limits, see `within_limits`, free joints chosen so that limits allow them.
 
     Where a pose leaves joints free, a branch is a whole family of solutions, and a closed form returns one
@@ -466,28 +479,28 @@ def within_limits_by_choice(
         solutions: Of a closed form, limits not asked.
         near: Joint values in [rad] or [m], shape (n, joints).
     """
-    found = within_limits(chain, solutions, near)
+    found = limit_solutions(chain, solutions, near)
     free = np.any([one.where for one in solutions.singular if one.free], axis=0)
     refused = solutions.reached & ~found.reached & free
     if not refused.any():
         return found
     row, column = np.nonzero(refused)
-    refined = refine(chain, targets.rows(row), nearest_to_limits(chain, solutions.q[row, column]))
+    refined = refine(chain, targets.rows(row), shift_towards_limits(chain, solutions.q[row, column]))
     new = refined.converged & ~_another(refined.q, found, row)
     row, column = row[new], column[new]
     q = solutions.q.copy()
     q[row, column] = refined.q[new]
     singular = tuple(_free_joints_message(one, row, column) for one in solutions.singular)
-    return within_limits(chain, replace(solutions, q=q, singular=singular), near)
+    return limit_solutions(chain, replace(solutions, q=q, singular=singular), near)
 
 
 def _another(q: FloatArray, found: Solutions, row: IndexArray) -> BoolArray:
     """Return which joint values, shape (m, joints), are those of another branch of their targets."""
-    away = np.abs(wrapped(q[:, None] - found.q[row])).max(axis=2)
+    away = np.abs(wrap_angle(q[:, None] - found.q[row])).max(axis=2)
     return np.asarray((away < SAME).any(axis=1))
 
 
-def _free_joints_message(family: Singular, row: IndexArray, column: IndexArray) -> Singular:
+def _free_joints_message(family: SingularPoses, row: IndexArray, column: IndexArray) -> SingularPoses:
     """Return a family whose text says, if some of its solutions were chosen by limits, that they were."""
     if not (family.free and family.where[row, column].any()):
         return family

@@ -32,7 +32,7 @@ DIGITS = 4
 """Significant digits, where they are enough."""
 
 
-def figures(found: float, *allowed: float) -> tuple[str, ...]:
+def format_with_limits(found: float, *allowed: float) -> tuple[str, ...]:
     """Return what was found and the limits that are allowed as texts.
 
     All have four significant digits, or as many more as let the found one differ from every limit: "at
@@ -65,12 +65,12 @@ class Targets:
         return Targets(self.position[chosen], None if self.rotation is None else self.rotation[chosen])
 
 
-def targets_of(chain: Chain, q: FloatArray) -> Targets:
+def forward_targets(chain: Chain, q: FloatArray) -> Targets:
     """Return the poses of the tool centre point at joint values q in [rad] or [m], shape (n, joints)."""
     return Targets(*poses_over_log(chain, q))
 
 
-def misses(chain: Chain, q: FloatArray, targets: Targets) -> tuple[FloatArray, FloatArray]:
+def pose_errors(chain: Chain, q: FloatArray, targets: Targets) -> tuple[FloatArray, FloatArray]:
     """Return how far the tool at q is from its targets, by forward kinematics.
 
     Args:
@@ -114,7 +114,7 @@ NO_BRANCH = "found by search"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Singular:
+class SingularPoses:
     """A family of singular poses that solutions lie in, and what was chosen there.
 
     Attributes:
@@ -150,7 +150,7 @@ class Solutions:
     q: FloatArray
     branches: tuple[str, ...]
     reasons: TextArray
-    singular: tuple[Singular, ...] = ()
+    singular: tuple[SingularPoses, ...] = ()
     shortfall: FloatArray = field(default_factory=lambda: np.zeros(()))
     labels: TextArray = field(default_factory=lambda: np.array("", dtype=np.object_))
 
@@ -237,14 +237,14 @@ class Solutions:
         return away
 
 
-def no_solutions(reasons: Sequence[str], branches: tuple[str, ...], joints: int) -> Solutions:
+def empty_solutions(reasons: Sequence[str], branches: tuple[str, ...], joints: int) -> Solutions:
     """Return solutions of which there are none, each target for its own reason."""
     count = len(reasons)
     texts = np.repeat(np.array(reasons, dtype=np.object_)[:, None], len(branches), axis=1)
     return Solutions(np.full((count, len(branches), joints), np.nan), branches, texts)
 
 
-def joined(parts: Sequence[Solutions]) -> Solutions:
+def concatenate_solutions(parts: Sequence[Solutions]) -> Solutions:
     """Return solutions of targets one after the other from those of parts of them, one part at least.
 
     Parts with fewer branches than the widest are filled up with solutions that there are not. A family of
@@ -258,7 +258,8 @@ def joined(parts: Sequence[Solutions]) -> Solutions:
         branches,
         np.concatenate([_filled(part.reasons, count, "") for part in parts]),
         tuple(
-            Singular(family, _where(parts, (family, *texts), count), *texts) for family, *texts in families
+            SingularPoses(family, _where(parts, (family, *texts), count), *texts)
+            for family, *texts in families
         ),
         np.concatenate([_filled(part.shortfall, count, 0.0) for part in parts]),
         np.concatenate([_filled(part.labels, count, "") for part in parts]),
@@ -286,12 +287,12 @@ def _where(parts: Sequence[Solutions], family: tuple[str, ...], count: int) -> B
     return np.concatenate(where)
 
 
-MOST_RESTARTS = 10_000
+MAX_RESTARTS = 10_000
 """Most random starts: so many take minutes for one target already."""
 
 
 @dataclass(frozen=True, slots=True)
-class Search:
+class SearchOptions:
     """How far a search goes for what does not follow from the start.
 
     Attributes:
@@ -317,22 +318,22 @@ class Search:
         for name, value in (("restarts", self.restarts), ("seed", self.seed)):
             if not isinstance(value, Integral) or value < 0:
                 yield Finding(parameter=name, found=shown(value), allowed="a whole number, 0 or more")
-            elif name == "restarts" and value > MOST_RESTARTS:
-                yield Finding(parameter=name, found=shown(value), allowed=f"{MOST_RESTARTS} at most")
+            elif name == "restarts" and value > MAX_RESTARTS:
+                yield Finding(parameter=name, found=shown(value), allowed=f"{MAX_RESTARTS} at most")
 
 
-USUAL_SEARCH = Search()
+DEFAULT_SEARCH = SearchOptions()
 """The search where nothing else is asked."""
 
 
 ROTATION_TOLERANCE = 1e-6
 """A matrix of a file with 7 digits is a rotation within this, and the nearest one is taken [-]."""
 
-FARTHEST = 1e9
+MAX_COORDINATE = 1e9
 """A coordinate beyond this, in [m], is no place of a tool: its square leaves no digit of an arm's length."""
 
 
-def checked(targets: Targets) -> tuple[Targets, list[str]]:
+def validate_targets(targets: Targets) -> tuple[Targets, list[str]]:
     """Return targets with the nearest rotations, and why each of them is no target; empty where it is one.
 
     Of R with |R^T R - 1| <= 1e-6 in every entry the nearest rotation is taken: two steps of
@@ -364,10 +365,10 @@ def checked(targets: Targets) -> tuple[Targets, list[str]]:
 def _of_positions(position: FloatArray) -> list[str]:
     """Return why positions in [m], shape (n, 3), are none."""
     reasons = [""] * len(position)
-    for row in np.flatnonzero(~(np.abs(position) <= FARTHEST).all(axis=1)):
+    for row in np.flatnonzero(~(np.abs(position) <= MAX_COORDINATE).all(axis=1)):
         found = ", ".join(f"{value:g}" for value in position[row])
         finite = np.isfinite(position[row]).all()
-        allowed = f"up to {FARTHEST:g} m along each axis" if finite else "finite numbers"
+        allowed = f"up to {MAX_COORDINATE:g} m along each axis" if finite else "finite numbers"
         reasons[row] = f"the position is {found} m, allowed: {allowed}"
     return reasons
 
@@ -397,7 +398,7 @@ LIMIT_ROUNDING = 1e-11
 TURN = 2.0 * math.pi
 
 
-def periods(chain: Chain) -> FloatArray:
+def joint_periods(chain: Chain) -> FloatArray:
     """Return 2 pi of each joint that may turn without end, infinity of any other, in [rad], shape (joints,).
 
     Without end turns a revolute joint without limits. One that may turn by several turns but has limits, as
@@ -405,10 +406,10 @@ def periods(chain: Chain) -> FloatArray:
     turns is allowed and nearest, `within_limits` knows.
     """
     free = [not (math.isfinite(joint.lower) or math.isfinite(joint.upper)) for joint in chain.moving]
-    return np.where(turning(chain) & np.array(free), TURN, np.inf)
+    return np.where(is_periodic(chain) & np.array(free), TURN, np.inf)
 
 
-def within_limits(chain: Chain, solutions: Solutions, near: FloatArray | None = None) -> Solutions:
+def limit_solutions(chain: Chain, solutions: Solutions, near: FloatArray | None = None) -> Solutions:
     """Return solutions with every revolute joint shifted by whole turns into its limits.
 
     Args:
@@ -420,7 +421,9 @@ def within_limits(chain: Chain, solutions: Solutions, near: FloatArray | None = 
     Returns:
         The solutions; one with a joint that cannot be brought into its limits is NaN and has a reason.
     """
-    q, outside = in_nearest_turn(chain, solutions.q, 0.0 if near is None else np.atleast_2d(near)[:, None, :])
+    q, outside = shift_into_limits(
+        chain, solutions.q, 0.0 if near is None else np.atleast_2d(near)[:, None, :]
+    )
     refused = np.asarray(outside.any(axis=2))
     return replace(
         solutions,
@@ -430,7 +433,7 @@ def within_limits(chain: Chain, solutions: Solutions, near: FloatArray | None = 
     )
 
 
-def in_nearest_turn(chain: Chain, q: FloatArray, near: FloatArray | float) -> tuple[FloatArray, BoolArray]:
+def shift_into_limits(chain: Chain, q: FloatArray, near: FloatArray | float) -> tuple[FloatArray, BoolArray]:
     """Return joint values shifted by whole turns into their limits, and where they cannot be brought there.
 
     Args:
@@ -443,16 +446,16 @@ def in_nearest_turn(chain: Chain, q: FloatArray, near: FloatArray | float) -> tu
         In [rad] or [m] and [-], shape (..., joints) both; what is outside of its limits is put on the nearest
         one.
     """
-    lower, upper = limits_of(chain)
+    lower, upper = joint_limits(chain)
     least = np.ceil((lower - LIMIT_ROUNDING - q) / TURN)
     most = np.floor((upper + LIMIT_ROUNDING - q) / TURN)
-    turns = np.where(turning(chain), np.clip(np.round((near - q) / TURN), least, most), 0.0)
+    turns = np.where(is_periodic(chain), np.clip(np.round((near - q) / TURN), least, most), 0.0)
     shifted = q + turns * TURN
     outside = (shifted < lower - LIMIT_ROUNDING) | (shifted > upper + LIMIT_ROUNDING)
     return np.clip(shifted, lower, upper), outside
 
 
-def within_pi(q: FloatArray, period: FloatArray) -> FloatArray:
+def wrap_continuous_joints(q: FloatArray, period: FloatArray) -> FloatArray:
     """Return joint values with those of joints that turn without end within (-pi, pi].
 
     Args:
@@ -468,20 +471,20 @@ def within_pi(q: FloatArray, period: FloatArray) -> FloatArray:
     return values
 
 
-def nearest_to_limits(chain: Chain, q: FloatArray) -> FloatArray:
+def shift_towards_limits(chain: Chain, q: FloatArray) -> FloatArray:
     """Return q with each joint in the turn nearest to its limits, both in [rad] or [m], shape (n, joints)."""
-    lower, upper = limits_of(chain)
-    limited = turning(chain) & np.isfinite(lower) & np.isfinite(upper)
+    lower, upper = joint_limits(chain)
+    limited = is_periodic(chain) & np.isfinite(lower) & np.isfinite(upper)
     middle = np.where(limited, 0.5 * (lower + upper), 0.0)
     return np.where(limited, q + TURN * np.round((middle - q) / TURN), q)
 
 
-def limits_of(chain: Chain) -> tuple[FloatArray, FloatArray]:
+def joint_limits(chain: Chain) -> tuple[FloatArray, FloatArray]:
     """Return the least and the largest value of every coordinate in [rad] or [m], each of shape (joints,)."""
     return np.array([one.lower for one in chain.moving]), np.array([one.upper for one in chain.moving])
 
 
-def turning(chain: Chain) -> BoolArray:
+def is_periodic(chain: Chain) -> BoolArray:
     """Return true of the joints that a whole turn leaves where they were, shape (joints,).
 
     One that another follows (mimic) is among them only if that one turns by whole turns, too.
@@ -501,7 +504,9 @@ def _reasons(chain: Chain, solutions: Solutions, outside: BoolArray) -> TextArra
     for target, column in zip(*np.nonzero(outside.any(axis=2)), strict=True):
         faults = [
             _fault(
-                chain.moving[joint], float(solutions.q[target, column, joint]), bool(turning(chain)[joint])
+                chain.moving[joint],
+                float(solutions.q[target, column, joint]),
+                bool(is_periodic(chain)[joint]),
             )
             for joint in np.flatnonzero(outside[target, column])
         ]
@@ -514,5 +519,5 @@ def _fault(joint: Joint, value: float, turns: bool) -> str:
     if turns:
         value += TURN * round((0.5 * (joint.lower + joint.upper) - value) / TURN)
     unit = "m" if joint.kind == "prismatic" else "rad"
-    found, lower, upper = figures(value, joint.lower, joint.upper)
+    found, lower, upper = format_with_limits(value, joint.lower, joint.upper)
     return f"joint {joint.name} at {found} {unit}, allowed: {lower} to {upper} {unit}"

@@ -15,19 +15,19 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import BoolArray, FloatArray, norms
 from urmpipe_models.errors import Finding, Hint, OptionError, shown
-from urmpipe_models.ik.closed import ClosedForm, closed_form, exact_form
-from urmpipe_models.ik.restarts import within_limits_by_choice
+from urmpipe_models.ik.closed import ClosedForm, closed_form, exact_closed_form
+from urmpipe_models.ik.restarts import choose_free_joints
 from urmpipe_models.ik.solutions import (
+    DEFAULT_SEARCH,
     NEAREST_POINT,
     NO_BRANCH,
-    USUAL_SEARCH,
-    Search,
-    Singular,
+    SearchOptions,
+    SingularPoses,
     Solutions,
     Targets,
-    checked,
-    no_solutions,
-    periods,
+    empty_solutions,
+    joint_periods,
+    validate_targets,
 )
 
 Method = Literal["auto", "closed", "iterative"]
@@ -44,7 +44,7 @@ def solve(
     start: FloatArray | None = None,
     every: bool = False,
     method: Method = "auto",
-    search: Search = USUAL_SEARCH,
+    search: SearchOptions = DEFAULT_SEARCH,
 ) -> Solutions:
     """Return joint values, limits kept, that bring the tool centre point to its targets.
 
@@ -68,7 +68,7 @@ def solve(
         OptionError: With all that is wrong with the options.
     """
     position_only = targets.rotation is None
-    targets, reasons = checked(targets)
+    targets, reasons = validate_targets(targets)
     form = None if position_only or method == "iterative" else closed_form(chain)
     faults = [*_start_faults(chain, len(targets), start), *search.faults()]
     if method not in METHODS:
@@ -79,7 +79,7 @@ def solve(
         raise OptionError(*faults)
     begin = _starts(chain, len(targets), start)
     good = np.array([not reason for reason in reasons], dtype=bool)
-    nearly = method == "auto" and form is not None and form != exact_form(chain)
+    nearly = method == "auto" and form is not None and form != exact_closed_form(chain)
     asked = _Asked(chain, every, search, nearly or search.tolerance is not None)
     if form is None:
         found = asked.iteratively(targets.rows(good), begin[good])
@@ -95,7 +95,7 @@ class _Asked:
 
     chain: Chain
     every: bool
-    search: Search
+    search: SearchOptions
     rest: bool
     """Whether what a closed form does not reach is searched for: the nearest points, or what one that holds
     nearly may have lost."""
@@ -104,9 +104,9 @@ class _Asked:
         self, form: ClosedForm, targets: Targets, start: FloatArray, near: FloatArray | None
     ) -> Solutions:
         """Return the branches within limits, or the nearest; what they do not reach is searched for."""
-        found = within_limits_by_choice(self.chain, targets, form.solve(targets, near), start)
+        found = choose_free_joints(self.chain, targets, form.solve(targets, near), start)
         if not self.every:
-            found = found.picked(found.nearest_column(start, periods(self.chain)), NEAREST)
+            found = found.picked(found.nearest_column(start, joint_periods(self.chain)), NEAREST)
         out = np.asarray(~found.reached.any(axis=1))
         if not self.rest or not out.any():
             return found
@@ -117,7 +117,7 @@ class _Asked:
         from urmpipe_models.ik.restarts import solve_iteratively
 
         if not len(targets):
-            return no_solutions([], ("1",), len(self.chain.coordinates))
+            return empty_solutions([], ("1",), len(self.chain.coordinates))
         return solve_iteratively(self.chain, targets, start=start, every=self.every, search=self.search)
 
 
@@ -135,7 +135,7 @@ def _approached(found: Solutions, out: BoolArray, nearest: Solutions) -> Solutio
 
 def _spread(found: Solutions, good: BoolArray, reasons: list[str]) -> Solutions:
     """Return solutions of all targets from those of the good ones, the others with their reasons."""
-    every = no_solutions(reasons, found.branches, found.q.shape[2])
+    every = empty_solutions(reasons, found.branches, found.q.shape[2])
     count, columns = every.q.shape[:2]
     every.q[good], every.reasons[good] = found.q, found.reasons
     shortfall, labels = np.zeros((count, columns)), every.labels.copy()
@@ -148,7 +148,7 @@ def _spread(found: Solutions, good: BoolArray, reasons: list[str]) -> Solutions:
     )
 
 
-def _spread_family(family: Singular, good: BoolArray) -> Singular:
+def _spread_family(family: SingularPoses, good: BoolArray) -> SingularPoses:
     """Return a family of all targets from one of the good ones."""
     where = np.zeros((len(good), family.where.shape[1]), dtype=bool)
     where[good] = family.where
@@ -195,7 +195,7 @@ SURE = 1e-3
 """A target is too far if it is by more than this, in [m]: the edge of the reach is left to the search."""
 
 
-def farthest(chain: Chain) -> float:
+def max_reach(chain: Chain) -> float:
     """Return what the tool centre point can be away from the first joint's frame at most, in [m].
 
     It is the sum of the offsets from frame to frame, and of what each prismatic joint can add: no posture
@@ -206,7 +206,7 @@ def farthest(chain: Chain) -> float:
     return sum(math.hypot(*offset) for offset in offsets) + sum(_strokes(chain))
 
 
-def too_far(chain: Chain, targets: Targets, tolerance: float | None) -> list[str]:
+def find_out_of_reach(chain: Chain, targets: Targets, tolerance: float | None) -> list[str]:
     """Return why targets are out of any posture's reach, one text each; empty where they may be in it.
 
     Args:
@@ -214,7 +214,7 @@ def too_far(chain: Chain, targets: Targets, tolerance: float | None) -> list[str
         targets: n of them; one that is not finite has no reason here.
         tolerance: In [m] along each axis, of targets that the tool need only come near to.
     """
-    most = farthest(chain)
+    most = max_reach(chain)
     first = (chain.base @ chain.joints[0].origin).translation
     away = norms(targets.position - np.array(first))
     reasons = [""] * len(targets)

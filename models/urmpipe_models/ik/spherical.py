@@ -11,19 +11,25 @@ import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, TextArray, row_blocks, side_by_side
 from urmpipe_models.ik.position_arm import PositionArm, Postures, position_arm
-from urmpipe_models.ik.solutions import Singular, SingularFamily, Solutions, Targets, joined
-from urmpipe_models.ik.trigonometric import BOUNDARY, MEETING, angle_about, angle_between, wrapped
+from urmpipe_models.ik.solutions import (
+    SingularFamily,
+    SingularPoses,
+    Solutions,
+    Targets,
+    concatenate_solutions,
+)
+from urmpipe_models.ik.trigonometric import BOUNDARY, MEETING, angle_about, angle_between, wrap_angle
 from urmpipe_models.kinematics.forward import Screws
 from urmpipe_models.math3d import rotation_about
 
-ALIGNED = 1e-11
+ALIGNED_TOLERANCE = 1e-11
 """Axes 4 and 6 at a smaller angle than this, in [rad], count as one line.
 
 What is chosen there turns the tool away by less than this; beyond it the angles are still good to the
 rounding, as each is computed from the ones before it.
 """
 
-SAME_ANGLE = 1e-5
+DUPLICATE_TOLERANCE = 1e-5
 """Flips that differ by less than this in every joint are one, in [rad]."""
 
 
@@ -91,17 +97,17 @@ class Wrist:
         angle = angle_between(k4, tool_axis)
         away, meet = self._away(angle)
         level = float(angle_about(k5, k6, k4))
-        in_line = (np.sin(angle) <= ALIGNED) & np.isfinite(away)
-        q5 = wrapped(level + np.stack((away, -away)))
+        in_line = (np.sin(angle) <= ALIGNED_TOLERANCE) & np.isfinite(away)
+        q5 = wrap_angle(level + np.stack((away, -away)))
         fifth = rotation_about(k5.tolist(), q5)
         raised = np.stack(np.broadcast_arrays(*fifth.rotate(tuple(k6.tolist())), q5)[:3])
         q4 = angle_about(k4, raised, np.broadcast_to(tool_axis[:, None], raised.shape))
-        q4 = np.where(in_line, wrapped(chosen + np.array([[0.0], [np.pi]])), q4)
+        q4 = np.where(in_line, wrap_angle(chosen + np.array([[0.0], [np.pi]])), q4)
         before_fifth = rotation_about(k4.tolist(), -q4).rotate(tuple(across[:, None]))
         before_sixth = np.stack(fifth.inverse().rotate(before_fifth))
         q6 = angle_about(k6, self.across_tool, before_sixth)
         q = np.where(np.isfinite(away), np.stack((q4, q5, q6)), np.nan)
-        meet = meet & (np.abs(wrapped(q4[0] - q4[1])) < SAME_ANGLE)
+        meet = meet & (np.abs(wrap_angle(q4[0] - q4[1])) < DUPLICATE_TOLERANCE)
         q[:, 1, meet] = np.nan
         along, against = in_line & (angle < np.pi / 2), in_line & (angle > np.pi / 2)
         return WristAngles(q, angle, along, against, meet)
@@ -127,17 +133,17 @@ class Wrist:
         return np.where(none, np.nan, away), np.asarray(meet & ~none)
 
 
-MEETING_POINT = 1e-11
+MEETING_TOLERANCE = 1e-11
 """Axes 4 to 6 meet in one point if none passes it by more than this, in units of the arm's size.
 
 The tool is then off by no more: 1e-11 of an arm of some metres is well below the 1e-10 m that the closed
 form keeps. An arm whose description is rounded more coarsely has this closed form nearly (`nearly`).
 """
 
-TILT = 1e-6
+MIN_TILT_SINE = 1e-6
 """Axes 4 and 5, and 5 and 6, must stand at an angle whose sine is larger than this."""
 
-BLOCK = 5000
+BATCH_SIZE = 5000
 """Targets worked on at a time: long enough that NumPy outweighs Python, short enough for a core's cache."""
 
 FLIPS = "not flipped", "flipped"
@@ -197,7 +203,7 @@ class SphericalWrist:
             raise ValueError("targets without orientation; allowed: poses")
         count = len(targets)
         wish = None if near is None else np.broadcast_to(near, (count, 6))
-        if count <= BLOCK:
+        if count <= BATCH_SIZE:
             return self._block(targets.position, targets.rotation, wish)
         positions, rotations = targets.position, targets.rotation
 
@@ -205,7 +211,7 @@ class SphericalWrist:
             """Return the solutions of the targets of a block."""
             return self._block(positions[rows], rotations[rows], None if wish is None else wish[rows])
 
-        return joined(side_by_side(work, row_blocks(count, BLOCK)))
+        return concatenate_solutions(side_by_side(work, row_blocks(count, BATCH_SIZE)))
 
     def _block(self, positions: FloatArray, rotations: FloatArray, near: FloatArray | None) -> Solutions:
         """Return the solutions of some targets, near of shape (n, joints)."""
@@ -264,7 +270,7 @@ class SphericalWrist:
 
     def _singular(
         self, postures: Postures, angles: WristAngles, reached: BoolArray, near: bool
-    ) -> list[Singular]:
+    ) -> list[SingularPoses]:
         """Return the families that solutions lie in, with what is free there and what was chosen."""
         one, two, _, four, _, six = self.names
         shape = postures.reasons.shape
@@ -280,7 +286,7 @@ class SphericalWrist:
         families += [(family, where, "", "") for family, where in postures.meeting.items()]
         families.append(("flips meet", angles.meet.reshape(shape), "", ""))
         spread = ((f, np.repeat(where.T, 2, axis=1) & reached, a, b) for f, where, a, b in families)
-        return [Singular(f, where, a, b) for f, where, a, b in spread if where.any()]
+        return [SingularPoses(f, where, a, b) for f, where, a, b in spread if where.any()]
 
 
 def spherical_wrist(screws: Screws, names: tuple[str, ...]) -> SphericalWrist | None:
@@ -298,11 +304,14 @@ def spherical_wrist(screws: Screws, names: tuple[str, ...]) -> SphericalWrist | 
     if len(screws.revolute) != 6 or not screws.revolute[3:].all():
         return None
     axes = screws.direction[3:]
-    if min(np.linalg.norm(np.cross(axes[0], axes[1])), np.linalg.norm(np.cross(axes[1], axes[2]))) <= TILT:
+    if (
+        min(np.linalg.norm(np.cross(axes[0], axes[1])), np.linalg.norm(np.cross(axes[1], axes[2])))
+        <= MIN_TILT_SINE
+    ):
         return None
     centre = meeting_point(axes, screws.point[3:])
     passing = np.linalg.norm(np.cross(centre - screws.point[3:], axes), axis=1)
-    if passing.max() > MEETING_POINT * screws.size:
+    if passing.max() > MEETING_TOLERANCE * screws.size:
         return None
     arm = position_arm(screws, centre)
     return None if arm is None else SphericalWrist(arm, Wrist(axes), screws, centre, names)

@@ -39,7 +39,7 @@ from urmpipe_models.math3d import Transform
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Factor:
+class LDLFactor:
     """A = L D L^T, the Cholesky factor without square roots.
 
     Attributes:
@@ -61,7 +61,7 @@ class Factor:
         return x
 
 
-def factor(A: FloatArray, damping: FloatArray | float = 0.0) -> Factor:
+def factor(A: FloatArray, damping: FloatArray | float = 0.0) -> LDLFactor:
     """Return the factor of A + mu I.
 
     Where A is positive semidefinite no pivot D_i is less than mu. Rounding, which can make it so where A is
@@ -77,7 +77,7 @@ def factor(A: FloatArray, damping: FloatArray | float = 0.0) -> Factor:
         np.divide(1.0, np.maximum(column[0] + damping, damping), out=inverse[j])
         scaled[j + 1 :, j] = column[1:]
         np.multiply(column[1:], inverse[j], out=lower[j + 1 :, j])
-    return Factor(lower, inverse)
+    return LDLFactor(lower, inverse)
 
 
 def gram(M: FloatArray) -> FloatArray:
@@ -110,7 +110,7 @@ def outer_sum(a: FloatArray, b: FloatArray) -> FloatArray:
     return _sum("kpn,krn->prn", a, b)
 
 
-def rows_of(a: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
+def take_rows(a: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
     """Return some of the n of an array of shape (..., n) in any unit, their values side by side.
 
     a[..., rows] has them a matrix apart, which makes all that follows several times as slow.
@@ -156,7 +156,7 @@ class ToolMotion(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class ConstantTransform:
     """A constant transform C: its columns and its translation."""
 
     columns: tuple[Terms, Terms, Terms]
@@ -164,7 +164,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Arm:
+class PreparedChain:
     """A chain made ready for `tool_motion`.
 
     Attributes:
@@ -175,11 +175,11 @@ class Arm:
 
     chain: Chain
     joints: tuple[Joint, ...]
-    steps: tuple[Step, ...]
+    steps: tuple[ConstantTransform, ...]
 
 
 @lru_cache(maxsize=32)
-def arm_of(chain: Chain) -> Arm:
+def prepare_chain(chain: Chain) -> PreparedChain:
     """Return a chain made ready for `tool_motion`."""
     between, joints, steps = chain.base, [], []
     for joint in chain.joints:
@@ -190,7 +190,7 @@ def arm_of(chain: Chain) -> Arm:
             joints.append(joint)
             between = upright.inverse()
     steps.append(_step(between @ chain.tip @ chain.tool))
-    return Arm(chain, tuple(joints), tuple(steps))
+    return PreparedChain(chain, tuple(joints), tuple(steps))
 
 
 def _upright(axis: Vector) -> Transform:
@@ -203,10 +203,10 @@ def _upright(axis: Vector) -> Transform:
     return Transform(Transform((x, cross(axis, x), axis)).columns)
 
 
-def _step(frame: Transform) -> Step:
+def _step(frame: Transform) -> ConstantTransform:
     """Return a constant transform by its entries that are not 0."""
     x, y, z = frame.columns
-    return Step((_terms(x), _terms(y), _terms(z)), _terms(frame.translation))
+    return ConstantTransform((_terms(x), _terms(y), _terms(z)), _terms(frame.translation))
 
 
 def _terms(vector: Vector) -> Terms:
@@ -214,7 +214,7 @@ def _terms(vector: Vector) -> Terms:
     return tuple((i, float(weight)) for i, weight in enumerate(vector) if weight != 0.0)
 
 
-def tool_motion(arm: Arm, q: FloatArray) -> ToolMotion:
+def tool_motion(arm: PreparedChain, q: FloatArray) -> ToolMotion:
     """Return pose and Jacobian of the tool centre point.
 
     Args:
@@ -242,7 +242,7 @@ def tool_motion(arm: Arm, q: FloatArray) -> ToolMotion:
     return ToolMotion(position, axes, _jacobian(arm, J, origins))
 
 
-def _values(arm: Arm, q: FloatArray) -> list[FloatArray]:
+def _values(arm: PreparedChain, q: FloatArray) -> list[FloatArray]:
     """Return the value of every joint that is not fixed, mimics included."""
     if len(arm.joints) == len(q):
         return list(q)
@@ -250,7 +250,7 @@ def _values(arm: Arm, q: FloatArray) -> list[FloatArray]:
     return [value for joint, value in every if joint.kind != "fixed"]
 
 
-def _jacobian(arm: Arm, J: FloatArray, levers: FloatArray) -> FloatArray:
+def _jacobian(arm: PreparedChain, J: FloatArray, levers: FloatArray) -> FloatArray:
     """Return J, whose last rows are the axes, with its first: z x (p - o) of revolute joints, z of others.
 
     A mimic's column counts with its multiplier towards the joint that it follows.
@@ -271,7 +271,7 @@ def _jacobian(arm: Arm, J: FloatArray, levers: FloatArray) -> FloatArray:
     return J[:, [place[name] for name in arm.chain.coordinates]]
 
 
-def _placed(columns: Columns, point: FloatArray, step: Step) -> tuple[Columns, FloatArray]:
+def _placed(columns: Columns, point: FloatArray, step: ConstantTransform) -> tuple[Columns, FloatArray]:
     """Return axes and origin of a constant frame that is given in another's."""
     x, y, z = step.columns
     if step.translation:
@@ -292,7 +292,7 @@ HALF_TURN_SINE = 1e-6
 """Below this sine an angle near pi takes its axis from the symmetric part of the rotation matrix."""
 
 
-def turn_length(chain: Chain) -> float:
+def orientation_length(chain: Chain) -> float:
     """Return the length l in [m] that a radian of orientation counts as: a quarter of the arm's.
 
     A turn of the tool by a radian is then weighed as a way that the arm makes with ease; the arm's length is
@@ -314,7 +314,7 @@ def _rank(chain: Chain, rows: int) -> int:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Miss:
+class TaskError:
     """How far the tool is from its target at joint values q, and how that changes with them.
 
     The gradient of |e|^2 / 2 is -J^T e at any target. e itself changes by -A J dq: A is 1 for the position,
@@ -347,12 +347,12 @@ class Miss:
         """Return where position and orientation are as near as that, in [m] and [rad], shape (n,)."""
         return np.asarray((self.distance2 <= metres**2) & (self.turn2 <= (self.length * radians) ** 2))
 
-    def kept(self, rows: IndexArray) -> Miss:
+    def kept(self, rows: IndexArray) -> TaskError:
         """Return some of the rows, indices of shape (m,)."""
-        error, jacobian = rows_of(self.error, rows), rows_of(self.jacobian, rows)
-        return Miss(error, jacobian, self.distance2[rows], self.turn2[rows], self.length)
+        error, jacobian = take_rows(self.error, rows), take_rows(self.jacobian, rows)
+        return TaskError(error, jacobian, self.distance2[rows], self.turn2[rows], self.length)
 
-    def restore(self, rows: IndexArray, before: Miss) -> None:
+    def restore(self, rows: IndexArray, before: TaskError) -> None:
         """Write another's rows, indices of shape (m,), over some of this one's."""
         for mine, other in (
             (self.error, before.error),
@@ -375,38 +375,38 @@ class Task:
             orientation will do.
     """
 
-    arm: Arm
+    arm: PreparedChain
     length: float
     position: FloatArray
     columns: FloatArray | None
 
     def kept(self, rows: IndexArray) -> Task:
         """Return some of the rows, indices of shape (m,)."""
-        columns = None if self.columns is None else rows_of(self.columns, rows)
-        return replace(self, position=rows_of(self.position, rows), columns=columns)
+        columns = None if self.columns is None else take_rows(self.columns, rows)
+        return replace(self, position=take_rows(self.position, rows), columns=columns)
 
-    def miss(self, q: FloatArray) -> Miss:
+    def miss(self, q: FloatArray) -> TaskError:
         """Return what is missed at joint values q in [rad] or [m], shape (joints, n)."""
         tool = tool_motion(self.arm, q)
         size = 3 if self.columns is None else 6
         error, J = np.empty((size, q.shape[1])), tool.jacobian[:size]
         np.subtract(self.position, tool.position, out=error[:3])
         if self.columns is not None:
-            np.multiply(turn_between(tool.columns, self.columns), self.length, out=error[3:])
+            np.multiply(rotation_error(tool.columns, self.columns), self.length, out=error[3:])
             J[3:] *= self.length
         turn2 = np.zeros(q.shape[1]) if size == 3 else dot_product(error[3:], error[3:])
-        return Miss(error, J, dot_product(error[:3], error[:3]), turn2, self.length)
+        return TaskError(error, J, dot_product(error[:3], error[:3]), turn2, self.length)
 
 
-def task_of(chain: Chain, targets: Targets) -> Task:
+def build_task(chain: Chain, targets: Targets) -> Task:
     """Return the targets as one array a coordinate."""
     position, columns = np.ascontiguousarray(targets.position.T), None
     if targets.rotation is not None:
         columns = np.ascontiguousarray(targets.rotation.transpose(2, 1, 0))
-    return Task(arm_of(chain), turn_length(chain), position, columns)
+    return Task(prepare_chain(chain), orientation_length(chain), position, columns)
 
 
-def turn_between(columns: FloatArray, wanted: FloatArray) -> FloatArray:
+def rotation_error(columns: FloatArray, wanted: FloatArray) -> FloatArray:
     """Return the rotation vector u a, 0 <= a <= pi, in [rad], in the world, of R_wanted R^T: shape (3, n).
 
     With the columns c_k of R and w_k of R_wanted: u sin(a) = sum_k c_k x w_k / 2 and
@@ -425,7 +425,7 @@ def turn_between(columns: FloatArray, wanted: FloatArray) -> FloatArray:
     vector *= np.divide(angle, size, out=np.ones_like(size), where=size > 0.0)
     half = np.flatnonzero((size < HALF_TURN_SINE) & (cosine < 0.0))
     if len(half):
-        vector[:, half] = _half_turns(rows_of(turn, half)) * angle[half]
+        vector[:, half] = _half_turns(take_rows(turn, half)) * angle[half]
     return vector
 
 

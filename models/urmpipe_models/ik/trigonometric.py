@@ -29,7 +29,7 @@ POLISHING = 4
 """Newton steps after the eigenvalues: these leave 1e-8 of a double root, and each step doubles the digits."""
 
 
-def wrapped(angle: FloatArray) -> FloatArray:
+def wrap_angle(angle: FloatArray) -> FloatArray:
     """Return an angle of any shape in (-pi, pi], in [rad]."""
     turns = np.asarray(angle / (2 * np.pi))
     np.round(turns, out=turns)
@@ -58,7 +58,7 @@ def linear_roots(a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[FloatArra
     none = ~(np.abs(c) <= r * (1.0 + BOUNDARY)) | (r == 0.0)
     away = np.arctan2(np.sqrt(np.maximum((r - c) * (r + c), 0.0)), c)
     middle = np.where(none, np.nan, np.arctan2(b, a))
-    return wrapped(middle + away), wrapped(middle - away)
+    return wrap_angle(middle + away), wrap_angle(middle - away)
 
 
 def quadric_roots(coefficients: Sequence[FloatArray] | FloatArray) -> FloatArray:
@@ -89,7 +89,7 @@ def quadric_roots(coefficients: Sequence[FloatArray] | FloatArray) -> FloatArray
     x = np.where(t.imag == 0.0, x, np.where(near, _beside_extremum(k, x, np.sign(t.imag)), np.nan))
     for _ in range(POLISHING):
         x = _newton_step(k, x)
-    x = np.where(np.abs(_value(k, x)) <= BOUNDARY, wrapped(x), np.nan)
+    x = np.where(np.abs(_value(k, x)) <= BOUNDARY, wrap_angle(x), np.nan)
     return np.sort(x, axis=0)
 
 
@@ -185,7 +185,7 @@ def angle_about(axis: FloatArray, start: FloatArray, end: FloatArray) -> FloatAr
     """
     x, y, z = (float(one) for one in axis)
     u, v = cross((x, y, z), tuple(start)), cross((x, y, z), tuple(end))
-    return wrapped(np.arctan2(dot((x, y, z), cross(u, v)), dot(u, v)))
+    return wrap_angle(np.arctan2(dot((x, y, z), cross(u, v)), dot(u, v)))
 
 
 def angle_between(first: FloatArray, second: FloatArray) -> FloatArray:

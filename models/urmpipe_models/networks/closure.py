@@ -25,7 +25,7 @@ from urmpipe_models.elementwise import (
     scale,
     subtract,
 )
-from urmpipe_models.ik.numeric import FIRST_GAIN, GAINS, LEAST_RATIO, STATIONARY, damped_step
+from urmpipe_models.ik.numeric import FIRST_GAIN, GAINS, MIN_GAIN_RATIO, STATIONARY, damped_step
 from urmpipe_models.ik.task import column_squares, dot_product, product, transposed_product
 from urmpipe_models.math3d import Transform, quaternions, rotation_vectors
 from urmpipe_models.networks.joint_motion import (
@@ -379,7 +379,7 @@ def descend(mechanism: Mechanism, x: FloatArray, free: IndexArray, *, patient: b
         left = now.error + product(now.jacobian, step)
         foreseen = square - dot_product(left, left)
         gained = square - dot_product(new.error, new.error)
-        taken = (gained > LEAST_RATIO * foreseen) & (gained > 0.0)
+        taken = (gained > MIN_GAIN_RATIO * foreseen) & (gained > 0.0)
         good, poor = taken & (gained > 0.75 * foreseen), ~taken | (gained < 0.25 * foreseen)
         gain = np.clip(gain * np.where(good, 0.125, np.where(poor, 4.0, 1.0)), *GAINS)
         found[:, rows[taken]], error[:, rows[taken]] = moved[:, taken], new.error[:, taken]

@@ -24,8 +24,8 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray
-from urmpipe_models.ik.path import JointPath, follow
-from urmpipe_models.ik.solutions import LIMIT_ROUNDING, Targets, limits_of, misses
+from urmpipe_models.ik.path import JointPath, solve_path
+from urmpipe_models.ik.solutions import LIMIT_ROUNDING, Targets, joint_limits, pose_errors
 from urmpipe_models.kinematics.forward import bias_over_log, jacobian_over_log
 from urmpipe_models.planning.laws import PathMotion, Phase, TimeLaw
 from urmpipe_models.planning.path import LineArcPath, part_at
@@ -126,7 +126,7 @@ def polished(chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray, move
     """
     better, off = q.copy(), np.flatnonzero(np.isfinite(q).all(axis=1))
     for _ in range(STEPS):
-        miss = np.hstack(misses(chain, better[off], targets_at(path, s[off])))
+        miss = np.hstack(pose_errors(chain, better[off], targets_at(path, s[off])))
         miss = miss[:, : 3 if path.turning is None else 6]
         far = np.abs(miss).max(axis=1) > NEAR
         off, miss = off[far], miss[far]
@@ -291,7 +291,7 @@ class PathJoints:
         k = part_at(self.s, s)
         way, length = s - self.s[k], np.diff(self.s)[k]
         q = _ahead(self.after, k, way) + (way / length)[:, None] * self._missed()[k]
-        lower, upper = limits_of(self.chain)
+        lower, upper = joint_limits(self.chain)
         q = polished(self.chain, self.path, np.clip(q, lower, upper), s, self.moves[k])
         q = np.clip(q, lower, upper)  # the last digits of a joint that comes to a limit
         return joint_slopes(self.chain, self.path, q, s, self.moves[k])
@@ -343,7 +343,7 @@ def _followed(
     progress: Callable[[float], None] | None,
 ) -> PathJoints:
     """Return the joints on a grid of arc lengths in [m], shape (n + 1,)."""
-    grid = follow(chain, targets_at(path, s), np.arange(len(s)), start=start, progress=progress)
+    grid = solve_path(chain, targets_at(path, s), np.arange(len(s)), start=start, progress=progress)
     moves, touches = _moving(chain, grid.q)
     after = joint_slopes(chain, path, grid.q[:-1], s[:-1], moves)
     return PathJoints(
@@ -401,7 +401,7 @@ def _moving(chain: Chain, q: FloatArray) -> tuple[BoolArray, BoolArray]:
         chain: The arm.
         q: Joint values in [rad] or [m], shape (n + 1, joints).
     """
-    lower, upper = limits_of(chain)
+    lower, upper = joint_limits(chain)
     free = lower < upper
     on = free & ((np.abs(q - lower) <= LIMIT_ROUNDING) | (np.abs(q - upper) <= LIMIT_ROUNDING))
     rests = on[1:] & on[:-1] & (np.abs(np.diff(q, axis=0)) <= LIMIT_ROUNDING)

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from urmpipe_models.elementwise import BoolArray
-from urmpipe_models.ik.branch_walk import stretches
+from urmpipe_models.ik.branch_walk import find_true_runs
 from urmpipe_models.ik.path import JointPath
 from urmpipe_models.planning.joints import PathJoints, Usage
 from urmpipe_models.planning.laws import TimeLaw
@@ -58,14 +58,14 @@ def obstacles_of(joints: PathJoints, law: TimeLaw) -> Iterator[Obstacle]:
     Source: [Iso9283]_ section 4, step 17.
     """
     grid, s, names = joints.grid, joints.s, joints.chain.coordinates
-    for first, last in stretches(~grid.reached):
+    for first, last in find_true_runs(~grid.reached):
         along = f"; so it is along {s[last] - s[first]:.3g} m" if last > first else ""
         yield _obstacle(joints, law, float(s[first]), "unreachable", f"{grid.reasons[first]}{along}")
     for jump in grid.jumps:
         moved = ", ".join(f"{one.joint} by {in_words(one.step, one.unit)}" for one in jump.joints)
         words = f"the joints jump: {moved}"
         yield _obstacle(joints, law, float(s[jump.sample]), "jump", words, jump.joints[0].joint)
-    for first, _ in stretches(_singular(grid)):
+    for first, _ in find_true_runs(_singular(grid)):
         moved_most = int(np.argmax(np.abs(grid.q[first] - grid.q[max(first - 1, 0)])))
         words = "the arm passes a singular pose"
         yield _obstacle(joints, law, float(s[first]), "singular", words, names[moved_most])

@@ -11,7 +11,7 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, OptionError, PathError
-from urmpipe_models.ik.solutions import Search
+from urmpipe_models.ik.solutions import SearchOptions
 from urmpipe_models.ik.solve import solve
 from urmpipe_models.planning.from_rows import path_of
 from urmpipe_models.planning.joints import PathJoints, joints_along, largest_usage, law_of_limits, targets_at
@@ -102,7 +102,7 @@ def _refuse_out_of_reach(given: GivenPath, path: LineArcPath, arm: Chain, start:
     out = np.flatnonzero(~found.reached[:, 0])
     if not len(out):
         return
-    near = solve(arm, targets.rows(out), start=start, search=Search(tolerance=ANYWHERE))
+    near = solve(arm, targets.rows(out), start=start, search=SearchOptions(tolerance=ANYWHERE))
     faults = []
     for k, row in enumerate(out.tolist()):
         gap = float(near.shortfall[k, 0])

@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, OptionError, PathError
-from urmpipe_models.ik.solutions import Targets, checked
+from urmpipe_models.ik.solutions import Targets, validate_targets
 from urmpipe_models.planning.from_rows import end_faults, path_faults
 from urmpipe_models.planning.path import VARIANTS, PathRows
 from urmpipe_pipeline.sources.tables.numbers import capped
@@ -96,9 +96,9 @@ def _checked_poses(
     position: FloatArray, rotation: FloatArray | None
 ) -> tuple[FloatArray | None, list[Finding]]:
     """Return the nearest rotations, shape (n, 3, 3) [-], and which rows are no pose: positions in [m]."""
-    of_each = [checked(Targets(position))[1]]
+    of_each = [validate_targets(Targets(position))[1]]
     if rotation is not None:
-        targets, reasons = checked(Targets(np.zeros_like(position), rotation))
+        targets, reasons = validate_targets(Targets(np.zeros_like(position), rotation))
         rotation = targets.rotation
         of_each.append(reasons)
     return rotation, [

@@ -9,9 +9,9 @@ from itertools import groupby
 
 import numpy as np
 
-from urmpipe_models.ik.closed import method_words
-from urmpipe_models.ik.path import JointPath, Jump, TooFast
-from urmpipe_models.ik.solutions import TURN, periods
+from urmpipe_models.ik.closed import format_method
+from urmpipe_models.ik.path import JointPath, Jump, SpeedViolation
+from urmpipe_models.ik.solutions import TURN, joint_periods
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import colour_word, ghost_colour, run_colour
 from urmpipe_pipeline.presentation.parts import columns_of, recording_fact, spot_at, table_of
@@ -31,7 +31,7 @@ def facts(one: SolvedTargets) -> Iterator[Fact]:
     """Yield what was solved, how, and how much of it."""
     yield Fact("Targets", f"{int(one.reached.sum())} of {len(one)} with a solution", brief=False)
     yield Fact("Robot", one.robot.name, brief=False)
-    yield Fact("Method", method_words(one.method), brief=False)
+    yield Fact("Method", format_method(one.method), brief=False)
     if one.t_ns is None:
         yield Fact("Rows", f"{len(one)}, without times", brief=False)
     else:
@@ -64,7 +64,7 @@ def jump_words(one: SolvedTargets, jump: Jump) -> str:
     return f"{_at(one, jump.sample)}{since}, at ({text.point(jump.position)}) m: {change}{steps}"
 
 
-def fast_words(one: SolvedTargets, stretch: TooFast) -> str:
+def fast_words(one: SolvedTargets, stretch: SpeedViolation) -> str:
     """Return how fast a joint would have to be, how fast it may be, and where."""
     speed, allowed = (in_words(value, stretch.unit) for value in (stretch.speed, stretch.allowed))
     rows = f"{_at(one, stretch.first)} to row {one.row[stretch.last]}"
@@ -156,7 +156,7 @@ def joints_table(one: SolvedTargets) -> Table:
     columns = [Column("joint", "Joint", [joint.name for joint in joints])]
     columns += [Column(key, key, list(map(_shown, values, units))) for key, values in ends.items()]
     if one.t is not None and len(q) > 1:
-        step, endless = np.diff(q, axis=0), np.isfinite(periods(one.robot))
+        step, endless = np.diff(q, axis=0), np.isfinite(joint_periods(one.robot))
         step[:, endless] -= TURN * np.round(step[:, endless] / TURN)  # of values within pi: no joint wraps
         speed = np.abs(step) / np.diff(one.t[one.reached])[:, None]
         speeds = {"fastest": speed.max(axis=0), "allowed": [joint.velocity for joint in joints]}

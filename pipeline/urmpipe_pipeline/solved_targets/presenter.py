@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 
-from urmpipe_models.ik.closed import method_words
+from urmpipe_models.ik.closed import format_method
 from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.figure import Figure
 from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table
@@ -59,7 +59,7 @@ def present(one: SolvedTargets) -> Presentation:
                 "Targets": Ref(body.title),
                 "Verdict": Judged(one.verdict),
                 "Robot": one.robot.name,
-                "Method": method_words(one.method),
+                "Method": format_method(one.method),
                 "Rows": Value(len(one)),
                 "Reached": Value(reached),
                 "Duration": None if one.t_ns is None else Value(float(one.t_ns[-1]) / 1e9, "s"),
@@ -79,7 +79,7 @@ def headline(one: SolvedTargets) -> str:
     """Return how many targets the arm reaches, how they were solved, and why it cannot follow a path."""
     found, wanted = int(one.reached.sum()), len(one)
     part = "" if found == wanted else f"{found} of "
-    method = method_words(one.method)
+    method = format_method(one.method)
     said = f"{one.name}: {one.robot.name} reaches {part}{counted(wanted, 'target')} ({method})"
     if one.path is None:
         return said

@@ -13,8 +13,8 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, Hint, OptionError, for_each, shown
-from urmpipe_models.ik.closed import ClosedForm, closed_form, exact_form
-from urmpipe_models.ik.solutions import Search
+from urmpipe_models.ik.closed import ClosedForm, closed_form, exact_closed_form
+from urmpipe_models.ik.solutions import SearchOptions
 from urmpipe_models.ik.solve import METHODS, Method
 from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets
@@ -44,14 +44,14 @@ class Request:
     every: bool
     within_pi: bool
     method: Method
-    search: Search
+    search: SearchOptions
 
     @property
     def form(self) -> ClosedForm | None:
         """The closed form by which the targets are solved, if they are."""
         if self.given.targets.rotation is None or self.method == "iterative":
             return None
-        return closed_form(self.arm) if self.given.t_ns is None else exact_form(self.arm)
+        return closed_form(self.arm) if self.given.t_ns is None else exact_closed_form(self.arm)
 
     @property
     def begin(self) -> FloatArray:

@@ -15,7 +15,7 @@ from urmpipe_models.display import line_of, number_of
 from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray, IntArray, TextArray
 from urmpipe_models.errors import Finding, LogError, Voice
 from urmpipe_models.ik.path import JointPath
-from urmpipe_models.ik.solutions import Solutions, Targets, misses
+from urmpipe_models.ik.solutions import Solutions, Targets, pose_errors
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
 from urmpipe_pipeline.presentation.result import Result
@@ -306,7 +306,7 @@ def missed_by(chain: Chain, solutions: Solutions, targets: Targets) -> tuple[Flo
         The distances in [m] and the angles in [rad], shape (n, k); no angles where any orientation will do.
         NaN where there is no solution.
     """
-    both = [misses(chain, solutions.q[:, column], targets) for column in range(solutions.q.shape[1])]
+    both = [pose_errors(chain, solutions.q[:, column], targets) for column in range(solutions.q.shape[1])]
     miss = np.column_stack([np.linalg.norm(position, axis=1) for position, _ in both])
     if targets.rotation is None:
         return miss, None

@@ -8,8 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, IndexArray, IntArray, TextArray
-from urmpipe_models.ik.path import JointPath, follow
-from urmpipe_models.ik.solutions import Singular, Solutions, Targets, joined, periods, within_pi
+from urmpipe_models.ik.path import JointPath, solve_path
+from urmpipe_models.ik.solutions import (
+    SingularPoses,
+    Solutions,
+    Targets,
+    concatenate_solutions,
+    joint_periods,
+    wrap_continuous_joints,
+)
 from urmpipe_models.ik.solve import solve
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.provenance import provenance
@@ -65,17 +72,17 @@ def _solutions(request: Request, *, every: bool, progress: Progress) -> Solution
     for first in range(0, len(targets), BLOCK):
         blocks.append(found(targets.rows(slice(first, first + BLOCK))))
         progress(min(1.0, (first + BLOCK) / len(targets)))
-    return joined(blocks)
+    return concatenate_solutions(blocks)
 
 
 def _of_targets(request: Request, progress: Progress) -> SolvedTargets:
     """Return the solutions of targets that stand for themselves: all that a closed form has."""
-    period = periods(request.arm)
+    period = joint_periods(request.arm)
     every = request.every or request.form is not None
     solutions = _solutions(request, every=every, progress=progress)
     chosen = solutions.nearest_column(request.begin, period)
     if request.within_pi:
-        solutions = replace(solutions, q=within_pi(solutions.q, period))
+        solutions = replace(solutions, q=wrap_continuous_joints(solutions.q, period))
     listed = solutions.reached.copy()
     if not request.every:
         listed &= np.arange(listed.shape[1]) == chosen[:, None]
@@ -84,7 +91,7 @@ def _of_targets(request: Request, progress: Progress) -> SolvedTargets:
 
 def _of_path(request: Request, t_ns: IntArray, progress: Progress) -> SolvedTargets:
     """Return the solutions of a path, which follow each other, and beside them its branches if requested."""
-    path = follow(
+    path = solve_path(
         request.arm, request.given.targets, t_ns, start=request.start, within_pi=request.within_pi,
         search=request.search, progress=progress,
     )  # fmt: skip
@@ -97,13 +104,13 @@ def _of_path(request: Request, t_ns: IntArray, progress: Progress) -> SolvedTarg
     return _result(request, solutions, chosen, solutions.reached, path, branches)
 
 
-def _families(path: JointPath) -> Iterator[Singular]:
+def _families(path: JointPath) -> Iterator[SingularPoses]:
     """Yield the families of singular poses along a path, with all stretches of one together."""
     for family in dict.fromkeys(one.family for one in path.singular):
         where = np.zeros((len(path), 1), dtype=bool)
         for one in path.singular:
             where[one.first : one.last + 1] |= one.family == family
-        yield Singular(family, where, KEPT[0], KEPT[1])
+        yield SingularPoses(family, where, KEPT[0], KEPT[1])
 
 
 def _result(

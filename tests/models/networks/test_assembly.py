@@ -36,7 +36,7 @@ from random_networks import matrix, transform, unit, vec
 from spherical_arms import random_arm
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import NetworkError
-from urmpipe_models.ik.solutions import targets_of
+from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.ik.solve import solve
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.math3d import Transform
@@ -260,12 +260,12 @@ def test_an_arm_with_a_spherical_wrist_has_the_eight_modes_of_its_closed_form(se
     chain = random_arm(rng, "like a PUMA")
     while True:
         q = rng.uniform(-2.5, 2.5, (1, 6))
-        closed = solve(chain, targets_of(chain, q), every=True)
+        closed = solve(chain, forward_targets(chain, q), every=True)
         if closed.reached.sum() == 8:
             break
     J = jacobian_over_log(chain, q)[0]
     v, n = J[:3].T, J[3:].T
-    tool = targets_of(chain, q).position[0]
+    tool = forward_targets(chain, q).position[0]
     network = ring("rrrrrr", n, tool + np.cross(n, v))
     found = every(network, restarts=300)
     ours = np.array([[one.values[f"j{k}"][0] for k in range(6)] for one in found.assemblies])

@@ -12,7 +12,7 @@ from toppra.constraint import DiscretizationType, JointAccelerationConstraint, J
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IndexArray
-from urmpipe_models.ik.solutions import misses
+from urmpipe_models.ik.solutions import pose_errors
 from urmpipe_models.planning import joints as path_joints
 from urmpipe_models.planning.from_rows import path_of
 from urmpipe_models.planning.joints import (
@@ -119,7 +119,7 @@ def test_slopes_move_the_tool_along_its_path(case: str) -> None:
     found = joints_of(case).at(s)
     h = 1e-4
     ahead = found.q + h * found.dq + 0.5 * h * h * found.ddq
-    miss, turn = misses(joints_of(case).chain, ahead, targets_at(path, s + h))
+    miss, turn = pose_errors(joints_of(case).chain, ahead, targets_at(path, s + h))
     allowed = 10.0 * h**3 / path.radius.min() ** 2  # the third derivative of an arc is 1 / r^2
     assert np.abs(miss).max() < allowed
     assert np.abs(turn).max() < allowed
@@ -131,7 +131,7 @@ def test_polished_joints_are_on_the_path(case: str) -> None:
     joints = joints_of(case)
     path, s = joints.path, np.linspace(0.0, joints.path.total, 300)
     found = joints.at(s)
-    assert np.linalg.norm(misses(joints.chain, found.q, targets_at(path, s))[0], axis=1).max() < 1e-14
+    assert np.linalg.norm(pose_errors(joints.chain, found.q, targets_at(path, s))[0], axis=1).max() < 1e-14
 
 
 class Sampled:

@@ -9,7 +9,7 @@ import pytest
 
 from asserting import there
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.path import follow
+from urmpipe_models.ik.path import solve_path
 from urmpipe_models.ik.solutions import Targets
 from urmpipe_models.ik.solve import solve
 from urmpipe_models.kinematics.forward import jacobian_over_log, poses_over_log, positions_over_log
@@ -101,7 +101,7 @@ def test_its_inverse_reaches_the_papers_contour_with_a_level_wrist() -> None:
     found = solve(ARM, Targets(points, None))
     assert found.reached.all()
     np.testing.assert_array_equal(found.q[:, 0, 3], 0.0)
-    path = follow(ARM, Targets(points, None), np.arange(len(points)))
+    path = solve_path(ARM, Targets(points, None), np.arange(len(points)))
     assert not path.jumps
     np.testing.assert_array_equal(path.q[:, 3], 0.0)
     for q in (found.q[:, 0], path.q):  # a nanometre is what an inverse promises

@@ -22,7 +22,7 @@ from made_plans import (
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError, PathError
-from urmpipe_models.ik.solutions import Targets, misses
+from urmpipe_models.ik.solutions import Targets, pose_errors
 from urmpipe_models.math3d import matrices, quaternions
 from urmpipe_models.planning.from_rows import path_of
 from urmpipe_models.planning.path import PathRows, cube_rows
@@ -60,7 +60,7 @@ def test_the_papers_contour_by_its_arm() -> None:
     assert (len(plan), plan.scaled, plan.speed) == (958, 1.0, 0.5)
     joints = joints_of(plan)
     np.testing.assert_array_equal(joints.q[:, 3], 0.0)
-    miss = misses(load_robot("irb60"), joints.q, Targets(plan.position))[0]
+    miss = pose_errors(load_robot("irb60"), joints.q, Targets(plan.position))[0]
     assert np.linalg.norm(miss, axis=1).max() < 1e-9
     np.testing.assert_allclose(plan.stops, [[1.7, 0.3, 1.0]] * 2, atol=1e-15)
     np.testing.assert_allclose(plan.corners[1], [2.0, -0.3, 1.0], atol=1e-12)
@@ -285,7 +285,7 @@ def test_the_tool_is_turned_as_the_rows_say() -> None:
         "the tool's angular rate steps in row 2 while it moves, and so do the joints' rates"
     )
     wanted = Targets(plan.position, matrices(there(plan.quat_xyzw)))
-    miss = np.hstack(misses(load_robot("ur5e"), joints_of(plan).q, wanted))
+    miss = np.hstack(pose_errors(load_robot("ur5e"), joints_of(plan).q, wanted))
     assert np.abs(miss).max() < 1e-9
 
 

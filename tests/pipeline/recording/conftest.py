@@ -14,7 +14,7 @@ from solved import solved
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.arm.geometric_models import urm_chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.solutions import targets_of
+from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
@@ -119,7 +119,7 @@ def build_solved(
 ) -> SolvedTargets:
     """Return solved targets: rows 5 to 8 out of reach; ghost k is there from row 2 k on, but for 20 to 29."""
     chain, q = robot or load_robot("ur5e"), slow_motion(rows)
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     q[5:9] = np.nan
     reasons = tuple(TOO_FAR if 5 <= k < 9 else "" for k in range(rows))
     others = {}

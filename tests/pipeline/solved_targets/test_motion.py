@@ -11,7 +11,7 @@ from solved import FILE, solved
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_models.ik.solutions import targets_of
+from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.kinematics.forward import points_over_log, positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
@@ -79,7 +79,7 @@ def test_nothing_is_interpolated_across_unreachable_targets(timed: bool) -> None
     q[[3, 4, 7]] = np.nan
     reasons = ("", "", "", "too far; too near", "too far", "", "", "too far", "")
     times = np.arange(9) * STEP_NS if timed else None
-    run = solved("targets", UR5E, q, times, reasons=reasons, targets=targets_of(UR5E, way(9))).as_run()
+    run = solved("targets", UR5E, q, times, reasons=reasons, targets=forward_targets(UR5E, way(9))).as_run()
     missing = [3, 4, 7]
     assert run.tcp is not None
     for values in (run.q, run.log.q, run.tcp.position):
@@ -125,7 +125,9 @@ def test_single_poses_are_no_motion_to_be_compared_with() -> None:
 
 def test_where_nothing_is_reachable_there_is_a_run_without_poses() -> None:
     for times in (None, np.arange(5) * STEP_NS):
-        run = solved("far", UR5E, np.full((5, 6), np.nan), times, targets=targets_of(UR5E, way(5))).as_run()
+        run = solved(
+            "far", UR5E, np.full((5, 6), np.nan), times, targets=forward_targets(UR5E, way(5))
+        ).as_run()
         assert np.isnan(run.q).all()
         assert run.warnings == (
             LogWarning("unreachable", "no solution for 5 of 5 targets, here the first", 1),

@@ -12,7 +12,7 @@ import urmpipe
 from solved import solved
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.solutions import USUAL_SEARCH, misses, targets_of
+from urmpipe_models.ik.solutions import DEFAULT_SEARCH, forward_targets, pose_errors
 from urmpipe_models.math3d import matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.presentation.figure import Figure
@@ -39,10 +39,10 @@ def way(rows: int) -> FloatArray:
 @pytest.fixture(scope="module")
 def path() -> SolvedTargets:
     """A path of arm6 of which some rows are out of reach, with every branch beside it."""
-    targets = targets_of(ARM6, way(40))
+    targets = forward_targets(ARM6, way(40))
     targets.position[17:20, 2] = 3.0
     given = given_targets(targets, 7.0 + 0.01 * np.arange(40), None, None)
-    return solve_targets(Request(ARM6, given, way(1)[0], True, False, "auto", USUAL_SEARCH))
+    return solve_targets(Request(ARM6, given, way(1)[0], True, False, "auto", DEFAULT_SEARCH))
 
 
 def test_rows_out_of_reach_for_one_reason_are_one_line_whatever_its_numbers() -> None:
@@ -65,7 +65,7 @@ def test_a_joint_that_is_too_fast_twice_is_one_joint() -> None:
     arm = load_robot("ur5e")
     q = np.tile([0.1, -0.9, 1.2, -0.5, 0.7, 0.2], (40, 1))
     q[:, 0] += np.cumsum(np.where((np.arange(40) // 10) % 2, 0.05, 0.001))
-    found = urmpipe.ik(targets_of(arm, q), arm, tsp=0.01, start=q[0].tolist())
+    found = urmpipe.ik(forward_targets(arm, q), arm, tsp=0.01, start=q[0].tolist())
     assert found.path is not None
     assert [one.joint for one in found.path.too_fast] == ["shoulder_pan_joint"] * 2
     assert headline(found).endswith(" (closed form: three parallel axes), with 1 joint too fast")
@@ -86,7 +86,7 @@ def test_every_ghost_brings_the_tool_to_the_targets_as_the_chosen_solution_does(
     for arm in (chosen, *others):
         assert arm.t_ns is not None
         assert np.array_equal(np.flatnonzero(np.isnan(arm.q).all(axis=1)), [17, 18, 19])
-        for miss in misses(ARM6, arm.q[reached], path.targets.rows(reached)):
+        for miss in pose_errors(ARM6, arm.q[reached], path.targets.rows(reached)):
             assert np.abs(miss).max() < 1e-10
     for ghost in others:
         away = ghost.q[reached] - path.q[reached]
@@ -108,7 +108,7 @@ def test_a_ghost_is_where_another_solution_is() -> None:
     none = np.full((4, 6), np.nan)
     found = solved(
         "targets", UR5E, chosen, others={"b": other, "c": none, "d": chosen + 2 * math.pi},
-        targets=targets_of(UR5E, way(4)),
+        targets=forward_targets(UR5E, way(4)),
     )  # fmt: skip
     (ghost,) = ghosts(found)
     assert ghost.name == "b"
@@ -139,7 +139,9 @@ def panels(shown: Presentation) -> list[tuple[bool, bool]]:
 def test_targets_without_times_show_no_time(path: SolvedTargets) -> None:
     q = way(5)
     q[0] = np.nan
-    poses = solved("poses", ARM6, q, targets=targets_of(ARM6, way(5)), reasons=("too far", "", "", "", ""))
+    poses = solved(
+        "poses", ARM6, q, targets=forward_targets(ARM6, way(5)), reasons=("too far", "", "", "", "")
+    )
     shown = present(poses)
     assert set(panels(shown)) == {(False, True)}
     assert {one.t_ns for one in shown.body.events()} == {None}
@@ -154,7 +156,7 @@ def test_targets_without_times_show_no_time(path: SolvedTargets) -> None:
 def test_the_checks_are_the_verdict(path: SolvedTargets) -> None:
     q = np.tile([0.1, -0.9, 1.2, -0.5, 0.7, 0.2], (30, 1))
     q[:, 0] += 0.05 * np.arange(30)  # 5 rad/s
-    fast = urmpipe.ik(targets_of(UR5E, q), UR5E, tsp=0.01, start=q[0].tolist())
+    fast = urmpipe.ik(forward_targets(UR5E, q), UR5E, tsp=0.01, start=q[0].tolist())
     whole = solved("poses", ARM6, way(3))
     for one, failed in ((path, ["unreachable"]), (fast, ["joint-too-fast"]), (whole, [])):
         shown = present(one)
@@ -168,7 +170,7 @@ def solutions(one: SolvedTargets) -> Table:
 
 
 def test_the_table_has_the_solutions_of_the_result(path: SolvedTargets) -> None:
-    every = urmpipe.ik(targets_of(ARM6, way(2)), ARM6, every=True)
+    every = urmpipe.ik(forward_targets(ARM6, way(2)), ARM6, every=True)
     for one, rows in ((every, int(every.solutions.reached.sum())), (replace(every, every=False), 2)):
         table = solutions(one)
         columns = {column.key: list(column.cells) for column in table.columns}

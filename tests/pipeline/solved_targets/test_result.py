@@ -10,7 +10,7 @@ import pytest
 import urmpipe
 from solved import solved
 from urmpipe_models.errors import LogError
-from urmpipe_models.ik.solutions import targets_of
+from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.robots.catalogue import load_robot
 
 UR5E = load_robot("ur5e")
@@ -20,10 +20,10 @@ Q = np.array([[0.1, -0.9, 1.2, -0.5, 0.7, 0.2]])
 def test_the_verdict_is_that_of_the_data() -> None:
     """Every target reached, without a jump and without a joint that is too fast: nothing else counts."""
     q = np.tile(Q, (30, 1))
-    calm = urmpipe.ik(targets_of(UR5E, q), UR5E, tsp=0.01, start=q[0].tolist())
+    calm = urmpipe.ik(forward_targets(UR5E, q), UR5E, tsp=0.01, start=q[0].tolist())
     assert calm.verdict == "pass"
     q[:, 0] += 0.05 * np.arange(30)  # 5 rad/s; the joint is allowed 3.14
-    fast = urmpipe.ik(targets_of(UR5E, q), UR5E, tsp=0.01, start=q[0].tolist())
+    fast = urmpipe.ik(forward_targets(UR5E, q), UR5E, tsp=0.01, start=q[0].tolist())
     assert fast.path is not None
     assert (fast.verdict, bool(fast.reached.all()), len(fast.path.jumps)) == ("fail", True, 0)
     assert replace(fast, path=replace(fast.path, too_fast=())).verdict == "pass"
@@ -46,4 +46,4 @@ def test_all_that_does_not_fit_together_is_told_at_once() -> None:
     with pytest.raises(LogError, match="found no target, allowed: one or more"):
         solved("none", UR5E, np.empty((0, 6)))
     with pytest.raises(LogError, match="found 5 joints, allowed: 6"):
-        solved("five", UR5E, np.zeros((2, 5)), targets=targets_of(UR5E, np.zeros((2, 6))))
+        solved("five", UR5E, np.zeros((2, 5)), targets=forward_targets(UR5E, np.zeros((2, 6))))

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_models.ik.closed import method_words
-from urmpipe_models.ik.solutions import Singular, Solutions, Targets, targets_of
+from urmpipe_models.ik.closed import format_method
+from urmpipe_models.ik.solutions import SingularPoses, Solutions, Targets, forward_targets
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
@@ -55,11 +55,11 @@ def test_every_row_is_named_or_counted(rows: set[int]) -> None:
 
 
 def test_what_solved_the_targets() -> None:
-    assert method_words("spherical wrist") == "closed form: spherical wrist"
-    assert method_words("iterative") == "iterative"
+    assert format_method("spherical wrist") == "closed form: spherical wrist"
+    assert format_method("iterative") == "iterative"
 
 
-def solutions(*families: Singular, shortfall: list[list[float]] | None = None) -> Solutions:
+def solutions(*families: SingularPoses, shortfall: list[list[float]] | None = None) -> Solutions:
     """Three targets of two solutions each; the last target has none."""
     q = np.zeros((3, 2, 6))
     q[2] = np.nan
@@ -72,8 +72,8 @@ def test_a_family_of_singular_poses_is_told_once_with_its_rows() -> None:
     aligned = np.array([[True, False], [False, True], [True, True]])
     stretched = np.array([[False, False], [True, True], [False, False]])
     found = solutions(
-        Singular("wrist aligned", aligned, "q4 and q6: only their sum is determined", "q4 = 0"),
-        Singular("arm stretched", stretched),
+        SingularPoses("wrist aligned", aligned, "q4 and q6: only their sum is determined", "q4 = 0"),
+        SingularPoses("arm stretched", stretched),
     )
     row, every = np.array([1, 4, 5]), np.ones((3, 2), dtype=bool)
     assert list(singular_warnings(found, row, every)) == [
@@ -120,14 +120,14 @@ def test_targets_in_mm_are_told_from_those_out_of_reach() -> None:
 def test_no_pose_is_farther_than_the_longest_reach(name: str) -> None:
     arm = load_robot(name)
     q = np.random.default_rng(6).uniform(-np.pi, np.pi, (2000, len(arm.coordinates)))
-    away = np.linalg.norm(targets_of(arm, q).position, axis=1).max()
+    away = np.linalg.norm(forward_targets(arm, q).position, axis=1).max()
     assert 0.5 * longest(arm) < away <= longest(arm)
 
 
 def test_a_wrist_that_is_aligned_but_for_the_digits_of_a_file_is_told_of() -> None:
     arm = load_robot("arm6")
     q = np.array([[0.3, 0.8, -0.6, 0.5, bend, 0.2] for bend in (1e-10, 0.7, 1e-5, 0.0, 1e-2)])
-    flat = Singular("wrist aligned", (q[:, 4] == 0.0)[:, None], "q4 and q6: only their sum", "q4 = 0")
+    flat = SingularPoses("wrist aligned", (q[:, 4] == 0.0)[:, None], "q4 and q6: only their sum", "q4 = 0")
     found = Solutions(q[:, None], ("1",), np.full((5, 1), "", dtype=object), (flat,))
     row, every = np.arange(1, 6), np.ones((5, 1), dtype=bool)
     (said,) = near_singular_warnings(arm, found, row, every, orientation=True)

@@ -12,8 +12,8 @@ from spherical_arms import assert_explained, assert_reached, away_from, inverse_
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.arm.geometric_models import DHRow, dh_chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.solutions import Solutions, Targets, targets_of
-from urmpipe_models.ik.spherical import BLOCK
+from urmpipe_models.ik.solutions import Solutions, Targets, forward_targets
+from urmpipe_models.ik.spherical import BATCH_SIZE
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -34,7 +34,7 @@ def q2_on_axis_1(q3: float) -> float:
 
 def solved(chain: Chain, q: FloatArray) -> Solutions:
     """Solve for the poses of joint values, with all solutions held against them."""
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     solutions = inverse_of(chain).solve(targets)
     assert_reached(chain, targets, solutions)
     assert_explained(solutions)
@@ -80,7 +80,7 @@ def test_wrist_folded_back_leaves_the_difference() -> None:
 
 def test_a_free_joint_is_taken_from_near() -> None:
     q = np.array([[0.4, 0.5, -0.3, 0.7, 0.0, -0.2]])
-    solutions = FORM.solve(targets_of(ARM, q), near=np.array([9.0, 9.0, 9.0, 0.3, 9.0, 9.0]))
+    solutions = FORM.solve(forward_targets(ARM, q), near=np.array([9.0, 9.0, 9.0, 0.3, 9.0, 9.0]))
     (one,) = solutions.singular
     assert one.chosen == "theta4 as near, and pi more for the flipped wrist"
     not_flipped, flipped = solutions.q[0, one.where[0]]
@@ -90,7 +90,7 @@ def test_a_free_joint_is_taken_from_near() -> None:
 
 def test_near_may_be_a_row_a_target() -> None:
     q = np.array([[0.4, 0.5, -0.3, 0.7, 0.0, -0.2], [0.9, 0.5, -0.3, 0.7, 0.0, -0.2]])
-    targets = targets_of(ARM, q)
+    targets = forward_targets(ARM, q)
     solutions = FORM.solve(targets, near=q)
     assert away_from(ARM, solutions, q).min(axis=1).max() < 1e-13
 
@@ -102,7 +102,7 @@ def test_wrist_on_axis_1_alone_takes_0_and_pi_or_near() -> None:
     np.testing.assert_allclose(solutions.q[0, :4, 0], 0.0, atol=0)
     np.testing.assert_allclose(solutions.q[0, 4:, 0], math.pi, atol=0)
     assert least_singular_value(solutions.q[0]).max() < 1e-12
-    targets = targets_of(ARM, q)
+    targets = forward_targets(ARM, q)
     near = FORM.solve(targets, near=q[0])
     assert_reached(ARM, targets, near)
     assert away_from(ARM, near, q).min() < 1e-13
@@ -214,7 +214,7 @@ def test_beside_where_right_and_left_meet(distance: float) -> None:
 
 def test_a_wrist_nearer_to_axis_1_than_the_offset_is_told_with_figures() -> None:
     chain = with_offset_shoulder()
-    targets = targets_of(chain, np.zeros((1, 6)))
+    targets = forward_targets(chain, np.zeros((1, 6)))
     targets.position[0] = there(targets.rotation)[0] @ np.array([0.0, 0.0, 0.1]) + np.array([0.03, 0.04, 0.6])
     solutions = inverse_of(chain).solve(targets)
     assert solutions.reason(0) == "the wrist centre is 0.050 m from axis 1, allowed: 0.150 m or more"
@@ -287,7 +287,7 @@ def test_wrist_on_axis_2_leaves_joint_2() -> None:
     (one,) = (one for one in solutions.singular if one.family == "wrist on axis 2")
     assert (one.free, one.chosen) == ("q2: any value", "q2 = 0")
     np.testing.assert_array_equal(solutions.q[0, found["wrist on axis 2"], 1], 0.0)
-    near = inverse_of(chain).solve(targets_of(chain, q), near=q[0])
+    near = inverse_of(chain).solve(forward_targets(chain, q), near=q[0])
     assert away_from(chain, near, q).min() < 1e-7
 
 
@@ -308,13 +308,13 @@ def test_beside_where_the_flips_of_a_wrist_that_is_not_square_meet(distance: flo
 
 
 def test_blocks_of_targets_are_as_single_ones_with_their_singular_poses() -> None:
-    q = np.random.default_rng(8).uniform(-math.pi, math.pi, (2 * BLOCK + 3, 6))
-    aligned = [0, BLOCK - 1, BLOCK, 2 * BLOCK + 1]
+    q = np.random.default_rng(8).uniform(-math.pi, math.pi, (2 * BATCH_SIZE + 3, 6))
+    aligned = [0, BATCH_SIZE - 1, BATCH_SIZE, 2 * BATCH_SIZE + 1]
     q[aligned, 4] = 0.0
-    stretched = BLOCK + 7  # in the second block alone
+    stretched = BATCH_SIZE + 7  # in the second block alone
     q[stretched, 2] = ELBOW
-    targets = targets_of(ARM, q)
-    targets.position[2 * BLOCK + 2] = np.nan
+    targets = forward_targets(ARM, q)
+    targets.position[2 * BATCH_SIZE + 2] = np.nan
     every = FORM.solve(targets, q)
     assert [(one.family, one.free) for one in every.singular] == [
         ("wrist aligned", "theta4 and theta6: only their sum is determined"),
@@ -322,7 +322,7 @@ def test_blocks_of_targets_are_as_single_ones_with_their_singular_poses() -> Non
     ]
     assert np.flatnonzero(every.singular[0].where.any(axis=1)).tolist() == aligned
     assert np.flatnonzero(every.singular[1].where.any(axis=1)).tolist() == [stretched]
-    for row in (*aligned, stretched, 2 * BLOCK + 2):
+    for row in (*aligned, stretched, 2 * BATCH_SIZE + 2):
         alone = FORM.solve(targets.rows(slice(row, row + 1)), q[row])
         np.testing.assert_array_equal(every.q[row], alone.q[0])
         assert every.reasons[row].tolist() == alone.reasons[0].tolist()

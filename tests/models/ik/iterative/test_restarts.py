@@ -11,16 +11,22 @@ import pytest
 from asserting import there
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.ik.closed import closed_form
-from urmpipe_models.ik.restarts import DISTINCT, ROUGH, random_starts, refine, solve_iteratively
+from urmpipe_models.ik.restarts import (
+    ATTEMPT_STATIONARY,
+    DISTINCT_TOLERANCE,
+    random_starts,
+    refine,
+    solve_iteratively,
+)
 from urmpipe_models.ik.solutions import (
     NEAREST_POINT,
-    Search,
+    SearchOptions,
     Solutions,
     Targets,
-    limits_of,
-    misses,
-    targets_of,
-    within_limits,
+    forward_targets,
+    joint_limits,
+    limit_solutions,
+    pose_errors,
 )
 from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
@@ -30,15 +36,15 @@ MET = 1.01e-10
 
 
 def random_targets(chain: Chain, count: int, seed: int = 6) -> Targets:
-    lower, upper = limits_of(chain)
+    lower, upper = joint_limits(chain)
     low, high = np.maximum(lower, -math.pi), np.minimum(upper, math.pi)
-    return targets_of(chain, np.random.default_rng(seed).uniform(low, high, (count, len(low))))
+    return forward_targets(chain, np.random.default_rng(seed).uniform(low, high, (count, len(low))))
 
 
 def assert_solved(chain: Chain, targets: Targets, solutions: Solutions) -> None:
     for column in range(solutions.q.shape[1]):
         rows = solutions.reached[:, column] & (solutions.shortfall[:, column] == 0.0)
-        distance, turn = misses(chain, solutions.q[rows, column], targets.rows(rows))
+        distance, turn = pose_errors(chain, solutions.q[rows, column], targets.rows(rows))
         assert np.linalg.norm(distance, axis=1).max(initial=0.0) < MET
         assert np.linalg.norm(turn, axis=1).max(initial=0.0) < MET
 
@@ -60,7 +66,7 @@ def test_random_reachable_poses_are_solved(robot: str) -> None:
     assert solutions.branches == ("1",)
     assert solutions.reached.all()
     assert_solved(chain, targets, solutions)
-    lower, upper = limits_of(chain)
+    lower, upper = joint_limits(chain)
     assert ((solutions.q >= lower) & (solutions.q <= upper)).all()
 
 
@@ -70,10 +76,10 @@ def test_random_poses_of_urm6_take_no_more_restarts_than_promised() -> None:
     chain = load_robot("urm6")
     targets = random_targets(chain, 1000, seed=2021)
     start = np.random.default_rng(9).uniform(-math.pi, math.pi, (1000, 6))
-    few = solve_iteratively(chain, targets, start=start, search=Search(restarts=20))
+    few = solve_iteratively(chain, targets, start=start, search=SearchOptions(restarts=20))
     print(f"within 20 restarts: {few.reached.sum()} of 1000")
     assert few.reached.sum() >= 995
-    many = solve_iteratively(chain, targets, start=start, search=Search(restarts=200))
+    many = solve_iteratively(chain, targets, start=start, search=SearchOptions(restarts=200))
     print(f"within 200 restarts: {many.reached.sum()} of 1000")
     assert many.reached.all()
     assert_solved(chain, targets, many)
@@ -82,7 +88,7 @@ def test_random_poses_of_urm6_take_no_more_restarts_than_promised() -> None:
 def test_the_solution_from_the_start_is_kept_where_there_is_one() -> None:
     chain = load_robot("urm6")
     q = np.random.default_rng(1).uniform(-math.pi, math.pi, (50, 6))
-    solutions = solve_iteratively(chain, targets_of(chain, q), start=q + 1e-3)
+    solutions = solve_iteratively(chain, forward_targets(chain, q), start=q + 1e-3)
     np.testing.assert_allclose(solutions.q[:, 0], q, atol=1e-6)  # poses of conditions up to 1e4
 
 
@@ -90,7 +96,7 @@ def test_a_singular_target_is_met_however_short_the_steps_towards_it() -> None:
     """The wrist of this pose is aligned to 1e-5: the last of the way takes hundreds of steps."""
     chain = load_robot("ur5e")
     q = np.random.default_rng(1).uniform(-math.pi, math.pi, (1000, 6))[958:959]
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     found = solve_iteratively(chain, targets)
     assert found.reached.all()
     assert_solved(chain, targets, found)
@@ -105,7 +111,7 @@ def test_of_the_solutions_that_are_found_first_the_nearest_to_the_start_is_taken
     restarts, others = random_starts(chain, 7, 0), 0
     for row in np.flatnonzero(~refine(chain, targets, start).converged):
         one = targets.rows(np.full(7, row))
-        refined = refine(chain, one, restarts, stationary=ROUGH)
+        refined = refine(chain, one, restarts, stationary=ATTEMPT_STATIONARY)
         for some in (slice(0, 1), slice(1, 3), slice(3, 7)):
             if refined.converged[some].any():
                 q = refined.q[some][refined.converged[some]]
@@ -124,7 +130,7 @@ def test_of_the_solutions_that_are_found_first_the_nearest_to_the_start_is_taken
 def test_both_solutions_of_a_planar_arm_are_found_nearest_to_the_start_first() -> None:
     arm = planar()
     q = np.array([[0.3, 0.8]])
-    found = solve_iteratively(arm, Targets(targets_of(arm, q).position), start=q[0] - 0.1, every=True)
+    found = solve_iteratively(arm, Targets(forward_targets(arm, q).position), start=q[0] - 0.1, every=True)
     angle = 2 * math.atan2(0.4 * math.sin(0.8), 0.5 + 0.4 * math.cos(0.8))
     assert found.branches == ("1", "2")
     np.testing.assert_allclose(found.q[0], [[0.3, 0.8], [0.3 + angle, -0.8]], atol=1e-8)
@@ -134,7 +140,7 @@ def test_nearest_counts_the_way_that_limits_leave() -> None:
     """From 3.0 rad a joint that ends at +-3.1 gets to -2.9 rad by 5.9 rad, not by 0.38."""
     arm = planar()
     arm = replace(arm, joints=tuple(replace(joint, lower=-3.1, upper=3.1) for joint in arm.joints))
-    position = Targets(targets_of(arm, np.array([[-2.9, 0.8]])).position)
+    position = Targets(forward_targets(arm, np.array([[-2.9, 0.8]])).position)
     start = np.array([3.0, 0.8])
     angle = 2 * math.atan2(0.4 * math.sin(0.8), 0.5 + 0.4 * math.cos(0.8))
     found = solve_iteratively(arm, position, start=start, every=True)
@@ -147,8 +153,8 @@ def test_every_solution_of_a_closed_form_is_found() -> None:
     targets = random_targets(chain, 12)
     form = there(closed_form(chain))
     start = np.array(chain.start)
-    peer = within_limits(chain, form.solve(targets), start)
-    found = solve_iteratively(chain, targets, every=True, search=Search(restarts=150))
+    peer = limit_solutions(chain, form.solve(targets), start)
+    found = solve_iteratively(chain, targets, every=True, search=SearchOptions(restarts=150))
     for row in range(12):
         ours = found.q[row][found.reached[row]]
         theirs = peer.q[row][peer.reached[row]]
@@ -175,7 +181,7 @@ def test_every_solution_is_distinct_ordered_and_met() -> None:
         for a in range(count):
             for b in range(a):
                 apart = np.remainder(found.q[row, a] - found.q[row, b] + math.pi, 2 * math.pi) - math.pi
-                assert np.abs(apart).max() > DISTINCT
+                assert np.abs(apart).max() > DISTINCT_TOLERANCE
         assert set(found.reasons[row, count:]) <= {"no further solution in 20 restarts"}
         assert set(found.reasons[row, :count]) == {""}
 
@@ -189,7 +195,8 @@ def test_the_same_seed_finds_the_same_and_another_seed_begins_elsewhere(robot: s
     chain = load_robot(robot)
     targets = random_targets(chain, 12)
     first, again = (
-        solve_iteratively(chain, targets, every=True, search=Search(restarts=6, seed=4)) for _ in range(2)
+        solve_iteratively(chain, targets, every=True, search=SearchOptions(restarts=6, seed=4))
+        for _ in range(2)
     )
     np.testing.assert_array_equal(first.q, again.q)
     assert (random_starts(chain, 6, 4) != random_starts(chain, 6, 5)).all()
@@ -200,10 +207,10 @@ def test_the_same_seed_finds_the_same_and_another_seed_begins_elsewhere(robot: s
 def test_what_is_found_for_a_target_does_not_depend_on_the_others(every: bool) -> None:
     chain = load_robot("urm6")
     targets = random_targets(chain, 15)
-    together = solve_iteratively(chain, targets, every=every, search=Search(restarts=8))
+    together = solve_iteratively(chain, targets, every=every, search=SearchOptions(restarts=8))
     for row in (14, 3):
         alone = solve_iteratively(
-            chain, targets.rows(slice(row, row + 1)), every=every, search=Search(restarts=8)
+            chain, targets.rows(slice(row, row + 1)), every=every, search=SearchOptions(restarts=8)
         )
         count = alone.q.shape[1]
         np.testing.assert_array_equal(together.q[row, :count], alone.q[0])
@@ -230,17 +237,19 @@ def test_random_starts_lie_within_limits() -> None:
 def test_a_target_out_of_reach_says_how_near_the_tool_comes() -> None:
     arm = planar()
     found = solve_iteratively(
-        arm, Targets(np.array([[1.2, 0.0, 0.0], [0.5, 0.1, 0.0]])), search=Search(restarts=3)
+        arm, Targets(np.array([[1.2, 0.0, 0.0], [0.5, 0.1, 0.0]])), search=SearchOptions(restarts=3)
     )
     assert found.reached[:, 0].tolist() == [False, True]
     assert found.reason(0) == "no solution in 3 restarts; nearest: 0.3 m away"
-    pose = targets_of(arm, np.array([[0.0, 0.0]]))
-    found = solve_iteratively(arm, replace(pose, position=pose.position + 0.1), search=Search(restarts=1))
+    pose = forward_targets(arm, np.array([[0.0, 0.0]]))
+    found = solve_iteratively(
+        arm, replace(pose, position=pose.position + 0.1), search=SearchOptions(restarts=1)
+    )
     assert found.reason(0) is not None
     assert str(found.reason(0)).startswith("no solution in 1 restart; nearest: 0.1")
     assert str(found.reason(0)).endswith(" rad away")
     found = solve_iteratively(
-        arm, Targets(np.array([[1.2, 0.0, 0.0]])), search=Search(restarts=0, tolerance=0.29)
+        arm, Targets(np.array([[1.2, 0.0, 0.0]])), search=SearchOptions(restarts=0, tolerance=0.29)
     )
     assert found.reason(0) == (
         "no solution from the start; nearest: 0.3 m away, allowed: 0.29 m along each axis"
@@ -261,7 +270,9 @@ def test_of_all_attempts_the_one_that_came_nearest_counts(every: bool) -> None:
 def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() -> None:
     arm = planar()
     targets = Targets(np.array([[0.903, 0.0, 0.0], [0.91, 0.0, 0.0], [0.5, 0.1, 0.0]]))
-    found = solve_iteratively(arm, targets, start=np.array([0.1, 0.2]), search=Search(tolerance=0.0035))
+    found = solve_iteratively(
+        arm, targets, start=np.array([0.1, 0.2]), search=SearchOptions(tolerance=0.0035)
+    )
     assert found.reached[:, 0].tolist() == [True, False, True]
     np.testing.assert_allclose(found.shortfall[:, 0], [0.003, 0.0, 0.0], atol=1e-9)
     assert found.labels[:, 0].tolist() == [NEAREST_POINT, "1", "1"]
@@ -272,11 +283,11 @@ def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() ->
 def test_a_nearest_pose_that_is_turned_too_far_is_none() -> None:
     """The point is met only with another orientation: the arm in the plane cannot tilt its tool."""
     arm = planar()
-    tilted = targets_of(arm, np.array([[0.3, 0.8]]))
+    tilted = forward_targets(arm, np.array([[0.3, 0.8]]))
     c, s = math.cos(0.1), math.sin(0.1)
     tilt = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
     found = solve_iteratively(
-        arm, replace(tilted, rotation=tilt @ tilted.rotation), search=Search(tolerance=0.0035)
+        arm, replace(tilted, rotation=tilt @ tilted.rotation), search=SearchOptions(tolerance=0.0035)
     )
     assert found.reason(0) is not None
 

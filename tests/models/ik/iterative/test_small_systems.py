@@ -13,7 +13,7 @@ from urmpipe_models.ik.task import (
     gram,
     outer_sum,
     product,
-    rows_of,
+    take_rows,
     transposed_product,
 )
 
@@ -78,12 +78,12 @@ def test_a_sum_has_the_same_bits_beside_any_others_however_its_rows_are_stored(r
     M, x, y = matrices(6, 8), matrices(8, 1)[:, 0], matrices(6, 1)[:, 0]
     for form, a, b in ((product, M, x), (transposed_product, M, y), (outer_sum, M, M), (dot_product, x, x)):
         whole = form(a, b)[..., rows]
-        np.testing.assert_array_equal(form(rows_of(a, np.array(rows)), rows_of(b, np.array(rows))), whole)
+        np.testing.assert_array_equal(form(take_rows(a, np.array(rows)), take_rows(b, np.array(rows))), whole)
         np.testing.assert_array_equal(form(a[..., rows], b[..., rows]), whole)  # a matrix apart
 
 
 def test_some_rows_stand_side_by_side() -> None:
     M = matrices(6, 8)
-    some = rows_of(M, np.array([3, 1, 7]))
+    some = take_rows(M, np.array([3, 1, 7]))
     np.testing.assert_array_equal(some, M[..., [3, 1, 7]])
     assert some.flags.c_contiguous

@@ -16,8 +16,8 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
 from urmpipe_models.ik.numeric import METHODS, Method
 from urmpipe_models.ik.restarts import refine
-from urmpipe_models.ik.solutions import Targets, limits_of, misses, targets_of
-from urmpipe_models.ik.task import redundancy, turn_between, turn_length
+from urmpipe_models.ik.solutions import Targets, forward_targets, joint_limits, pose_errors
+from urmpipe_models.ik.task import orientation_length, redundancy, rotation_error
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.kinematics.singularity import characteristic_length
 from urmpipe_models.math3d import from_offset, translation
@@ -42,18 +42,18 @@ def test_where_nothing_bends_each_step_is_what_was_foreseen_and_the_next_is_damp
 
 def within(chain: Chain, count: int, seed: int = 3) -> FloatArray:
     """Return joint values, uniform within limits and one turn."""
-    lower, upper = limits_of(chain)
+    lower, upper = joint_limits(chain)
     low, high = np.maximum(lower, -math.pi), np.minimum(upper, math.pi)
     return np.random.default_rng(seed).uniform(low, high, (count, len(low)))
 
 
 def beside(chain: Chain, q: FloatArray, noise: float) -> FloatArray:
-    lower, upper = limits_of(chain)
+    lower, upper = joint_limits(chain)
     return np.clip(q + np.random.default_rng(5).normal(0.0, noise, q.shape), lower, upper)
 
 
 def assert_met(chain: Chain, q: FloatArray, targets: Targets) -> None:
-    distance, turn = misses(chain, q, targets)
+    distance, turn = pose_errors(chain, q, targets)
     # beside the promise there is the rounding of the peer's own rotation vector
     np.testing.assert_array_less(np.linalg.norm(distance, axis=1), 1.01 * MET)
     np.testing.assert_array_less(np.linalg.norm(turn, axis=1), 1.01 * MET)
@@ -78,12 +78,12 @@ def limited(chain: Chain, lower: float, upper: float) -> Chain:
 def test_targets_near_the_start_are_met(robot: str, pose: bool) -> None:
     chain = load_robot(robot)
     q = within(chain, 200)
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     targets = targets if pose else Targets(targets.position)
     refined = refine(chain, targets, beside(chain, q, 0.05))
     assert refined.converged.mean() > 0.98  # the others start beyond a singular pose
     assert_met(chain, refined.q[refined.converged], targets.rows(refined.converged))
-    lower, upper = limits_of(chain)
+    lower, upper = joint_limits(chain)
     assert ((refined.q >= lower) & (refined.q <= upper)).all()
 
 
@@ -93,9 +93,9 @@ def test_each_method_meets_regular_targets_near_the_start(method: Method) -> Non
     q = within(chain, 300)
     smallest = np.linalg.svd(jacobian_over_log(chain, q))[1][:, -1]
     q = q[smallest > 0.05]  # damping by 0.05 l slows what moves little
-    refined = refine(chain, targets_of(chain, q), q + 0.01, method=method)
+    refined = refine(chain, forward_targets(chain, q), q + 0.01, method=method)
     assert refined.converged.all()
-    assert_met(chain, refined.q, targets_of(chain, q))
+    assert_met(chain, refined.q, forward_targets(chain, q))
 
 
 def test_the_pseudoinverse_and_marquardt_take_quadratic_steps() -> None:
@@ -104,7 +104,7 @@ def test_the_pseudoinverse_and_marquardt_take_quadratic_steps() -> None:
     q = within(chain, 300)
     q = q[np.linalg.svd(jacobian_over_log(chain, q))[1][:, -1] > 0.05]
     steps = {
-        name: np.median(refine(chain, targets_of(chain, q), q + 0.01, method=name).iterations)
+        name: np.median(refine(chain, forward_targets(chain, q), q + 0.01, method=name).iterations)
         for name in METHODS
     }
     assert steps["pinv"] <= 4
@@ -117,18 +117,18 @@ def test_what_a_radian_counts_as_does_not_depend_on_where_a_description_puts_fra
     there = Joint("aside", "fixed", translation(0.0, 0.0, 100.0))  # axis 2 of a calibrated arm
     back = replace(chain.joints[2], origin=translation(0.0, 0.0, -100.0) @ chain.joints[2].origin)
     other = replace(chain, joints=(*chain.joints[:2], there, back, *chain.joints[3:]), visuals=())
-    assert turn_length(other) == pytest.approx(turn_length(chain), rel=1e-12)
-    assert turn_length(chain) == characteristic_length(chain) / 4.0
+    assert orientation_length(other) == pytest.approx(orientation_length(chain), rel=1e-12)
+    assert orientation_length(chain) == characteristic_length(chain) / 4.0
 
 
 def test_a_pseudoinverse_step_is_the_moore_penrose_one() -> None:
     chain = load_robot("urm8")
     q = within(chain, 20)
     start = q + 1e-3
-    targets = targets_of(chain, q)
-    length = turn_length(chain)
+    targets = forward_targets(chain, q)
+    length = orientation_length(chain)
     weights = np.array([1.0, 1.0, 1.0, length, length, length])
-    distance, turn = misses(chain, start, targets)
+    distance, turn = pose_errors(chain, start, targets)
     J = weights[:, None] * jacobian_over_log(chain, start)
     peer = np.einsum("nij,nj->ni", np.linalg.pinv(J), weights * np.hstack([distance, turn]))
     one = refine(chain, targets, start, method="pinv", iterations=1, metres=1e-15, home=start)
@@ -141,9 +141,9 @@ def test_a_pseudoinverse_step_is_the_moore_penrose_one() -> None:
 def test_chains_of_any_joints_are_solved(chains: SearchStrategy[Chain], data: st.DataObject) -> None:
     """Prismatic joints, mimics, fixed frames, limits, few freedoms: a start on the target stays there."""
     chain = data.draw(chains)
-    lower, upper = limits_of(chain)
+    lower, upper = joint_limits(chain)
     q = np.clip(np.random.default_rng(1).uniform(-1.0, 1.0, (5, len(lower))), lower, upper)
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     refined = refine(chain, targets, np.clip(q + 1e-4, lower, upper))
     assert ((refined.q >= lower) & (refined.q <= upper)).all()
     assert_met(chain, refined.q[refined.converged], targets.rows(refined.converged))
@@ -158,7 +158,7 @@ def test_a_joint_that_another_follows_is_solved_with_it() -> None:
     follower = Joint("b", origin=translation(0.4, 0.0, 0.0), mimic=Mimic("a", -0.5, 0.1))
     chain = Chain("mimic", (Joint("z"), followed, follower), tip=translation(0.2, 0.0, 0.0))
     q = np.array([[0.3, 0.9]])
-    refined = refine(chain, targets_of(chain, q), q + 0.1)
+    refined = refine(chain, forward_targets(chain, q), q + 0.1)
     np.testing.assert_allclose(refined.q, q, atol=1e-8)  # regular: a miss of 1e-10 over arms of 0.2 m
 
 
@@ -192,15 +192,15 @@ def test_the_nearest_pose_is_that_of_another_solver() -> None:
 
     chain = limited(load_robot("urm6"), -2.0, 2.0)
     rng = np.random.default_rng(2)
-    targets = targets_of(chain, rng.uniform(-2.0, 2.0, (8, 6)))
+    targets = forward_targets(chain, rng.uniform(-2.0, 2.0, (8, 6)))
     targets = Targets(targets.position + np.array([0.0, 0.0, 1.5]), targets.rotation)
     refined = refine(chain, targets, rng.uniform(-2.0, 2.0, (8, 6)), iterations=400)
-    length = turn_length(chain)
+    length = orientation_length(chain)
     assert not refined.converged.any()
     for row in range(8):
 
         def miss(q: FloatArray, one: int = row) -> FloatArray:
-            distance, turn = misses(chain, q[None], targets.rows(slice(one, one + 1)))
+            distance, turn = pose_errors(chain, q[None], targets.rows(slice(one, one + 1)))
             return np.concatenate([distance[0], length * turn[0]])
 
         peer = least_squares(
@@ -214,7 +214,7 @@ def test_the_nearest_pose_is_that_of_another_solver() -> None:
 
 def test_a_rough_descent_to_a_nearest_point_ends_early_and_not_far_from_it() -> None:
     chain = load_robot("urm6")
-    targets = targets_of(chain, within(chain, 50))
+    targets = forward_targets(chain, within(chain, 50))
     targets = Targets(targets.position + np.array([0.0, 0.0, 3.0]), targets.rotation)
     fine = refine(chain, targets, np.array(chain.start), iterations=500)
     rough = refine(chain, targets, np.array(chain.start), iterations=500, stationary=1e-2)
@@ -229,7 +229,7 @@ def test_a_limit_that_is_in_the_way_is_stood_at_and_left_again() -> None:
     away = Targets(np.array([[0.0, 0.8, 0.0]]))
     refined = refine(arm, away, np.array([0.0, 0.1]))
     np.testing.assert_allclose(refined.q, [[0.5, 0.5]], atol=1e-12)
-    back = refine(arm, targets_of(arm, np.array([[0.1, -0.3]])), refined.q)
+    back = refine(arm, forward_targets(arm, np.array([[0.1, -0.3]])), refined.q)
     assert back.converged.all()
     np.testing.assert_allclose(back.q, [[0.1, -0.3]], atol=1e-8)
 
@@ -237,7 +237,7 @@ def test_a_limit_that_is_in_the_way_is_stood_at_and_left_again() -> None:
 def test_joints_stay_within_limits_at_every_step() -> None:
     chain = limited(load_robot("urm6"), -1.0, 1.0)
     rng = np.random.default_rng(4)
-    targets = targets_of(chain, rng.uniform(-1.5, 1.5, (100, 6)))
+    targets = forward_targets(chain, rng.uniform(-1.5, 1.5, (100, 6)))
     start = rng.uniform(-1.2, 1.2, (100, 6))  # clipped
     for method in METHODS:
         for steps in range(6):
@@ -249,7 +249,7 @@ def test_no_step_leads_away_from_the_target() -> None:
     """Limits cut steps short: what is left of one may lead away, and may have been foreseen to."""
     chain = limited(load_robot("urm6"), -2.0, 2.0)
     rng = np.random.default_rng(2)
-    targets = targets_of(chain, rng.uniform(-2.0, 2.0, (200, 6)))
+    targets = forward_targets(chain, rng.uniform(-2.0, 2.0, (200, 6)))
     targets = Targets(targets.position + np.array([0.0, 0.0, 1.5]), targets.rotation)
     start = rng.uniform(-2.0, 2.0, (200, 6))
     before = np.full(200, np.inf)
@@ -265,7 +265,7 @@ def test_no_step_leads_away_from_the_target() -> None:
 def test_a_bad_row_stops_no_other() -> None:
     chain = load_robot("urm6")
     q = within(chain, 3)
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     alone = refine(chain, targets, q + 0.05)
     targets.position[1] = np.nan
     refined = refine(chain, targets, q + 0.05)
@@ -281,20 +281,20 @@ def test_rows_are_solved_to_the_same_bits_alone_and_in_any_company(
 ) -> None:
     chain = load_robot(robot)
     q = within(chain, 40)
-    targets, start = targets_of(chain, q), beside(chain, q, 0.4)
+    targets, start = forward_targets(chain, q), beside(chain, q, 0.4)
     whole = refine(chain, targets, start)
     for row in range(0, 40, 7):
         alone = refine(chain, targets.rows(slice(row, row + 1)), start[row])
         np.testing.assert_array_equal(alone.q[0], whole.q[row])
         assert alone.iterations[0] == whole.iterations[row]
-    monkeypatch.setattr("urmpipe_models.ik.restarts.BLOCK", 7)
+    monkeypatch.setattr("urmpipe_models.ik.restarts.BATCH_SIZE", 7)
     np.testing.assert_array_equal(refine(chain, targets, start, threads=3).q, whole.q)
 
 
 def test_wrong_options_are_all_told() -> None:
     chain = load_robot("urm6")
     with pytest.raises(OptionError) as told:
-        refine(chain, targets_of(chain, np.zeros((2, 6))), np.zeros(5), method="newton")  # type: ignore[arg-type]
+        refine(chain, forward_targets(chain, np.zeros((2, 6))), np.zeros(5), method="newton")  # type: ignore[arg-type]
     assert str(told.value).splitlines() == [
         "method: found 'newton', allowed: lm, dls, pinv",
         "starts: found an array of shape (5,), allowed: (6,) or (2, 6)",
@@ -318,7 +318,7 @@ def test_the_turn_between_two_frames_is_scipys_rotation_vector(
     vector = angle * np.array(axis) / math.hypot(*axis)
     pose = from_offset((0.0, 0.0, 0.0, 0.4, -1.1, 2.0))
     wanted = Rotation.from_rotvec(vector).as_matrix() @ np.array(pose.rotation)
-    found = turn_between(np.array(pose.columns)[..., None], wanted.T[..., None])[:, 0]
+    found = rotation_error(np.array(pose.columns)[..., None], wanted.T[..., None])[:, 0]
     np.testing.assert_allclose(np.linalg.norm(found), angle, atol=1e-14 + 1e-15 / max(math.sin(angle), 1e-7))
     again = Rotation.from_rotvec(found).as_matrix() @ np.array(pose.rotation)
     np.testing.assert_allclose(again, wanted, atol=3e-8)  # within 1e-6 of half a turn the axis has 8 digits
@@ -332,11 +332,11 @@ def test_the_turn_between_two_frames_is_scipys_rotation_vector(
 )
 def test_the_freedoms_that_a_target_leaves_are_counted(robot: str, pose: bool, free: int) -> None:
     chain = load_robot(robot)
-    targets = targets_of(chain, np.zeros((1, len(chain.coordinates))))
+    targets = forward_targets(chain, np.zeros((1, len(chain.coordinates))))
     assert redundancy(chain, targets if pose else Targets(targets.position)) == free
 
 
 def test_the_freedoms_of_a_planar_arm_are_those_of_the_plane() -> None:
     arm = planar(0.5, 0.4, 0.3)
-    assert redundancy(arm, targets_of(arm, np.zeros((1, 3)))) == 0
+    assert redundancy(arm, forward_targets(arm, np.zeros((1, 3)))) == 0
     assert redundancy(arm, Targets(np.zeros((1, 3)))) == 1

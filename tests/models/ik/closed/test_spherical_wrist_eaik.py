@@ -11,7 +11,7 @@ from asserting import there
 from spherical_arms import SPECIAL, inverse_of, random_arm, random_joints
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.solutions import targets_of
+from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.kinematics.forward import chain_to_screws, jacobian_over_log
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -35,7 +35,7 @@ def assert_agreement(chain: Chain, q: FloatArray) -> None:
     links = np.vstack((found.point[:1], np.diff(found.point, axis=0), found.position - found.point[-1]))
     peer = hp.HPRobot(found.direction, links)
     assert peer.hasSphericalWrist()
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     solutions = inverse_of(chain).solve(targets)
     for row in range(len(q)):
         ours = solutions.q[row][solutions.reached[row]]

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain, Joint
-from urmpipe_models.ik.path_numeric import in_nearest_turns
+from urmpipe_models.ik.path_numeric import unwrap_within_limits
 
 TURN = 2.0 * math.pi
 
@@ -19,7 +19,7 @@ def test_each_sample_is_in_the_turn_nearest_to_the_one_before_it_that_there_is()
     way = np.array([[2.0, 3.0, 9.0], [4.0, 3.5, 9.0], [6.0, 3.9, 0.0], [8.0, 3.9, 0.0], [10.0, 3.9, 0.0]])
     q = way - TURN * np.round(way / TURN) * [1.0, 1.0, 0.0]
     q[3] = np.nan
-    found = in_nearest_turns(chain, q, np.array([2.5 - TURN, 3.0, 0.0]))
+    found = unwrap_within_limits(chain, q, np.array([2.5 - TURN, 3.0, 0.0]))
     expected = way - np.array([TURN, 0.0, 0.0])
     expected[3] = np.nan
     expected[4, 0] -= TURN  # 4 rad after 6 are nearer by the other way: 2.28 back

@@ -15,20 +15,20 @@ from spherical_arms import KINDS, assert_reached, away_from, random_arm, random_
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.closed import (
-    LOST,
+    LOST_BRANCH_REASON,
     MET,
-    NearlyClosedForm,
+    NearClosedForm,
     closed_form,
-    compact,
-    exact_form,
-    with_parallel_axes,
-    with_spherical_wrist,
+    compact_axis_points,
+    exact_closed_form,
+    iter_parallel_axes,
+    iter_spherical_wrists,
 )
 from urmpipe_models.ik.parallel import parallel_axes
-from urmpipe_models.ik.solutions import Solutions, Targets, misses, targets_of
+from urmpipe_models.ik.solutions import Solutions, Targets, forward_targets, pose_errors
 from urmpipe_models.ik.solve import solve
 from urmpipe_models.ik.spherical import spherical_wrist
-from urmpipe_models.ik.trigonometric import wrapped
+from urmpipe_models.ik.trigonometric import wrap_angle
 from urmpipe_models.kinematics.forward import (
     chain_to_screws,
     jacobian_over_log,
@@ -67,9 +67,9 @@ def as_built(chain: Chain, deviation: float, seed: int = 3) -> Chain:
     return replace(chain, joints=tuple(joints), visuals=())
 
 
-def nearly(chain: Chain) -> NearlyClosedForm:
+def nearly(chain: Chain) -> NearClosedForm:
     form = closed_form(chain)
-    assert isinstance(form, NearlyClosedForm)
+    assert isinstance(form, NearClosedForm)
     return form
 
 
@@ -82,11 +82,11 @@ def regular_joints(chain: Chain, count: int) -> FloatArray:
 
 def assert_all_found(chain: Chain, q: FloatArray, solutions: Solutions) -> None:
     """Hold solutions to their poses: each once, the joint values that the poses were made of among them."""
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     assert_reached(chain, targets, solutions, MET + 1e-15)  # rounding of poses of some metres
     assert away_from(chain, solutions, q).min(axis=1).max() < 1e-6
     for k in range(1, solutions.q.shape[1]):
-        apart = np.abs(wrapped(solutions.q[:, :k] - solutions.q[:, [k]])).max(axis=2)
+        apart = np.abs(wrap_angle(solutions.q[:, :k] - solutions.q[:, [k]])).max(axis=2)
         assert np.nanmin(apart) > 1e-6
     assert ((solutions.reasons == "") == solutions.reached).all()
 
@@ -103,16 +103,16 @@ def test_a_urdf_with_rounded_numbers_has_all_solutions_of_the_exact_arm(
     assert form.name in {before.name, f"{before.name}, nearly"}
     assert form.branches == before.branches
     q = regular_joints(chain, 1000)
-    solutions = form.solve(targets_of(chain, q))
+    solutions = form.solve(forward_targets(chain, q))
     assert_all_found(chain, q, solutions)
-    count = before.solve(targets_of(exact, q)).reached.sum(axis=1)
+    count = before.solve(forward_targets(exact, q)).reached.sum(axis=1)
     # a branch on the edge of the reach of one arm may be beyond that of the other
     assert (solutions.reached.sum(axis=1) == count).mean() >= 0.997
 
 
 def test_arm6_rounded_has_its_form_nearly(tmp_path: Path) -> None:
     chain = rounded(load_robot("arm6"), tmp_path, 4)
-    assert exact_form(chain) is None
+    assert exact_closed_form(chain) is None
     assert nearly(chain).name == "spherical wrist, nearly"
 
 
@@ -123,7 +123,7 @@ def test_an_arm_as_built_has_every_branch_away_from_singular_poses(name: str) ->
     form = nearly(chain)
     assert form.name == f"{closed_form(exact).name}, nearly"  # type: ignore[union-attr]
     q = regular_joints(chain, 400)
-    assert_all_found(chain, q, form.solve(targets_of(chain, q)))
+    assert_all_found(chain, q, form.solve(forward_targets(chain, q)))
 
 
 @pytest.mark.slow
@@ -133,17 +133,17 @@ def test_random_arms_with_sliding_joints_are_solved_beside_their_forms() -> None
         assert set(kinds) <= set(KINDS)
         chain = as_built(random_arm(generator, kinds=kinds), 1e-5)
         q = regular_joints(chain, 100)
-        solutions = nearly(chain).solve(targets_of(chain, q))
-        assert_reached(chain, targets_of(chain, q), solutions)
+        solutions = nearly(chain).solve(forward_targets(chain, q))
+        assert_reached(chain, forward_targets(chain, q), solutions)
         assert (away_from(chain, solutions, q).min(axis=1) < 1e-5).mean() >= 0.99
 
 
 def test_a_solution_stays_beside_that_of_the_idealised_arm(tmp_path: Path) -> None:
     chain = rounded(load_robot("arm6"), tmp_path, 4)
     form = nearly(chain)
-    targets = targets_of(chain, regular_joints(chain, 200))
+    targets = forward_targets(chain, regular_joints(chain, 200))
     mine, ideal = form.solve(targets), form.form.solve(targets)
-    apart = np.abs(wrapped(mine.q - ideal.q))[mine.reached & ideal.reached]
+    apart = np.abs(wrap_angle(mine.q - ideal.q))[mine.reached & ideal.reached]
     # 2e-5 m and rad over the least singular value, 0.01; the other branches may be nearer to singular
     assert np.quantile(apart.max(axis=1), 0.95) < 2e-3
 
@@ -151,13 +151,13 @@ def test_a_solution_stays_beside_that_of_the_idealised_arm(tmp_path: Path) -> No
 def test_limits_are_not_asked() -> None:
     chain = as_built(load_robot("ur5e"), 1e-4)
     narrow = replace(chain, joints=tuple(replace(one, lower=-0.1, upper=0.1) for one in chain.joints))
-    targets = targets_of(chain, regular_joints(chain, 20))
+    targets = forward_targets(chain, regular_joints(chain, 20))
     np.testing.assert_array_equal(nearly(narrow).solve(targets).q, nearly(chain).solve(targets).q)
 
 
 def test_a_target_out_of_reach_or_not_finite_has_a_reason_and_stops_no_other() -> None:
     chain = as_built(load_robot("arm6"), 1e-4)
-    good = targets_of(chain, regular_joints(chain, 3))
+    good = forward_targets(chain, regular_joints(chain, 3))
     assert good.rotation is not None
     position = good.position.copy()
     position[1], position[2] = (9.0, 0.0, 0.0), np.nan
@@ -178,10 +178,10 @@ def test_a_branch_that_is_lost_beside_a_singular_pose_says_so() -> None:
     chain = as_built(load_robot("arm6"), 1e-3)
     q = random_joints(np.random.default_rng(2), chain, 200)
     q[:, 4] = np.random.default_rng(3).uniform(-2e-3, 2e-3, 200)  # about as far as the axes are off
-    solutions = nearly(chain).solve(targets_of(chain, q))
-    assert_reached(chain, targets_of(chain, q), solutions)
+    solutions = nearly(chain).solve(forward_targets(chain, q))
+    assert_reached(chain, forward_targets(chain, q), solutions)
     assert ((solutions.reasons == "") == solutions.reached).all()
-    assert (solutions.reasons == LOST).any()
+    assert (solutions.reasons == LOST_BRANCH_REASON).any()
 
 
 def idealised(chain: Chain) -> Chain:
@@ -189,8 +189,8 @@ def idealised(chain: Chain) -> Chain:
     found, names = chain_to_screws(chain), chain.coordinates
     assert found is not None
     ideals = (
-        *(one for one in with_spherical_wrist(found) if spherical_wrist(one, names)),
-        *(one for one in with_parallel_axes(found) if parallel_axes(one, names)),
+        *(one for one in iter_spherical_wrists(found) if spherical_wrist(one, names)),
+        *(one for one in iter_parallel_axes(found) if parallel_axes(one, names)),
     )
     return screws_to_chain(ideals[0], names)
 
@@ -199,7 +199,7 @@ def idealised(chain: Chain) -> Chain:
 def test_the_deviation_is_about_the_largest_of_many_poses(name: str) -> None:
     chain = as_built(load_robot(name), 1e-4)
     q = random_joints(np.random.default_rng(7), chain, 1000)
-    apart = misses(chain, q, targets_of(idealised(chain), q))
+    apart = pose_errors(chain, q, forward_targets(idealised(chain), q))
     for found, of_many in zip(nearly(chain).deviation, apart, strict=True):
         assert np.linalg.norm(of_many, axis=1).max() == pytest.approx(found, rel=0.3)
 
@@ -211,7 +211,7 @@ def test_what_is_left_of_singular_poses_is_told_where_a_solution_is_left() -> No
     chain = replace(exact, joints=(*exact.joints[:4], shifted, exact.joints[5]), visuals=())
     q = np.random.default_rng(5).uniform(-3.0, 3.0, (6, 6))
     q[1:, 4], q[3, 2] = 0.0, 0.0  # and the arm stretched in one of them
-    form, targets = nearly(chain), targets_of(idealised(chain), q)
+    form, targets = nearly(chain), forward_targets(idealised(chain), q)
     solutions = form.solve(targets)
     (before,), (after,) = form.form.solve(targets).singular, solutions.singular
     assert before.family == after.family == "wrist aligned"
@@ -242,7 +242,7 @@ def test_arms_that_are_truly_different_are_not_taken(name: str) -> None:
 def test_frames_far_along_their_axes_change_nothing() -> None:
     found = there(chain_to_screws(as_built(load_robot("ur5e"), 1e-4)))
     far = replace(found, point=found.point + found.direction * np.array([[3, -50, 20, 70, 9, 1]]).T)
-    one, other = compact(found), compact(far)
+    one, other = compact_axis_points(found), compact_axis_points(far)
     np.testing.assert_allclose(one.point, other.point, atol=1e-9)  # feet on lines 1e-4 from parallel
     assert one.size == pytest.approx(other.size, abs=1e-9)
 
@@ -266,8 +266,8 @@ def test_the_documentation_has_every_word(tmp_path: Path) -> None:
 def test_what_stands_at_q0_is_a_pose_as_any_other(tmp_path: Path) -> None:
     chain = rounded(load_robot("arm6"), tmp_path, 6)
     q = np.tile((0.3, 0.4, -0.5, 0.7, 0.0, 0.2), (1, 1))  # the wrist aligned, to the rounding of the file
-    solutions = nearly(chain).solve(targets_of(chain, q))
-    assert_reached(chain, targets_of(chain, q), solutions)
+    solutions = nearly(chain).solve(forward_targets(chain, q))
+    assert_reached(chain, forward_targets(chain, q), solutions)
     assert solutions.reached.sum() >= 6
     assert math.isfinite(nearly(chain).deviation[0])
 
@@ -278,7 +278,7 @@ def test_beside_a_singular_pose_an_arm_stays_where_it_is_wished(name: str) -> No
     chain = as_built(load_robot(name), 3e-4)
     q = np.random.default_rng(1).uniform(-1.5, 1.5, (100, 6))
     q[:, 4] = 1e-3  # the wrist all but aligned
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     solutions = nearly(chain).solve(targets, q)
     assert_reached(chain, targets, solutions)
     assert away_from(chain, solutions, q).min(axis=1).max() < 1e-4
@@ -288,7 +288,7 @@ def test_beside_a_singular_pose_an_arm_stays_where_it_is_wished(name: str) -> No
 def test_where_no_branch_is_left_a_target_is_searched_for_unless_only_a_closed_form_is_allowed() -> None:
     chain = as_built(load_robot("ur5e"), 2e-3, seed=1)
     q = np.random.default_rng(2).uniform(-np.pi, np.pi, (20000, 6))[[0, 14555]]
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     found = solve(chain, targets)
     assert_reached(chain, targets, found)
     assert found.reached[:, 0].all()

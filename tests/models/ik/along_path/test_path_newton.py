@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from urmpipe_models.ik.path_numeric import DAMPING, recurrence, sweep
-from urmpipe_models.ik.solutions import Targets, targets_of
-from urmpipe_models.ik.task import task_of
+from urmpipe_models.ik.path_numeric import DAMPING, newton_sweep, solve_recurrence
+from urmpipe_models.ik.solutions import Targets, forward_targets
+from urmpipe_models.ik.task import build_task
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -21,22 +21,22 @@ def test_a_recurrence_in_sections_is_the_one_in_turn(count: int) -> None:
     for matrix, offset in zip(matrices, offsets, strict=True):
         expected.append(matrix @ expected[-1] + offset)
     # projections make nothing longer, so that 384 steps add up 384 roundings of numbers below 100 at most
-    np.testing.assert_allclose(recurrence(matrices, offsets), expected[1:], rtol=0.0, atol=1e-11)
+    np.testing.assert_allclose(solve_recurrence(matrices, offsets), expected[1:], rtol=0.0, atol=1e-11)
 
 
 def test_a_sweep_solves_the_linearised_path_exactly() -> None:
     """Each q least in |q - q_{k-1}|^2 + |e_k - J_k (q - p_k)|^2 / lambda^2: normal equations, in turn."""
     arm = load_robot("urm6")
     q = np.array([0.3, 2.0, 0.4, 2.5, 0.2, 1.0]) + 0.01 * np.arange(30)[:, None]
-    targets = Targets(targets_of(arm, q).position)
+    targets = Targets(forward_targets(arm, q).position)
     guess = q + 0.002 * np.random.default_rng(1).normal(size=q.shape)
     held = np.full(6, np.nan)
     held[2] = guess[0, 2]
     guess[:, 2] = held[2]
-    swept = sweep(task_of(arm, targets), guess, q[0], held, np.full(30, DAMPING))
+    swept = newton_sweep(build_task(arm, targets), guess, q[0], held, np.full(30, DAMPING))
     free = np.isnan(held)
     J = jacobian_over_log(arm, guess)[:, :3] * free
-    error = targets.position - targets_of(arm, guess).position
+    error = targets.position - forward_targets(arm, guess).position
     last = np.where(free, q[0], held)
     for k in range(30):
         A = np.eye(6) + J[k].T @ J[k] / DAMPING

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_models.ik.solutions import USUAL_SEARCH, Search
+from urmpipe_models.ik.solutions import DEFAULT_SEARCH, SearchOptions
 
 
 def test_the_usual_search_makes_sense() -> None:
-    assert list(USUAL_SEARCH.faults()) == []
-    assert list(Search(1e-9, 0, 0).faults()) == list(Search(restarts=np.int64(3)).faults()) == []  # type: ignore[arg-type]
+    assert list(DEFAULT_SEARCH.faults()) == []
+    assert list(SearchOptions(1e-9, 0, 0).faults()) == []
+    assert list(SearchOptions(restarts=np.int64(3)).faults()) == []  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -29,9 +30,9 @@ def test_the_usual_search_makes_sense() -> None:
     ],
 )
 def test_a_value_that_makes_no_sense_is_told(wrong: dict[str, Any], text: str) -> None:
-    assert [str(one) for one in Search(**wrong).faults()] == [text]
+    assert [str(one) for one in SearchOptions(**wrong).faults()] == [text]
 
 
 def test_all_values_that_make_no_sense_are_told() -> None:
-    told = Search(tolerance=-1.0, restarts=-1, seed=-1).faults()
+    told = SearchOptions(tolerance=-1.0, restarts=-1, seed=-1).faults()
     assert [fault.parameter for fault in told] == ["tolerance", "restarts", "seed"]

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from urmpipe_models.ik.solutions import Singular, Solutions, no_solutions
+from urmpipe_models.ik.solutions import SingularPoses, Solutions, empty_solutions
 
 TURN = 2.0 * math.pi
 
@@ -14,7 +14,7 @@ def two_targets() -> Solutions:
     q = np.array([[[3.0], [-1.0]], [[np.nan], [0.5]]])
     reasons = np.array([["", ""], ["too far", ""]], dtype=np.object_)
     where = np.array([[True, False], [False, True]])
-    return Solutions(q, ("up", "down"), reasons, (Singular("arm stretched", where),))
+    return Solutions(q, ("up", "down"), reasons, (SingularPoses("arm stretched", where),))
 
 
 def test_labels_and_shortfall_have_defaults_of_the_right_shape() -> None:
@@ -35,7 +35,7 @@ def test_the_nearest_solution_is_taken_by_the_shorter_way() -> None:
 
 
 def test_where_there_are_none_reasons_can_be_made_longer() -> None:
-    none = no_solutions(["short", ""], ("up", "down"), 3)
+    none = empty_solutions(["short", ""], ("up", "down"), 3)
     assert none.q.shape == (2, 2, 3) and np.isnan(none.q).all()
     assert none.reasons.tolist() == [["short", "short"], ["", ""]]
     none.reasons[0] += ", and more"
@@ -57,7 +57,7 @@ def test_what_is_picked_keeps_branch_reason_family_and_shortfall() -> None:
 
 
 def test_a_target_without_solutions_has_each_reason_once() -> None:
-    none = no_solutions(["too far", "not finite"], ("up", "down"), 3)
+    none = empty_solutions(["too far", "not finite"], ("up", "down"), 3)
     assert [none.reason(0), none.reason(1)] == ["too far", "not finite"]
     assert none.q.shape == (2, 2, 3) and not none.reached.any()
     assert two_targets().reason(1) is None

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.ik.task import arm_of, tool_motion
+from urmpipe_models.ik.task import prepare_chain, tool_motion
 from urmpipe_models.kinematics.forward import jacobian_over_log, poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -22,7 +22,7 @@ def test_any_chain_has_the_pose_and_the_jacobian_of_its_kinematics(
     """Fixed frames, slides, mimics, any axis; entries of some metres at most, some products: 1e-12."""
     chain = data.draw(chains)
     q = np.random.default_rng(rows).uniform(-3.0, 3.0, (rows, len(chain.coordinates)))
-    tool = tool_motion(arm_of(chain), np.ascontiguousarray(q.T))
+    tool = tool_motion(prepare_chain(chain), np.ascontiguousarray(q.T))
     position, rotation = poses_over_log(chain, q)
     np.testing.assert_allclose(tool.position.T, position, atol=1e-12)
     np.testing.assert_allclose(tool.columns.transpose(2, 1, 0), rotation, atol=1e-12)
@@ -31,7 +31,7 @@ def test_any_chain_has_the_pose_and_the_jacobian_of_its_kinematics(
 
 @pytest.mark.parametrize("robot", ["urm6", "urm8", "panda", "ur5e"])
 def test_a_row_has_the_same_bits_alone_and_beside_others(robot: str) -> None:
-    arm = arm_of(load_robot(robot))
+    arm = prepare_chain(load_robot(robot))
     q = np.random.default_rng(0).uniform(-3.0, 3.0, (len(arm.chain.coordinates), 50))
     whole = tool_motion(arm, q)
     for rows in ([0], [7, 9], list(range(13, 50))):

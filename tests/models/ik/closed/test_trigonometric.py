@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.trigonometric import BOUNDARY, linear_roots, quadric_roots, wrapped
+from urmpipe_models.ik.trigonometric import BOUNDARY, linear_roots, quadric_roots, wrap_angle
 
 ROUNDING = 4e-15  # an angle up to pi through atan2, a sum and a wrap
 factors = st.floats(-10.0, 10.0)
@@ -36,7 +36,7 @@ def through(x: float, y: float) -> FloatArray:
 
 
 def apart(x: FloatArray, y: FloatArray) -> FloatArray:
-    return np.asarray(np.abs(wrapped(x - y)))
+    return np.asarray(np.abs(wrap_angle(x - y)))
 
 
 def roots_of(k: FloatArray) -> FloatArray:
@@ -46,7 +46,7 @@ def roots_of(k: FloatArray) -> FloatArray:
 def test_angles_are_wrapped_into_a_half_open_turn() -> None:
     turns = np.array([0.0, math.pi, -math.pi, 3 * math.pi, 7.0, -7.0])
     expected = [0.0, math.pi, math.pi, math.pi, 7.0 - 2 * math.pi, 2 * math.pi - 7.0]
-    np.testing.assert_allclose(wrapped(turns), expected, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(wrap_angle(turns), expected, rtol=0, atol=ROUNDING)
 
 
 @given(a=factors, b=factors, x=angles)

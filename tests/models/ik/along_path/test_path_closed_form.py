@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
-from urmpipe_models.ik.path import follow, jump_samples
-from urmpipe_models.ik.solutions import Search, Targets, targets_of
+from urmpipe_models.ik.path import find_jumps, solve_path
+from urmpipe_models.ik.solutions import SearchOptions, Targets, forward_targets
 from urmpipe_models.ik.solve import solve
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -59,7 +59,7 @@ def test_the_motion_that_a_path_was_made_from_is_found_again(
 ) -> None:
     arm = load_robot(robot)
     q = line(UR + np.array(one), UR + np.array(other), 40)
-    path = follow(arm, targets_of(arm, q), times(40), start=q[0])
+    path = solve_path(arm, forward_targets(arm, q), times(40), start=q[0])
     np.testing.assert_allclose(path.q, q, rtol=0.0, atol=ROUNDING)
     assert path.jumps == ()
     assert path.singular == ()
@@ -72,7 +72,7 @@ def test_turns_are_counted_on_up_to_the_limits() -> None:
     q = line(
         UR + np.array([2.0, 0.0, 0.0, 0.0, 0.0, -6.0]), UR + np.array([5.5, 0.0, 0.0, 0.0, 0.0, 5.5]), 600
     )
-    path = follow(arm, targets_of(arm, q), times(600), start=q[0])
+    path = solve_path(arm, forward_targets(arm, q), times(600), start=q[0])
     np.testing.assert_allclose(path.q, q, rtol=0.0, atol=ROUNDING)
     assert path.jumps == ()
 
@@ -92,7 +92,7 @@ def aligned_half_way(robot: str) -> tuple[Chain, FloatArray]:
 @pytest.mark.parametrize("robot", ["arm6", "articulated6r", "ur5e"])
 def test_through_an_aligned_wrist_the_joints_go_on_as_they_were(robot: str) -> None:
     arm, q = aligned_half_way(robot)
-    path = follow(arm, targets_of(arm, q), times(201), start=q[0])
+    path = solve_path(arm, forward_targets(arm, q), times(201), start=q[0])
     # rad: 1e-12 over the sine of 0.003 rad, with a margin of ten
     np.testing.assert_allclose(path.q, q, rtol=0.0, atol=1e-8)
     assert path.jumps == ()
@@ -104,7 +104,7 @@ def test_through_an_aligned_wrist_the_joints_go_on_as_they_were(robot: str) -> N
 def test_a_path_within_an_aligned_wrist_keeps_the_free_joints_still(robot: str) -> None:
     arm, q = aligned_half_way(robot)
     q[:, 4] = 0.0
-    path = follow(arm, targets_of(arm, q), times(201), start=q[0])
+    path = solve_path(arm, forward_targets(arm, q), times(201), start=q[0])
     # rad: nothing is near singular here, the family is resolved as it is
     np.testing.assert_allclose(path.q, q, rtol=0.0, atol=ROUNDING)
     assert path.jumps == ()
@@ -122,8 +122,8 @@ def test_a_walk_is_what_taking_the_nearest_sample_by_sample_gives(seed: int, rob
         arm = limited(arm, joint, *sorted(rng.uniform([-9.0, 2.0], [-2.0, 9.0])))
     t = np.linspace(0.0, 1.0, 40)[:, None]
     q = rng.uniform(-2.0, 2.0, 6) + rng.uniform(-2.0, 2.0, 6) * t
-    targets = targets_of(arm, q)
-    path = follow(arm, targets, times(40), start=q[0])
+    targets = forward_targets(arm, q)
+    path = solve_path(arm, targets, times(40), start=q[0])
     every = solve(arm, targets, every=True)
     turns = 2.0 * math.pi * np.arange(-4.0, 5.0)
     lower, upper = (np.array([getattr(one, side) for one in arm.moving]) for side in ("lower", "upper"))
@@ -143,10 +143,10 @@ def test_a_walk_is_what_taking_the_nearest_sample_by_sample_gives(seed: int, rob
 def test_what_is_out_of_reach_is_left_out_and_the_branch_goes_on() -> None:
     arm = load_robot("ur5e")
     q = line(UR, UR + np.array([1.0, 0.2, 0.1, 0.3, 0.2, -0.4]), 300)
-    targets = targets_of(arm, q)
+    targets = forward_targets(arm, q)
     targets.position[100:150, 0] += 3.0
     targets.position[200] = math.nan
-    path = follow(arm, targets, times(300), start=q[0])
+    path = solve_path(arm, targets, times(300), start=q[0])
     out = np.zeros(300, dtype=bool)
     out[100:150] = out[200] = True
     assert (path.reached == ~out).all()
@@ -162,7 +162,7 @@ def moved_over_a_gap(by: list[float]) -> tuple[FloatArray, Targets]:
     first = line(UR, UR + 0.1, 20)
     first[:, 4] -= 0.9
     q = np.vstack((first, first + np.array(by)))
-    targets = targets_of(load_robot("ur5e"), q)
+    targets = forward_targets(load_robot("ur5e"), q)
     targets.position[18:22, 2] += 3.0
     return q, targets
 
@@ -170,18 +170,18 @@ def moved_over_a_gap(by: list[float]) -> tuple[FloatArray, Targets]:
 def test_after_a_gap_the_branch_of_before_goes_on_though_another_is_nearer() -> None:
     arm = load_robot("ur5e")
     q, targets = moved_over_a_gap([0.0, 0.0, 0.0, 2.9, 0.0, 2.9])
-    path = follow(arm, targets, times(40), start=q[0])
+    path = solve_path(arm, targets, times(40), start=q[0])
     np.testing.assert_allclose(path.q[22:], q[22:], rtol=0.0, atol=ROUNDING)
     assert path.branch[22] == path.branch[17]
     assert path.jumps == ()
-    nearest = follow(arm, targets.rows(slice(22, 40)), times(18), start=path.q[17])
+    nearest = solve_path(arm, targets.rows(slice(22, 40)), times(18), start=path.q[17])
     assert nearest.branch[0] != path.branch[22]
 
 
 def test_another_branch_after_a_gap_is_told_as_a_jump() -> None:
     arm = limited(load_robot("ur5e"), 0, -2.0, 2.0)
     q, targets = moved_over_a_gap([2.5, 0.0, 0.0, 0.0, 0.0, 0.0])
-    path = follow(arm, targets, times(40), start=q[0])
+    path = solve_path(arm, targets, times(40), start=q[0])
     (jump,) = path.jumps
     assert jump.sample == 22
     assert (jump.from_branch, jump.to_branch) == (path.branch[17], path.branch[22])
@@ -193,9 +193,9 @@ def test_a_joint_that_starts_anew_by_a_turn_over_a_gap_is_told_as_a_jump_and_as_
     upper = arm.moving[5].upper
     q = line(UR, UR + np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.2]), 40)
     q[:, 5] += upper - UR[5] - 0.1
-    targets = targets_of(arm, q)
+    targets = forward_targets(arm, q)
     targets.position[18:22, 2] += 3.0
-    path = follow(arm, targets, times(40), start=q[0])
+    path = solve_path(arm, targets, times(40), start=q[0])
     assert path.branch[22] == path.branch[17]
     (jump,) = path.jumps
     assert (jump.last, jump.sample, jump.from_branch) == (17, 22, jump.to_branch)
@@ -211,12 +211,12 @@ def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
     arm = load_robot("ur5e")
     stretched = np.array([0.3, -0.9, 0.0, -0.7, 1.2, 0.3])
     q = line(stretched + np.array([0.0, 0.0, 0.4, 0.0, 0.0, 0.0]), stretched, 41)
-    targets = targets_of(arm, q)
+    targets = forward_targets(arm, q)
     shoulder = np.array([0.0, 0.0, 0.1625])
     away = targets.position[-1] - shoulder
     targets.position[-1] += 0.002 * away / np.linalg.norm(away)
-    assert not follow(arm, targets, times(41), start=q[0]).reached[-1]
-    path = follow(arm, targets, times(41), start=q[0], search=Search(tolerance=0.0035))
+    assert not solve_path(arm, targets, times(41), start=q[0]).reached[-1]
+    path = solve_path(arm, targets, times(41), start=q[0], search=SearchOptions(tolerance=0.0035))
     assert path.reached.all()
     assert path.branch[-1] == "nearest point"
     assert 0.0 < path.shortfall[-1] <= 0.002 + 1e-9  # m: the pose before the shift is that near
@@ -227,11 +227,11 @@ def test_nearest_points_one_after_the_other_stay_in_their_turns() -> None:
     arm = load_robot("ur5e")
     stretched = np.array([0.3, -0.9, 0.0, -0.7, 1.2, 0.3])
     q = line(stretched + np.array([0.0, 0.0, 0.4, 0.0, 0.0, 0.0]), stretched, 41)
-    targets = targets_of(arm, q)
+    targets = forward_targets(arm, q)
     away = targets.position - np.array([0.0, 0.0, 0.1625])
     away /= np.linalg.norm(away, axis=1)[:, None]
     targets.position[:] += np.linspace(0.0, 0.004, 41)[:, None] * away
-    path = follow(arm, targets, times(41), start=q[0], search=Search(tolerance=0.0035))
+    path = solve_path(arm, targets, times(41), start=q[0], search=SearchOptions(tolerance=0.0035))
     assert path.reached.all()
     assert (path.branch == "nearest point").sum() > 10
     # rad: restarts find other turns of the same points, up to 12.6 away
@@ -244,8 +244,8 @@ def test_a_branch_that_ends_is_left_by_a_jump_that_is_told() -> None:
     q = line(
         UR + np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0]), UR + np.array([3.2, 0.0, 0.0, 0.0, 0.0, 0.0]), 121
     )
-    targets = targets_of(free, q)
-    path = follow(arm, targets, times(121), start=q[0])
+    targets = forward_targets(free, q)
+    path = solve_path(arm, targets, times(121), start=q[0])
     assert path.reached.all()
     assert path.q[:, 0].max() <= 3.0
     (jump,) = path.jumps
@@ -271,7 +271,7 @@ def test_a_joint_at_the_end_of_its_turns_starts_anew_and_that_is_told() -> None:
     upper = arm.moving[5].upper
     q = line(UR, UR + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.4]), 81)
     q[:, 5] += upper - 0.5
-    path = follow(arm, targets_of(arm, q), times(81), start=q[0])
+    path = solve_path(arm, forward_targets(arm, q), times(81), start=q[0])
     (jump,) = path.jumps
     assert jump.sample == int(np.argmax(q[:, 5] > upper))
     assert jump.from_branch == jump.to_branch
@@ -286,7 +286,7 @@ def test_a_joint_that_would_be_too_fast_is_told_once_a_stretch() -> None:
     t = np.linspace(0.0, 1.0, 201)
     q = np.repeat(UR[None], 201, axis=0)
     q[:, 0] += 0.4 * np.sin(2.0 * math.pi * 2.0 * t)  # 5.03 rad/s at most, allowed: 3.14
-    path = follow(arm, targets_of(arm, q), times(201), start=q[0])
+    path = solve_path(arm, forward_targets(arm, q), times(201), start=q[0])
     speed = np.abs(np.diff(q[:, 0])) / 0.005
     over = speed > arm.moving[0].velocity
     assert [one.joint for one in path.too_fast] == [arm.coordinates[0]] * 5
@@ -298,25 +298,27 @@ def test_a_joint_that_would_be_too_fast_is_told_once_a_stretch() -> None:
         f"samples 0 to {first.last} from 0.000 s: joint {arm.coordinates[0]} moves at"
         f" {speed.max():.4g} rad/s, allowed: 3.142"
     )
-    slow = follow(arm, targets_of(arm, q), 2 * times(201), start=q[0])
+    slow = solve_path(arm, forward_targets(arm, q), 2 * times(201), start=q[0])
     assert slow.too_fast == ()
 
 
 def test_the_start_decides_the_branch() -> None:
     arm = load_robot("ur5e")
     q = line(UR, UR + 0.2, 20)
-    targets = targets_of(arm, q)
+    targets = forward_targets(arm, q)
     away = UR * [1.0, 1.0, 1.0, 1.0, -1.0, 1.0] + np.array([0.0, 0.0, 0.0, 3.0, 0.0, 3.0])
-    flipped = follow(arm, targets, times(20), start=away)
-    assert flipped.branch[0] != follow(arm, targets, times(20), start=UR).branch[0]
+    flipped = solve_path(arm, targets, times(20), start=away)
+    assert flipped.branch[0] != solve_path(arm, targets, times(20), start=UR).branch[0]
     assert flipped.jumps == ()
-    np.testing.assert_allclose(targets_of(arm, flipped.q).position, targets.position, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(
+        forward_targets(arm, flipped.q).position, targets.position, rtol=0.0, atol=1e-10
+    )
 
 
 def test_a_step_is_a_jump_only_if_half_of_it_leaves_the_path() -> None:
     arm = load_robot("ur5e")
     bent = UR
-    every = solve(arm, targets_of(arm, bent[None]), every=True)
+    every = solve(arm, forward_targets(arm, bent[None]), every=True)
     flipped = every.q[0, every.branches.index("left, elbow up, flipped")]
     aligned = UR * [1.0, 1.0, 1.0, 1.0, 0.0, 1.0]
     apart = np.array([0.0, 0.0, 0.0, 0.4, 0.0, 0.4])
@@ -326,15 +328,15 @@ def test_a_step_is_a_jump_only_if_half_of_it_leaves_the_path() -> None:
         (np.array([bent, bent + np.array([0, 0, 0, 0, 0, 2.0 * math.pi])]), [1]),
         (np.array([aligned, aligned + 0.01 + apart]), []),
     ):
-        assert jump_samples(arm, q, False).tolist() == expected
+        assert find_jumps(arm, q, False).tolist() == expected
 
 
 def test_all_that_is_wrong_with_the_options_is_told_at_once() -> None:
     arm = load_robot("ur5e")
-    targets = targets_of(arm, line(UR, UR + 0.1, 3))
-    search = Search(tolerance=-1.0, restarts=-1, seed=-1)
+    targets = forward_targets(arm, line(UR, UR + 0.1, 3))
+    search = SearchOptions(tolerance=-1.0, restarts=-1, seed=-1)
     with pytest.raises(OptionError) as caught:
-        follow(arm, targets, np.array([0, 5, 5]), start=np.zeros(5), search=search)
+        solve_path(arm, targets, np.array([0, 5, 5]), start=np.zeros(5), search=search)
     assert [str(one) for one in caught.value.findings] == [
         "t_ns: found 5 ns at sample 2 after 5 ns, allowed: times that rise",
         "start: found [0., 0., 0., 0., 0.], allowed: 6 finite numbers, in rad or m, one each of"
@@ -344,6 +346,6 @@ def test_all_that_is_wrong_with_the_options_is_told_at_once() -> None:
     with pytest.raises(
         OptionError, match=r"t_ns: found float64 of shape \(2,\), allowed: integer ns of shape \(3,\)"
     ):
-        follow(arm, targets, np.array([0.0, 1.0]))
+        solve_path(arm, targets, np.array([0.0, 1.0]))
     with pytest.raises(OptionError, match="targets: found none, allowed: a path of one sample or more"):
-        follow(arm, Targets(np.empty((0, 3))), times(0))
+        solve_path(arm, Targets(np.empty((0, 3))), times(0))

@@ -11,8 +11,8 @@ from asserting import there
 from urmpipe_models.arm.chain import Chain, Joint, Mimic
 from urmpipe_models.arm.geometric_models import DHRow, dh_chain, modified_dh_chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.closed import ClosedForm, closed_form, exact_form
-from urmpipe_models.ik.solutions import targets_of
+from urmpipe_models.ik.closed import ClosedForm, closed_form, exact_closed_form
+from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import Transform, from_offset
 from urmpipe_models.robots.catalogue import load_robot, robot_names
@@ -52,7 +52,7 @@ def name_of(chain: Chain) -> str | None:
 
 def solutions_of(chain: Chain, q: FloatArray) -> FloatArray:
     form = there(closed_form(chain))
-    return form.solve(targets_of(chain, q)).q
+    return form.solve(forward_targets(chain, q)).q
 
 
 def nearest_misses(solutions: FloatArray, q: FloatArray) -> FloatArray:
@@ -134,7 +134,7 @@ def test_an_arm_that_is_off_by_ten_micrometres_has_its_form_nearly(
     name: str, joint: int, offset: tuple[float, ...]
 ) -> None:
     off = moved(load_robot(name), joint, offset)
-    assert exact_form(off) is None
+    assert exact_closed_form(off) is None
     assert name_of(off) == f"{FORMS[name]}, nearly"
 
 

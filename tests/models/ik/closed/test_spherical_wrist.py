@@ -24,7 +24,7 @@ from spherical_arms import (
 )
 from urmpipe_models.arm.chain import Chain, Joint, Mimic
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.solutions import Targets, targets_of
+from urmpipe_models.ik.solutions import Targets, forward_targets
 from urmpipe_models.ik.spherical import spherical_wrist
 from urmpipe_models.kinematics.forward import Screws, chain_to_screws
 from urmpipe_models.math3d import from_offset, rotation_about, translation
@@ -59,7 +59,7 @@ def kr3() -> Chain:
 def test_ten_thousand_poses_are_reached_by_every_solution_the_given_one_among_them(robot: str) -> None:
     chain = load_robot(robot)
     q = random_joints(np.random.default_rng(2019), chain, 10_000)
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     solutions = inverse_of(chain).solve(targets)
     assert_reached(chain, targets, solutions)
     assert_explained(solutions)
@@ -76,7 +76,7 @@ def test_random_arms_are_reached_by_every_solution_the_given_one_among_them(spec
     for _ in range(40 if special == "plain" else 8):
         chain = random_arm(generator, special)
         q = random_joints(generator, chain, 60)
-        targets = targets_of(chain, q)
+        targets = forward_targets(chain, q)
         solutions = inverse_of(chain).solve(targets)
         assert_reached(chain, targets, solutions)
         assert_explained(solutions)
@@ -96,7 +96,7 @@ def test_prismatic_joints_among_the_first_three(kinds: str, special: str) -> Non
             continue
         forms += 1
         q = random_joints(generator, chain, 60)
-        targets = targets_of(chain, q)
+        targets = forward_targets(chain, q)
         solutions = form.solve(targets)
         assert_reached(chain, targets, solutions)
         assert_explained(solutions)
@@ -132,7 +132,7 @@ def test_small_industrial_arm() -> None:
     chain = kr3()
     generator = np.random.default_rng(3)
     q = random_joints(generator, chain, 500)
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     solutions = inverse_of(chain).solve(targets)
     assert_reached(chain, targets, solutions)
     assert away_from(chain, solutions, q).min(axis=1).max() < FOUND
@@ -143,7 +143,7 @@ def test_elbow_up_is_above_the_line_from_shoulder_to_wrist_on_both_sides() -> No
     for chain in (load_robot("arm6"), kr3()):
         form = inverse_of(chain)
         q = random_joints(np.random.default_rng(5), chain, 300)
-        solutions = form.solve(targets_of(chain, q))
+        solutions = form.solve(forward_targets(chain, q))
         (up, *_), (column, *_) = form.screws.direction, form.screws.point
         held = 0
         for slot, name in enumerate(form.branches):
@@ -182,7 +182,7 @@ def test_names_base_tool_and_zeros_change_no_branch(seed: int, special: str) -> 
     form, anew = inverse_of(chain), inverse_of(other)
     assert form.branches == anew.branches
     q = random_joints(generator, chain, 20)
-    one, two = form.solve(targets_of(chain, q)), anew.solve(targets_of(other, q - zeros))
+    one, two = form.solve(forward_targets(chain, q)), anew.solve(forward_targets(other, q - zeros))
     # away from where two solutions meet: there a rounding may part or unite them, or move the given digits
     clear = (one.reached.sum(axis=1) == two.reached.sum(axis=1)) & ~_crowded(chain, one.q)
     assert clear.sum() >= 10
@@ -210,7 +210,7 @@ def test_an_elbow_joint_that_counts_the_other_way_changes_no_branch(special: str
     joints[2] = Joint("other way", "revolute", joints[2].origin, (-x, -y, -z))
     other = Chain("other way", tuple(joints), tip=chain.tip, base=chain.base, tool=chain.tool)
     q = random_joints(generator, chain, 50)
-    one, two = (inverse_of(arm).solve(targets_of(chain, q)) for arm in (chain, other))
+    one, two = (inverse_of(arm).solve(forward_targets(chain, q)) for arm in (chain, other))
     np.testing.assert_array_equal(one.reached, two.reached)
     away = one.q * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0] - two.q
     away -= 2 * math.pi * np.round(away / (2 * math.pi))
@@ -226,7 +226,7 @@ def test_a_branch_keeps_its_name_along_a_path_without_singular_poses() -> None:
         form = inverse_of(chain)
         start = random_joints(generator, chain, 1)[0]
         q = start + np.linspace(0.0, 1.0, 400)[:, None] * generator.uniform(-0.3, 0.3, 6)
-        solutions = form.solve(targets_of(chain, q))
+        solutions = form.solve(forward_targets(chain, q))
         followed = away_from(chain, solutions, q).argmin(axis=1)
         clear = ~_crowded(chain, solutions.q)
         assert clear.sum() > 100
@@ -240,7 +240,7 @@ def test_many_targets_at_once_are_one_by_one() -> None:
         chain = random_arm(generator, special)
         form = inverse_of(chain)
         q = random_joints(generator, chain, 21)
-        targets = targets_of(chain, q)
+        targets = forward_targets(chain, q)
         targets.position[::7] += 3.0  # some out of reach
         together = form.solve(targets)
         for row in range(21):
@@ -255,7 +255,7 @@ def test_a_bad_row_gives_its_reason_and_touches_no_other(special: str) -> None:
     generator = np.random.default_rng(2)
     chain = random_arm(generator, special)
     form = inverse_of(chain)
-    targets = targets_of(chain, random_joints(generator, chain, 6))
+    targets = forward_targets(chain, random_joints(generator, chain, 6))
     good = form.solve(targets)
     targets.position[1] = np.nan
     targets.position[2] = np.inf
@@ -319,7 +319,7 @@ def test_a_joint_that_follows_another_is_no_screw() -> None:
 def test_unreachable_tilt_of_a_wrist_that_is_not_square_is_told_with_figures() -> None:
     chain = random_arm(np.random.default_rng(8), "like a PUMA", alpha4=0.5, alpha5=-0.8)
     generator = np.random.default_rng(9)
-    targets = targets_of(chain, random_joints(generator, chain, 200))
+    targets = forward_targets(chain, random_joints(generator, chain, 200))
     turned = Targets(targets.position, there(targets.rotation)[::-1].copy())
     solutions = inverse_of(chain).solve(turned)
     assert_reached(chain, turned, solutions)

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from parallel_arms import EXACT, apart, assert_every_solution_meets, form_of, rotation_matrix
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.solutions import Targets, targets_of
+from urmpipe_models.ik.solutions import Targets, forward_targets
 from urmpipe_models.math3d import Transform, from_offset
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -64,7 +64,7 @@ FAMILIES = (
 def test_poses_at_and_near_singular_ones_are_met(family: str, distance: float) -> None:
     chain = load_robot("ur5e")
     q = singular_joints(family, distance)
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     for near in (None, q):
         solutions = form_of(chain).solve(targets, near)
         assert_every_solution_meets(chain, targets, solutions, EXACT)
@@ -80,7 +80,7 @@ def test_poses_at_and_near_singular_ones_are_met(family: str, distance: float) -
 def test_at_singular_poses_the_joints_near_by_are_found_again(family: str) -> None:
     chain = load_robot("ur5e")
     q = singular_joints(family, 0.0)
-    solutions = form_of(chain).solve(targets_of(chain, q), near=q)
+    solutions = form_of(chain).solve(forward_targets(chain, q), near=q)
     assert apart(solutions, q).max() < 1e-5  # the root of the rounding of poses where two branches meet
 
 
@@ -89,7 +89,7 @@ def test_near_an_aligned_wrist_a_stretched_arm_stays_in_reach(distance: float) -
     chain = load_robot("ur5e")
     q = singular_joints("wrist aligned", distance)
     q[:, 2] = distance
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     solutions = form_of(chain).solve(targets, q)
     assert_every_solution_meets(chain, targets, solutions, EXACT)
     assert solutions.reached.any(axis=1).all()
@@ -98,7 +98,7 @@ def test_near_an_aligned_wrist_a_stretched_arm_stays_in_reach(distance: float) -
 def test_straight_up_three_families_meet_and_the_start_is_found() -> None:
     chain = load_robot("ur5e")
     q = np.array([chain.start])
-    solutions = form_of(chain).solve(targets_of(chain, q))
+    solutions = form_of(chain).solve(forward_targets(chain, q))
     assert solutions.families(0) == ["wrist beside axis 1", "wrist aligned", "arm stretched"]
     assert apart(solutions, q)[0] < 1e-7
     assert solutions.reached[0].tolist() == [True, *[False] * 7]
@@ -108,7 +108,7 @@ def test_straight_up_three_families_meet_and_the_start_is_found() -> None:
 def test_an_aligned_wrist_has_both_flips_and_says_what_is_free_and_what_was_chosen() -> None:
     chain = load_robot("ur5e")
     q = np.array([[0.3, -1.0, 1.2, -0.5, 0.0, 0.2]])
-    solutions = form_of(chain).solve(targets_of(chain, q))
+    solutions = form_of(chain).solve(forward_targets(chain, q))
     assert solutions.reached.all()
     (aligned,) = [one for one in solutions.singular if one.family == "wrist aligned"]
     # with q5 = 0 the right or the left arm is aligned, and the other one reaches the pose with another q5
@@ -128,7 +128,7 @@ def test_an_aligned_wrist_has_both_flips_and_says_what_is_free_and_what_was_chos
 def test_where_q6_of_the_convention_is_out_of_reach_the_nearest_in_reach_is_taken() -> None:
     chain = load_robot("ur5e")
     q = np.array([[0.3, -1.0, 0.001, -0.5, 0.0, 2.0]])
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     solutions = form_of(chain).solve(targets)
     assert_every_solution_meets(chain, targets, solutions, EXACT)
     (stretched,) = [one for one in solutions.singular if one.family == "arm stretched"]
@@ -141,7 +141,7 @@ def test_where_q6_of_the_convention_is_out_of_reach_the_nearest_in_reach_is_take
 def test_two_branches_that_are_one_are_told_once_whatever_stands_before_them() -> None:
     chain = load_robot("ur5e")
     regular, stretched = [0.3, -1.0, 1.2, -0.5, 0.7, 0.2], [0.3, -1.0, 0.0, -0.5, 0.7, 0.2]
-    targets = targets_of(chain, np.array([regular, stretched, regular]))
+    targets = forward_targets(chain, np.array([regular, stretched, regular]))
     together = form_of(chain).solve(targets)
     assert any(text.startswith("the same as") for text in together.reasons[1])
     for row in range(3):
@@ -170,7 +170,7 @@ def arm_without_shoulder_offset(upper: float, fore: float) -> Chain:
 def test_an_arm_with_equal_links_leaves_q2_free_where_it_is_folded() -> None:
     chain = arm_without_shoulder_offset(0.4, 0.4)
     q = np.array([[0.4, 0.7, math.pi, -0.3, 1.0, 0.5]])
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     solutions = form_of(chain).solve(targets)
     assert_every_solution_meets(chain, targets, solutions, EXACT)
     (folded,) = [one for one in solutions.singular if one.free == "b: any value"]

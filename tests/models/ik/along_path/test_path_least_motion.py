@@ -12,9 +12,9 @@ from urmpipe_datasets import LOGS
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik import path_numeric as sliding_window
-from urmpipe_models.ik.path import JointPath, follow
+from urmpipe_models.ik.path import JointPath, solve_path
 from urmpipe_models.ik.path_numeric import LeastMotionPath, SlidingWindow
-from urmpipe_models.ik.solutions import Search, Targets, misses, targets_of
+from urmpipe_models.ik.solutions import SearchOptions, Targets, forward_targets, pose_errors
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.math3d import Transform, translation
 from urmpipe_models.robots.catalogue import load_robot
@@ -39,7 +39,7 @@ def demo_path() -> FloatArray:
 
 @pytest.fixture(scope="module")
 def followed(demo_path: FloatArray) -> JointPath:
-    return follow(load_robot("urm6"), Targets(demo_path), times(len(demo_path)))
+    return solve_path(load_robot("urm6"), Targets(demo_path), times(len(demo_path)))
 
 
 def planar(count: int, lower: float = -math.inf, upper: float = math.inf) -> Chain:
@@ -50,7 +50,7 @@ def planar(count: int, lower: float = -math.inf, upper: float = math.inf) -> Cha
 
 
 def assert_met(path: JointPath, targets: Targets) -> None:
-    distance, turn = misses(path.chain, path.q, targets)
+    distance, turn = pose_errors(path.chain, path.q, targets)
     assert path.reached.all(), list(path.reasons[path.reasons != ""])
     assert np.linalg.norm(distance, axis=1).max() <= NANOMETRE
     # rad: the solver counts rotations as arcs of a quarter of the arm, 0.2 m and more of these arms
@@ -112,7 +112,7 @@ def test_windows_give_what_one_sample_after_the_other_gives(
     for target in demo_path[rows.start + 1 : rows.stop]:
         q = last = expected[-1]
         for _ in range(6):
-            error, _ = misses(chain, q[None], Targets(target[None]))
+            error, _ = pose_errors(chain, q[None], Targets(target[None]))
             J = jacobian_over_log(chain, q[None])[0, :3]
             q = last + np.linalg.pinv(J) @ (error[0] + J @ (q - last))
         expected.append(q)
@@ -124,9 +124,9 @@ def test_windows_give_what_one_sample_after_the_other_gives(
 def test_windows_of_other_sizes_give_the_same_motion(
     followed: JointPath, demo_path: FloatArray, longest: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sliding_window, "LONGEST", longest)
+    monkeypatch.setattr(sliding_window, "WINDOW_SIZE", longest)
     count = 1500
-    path = follow(followed.chain, Targets(demo_path[:count]), times(count))
+    path = solve_path(followed.chain, Targets(demo_path[:count]), times(count))
     # rad: at the singular start the nanometre leaves that open; what comes after goes on from there
     np.testing.assert_allclose(path.q, followed.q[:count], rtol=0.0, atol=2e-6)
     steps, expected = np.diff(path.q[1000:], axis=0), np.diff(followed.q[1000:count], axis=0)
@@ -142,7 +142,7 @@ def test_at_the_singular_start_the_joints_do_not_follow_the_rounding_of_the_file
 def test_joints_within_pi_are_unwrapped_by_the_repolarizer(
     followed: JointPath, demo_path: FloatArray
 ) -> None:
-    wrapped = follow(followed.chain, Targets(demo_path), followed.t_ns, within_pi=True)
+    wrapped = solve_path(followed.chain, Targets(demo_path), followed.t_ns, within_pi=True)
     assert np.abs(followed.q).max() > math.pi
     assert wrapped.q.max() <= math.pi
     assert wrapped.q.min() > -math.pi
@@ -159,8 +159,8 @@ def test_a_redundant_arm_follows_poses_within_its_limits() -> None:
     panda = load_robot("panda")
     t = np.linspace(0.0, 6.0, 500)[:, None]
     q = np.array(panda.start) + 0.4 * np.sin(t * np.linspace(0.3, 1.0, 7))
-    targets = targets_of(panda, q)
-    path = follow(panda, targets, times(len(q)), start=q[0])
+    targets = forward_targets(panda, q)
+    path = solve_path(panda, targets, times(len(q)), start=q[0])
     assert_met(path, targets)
     assert path.jumps == ()
     assert_least_motion(path, 0.01)
@@ -172,11 +172,11 @@ def test_a_joint_is_held_on_its_limit_and_let_go_again() -> None:
     free, limited = planar(3), planar(3, upper=0.5)
     start = np.array([0.2, -0.6, 0.3])
     t = np.linspace(0.0, 2.0 * math.pi, 400)
-    circle = targets_of(free, start[None]).position + 0.6 * np.column_stack(
+    circle = forward_targets(free, start[None]).position + 0.6 * np.column_stack(
         (np.cos(t) - 1.0, np.sin(t), np.zeros_like(t))
     )
-    without = follow(free, Targets(circle), times(400), start=start)
-    path = follow(limited, Targets(circle), times(400), start=start)
+    without = solve_path(free, Targets(circle), times(400), start=start)
+    path = solve_path(limited, Targets(circle), times(400), start=start)
     assert without.q[:, 0].max() > 0.6
     assert_met(path, Targets(circle))
     assert path.q[:, 0].max() == 0.5
@@ -199,14 +199,14 @@ def test_what_is_out_of_reach_has_a_reason_and_the_path_goes_on_after_it() -> No
     t = np.linspace(0.0, 1.0, 301)
     reach = 2.5 + 1.2 * np.sin(math.pi * t)
     line = np.column_stack((reach, np.zeros((301, 2))))
-    path = follow(arm, Targets(line), times(301), start=np.array([0.6, -1.0, 0.1]))
+    path = solve_path(arm, Targets(line), times(301), start=np.array([0.6, -1.0, 0.1]))
     out = reach > 3.0
     assert (path.reached == ~out).all()
     assert np.isnan(path.q[out]).all()
     assert all(path.reasons[out])
     assert not any(path.reasons[~out])
     assert (path.branch[out] == "").all()
-    distance, _ = misses(arm, path.q[~out], Targets(line[~out]))
+    distance, _ = pose_errors(arm, path.q[~out], Targets(line[~out]))
     assert np.abs(distance).max() <= NANOMETRE
     assert path.jumps == ()
 
@@ -214,9 +214,9 @@ def test_what_is_out_of_reach_has_a_reason_and_the_path_goes_on_after_it() -> No
 def test_another_bend_after_a_gap_is_told_as_a_jump() -> None:
     free, arm = planar(2), planar(2, upper=1.0)
     q = np.array([0.9, -1.0]) + np.linspace(0.0, 0.2, 41)[:, None] * np.array([1.0, 0.0])
-    targets = Targets(targets_of(free, q).position)
+    targets = Targets(forward_targets(free, q).position)
     targets.position[18:22] *= 2.0
-    path = follow(arm, targets, times(41), start=q[0])
+    path = solve_path(arm, targets, times(41), start=q[0])
     assert (np.flatnonzero(~path.reached) == np.arange(18, 22)).all()
     (jump,) = path.jumps
     assert (jump.last, jump.sample, jump.from_branch, jump.to_branch) == (17, 22, "1", "2")
@@ -228,8 +228,12 @@ def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
     arm = planar(3)
     reach = 2.9 + 0.102 * np.sin(np.linspace(0.0, math.pi, 101))
     line = np.column_stack((reach, np.zeros((101, 2))))
-    path = follow(
-        arm, Targets(line), times(101), start=np.array([0.3, -0.5, 0.1]), search=Search(tolerance=0.003)
+    path = solve_path(
+        arm,
+        Targets(line),
+        times(101),
+        start=np.array([0.3, -0.5, 0.1]),
+        search=SearchOptions(tolerance=0.003),
     )
     assert path.reached.all()
     # m: along x the arm reaches 3 m; the nearest point is found to 1e-6 rad about it, so much better
@@ -240,11 +244,11 @@ def test_nearest_points_one_after_the_other_stay_in_their_turns() -> None:
     arm = load_robot("ur5e")
     stretched = np.array([0.3, -0.9, 0.0, -0.7, 0.3, 0.3])
     q = stretched + np.linspace(0.4, 0.0, 41)[:, None] * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-    targets = targets_of(arm, q)
+    targets = forward_targets(arm, q)
     away = targets.position - np.array([0.0, 0.0, 0.1625])
     away /= np.linalg.norm(away, axis=1)[:, None]
     targets.position[:] += np.linspace(0.0, 0.004, 41)[:, None] * away
-    path = LeastMotionPath(arm, targets, q[0], Search(tolerance=0.0035), lambda share: None)
+    path = LeastMotionPath(arm, targets, q[0], SearchOptions(tolerance=0.0035), lambda share: None)
     assert np.isfinite(path.q).all()
     assert (path.shortfall > 0.0).sum() > 10
     # rad: restarts find other turns of the same points, 6.28 away
@@ -254,10 +258,10 @@ def test_nearest_points_one_after_the_other_stay_in_their_turns() -> None:
 def test_a_sample_that_is_none_stops_no_other() -> None:
     arm = planar(3)
     line = np.column_stack((np.linspace(2.0, 2.2, 21), np.zeros((21, 2))))
-    whole = follow(arm, Targets(line), times(21), start=np.array([0.6, -1.0, 0.1]))
+    whole = solve_path(arm, Targets(line), times(21), start=np.array([0.6, -1.0, 0.1]))
     broken = line.copy()
     broken[10] = math.nan
-    path = follow(arm, Targets(broken), times(21), start=np.array([0.6, -1.0, 0.1]))
+    path = solve_path(arm, Targets(broken), times(21), start=np.array([0.6, -1.0, 0.1]))
     assert path.reasons[10] == "the position is nan, nan, nan m, allowed: finite numbers"
     assert path.reached.sum() == 20
     # rad: least motion of two steps and of one, 0.01 m each, differ in second order
@@ -267,10 +271,10 @@ def test_a_sample_that_is_none_stops_no_other() -> None:
 def test_one_sample_and_equal_samples_are_paths_too() -> None:
     arm = load_robot("urm6")
     start = np.array([0.3, 2.0, 0.4, 2.5, 0.2, 1.0])
-    one = targets_of(arm, start[None] + 0.05)
-    assert_met(follow(arm, one, times(1), start=start), one)
+    one = forward_targets(arm, start[None] + 0.05)
+    assert_met(solve_path(arm, one, times(1), start=start), one)
     twice = Targets(np.repeat(one.position, 2, axis=0))
-    path = follow(arm, twice, times(2), start=start)
+    path = solve_path(arm, twice, times(2), start=start)
     assert_met(path, twice)
     # rad: there is nothing to move for
     np.testing.assert_allclose(path.q[0], path.q[1], rtol=0.0, atol=1e-9)
@@ -280,9 +284,9 @@ def test_one_sample_and_equal_samples_are_paths_too() -> None:
 @pytest.mark.parametrize("place", [math.nan, 9.0])
 def test_a_path_of_which_no_sample_has_a_solution_has_a_reason_each(robot: str, place: float) -> None:
     arm = load_robot(robot)
-    targets = targets_of(arm, np.full((3, 6), 0.3))
+    targets = forward_targets(arm, np.full((3, 6), 0.3))
     targets.position[:] = place
-    path = follow(arm, targets, times(3), within_pi=True, search=Search(restarts=2))
+    path = solve_path(arm, targets, times(3), within_pi=True, search=SearchOptions(restarts=2))
     assert not path.reached.any()
     assert all("finite numbers" in text if math.isnan(place) else " m" in text for text in path.reasons)
     assert list(path.branch) == ["", "", ""]
@@ -304,11 +308,11 @@ def test_prismatic_joints_follow_too() -> None:
     )
     t = np.linspace(0.0, 3.0, 100)
     q = np.column_stack((np.sin(t), np.cos(t), 0.4 * np.sin(t), 0.7 * t))
-    targets = targets_of(gantry, q)
-    path = follow(gantry, targets, times(100), start=q[0])
+    targets = forward_targets(gantry, q)
+    path = solve_path(gantry, targets, times(100), start=q[0])
     # m and rad: linear in the lengths, so as near as targets are met
     np.testing.assert_allclose(path.q, q, rtol=0.0, atol=5.0 * NANOMETRE)
-    positions = follow(gantry, Targets(targets.position), times(100), start=q[0])
+    positions = solve_path(gantry, Targets(targets.position), times(100), start=q[0])
     np.testing.assert_allclose(positions.q[:, :3], q[:, :3], rtol=0.0, atol=NANOMETRE)
     assert (positions.q[:, 3] == q[0, 3]).all()  # nothing asks the last joint to turn
 
@@ -317,7 +321,7 @@ def test_far_apart_samples_are_followed_one_by_one() -> None:
     arm = planar(3)
     angles = np.linspace(0.0, 3.0, 7)
     circle = np.column_stack((2.0 * np.cos(angles), 2.0 * np.sin(angles), np.zeros(7)))
-    path = follow(arm, Targets(circle), times(7), start=np.array([0.8, -0.9, -0.9]))
+    path = solve_path(arm, Targets(circle), times(7), start=np.array([0.8, -0.9, -0.9]))
     assert_met(path, Targets(circle))
     assert path.jumps == ()
 
@@ -325,7 +329,7 @@ def test_far_apart_samples_are_followed_one_by_one() -> None:
 def test_from_a_nearly_singular_start_no_large_correction_is_trusted() -> None:
     start = np.array([0.1, 0.02, 0.0])
     target = Targets(np.array([[0.0, 1.2, 0.0]]))
-    path = follow(planar(3), target, times(1), start=start)
+    path = solve_path(planar(3), target, times(1), start=start)
     assert_met(path, target)
     # rad: 2.07 by steps of 0.1; the whole first correction ends 8.03 away, after a turn in vain
     assert np.linalg.norm(path.q[0] - start) < 2.5
@@ -335,7 +339,7 @@ def test_after_a_rescue_no_joint_is_held_where_one_was_before() -> None:
     free, limited = planar(3), planar(3, upper=0.5)
     q = np.array([0.45, -0.6, 0.3]) + np.linspace(0.0, 0.3, 40)[:, None] * np.array([1.0, 0.3, 0.0])
     elsewhere = np.array([-1.8, 0.4, 0.3])  # out of reach with joint 1 at 0.5 rad
-    targets = targets_of(free, np.vstack((q, elsewhere + np.linspace(0.0, 0.02, 20)[:, None])))
+    targets = forward_targets(free, np.vstack((q, elsewhere + np.linspace(0.0, 0.02, 20)[:, None])))
     asked = []
 
     def rescue(sample: int, last: FloatArray) -> FloatArray:
@@ -355,10 +359,10 @@ def test_after_a_rescue_no_joint_is_held_where_one_was_before() -> None:
 @pytest.mark.parametrize("robot", ["urm6", "ur5e"])
 def test_the_share_that_is_done_rises_to_the_whole(robot: str) -> None:
     arm = load_robot(robot)
-    targets = targets_of(arm, np.array(arm.start) + 0.3 + np.linspace(0.0, 0.5, 900)[:, None])
+    targets = forward_targets(arm, np.array(arm.start) + 0.3 + np.linspace(0.0, 0.5, 900)[:, None])
     targets.position[300:400] += 9.0
     told: list[float] = []
-    follow(arm, targets, times(900), start=np.array(arm.start) + 0.3, progress=told.append)
+    solve_path(arm, targets, times(900), start=np.array(arm.start) + 0.3, progress=told.append)
     assert told == sorted(told)
     assert told[-1] == 1.0
     assert told[0] >= 0.0
@@ -371,7 +375,7 @@ def test_a_far_step_starts_from_the_sample_before_turns_and_all() -> None:
     angles = np.append(np.linspace(0.0, 9.0, 400), [10.5, 12.0])
     circle = np.column_stack((2.0 * np.cos(angles), 2.0 * np.sin(angles), np.zeros(402)))
     start = np.array([0.8, -0.9, -0.9])
-    path = follow(arm, Targets(circle), times(402), start=start)
+    path = solve_path(arm, Targets(circle), times(402), start=start)
     assert_met(path, Targets(circle))
     assert path.q[-1, 0] - path.q[0, 0] > 9.0
     assert np.abs(np.diff(path.q[-3:], axis=0)).max() < 2.0  # rad: the base turns by about 1.5 a step
@@ -381,5 +385,7 @@ def test_the_same_seed_gives_the_same_motion_bit_for_bit() -> None:
     arm = planar(3)
     rng = np.random.default_rng(5)
     targets = Targets(np.column_stack((rng.uniform(-2.5, 2.5, (8, 2)), np.zeros(8))))
-    one, other = (follow(arm, targets, times(8), search=Search(seed=3, restarts=5)) for _ in range(2))
+    one, other = (
+        solve_path(arm, targets, times(8), search=SearchOptions(seed=3, restarts=5)) for _ in range(2)
+    )
     assert np.array_equal(one.q, other.q, equal_nan=True)

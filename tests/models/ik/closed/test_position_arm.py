@@ -9,7 +9,7 @@ import pytest
 
 from spherical_arms import assert_reached, away_from, inverse_of, random_arm, random_joints
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.solutions import targets_of
+from urmpipe_models.ik.solutions import forward_targets
 
 NEARLY = {
     "axes 1 and 2 nearly meet": "a1",
@@ -90,7 +90,7 @@ def test_an_arm_that_is_almost_special_loses_no_digit(parameter: str, off: float
     for _ in range(3):
         chain = random_arm(generator, "plain", "RRR", **{parameter: off})
         q = random_joints(generator, chain, 120)
-        targets = targets_of(chain, q)
+        targets = forward_targets(chain, q)
         solutions = inverse_of(chain).solve(targets)
         assert_reached(chain, targets, solutions)
         lost += int((away_from(chain, solutions, q).min(axis=1) > 2e-5).sum())
@@ -104,7 +104,7 @@ def test_an_arm_that_is_almost_special_twice_loses_no_posture(off: float) -> Non
     generator = np.random.default_rng(16)
     chain = random_arm(generator, "plain", "RRR", a1=off, alpha2=off)
     q = random_joints(generator, chain, 200)
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     solutions = inverse_of(chain).solve(targets)
     assert_reached(chain, targets, solutions)
     assert away_from(chain, solutions, q).min(axis=1).max() < 2e-5

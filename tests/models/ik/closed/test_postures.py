@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from urmpipe_models.ik.position_arm import SAME, Meeting, leave_out_equal, leave_out_second
+from urmpipe_models.ik.position_arm import DUPLICATE_TOLERANCE, Meeting, mask_coincident, mask_duplicates
 
 TURNING = np.array([True, True, False])
 NAMES = ("one", "two", "three")
@@ -23,7 +23,7 @@ def test_of_equal_postures_the_first_stays_and_the_others_name_it() -> None:
     )
     reasons = np.full((3, 4), "", dtype=np.object_)
     meeting: Meeting = {}
-    leave_out_equal(q, TURNING, 1.0, NAMES, reasons, meeting)
+    mask_duplicates(q, TURNING, 1.0, NAMES, reasons, meeting)
     same = "the same as one: both meet here"
     assert reasons.tolist() == [["", "", "", ""], ["", same, same, ""], ["", "", same, ""]]
     np.testing.assert_array_equal(np.isnan(q), np.broadcast_to(reasons == same, q.shape))
@@ -35,15 +35,15 @@ def test_of_equal_postures_the_first_stays_and_the_others_name_it() -> None:
 
 def test_postures_are_one_below_a_bound_that_grows_with_the_arm_for_slides_alone() -> None:
     for turn, slide, size, one in (
-        (0.9 * SAME, 0.0, 4.0, True),
-        (1.1 * SAME, 0.0, 4.0, False),
-        (0.0, 0.9 * SAME * 4.0, 4.0, True),
-        (0.0, SAME * 4.0, 4.0, False),
+        (0.9 * DUPLICATE_TOLERANCE, 0.0, 4.0, True),
+        (1.1 * DUPLICATE_TOLERANCE, 0.0, 4.0, False),
+        (0.0, 0.9 * DUPLICATE_TOLERANCE * 4.0, 4.0, True),
+        (0.0, DUPLICATE_TOLERANCE * 4.0, 4.0, False),
     ):
         q = np.zeros((3, 2, 1))
         q[1, 1], q[2, 1] = turn, slide
         meeting: Meeting = {}
-        leave_out_equal(q, TURNING, size, NAMES, np.full((2, 1), "", dtype=np.object_), meeting)
+        mask_duplicates(q, TURNING, size, NAMES, np.full((2, 1), "", dtype=np.object_), meeting)
         assert bool(np.isnan(q[0, 1, 0])) == bool(meeting) == one
 
 
@@ -51,7 +51,7 @@ def test_where_postures_met_before_they_meet_still() -> None:
     meeting: Meeting = {"postures meet": np.array([[True, False, False], [False, False, False]])}
     q = np.zeros((3, 2, 3))
     q[0, 1] = [1.0, 1.0, 0.0]
-    leave_out_equal(q, TURNING, 1.0, NAMES, np.full((2, 3), "", dtype=np.object_), meeting)
+    mask_duplicates(q, TURNING, 1.0, NAMES, np.full((2, 3), "", dtype=np.object_), meeting)
     assert meeting["postures meet"].tolist() == [[True, False, True], [False] * 3]
 
 
@@ -65,7 +65,7 @@ def test_the_second_of_two_sides_or_elbows_is_left_out() -> None:
         u1, u3 = np.ones((2, 2, 2, 2)), np.full((2, 2, 2, 2), 2.0)
         reasons = np.full((2, 2, 2), "", dtype=np.object_)
         reasons[..., 1] = "too far"
-        leave_out_second(u1, u3, reasons, meet, names, axis)
+        mask_coincident(u1, u3, reasons, meet, names, axis)
         gone = np.zeros((2, 2, 2), dtype=bool)
         gone[sides] = meet[sides]
         for u, value in ((u1, 1.0), (u3, 2.0)):

@@ -14,7 +14,7 @@ from asserting import there
 from parallel_arms import WRISTS, form_of, poses, random_arm
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.solutions import Targets, targets_of
+from urmpipe_models.ik.solutions import Targets, forward_targets
 from urmpipe_models.kinematics.forward import chain_to_screws
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.math3d import rotation_about
@@ -133,7 +133,7 @@ def test_a_branch_keeps_its_name_along_a_path_between_singular_poses(wrist: str)
     for _ in range(6):
         chain = load_robot("ur5e") if wrist == "ur" else random_arm(rng, wrist)
         q = rng.uniform(-math.pi, math.pi, 6) + np.linspace(0.0, 1.0, 400)[:, None] * rng.uniform(-1, 1, 6)
-        solutions = form_of(chain).solve(targets_of(chain, q))
+        solutions = form_of(chain).solve(forward_targets(chain, q))
         away = np.abs(np.remainder(solutions.q - q[:, None] + math.pi, 2.0 * math.pi) - math.pi).max(axis=2)
         column = np.where(solutions.reached, away, np.inf).argmin(axis=1)
         smallest = singularity_over_log(chain, q).smallest

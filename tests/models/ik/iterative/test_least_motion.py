@@ -10,10 +10,10 @@ import pytest
 
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.ik.numeric import AT_LIMIT, LEAST_MOTION, Settings, settle
+from urmpipe_models.ik.numeric import AT_LIMIT_TOLERANCE, MOTION_TOLERANCE, DescentOptions, minimise_motion
 from urmpipe_models.ik.restarts import refine
-from urmpipe_models.ik.solutions import Targets, limits_of, misses, targets_of
-from urmpipe_models.ik.task import task_of, turn_length
+from urmpipe_models.ik.solutions import Targets, forward_targets, joint_limits, pose_errors
+from urmpipe_models.ik.task import build_task, orientation_length
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.math3d import translation
 from urmpipe_models.robots.catalogue import load_robot
@@ -22,17 +22,17 @@ from urmpipe_models.robots.catalogue import load_robot
 def posed(robot: str, pose: bool, count: int, noise: float) -> tuple[Chain, Targets, FloatArray]:
     """Return an arm, targets within its reach, and starts beside the joint values that they come from."""
     chain = load_robot(robot)
-    lower, upper = limits_of(chain)
+    lower, upper = joint_limits(chain)
     rng = np.random.default_rng(8)
     q = rng.uniform(np.maximum(lower, -math.pi), np.minimum(upper, math.pi), (count, len(lower)))
-    targets = targets_of(chain, q)
+    targets = forward_targets(chain, q)
     home = np.clip(q + rng.normal(0.0, noise, q.shape), lower, upper)
     return chain, targets if pose else Targets(targets.position), home
 
 
 def weighted_jacobian(chain: Chain, q: FloatArray, pose: bool) -> FloatArray:
     J = jacobian_over_log(chain, q)
-    J[:, 3:] *= turn_length(chain)
+    J[:, 3:] *= orientation_length(chain)
     return J if pose else J[:, :3]
 
 
@@ -40,17 +40,17 @@ def assert_least_motion(chain: Chain, q: FloatArray, home: FloatArray, pose: boo
     """Hold the conditions of Karush, Kuhn and Tucker: home - q is J^T lambda and pulls against limits."""
     from scipy.optimize import lsq_linear
 
-    lower, upper = limits_of(chain)
+    lower, upper = joint_limits(chain)
     for row, J in enumerate(weighted_jacobian(chain, q, pose)):
         wish = home[row] - q[row]
-        low, high = q[row] <= lower + AT_LIMIT, q[row] >= upper - AT_LIMIT
+        low, high = q[row] <= lower + AT_LIMIT_TOLERANCE, q[row] >= upper - AT_LIMIT_TOLERANCE
         free = ~(low | high)
         # the joints that are held pull outwards or not at all: least squares over lambda and those pulls
         pulls = np.diag(np.where(low, -1.0, 1.0))[:, ~free]
         bounds = np.r_[np.full(len(J), -np.inf), np.zeros(pulls.shape[1])], np.inf
         left = lsq_linear(np.hstack([J.T, pulls]), wish, bounds, tol=1e-14)
         # t is a projection of what is left; released one at a time, each joint may leave LEAST_MOTION
-        assert np.abs(left.fun).max() < 10.0 * LEAST_MOTION, (row, free, left.fun)
+        assert np.abs(left.fun).max() < 10.0 * MOTION_TOLERANCE, (row, free, left.fun)
 
 
 @pytest.mark.slow
@@ -64,17 +64,17 @@ def test_a_target_that_leaves_freedoms_is_met_with_least_motion(robot: str, pose
     refined = refine(chain, targets, home)
     met = refined.converged
     assert met.mean() > 0.9
-    assert (refined.slack[met] <= LEAST_MOTION).all()
+    assert (refined.slack[met] <= MOTION_TOLERANCE).all()
     assert_least_motion(chain, refined.q[met], home[met], pose)
 
 
 def test_joints_at_limits_take_part_in_the_rule() -> None:
     """Some solutions of the panda stand at a limit, others have come off one that they started at."""
     chain, targets, home = posed("panda", False, 300, 0.6)
-    lower, upper = limits_of(chain)
+    lower, upper = joint_limits(chain)
     home[::2, 3] = upper[3]
     refined = refine(chain, targets, home)
-    at_limit = (refined.q <= lower + AT_LIMIT) | (refined.q >= upper - AT_LIMIT)
+    at_limit = (refined.q <= lower + AT_LIMIT_TOLERANCE) | (refined.q >= upper - AT_LIMIT_TOLERANCE)
     assert (at_limit.any(axis=1) & refined.converged).sum() > 20
     assert ((refined.q[::2, 3] < upper[3] - 0.01) & refined.converged[::2]).sum() > 20
     assert_least_motion(chain, refined.q[refined.converged], home[refined.converged], False)
@@ -105,8 +105,8 @@ def test_no_solution_is_left_for_one_that_is_farther_from_home(robot: str, pose:
     """Homes anywhere: a step that has overshot may meet the target farther away, turns away even."""
     chain, targets, home = posed(robot, pose, 200, 2.0)
     q = posed(robot, pose, 200, 0.0)[2]
-    settings = Settings(*limits_of(chain))
-    after, _ = settle(task_of(chain, targets), q.T.copy(), home.T.copy(), settings)
+    settings = DescentOptions(*joint_limits(chain))
+    after, _ = minimise_motion(build_task(chain, targets), q.T.copy(), home.T.copy(), settings)
     before = np.square(q - home).sum(axis=1)
     assert (np.square(after.T - home).sum(axis=1) <= before + 1e-12).all()  # rounding of a row at rest
 
@@ -117,13 +117,13 @@ def test_least_motion_counts_from_home_wherever_the_search_begins() -> None:
     around = refine(chain, targets, direct.q + 0.02, home=home)
     assert around.converged.all()
     # both end within LEAST_MOTION of where the gradient is 0; its slope is about 1
-    np.testing.assert_allclose(around.q, direct.q, atol=100 * LEAST_MOTION)
+    np.testing.assert_allclose(around.q, direct.q, atol=100 * MOTION_TOLERANCE)
 
 
 def test_a_whole_turn_is_no_motion_of_a_joint_that_turns_without_end() -> None:
     chain, targets, home = posed("urm8", True, 10, 0.02)
     plain, turned = refine(chain, targets, home), refine(chain, targets, home + 2 * math.pi, home=home)
-    np.testing.assert_allclose(turned.q, plain.q, atol=100 * LEAST_MOTION)
+    np.testing.assert_allclose(turned.q, plain.q, atol=100 * MOTION_TOLERANCE)
 
 
 def test_a_radian_counts_as_a_metre() -> None:
@@ -137,15 +137,15 @@ def test_a_radian_counts_as_a_metre() -> None:
     x, y, turn = -found.q[0]
     assert abs(turn) > 0.05
     lever = 0.5 * np.array([math.sin(turn), math.cos(turn)])  # of -turn: what turns back by 1 rad moves
-    np.testing.assert_allclose(turn, lever @ [x, y], atol=10 * LEAST_MOTION)
+    np.testing.assert_allclose(turn, lever @ [x, y], atol=10 * MOTION_TOLERANCE)
     both = Chain("slides", (slides[0], replace(slides[0], name="x2")))
     shared = refine(both, Targets(np.array([[1.0, 0.0, 0.0]])), np.array([0.2, 0.0]))
-    np.testing.assert_allclose(shared.q, [[0.6, 0.4]], atol=LEAST_MOTION)  # 0.8 m shared by halves
+    np.testing.assert_allclose(shared.q, [[0.6, 0.4]], atol=MOTION_TOLERANCE)  # 0.8 m shared by halves
 
 
 def test_what_is_left_of_a_miss_does_not_grow_with_the_motion_along_the_null_space() -> None:
     chain, targets, home = posed("panda", True, 60, 0.8)
     refined = refine(chain, targets, home)
-    distance, turn = misses(chain, refined.q[refined.converged], targets.rows(refined.converged))
+    distance, turn = pose_errors(chain, refined.q[refined.converged], targets.rows(refined.converged))
     assert np.linalg.norm(distance, axis=1).max() <= 1.01e-10
     assert np.linalg.norm(turn, axis=1).max() <= 1.01e-10

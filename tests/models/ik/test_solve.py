@@ -10,7 +10,7 @@ from asserting import refusal, there
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
-from urmpipe_models.ik.solutions import Search, Solutions, Targets, misses, targets_of
+from urmpipe_models.ik.solutions import SearchOptions, Solutions, Targets, forward_targets, pose_errors
 from urmpipe_models.ik.solve import Method, solve
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -23,12 +23,12 @@ def poses(chain: Chain, count: int, seed: int = 0) -> tuple[FloatArray, Targets]
     low = np.maximum([one.lower for one in joints], -math.pi)
     high = np.minimum([one.upper for one in joints], math.pi)
     q = np.random.default_rng(seed).uniform(low, high, (count, len(joints)))
-    return q, targets_of(chain, q)
+    return q, forward_targets(chain, q)
 
 
 def assert_met(chain: Chain, targets: Targets, found: Solutions, within: float = MET) -> None:
     row, column = np.nonzero(found.reached)
-    position, angle = misses(chain, found.q[row, column], targets.rows(row))
+    position, angle = pose_errors(chain, found.q[row, column], targets.rows(row))
     assert np.abs(position).max(initial=0.0) < within
     assert np.abs(angle).max(initial=0.0) < within
     lower, upper = np.array([(one.lower, one.upper) for one in chain.moving]).T
@@ -66,7 +66,7 @@ def test_one_solution_is_the_nearest_of_all_and_keeps_the_name_of_its_branch() -
 def test_a_joint_that_a_singular_pose_leaves_free_is_taken_from_the_start() -> None:
     chain = load_robot("ur5e")
     q = np.array([0.3, -1.0, 1.2, -0.5, 0.0, 0.8])  # an aligned wrist: q6 is free
-    targets = targets_of(chain, q[None])
+    targets = forward_targets(chain, q[None])
     np.testing.assert_allclose(solve(chain, targets, start=q).q[0, 0], q, atol=1e-9)
     every = solve(chain, targets, start=q, every=True)
     assert np.abs(every.q[0] - q).max(axis=1)[every.reached[0]].min() < 1e-9
@@ -81,7 +81,7 @@ def test_a_joint_that_a_singular_pose_leaves_free_is_taken_from_the_start() -> N
 
 def test_without_a_start_the_one_solution_is_near_the_start_of_the_robot() -> None:
     chain = load_robot("ur5e")
-    targets = targets_of(chain, np.array([chain.start]))
+    targets = forward_targets(chain, np.array([chain.start]))
     found = solve(chain, targets)
     np.testing.assert_allclose(found.q[0, 0], chain.start, atol=1e-7)  # three singular families meet there
 
@@ -110,7 +110,7 @@ def test_where_limits_refuse_the_choice_of_a_free_joint_they_choose(
     name: str, q: list[float], limit: float
 ) -> None:
     chain = narrow(load_robot(name), -limit, limit)
-    targets = targets_of(chain, np.array([q]))
+    targets = forward_targets(chain, np.array([q]))
     for start in (None, np.zeros(6), np.array(q)):
         found = solve(chain, targets, start=start, every=True)
         assert found.reached.any()
@@ -127,7 +127,7 @@ def test_where_limits_refuse_the_choice_of_a_free_joint_they_choose(
 def test_limits_that_chose_a_free_joint_are_told() -> None:
     chain = narrow(load_robot("arm6"), -2.0, 2.0)
     (aligned,) = solve(
-        chain, targets_of(chain, np.array([[0.4, 0.6, 0.5, 1.2, 0.0, 1.8]])), every=True
+        chain, forward_targets(chain, np.array([[0.4, 0.6, 0.5, 1.2, 0.0, 1.8]])), every=True
     ).singular
     assert aligned.chosen.endswith(", or what the limits of the joints allow")
 
@@ -170,9 +170,9 @@ REASONS = [
 def test_a_bad_target_has_a_reason_and_stops_no_other(name: str, every: bool) -> None:
     chain = load_robot(name)
     targets = bad_targets(chain)
-    found = solve(chain, targets, every=every, search=Search(restarts=40 if name == "urm6" else 0))
+    found = solve(chain, targets, every=every, search=SearchOptions(restarts=40 if name == "urm6" else 0))
     good = targets.rows(np.array([0, 6]))
-    alone = solve(chain, good, every=every, search=Search(restarts=40 if name == "urm6" else 0))
+    alone = solve(chain, good, every=every, search=SearchOptions(restarts=40 if name == "urm6" else 0))
     np.testing.assert_allclose(found.q[[0, 6]], alone.q, atol=1e-9)
     assert alone.reached.any(axis=1).all()
     x, y, z = (f"{value:g}" for value in (targets.position[1, 0], targets.position[1, 1], 0.0))
@@ -198,7 +198,7 @@ def test_a_position_beyond_all_digits_stops_no_other(name: str, far: float) -> N
 
 def test_a_bad_target_before_a_singular_one_leaves_the_family_where_it_is() -> None:
     chain = load_robot("ur5e")
-    targets = targets_of(
+    targets = forward_targets(
         chain, np.array([[0.3, -1.0, 1.2, -0.5, 1.0, 0.8], [0.3, -1.0, 1.2, -0.5, 0.0, 0.8]])
     )
     position = np.vstack((np.full((1, 3), math.nan), targets.position))
@@ -225,7 +225,7 @@ def test_a_rotation_written_with_seven_digits_is_the_nearest_rotation() -> None:
     written = Targets(targets.position, np.round(there(targets.rotation), 7))
     found = solve(chain, written, start=q)
     assert found.reached.all()
-    position, angle = misses(chain, found.q[:, 0], targets)
+    position, angle = pose_errors(chain, found.q[:, 0], targets)
     assert np.abs(position).max() < 1e-12  # position is kept exactly, and the orientation to its digits
     assert 1e-9 < np.abs(angle).max() < 2e-7
 
@@ -233,20 +233,20 @@ def test_a_rotation_written_with_seven_digits_is_the_nearest_rotation() -> None:
 def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() -> None:
     chain = load_robot("ur5e")
     q = np.array([0.3, -math.pi / 2, 0.0, -math.pi / 2, 1.2, 0.2])  # stretched straight up
-    targets = targets_of(chain, q[None])
+    targets = forward_targets(chain, q[None])
     above = targets.position + np.array([[0.0, 0.0, 0.002], [0.0, 0.0, 0.2]])
     out = Targets(above, np.repeat(there(targets.rotation), 2, axis=0))
     refused = solve(chain, out, start=q)
     assert not refused.reached.any()
-    found = solve(chain, out, start=q, search=Search(tolerance=0.0035))
+    found = solve(chain, out, start=q, search=SearchOptions(tolerance=0.0035))
     assert found.reached[:, 0].tolist() == [True, False]
     assert found.labels[0, 0] == "nearest point"
-    position, _ = misses(chain, found.q[:1, 0], out.rows(slice(0, 1)))
+    position, _ = pose_errors(chain, found.q[:1, 0], out.rows(slice(0, 1)))
     assert np.abs(position).max() <= 0.0035
     np.testing.assert_allclose(found.shortfall[0, 0], np.linalg.norm(position), rtol=1e-6)
     assert found.shortfall[0, 0] > 1e-4 and found.shortfall[1, 0] == 0.0
     assert found.reason(1) is not None and "from axis" in str(found.reason(1))
-    every = solve(chain, out, start=q, every=True, search=Search(tolerance=0.0035))
+    every = solve(chain, out, start=q, every=True, search=SearchOptions(tolerance=0.0035))
     assert every.reached.sum(axis=1).tolist() == [1, 0]
     assert every.labels[0, 0] == "nearest point"
 
@@ -255,7 +255,7 @@ def test_a_tolerance_changes_nothing_where_the_target_is_met() -> None:
     chain = load_robot("ur5e")
     _, targets = poses(chain, 20)
     np.testing.assert_array_equal(
-        solve(chain, targets).q, solve(chain, targets, search=Search(tolerance=0.01)).q
+        solve(chain, targets).q, solve(chain, targets, search=SearchOptions(tolerance=0.01)).q
     )
 
 
@@ -282,7 +282,7 @@ def test_positions_alone_are_solved_iteratively() -> None:
 def test_redundant_arms_are_solved_iteratively() -> None:
     chain = load_robot("panda")
     _, targets = poses(chain, 5)
-    found = solve(chain, targets, search=Search(restarts=40))
+    found = solve(chain, targets, search=SearchOptions(restarts=40))
     assert found.reached.all() and found.q.shape == (5, 1, 7)
     assert_met(chain, targets, found)
 
@@ -299,7 +299,7 @@ def test_everything_wrong_with_the_options_is_told_at_once() -> None:
     chain = load_robot("urm6")
     _, targets = poses(chain, 2)
     odd: Method = "exact"  # type: ignore[assignment]
-    search = Search(tolerance=-1.0, restarts=-2, seed=-1)
+    search = SearchOptions(tolerance=-1.0, restarts=-2, seed=-1)
     with pytest.raises(OptionError) as caught:
         solve(chain, targets, start=np.zeros(5), method=odd, search=search)
     assert [str(one) for one in caught.value.findings] == [
