@@ -22,7 +22,7 @@ from pairs import Bound, in_turn, machine, timed, write_results
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "shared"))
 
 from made_masses import with_drives, with_masses
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.build.fmu import build_fmu
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.dynamics.equations import terms_over_log, torque_over_log
@@ -85,7 +85,7 @@ def inverse_part(count: int) -> tuple[list[str], list[Bound]]:
 def driven_part(count: int) -> tuple[list[str], list[Bound]]:
     """Measure an arm with its drives as one native FMU."""
     with tempfile.TemporaryDirectory() as folder:
-        unit = make_unit("driven_arm", robot=arm())
+        unit = make_block("driven_arm", robot=arm())
         build = timed(lambda: build_fmu(unit, Path(folder) / "arm.fmu", backend="native"))
         it, _ = opened(Path(folder) / "arm.fmu")
         begin = [0]

@@ -21,8 +21,8 @@ from pairs import table as process_table
 
 from urmpipe.systems.blocks import Blocks
 from urmpipe_datasets import LOGS
-from urmpipe_fmus.block import Unit
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.block import BlockModel
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.build.fmu import build_fmu
 from urmpipe_fmus.cosim import Plan, load_system, prepare
 from urmpipe_fmus.cosim.job import ELSEWHERE, Progress
@@ -47,9 +47,9 @@ def sample_joints() -> FloatArray:
     return np.ascontiguousarray(np.loadtxt(LOG, delimiter=",", skiprows=1, usecols=range(1, 7)))
 
 
-def chain_unit() -> Unit:
+def chain_unit() -> BlockModel:
     """Return the chain of the paper's arm, as it is shipped."""
-    return make_unit("kinematic_chain", robot=load_robot("urm6"))
+    return make_block("kinematic_chain", robot=load_robot("urm6"))
 
 
 def ratio(taken: Sequence[float], base: Sequence[float]) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.build.description import TITLES, variable_row
 
 PAGE = Path(__file__).with_name("drives.md")
@@ -14,7 +14,7 @@ BLOCK = re.compile(r"(<!-- variables of (?P<unit>\w+) -->\n).*?(<!-- end -->)", 
 
 def table(name: str) -> str:
     """Return the variables of a unit as a table in Markdown."""
-    rows = [TITLES, ("---",) * len(TITLES), *map(variable_row, make_unit(name).variables)]
+    rows = [TITLES, ("---",) * len(TITLES), *map(variable_row, make_block(name).variables)]
     return "".join(f"| {' | '.join(row)} |\n" for row in rows)
 
 

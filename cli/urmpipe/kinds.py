@@ -83,9 +83,9 @@ def _is_baseline(value: Any) -> bool:
 
 
 def _is_unit(value: Any) -> bool:
-    from urmpipe_fmus.block import Unit
+    from urmpipe_fmus.block import BlockModel
 
-    return isinstance(value, Unit) or _is_path(value)
+    return isinstance(value, BlockModel) or _is_path(value)
 
 
 def _is_network(value: Any) -> bool:
@@ -279,7 +279,7 @@ KINDS = {
     "told": Kind(callable, "a function of a text, such as print"),
     "tolerance": KIND_OF_TOLERANCE,
     "tsp": SECONDS,
-    "build_fmu.unit": Kind(_is_unit, "the name of a unit, a Python file with one, or a Unit"),
+    "build_fmu.unit": Kind(_is_unit, "the name of a unit, a Python file with one, or a BlockModel"),
     "velocities": NUMBERS,
     "velocity": Kind(_is_number, "a number, in m/s"),
     "voice": _one_of("python", "command line"),

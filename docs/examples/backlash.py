@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from urmpipe_fmus.block import Input, Memory, Output, Parameter, Unit, Values
+from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Parameter, Values
 from urmpipe_models.elementwise import Element
 
 
@@ -16,7 +16,7 @@ def joint_angles(v: Values) -> tuple[Element, ...]:
     )
 
 
-unit = Unit(
+unit = BlockModel(
     name="backlash",
     description="Play in the gears of six joints",
     variables=(

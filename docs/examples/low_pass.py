@@ -1,8 +1,8 @@
 """A drive that follows its set point with a delay: a low-pass of the first order."""
 
-from urmpipe_fmus.block import Input, Parameter, State, Unit
+from urmpipe_fmus.block import BlockModel, Input, Parameter, State
 
-unit = Unit(
+unit = BlockModel(
     name="low_pass",
     description="Low-pass of the first order",
     variables=(

@@ -380,7 +380,7 @@ class Recipe:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Unit:
+class BlockModel:
     """A model with FMI variables.
 
     At a communication point t_k the inputs are set and the outputs are those of these inputs at once:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
-from urmpipe_fmus.block import Rows, Unit
+from urmpipe_fmus.block import BlockModel, Rows
 from urmpipe_fmus.run import Equations
 from urmpipe_models.errors import Finding, UnitError
 
@@ -145,7 +145,7 @@ class Dependencies:
         UnitError: If a function of the unit does what could not be traced, or returns other names.
     """
 
-    def __init__(self, unit: Unit) -> None:
+    def __init__(self, unit: BlockModel) -> None:
         given = [Remembering([name]) for one in unit.given for name in one.names]
         time, rows = Remembering([TIME]), None
         if unit.table is not None:

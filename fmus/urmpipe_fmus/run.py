@@ -19,13 +19,13 @@ import numpy as np
 from urmpipe_fmus.block import (
     INTERNAL_STEP,
     LARGEST_INTEGER,
+    BlockModel,
     Function,
     Memory,
     Output,
     Parameter,
     Rows,
     State,
-    Unit,
     Values,
     Variable,
 )
@@ -36,26 +36,26 @@ from urmpipe_models.errors import Finding, UnitError, UrmpipeError
 class Equations:
     """What a unit computes, from one element a scalar to one element a scalar.
 
-    Each method takes the elements of `unit.given` in their order: parameters, inputs, states, memories.
+    Each method takes the elements of `model.given` in their order: parameters, inputs, states, memories.
 
     Attributes:
-        unit: The unit.
+        model: The block model.
     """
 
-    def __init__(self, unit: Unit) -> None:
-        self.unit = unit
+    def __init__(self, model: BlockModel) -> None:
+        self.model = model
 
     def outputs(self, time: Element, given: Sequence[Element], rows: Rows | None = None) -> list[Element]:
-        """Return the elements of `unit.computed`."""
-        return self._called("outputs", self.unit.outputs, self.unit.computed, time, given, rows)
+        """Return the elements of `model.computed`."""
+        return self._called("outputs", self.model.outputs, self.model.computed, time, given, rows)
 
     def derivatives(self, time: Element, given: Sequence[Element], rows: Rows | None = None) -> list[Element]:
-        """Return the derivatives of `unit.states` in [unit/s]."""
-        return self._called("derivatives", self.unit.derivatives, self.unit.states, time, given, rows)
+        """Return the derivatives of `model.states` in [unit/s]."""
+        return self._called("derivatives", self.model.derivatives, self.model.states, time, given, rows)
 
     def update(self, time: Element, given: Sequence[Element], rows: Rows | None = None) -> list[Element]:
-        """Return the next values of `unit.memories`."""
-        return self._called("update", self.unit.update, self.unit.memories, time, given, rows)
+        """Return the next values of `model.memories`."""
+        return self._called("update", self.model.update, self.model.memories, time, given, rows)
 
     def _called(
         self,
@@ -69,8 +69,8 @@ class Equations:
         """Return what a function of the unit gives for some variables, flat."""
         if function is None:
             return []
-        where = f"unit {self.unit.name}: {what}"
-        values = Values(time, named(self.unit.given, given), rows)
+        where = f"unit {self.model.name}: {what}"
+        values = Values(time, named(self.model.given, given), rows)
         try:
             with np.errstate(all="ignore"):  # 1/0 is inf, as in C; who uses it asks whether it is finite
                 result = function(values)
@@ -168,25 +168,25 @@ class Instance:
     of shape (runs,) as well, which step many runs side by side.
 
     Attributes:
-        unit: The unit.
+        model: The block model.
         time: Where it stands in [s].
         stop: Where the simulation ends in [s]; infinite if that is not said.
         running: Whether fixed parameters are fixed: from the first step on.
     """
 
-    def __init__(self, unit: Unit, time: Element = 0.0) -> None:
-        self.unit = unit
+    def __init__(self, model: BlockModel, time: Element = 0.0) -> None:
+        self.model = model
         self.time: Element = np.float64(time)
         self.stop = math.inf
         self.running = False
-        self._equations = Equations(unit)
-        self._owner = [variable for _, variable in unit.scalars]
-        self._index = {name: index for index, (name, _) in enumerate(unit.scalars)}
-        self._values: list[Element] = [np.float64(start) for one in unit.variables for start in one.starts]
-        self._given = self._places(unit.given)
-        self._states = self._places(unit.states)
-        self._memories = self._places(unit.memories)
-        self._computed = self._places(unit.computed)
+        self._equations = Equations(model)
+        self._owner = [variable for _, variable in model.scalars]
+        self._index = {name: index for index, (name, _) in enumerate(model.scalars)}
+        self._values: list[Element] = [np.float64(start) for one in model.variables for start in one.starts]
+        self._given = self._places(model.given)
+        self._states = self._places(model.states)
+        self._memories = self._places(model.memories)
+        self._computed = self._places(model.computed)
         self._stale = True
 
     def reference(self, name: str) -> int:
@@ -197,7 +197,7 @@ class Instance:
         """
         if name not in self._index:
             allowed = ", ".join(self._index)
-            raise UnitError(f"unit {self.unit.name}: no variable {name}; allowed: {allowed}")
+            raise UnitError(f"unit {self.model.name}: no variable {name}; allowed: {allowed}")
         return self._index[name]
 
     def set(self, references: Sequence[int], values: Sequence[Element]) -> None:
@@ -213,7 +213,7 @@ class Instance:
             for fault in self._refusals(reference, value)
         ]
         if faults:
-            raise UnitError(*(f"unit {self.unit.name}: {fault}" for fault in faults))
+            raise UnitError(*(f"unit {self.model.name}: {fault}" for fault in faults))
         for reference, value in zip(references, values, strict=True):
             self._values[reference] = _doubles(value)
         self._stale = True
@@ -226,7 +226,7 @@ class Instance:
         """
         for reference in references:
             if not 0 <= reference < len(self._owner):
-                raise UnitError(f"unit {self.unit.name}: {self._no_reference(reference)}")
+                raise UnitError(f"unit {self.model.name}: {self._no_reference(reference)}")
             if self._stale and isinstance(self._owner[reference], Output):
                 self._refresh()
         return [self._values[reference] for reference in references]
@@ -245,16 +245,16 @@ class Instance:
         """
         if not (math.isfinite(time + step) and step > 0.0):
             raise UnitError(
-                f"unit {self.unit.name}: found a step of {step:g} s at {time:g} s, allowed: finite, above 0"
+                f"unit {self.model.name}: found a step of {step:g} s at {time:g} s, allowed: finite, above 0"
             )
         if not abs(time - self.time) <= max(TIME_SLACK * step, ROUNDING * abs(time)):
             raise UnitError(
-                f"unit {self.unit.name}: found a step from {time:.15g} s,"
+                f"unit {self.model.name}: found a step from {time:.15g} s,"
                 f" allowed: from where it stands, {self.time:.15g} s"
             )
         if time + step - self.stop > STOP_SLACK * step:
             raise UnitError(
-                f"unit {self.unit.name}: found a step to {time + step:g} s,"
+                f"unit {self.model.name}: found a step to {time + step:g} s,"
                 f" allowed: to the stop time, {self.stop:g} s"
             )
         before = (self.time, list(self._values), self._stale)
@@ -275,10 +275,10 @@ class Instance:
             UnitError: If the time is not finite, or the stop time before it.
         """
         if not math.isfinite(time):
-            raise UnitError(f"unit {self.unit.name}: startTime: found {time:g}, allowed: a finite number")
+            raise UnitError(f"unit {self.model.name}: startTime: found {time:g}, allowed: a finite number")
         if stop is not None and not stop >= time:
             raise UnitError(
-                f"unit {self.unit.name}: stopTime: found {stop:g}, allowed: from the start time {time:g} on"
+                f"unit {self.model.name}: stopTime: found {stop:g}, allowed: from the start time {time:g} on"
             )
         self.time, self._stale = np.float64(time), True
         self.stop = math.inf if stop is None else stop
@@ -302,7 +302,7 @@ class Instance:
         """Return why a scalar cannot be set."""
         if not 0 <= reference < len(self._owner):
             return [self._no_reference(reference)]
-        one, name = self._owner[reference], self.unit.scalars[reference][0]
+        one, name = self._owner[reference], self.model.scalars[reference][0]
         if isinstance(one, Output):
             return [f"{name}: set, allowed: an output is computed, not set"]
         if self.running and isinstance(one, (State, Memory)):
@@ -312,7 +312,7 @@ class Instance:
         return [f"{name}: {fault}" for each in _extremes(one, value) for fault in one.refusals(each)][:1]
 
     def _rows(self, time: Element) -> Rows | None:
-        return None if self.unit.table is None else self.unit.table.rows_at(time)
+        return None if self.model.table is None else self.model.table.rows_at(time)
 
     def _elements(self) -> list[Element]:
         return [self._values[place] for place in self._given]
@@ -335,7 +335,7 @@ class Instance:
         largest = self._values[self._index[INTERNAL_STEP]]
         if step / largest > LARGEST_INTEGER:
             raise UnitError(
-                f"unit {self.unit.name}: found a step of {step:g} s in internal steps of {largest:g} s,"
+                f"unit {self.model.name}: found a step of {step:g} s in internal steps of {largest:g} s,"
                 f" allowed: {LARGEST_INTEGER} internal steps"
             )
         count = max(1, math.ceil(step / largest - STEP_SLACK))
@@ -369,7 +369,7 @@ class Instance:
         """
         taken = [_doubles(value) for value in found]
         faults = [
-            f"unit {self.unit.name}: {what} {self.unit.scalars[place][0]} is not finite at"
+            f"unit {self.model.name}: {what} {self.model.scalars[place][0]} is not finite at"
             f" {self._first_not_finite(value):g} s"
             for place, value in zip(places, taken, strict=True)
             if not _all_finite(value)
@@ -408,7 +408,7 @@ def _extremes(variable: Variable, value: Element) -> list[float]:
 
 
 def run(
-    unit: Unit,
+    model: BlockModel,
     t: FloatArray,
     inputs: Mapping[str, Any] | None = None,
     start: Mapping[str, Any] | None = None,
@@ -416,7 +416,7 @@ def run(
     """Run a unit over the samples of a log: the outputs at each sample for the inputs of that sample.
 
     Args:
-        unit: The unit.
+        model: The block model.
         t: Times of the samples in [s], finite, strictly rising, shape (n,).
         inputs: Values of the inputs by variable name, in their units: shape (n,), or (n, size); an input
             that is not named stays at its start.
@@ -433,15 +433,15 @@ def run(
     t = np.asarray(t, dtype=np.float64)
     if t.ndim != 1 or not np.isfinite(t).all() or (np.diff(t) <= 0.0).any():
         raise UnitError(
-            f"unit {unit.name}: found times of shape {t.shape}, allowed: rising times, shape (n,)"
+            f"unit {model.name}: found times of shape {t.shape}, allowed: rising times, shape (n,)"
         )
-    instance = Instance(unit, t[0] if len(t) else 0.0)
+    instance = Instance(model, t[0] if len(t) else 0.0)
     for name, value in (start or {}).items():
-        owner = _variable(unit, name)
-        instance.set([instance.reference(scalar) for scalar in owner.names], _starts(unit, owner, value))
-    columns = _columns(unit, inputs or {}, len(t))
-    shown = [one for one in unit.variables if one.causality == "output"]
-    over = _stepped if unit.states or unit.memories else _at_once
+        owner = _variable(model, name)
+        instance.set([instance.reference(scalar) for scalar in owner.names], _starts(model, owner, value))
+    columns = _columns(model, inputs or {}, len(t))
+    shown = [one for one in model.variables if one.causality == "output"]
+    over = _stepped if model.states or model.memories else _at_once
     found = over(instance, t, columns, [name for one in shown for name in one.names])
     return {
         name: np.column_stack(value) if isinstance(value, tuple) else np.asarray(value)
@@ -449,33 +449,33 @@ def run(
     }
 
 
-def _variable(unit: Unit, name: str) -> Variable:
+def _variable(model: BlockModel, name: str) -> Variable:
     """Return a variable of a unit by name."""
-    allowed = [one.name for one in unit.variables]
+    allowed = [one.name for one in model.variables]
     if name not in allowed:
-        raise UnitError(f"unit {unit.name}: no variable {name}; allowed: {', '.join(allowed)}")
-    return unit.variables[allowed.index(name)]
+        raise UnitError(f"unit {model.name}: no variable {name}; allowed: {', '.join(allowed)}")
+    return model.variables[allowed.index(name)]
 
 
-def _starts(unit: Unit, owner: Variable, value: Any) -> list[float]:
+def _starts(model: BlockModel, owner: Variable, value: Any) -> list[float]:
     """Return the start value of every scalar of a variable: one for all of them, or one each."""
     values: list[float] = np.ravel(np.asarray(value, dtype=np.float64)).tolist()
     counts = sorted({1, owner.width})
     if len(values) not in counts:
         allowed = " or ".join(map(str, counts))
-        raise UnitError(f"unit {unit.name}: {owner.name}: found {len(values)} values, allowed: {allowed}")
+        raise UnitError(f"unit {model.name}: {owner.name}: found {len(values)} values, allowed: {allowed}")
     return values * (owner.width // len(values))
 
 
-def _columns(unit: Unit, inputs: Mapping[str, Any], count: int) -> dict[str, FloatArray]:
+def _columns(model: BlockModel, inputs: Mapping[str, Any], count: int) -> dict[str, FloatArray]:
     """Return the column of every scalar that is given over the log."""
     columns: dict[str, FloatArray] = {}
     for name, value in inputs.items():
-        owner, found = _variable(unit, name), np.asarray(value, dtype=np.float64)
+        owner, found = _variable(model, name), np.asarray(value, dtype=np.float64)
         shape = (count,) if owner.size is None else (count, owner.size)
-        if owner not in unit.inputs or found.shape != shape:
+        if owner not in model.inputs or found.shape != shape:
             raise UnitError(
-                f"unit {unit.name}: {name}: found {owner.causality} with values of shape {found.shape},"
+                f"unit {model.name}: {name}: found {owner.causality} with values of shape {found.shape},"
                 f" allowed: an input, shape {shape}"
             )
         columns |= zip(owner.names, found.reshape(count, owner.width).T, strict=True)

@@ -18,7 +18,7 @@ import urmpipe
 from foreign_fmus import HANGS, Foreign, Scalar, fmu, trouble_in
 from urmpipe.api.build_fmu import build_fmu
 from urmpipe_datasets import LOGS
-from urmpipe_fmus.blocks import unit_names
+from urmpipe_fmus.blocks import block_names
 from urmpipe_fmus.check import check_fmu
 from urmpipe_fmus.native import native_missing
 from urmpipe_models.errors import UrmpipeError
@@ -136,7 +136,7 @@ def test_the_unit_of_the_page_is_built_and_runs(urmpipe: RunCommand, tmp_path: P
 
 @pytest.mark.slow
 def test_what_a_unit_prints_is_no_part_of_the_json(urmpipe: RunCommand, tmp_path: Path) -> None:
-    talking = example().replace("spring = Unit(", "print('hello')\nspring = Unit(")
+    talking = example().replace("spring = BlockModel(", "print('hello')\nspring = BlockModel(")
     talking = talking.replace('lambda v: {"stopped"', "lambda v: print('called') or {\"stopped\"")
     (tmp_path / "my_unit.py").write_text(talking, encoding="utf-8")
     ran = urmpipe("fmu", "build", "my_unit.py", "--backend", "python", "--json")
@@ -263,7 +263,7 @@ def test_words_of_a_unit_are_joined_by_either_sign(urmpipe: RunCommand, tmp_path
 
 def test_a_unit_that_is_none_is_told_with_those_that_are(urmpipe: RunCommand) -> None:
     ran = urmpipe("fmu", "list", "dc-driv")
-    names = ", ".join(unit_names())
+    names = ", ".join(block_names())
     said = (
         f"unit: found 'dc-driv' (did you mean dc_drive?), allowed: {names}, or a .py file with a unit in it"
     )

@@ -13,7 +13,7 @@ from urmpipe.options.named import option_value
 from urmpipe.systems.log_tables import read_mapped_table, read_table
 from urmpipe.systems.units import unit_of
 from urmpipe_datasets import LOGS
-from urmpipe_fmus.blocks import unit_names
+from urmpipe_fmus.blocks import block_names
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -29,10 +29,10 @@ def test_the_list_has_every_unit_and_its_options(urmpipe: Any) -> None:
     ran = urmpipe("fmu", "list", "--json")
     assert (ran.code, ran.err) == (0, "")
     listed = {one["name"]: one for one in json.loads(ran.out)["units"]}
-    assert tuple(listed) == unit_names()
+    assert tuple(listed) == block_names()
     assert [one["name"] for one in listed["log_source"]["options"]] == ["log", "columns", "interpolate"]
     table = urmpipe("fmu", "list").out
-    assert all(name in table for name in unit_names())
+    assert all(name in table for name in block_names())
     assert "--robot" in table
     assert "-s joints=" in table
 

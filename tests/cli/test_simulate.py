@@ -22,9 +22,9 @@ from urmpipe_pipeline.simulations.simulation import Simulation
 RunCommand = Callable[..., Any]
 
 FOLLOWER = """
-from urmpipe_fmus.block import Input, Output, Parameter, State, Unit
+from urmpipe_fmus.block import BlockModel, Input, Output, Parameter, State
 
-unit = Unit(
+unit = BlockModel(
     name="follower",
     description="A lag of the first order",
     variables=(
@@ -42,14 +42,14 @@ unit = Unit(
 SWING = """
 import numpy as np
 
-from urmpipe_fmus.block import Output, Parameter, State, Unit
+from urmpipe_fmus.block import BlockModel, Output, Parameter, State
 
 
 def force(v):
     return np.clip(10.0 * np.sin(3.0 * v.time), -v.F_max, v.F_max)
 
 
-unit = Unit(
+unit = BlockModel(
     name="swing",
     description="A mass of 1 kg on a spring with a damper",
     variables=(

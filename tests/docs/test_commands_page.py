@@ -13,7 +13,7 @@ import pytest
 from pages import DOCS, command_lines, commands_in_text, pages, script, text_of
 from urmpipe.defaults import EACH_TIME
 from urmpipe.main import cli
-from urmpipe_fmus.blocks import unit_names
+from urmpipe_fmus.blocks import block_names
 from urmpipe_fmus.cosim import system_names
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.networks.file import network_names
@@ -74,7 +74,7 @@ def unknown_names(given: click.Context) -> list[str]:
 
     A name in capitals stands for any, and one with a suffix is a file.
     """
-    shipped = {"robot": robot_names(), "unit": unit_names(), "system": system_names()}
+    shipped = {"robot": robot_names(), "unit": block_names(), "system": system_names()}
     shipped["name"] = (*robot_names(), *network_names())
     named = [(key, given.params.get(key)) for key in shipped]
     return [

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from asserting import there
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.cosim import load_system
 from urmpipe_fmus.run import Instance
 
@@ -46,7 +46,7 @@ def test_every_parameter_stands_with_its_unit_and_value() -> None:
     expected = {
         one.name: (one.unit, one.starts[0])
         for name in ("dc_drive", "inertia", "drive_controller")
-        for one in make_unit(name).parameters
+        for one in make_block(name).parameters
         if one.name != "internal_step"
     }
     assert told == expected
@@ -65,7 +65,7 @@ def steady_speed(step: float, voltage: float) -> float:
 
     A step from the unit vectors of omega1 and i_a, and from 0, gives the map whose fixed point it is.
     """
-    drive = Instance(make_unit("dc_drive"))
+    drive = Instance(make_block("dc_drive"))
     omega, current = np.eye(3)[:2]
     for name, value in (("omega1", omega), ("omega2", omega), ("i_a", current), ("u", voltage)):
         drive.set([drive.reference(name)], [value])

@@ -9,18 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_fmus.block import TABLE_FILE, Unit, table_bytes
+from urmpipe_fmus.block import TABLE_FILE, BlockModel, table_bytes
 from urmpipe_fmus.native import guid_header, native_binaries, native_sources
 
 GUID = "{12345678-0000-0000-0000-000000000000}"
 HOST = Path(__file__).parent / "native" / "host.c"
 
 
-def script(unit: Unit, count: int, seed: int) -> str:
+def script(model: BlockModel, count: int, seed: int) -> str:
     """Random inputs and steps for the host, in hexadecimal: not all strtod round decimals alike."""
     rng = np.random.default_rng(seed)
-    inputs = [k for k, (_, one) in enumerate(unit.scalars) if one.causality == "input" and one.type == "Real"]
-    seen = [k for k, (_, one) in enumerate(unit.scalars) if one.type == "Real"]
+    inputs = [
+        k for k, (_, one) in enumerate(model.scalars) if one.causality == "input" and one.type == "Real"
+    ]
+    seen = [k for k, (_, one) in enumerate(model.scalars) if one.type == "Real"]
     lines = []
     for k in range(count):
         values = (rng.normal(size=len(inputs)) * rng.choice([0.01, 1.0, 10.0])).tolist()
@@ -50,13 +52,13 @@ def host(folder: Path, command: Sequence[str], name: str = "host") -> str:
     return program
 
 
-def write(folder: Path, unit: Unit, platforms: Sequence[str]) -> None:
+def write(folder: Path, model: BlockModel, platforms: Sequence[str]) -> None:
     """Write sources and binaries of a unit."""
-    sources = native_sources(unit)
+    sources = native_sources(model)
     files = {**sources, "sources/guid.h": guid_header(GUID)}
-    files |= native_binaries(unit, sources, GUID, platforms) if platforms else {}
-    if unit.table is not None:
-        files[TABLE_FILE] = table_bytes(unit.table)
+    files |= native_binaries(model, sources, GUID, platforms) if platforms else {}
+    if model.table is not None:
+        files[TABLE_FILE] = table_bytes(model.table)
     for name, content in files.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(content)

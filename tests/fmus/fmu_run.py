@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 
 from loaded_fmu import Loaded
-from urmpipe_fmus.block import Unit, Variable
+from urmpipe_fmus.block import BlockModel, Variable
 from urmpipe_models.elementwise import FloatArray
 
 
@@ -26,9 +26,9 @@ class FmuRun:
         time: Where it starts in [s].
     """
 
-    def __init__(self, path: Path, unit: Unit, start: Mapping[str, Any], time: float = 0.0) -> None:
-        self.path, self.unit, self.start, self.time = path, unit, start, time
-        self._index = {name: index for index, (name, _) in enumerate(unit.scalars)}
+    def __init__(self, path: Path, model: BlockModel, start: Mapping[str, Any], time: float = 0.0) -> None:
+        self.path, self.model, self.start, self.time = path, model, start, time
+        self._index = {name: index for index, (name, _) in enumerate(model.scalars)}
 
     def __enter__(self) -> Self:
         self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
@@ -49,7 +49,7 @@ class FmuRun:
 
     def put(self, values: Mapping[str, Any]) -> None:
         """Set variables by name."""
-        for one in self.unit.variables:
+        for one in self.model.variables:
             if one.name in values:
                 found = np.ravel(np.broadcast_to(values[one.name], (one.width,))).tolist()
                 whole = [value if one.type == "Real" else int(value) for value in found]
@@ -65,7 +65,7 @@ class FmuRun:
 
     def over(self, t: FloatArray, columns: Mapping[str, Any]) -> FloatArray:
         """Return what it shows at every sample for the inputs of that sample, a column a scalar."""
-        shown = [one for one in self.unit.variables if one.causality == "output"]
+        shown = [one for one in self.model.variables if one.causality == "output"]
         rows = []
         for k, time in enumerate(t.tolist()):
             self.put({name: column[k] for name, column in columns.items()})

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 from numpy.typing import NDArray
 
-from urmpipe_fmus.block import INTERNAL_STEP, Recipe, Unit, Variable
-from urmpipe_fmus.blocks.user import unit_of_source
+from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Recipe, Variable
+from urmpipe_fmus.blocks.user import block_from_source
 
 FILE = "random_unit.py"
 
@@ -115,9 +115,9 @@ def random_unit_sources(draw: DrawFn, remembers: bool = True) -> str:
     lines = [
         "import numpy as np",
         "from urmpipe_fmus.block import Table",
-        "from urmpipe_fmus.block import Unit",
+        "from urmpipe_fmus.block import BlockModel",
         "from urmpipe_fmus.block import Input, Memory, Output, Parameter, State",
-        "unit = Unit(",
+        "unit = BlockModel(",
         '    name="random_unit",',
         f"    description={draw(st.text(st.characters(categories=['L', 'Zs', 'P', 'S']), max_size=10))!r},",
         "    variables=(",
@@ -131,28 +131,28 @@ def random_unit_sources(draw: DrawFn, remembers: bool = True) -> str:
     return "\n".join(lines) + "\n"
 
 
-def random_units(remembers: bool = True) -> SearchStrategy[Unit]:
+def random_units(remembers: bool = True) -> SearchStrategy[BlockModel]:
     """Random units, made from the text that their recipe holds."""
     return random_unit_sources(remembers).map(
-        lambda source: replace(unit_of_source(source, FILE), recipe=Recipe(module=FILE, source=source))
+        lambda source: replace(block_from_source(source, FILE), recipe=Recipe(module=FILE, source=source))
     )
 
 
 @st.composite
-def random_starts(draw: DrawFn, unit: Unit) -> dict[str, Any]:
+def random_starts(draw: DrawFn, model: BlockModel) -> dict[str, Any]:
     """Start values of some parameters, inputs, states and memories, by variable name."""
     return {
         one.name: draw(_values(one, one.width)) if one.size else draw(_values(one, 1))[0]
-        for one in unit.given
+        for one in model.given
         if one.name != INTERNAL_STEP and draw(st.booleans())
     }
 
 
 @st.composite
-def random_columns(draw: DrawFn, unit: Unit, count: int) -> dict[str, NDArray[np.float64]]:
+def random_columns(draw: DrawFn, model: BlockModel, count: int) -> dict[str, NDArray[np.float64]]:
     """Values of the inputs over some samples, by variable name."""
     columns = {}
-    for one in unit.inputs:
+    for one in model.inputs:
         flat = np.array(draw(_values(one, count * one.width)))
         columns[one.name] = flat if one.size is None else flat.reshape(count, one.size)
     return columns

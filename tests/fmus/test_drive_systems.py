@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from urmpipe_fmus.block import Unit
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.block import BlockModel
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.cosim import Block, Recorded, load_system, prepare, simulate
 from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.run import Instance
@@ -65,11 +65,11 @@ needs_compiler = pytest.mark.skipif(
 )
 
 
-def make(block: Block) -> Unit:
+def make(block: Block) -> BlockModel:
     options = dict(block.options)
     if "robot" in options:
         options["robot"] = load_robot(options["robot"])
-    return make_unit(block.unit, **options)
+    return make_block(block.unit, **options)
 
 
 def run_system(name: str | Path, step: float | None = None, **changes: Any) -> Recorded:
@@ -125,7 +125,7 @@ def test_a_held_load_is_turned_by_its_torque_over_the_rigidity() -> None:
 
 def end_held(step: float, inertia: float = 1.0) -> float:
     """Return the spectral radius of a load on a shaft whose motor end is held, by one communication step."""
-    drive, load = Instance(make_unit("dc_drive")), Instance(make_unit("inertia"))
+    drive, load = Instance(make_block("dc_drive")), Instance(make_block("inertia"))
     load.set([load.reference(n) for n in ("J", "theta", "omega")], [inertia, *np.eye(2)])
     state = load.get([load.reference("theta"), load.reference("omega")])
     drive.set([drive.reference("theta2"), drive.reference("omega2")], state)

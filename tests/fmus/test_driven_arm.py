@@ -18,8 +18,8 @@ from asserting import refusal
 from fmu_run import FmuRun
 from made_masses import DRIVE, driven, with_drives, with_masses
 from sliding_arm import sprung_arm
-from urmpipe_fmus.block import Output, Unit
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.block import BlockModel, Output
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.blocks.driven_arm import starts_under
 from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.cosim import Block, Recorded, System, load_system, prepare, simulate
@@ -70,7 +70,7 @@ def urm6() -> Chain:
 
 def put(instance: Instance, **values: Any) -> None:
     """Set variables by name."""
-    names = [one for one in instance.unit.variables if one.name in values]
+    names = [one for one in instance.model.variables if one.name in values]
     for one in names:
         flat = np.ravel(np.broadcast_to(values[one.name], (one.width,))).tolist()
         instance.set([instance.reference(name) for name in one.names], flat)
@@ -81,7 +81,7 @@ def read(instance: Instance, *names: str) -> FloatArray:
     every = [
         scalar
         for name in names
-        for one in instance.unit.variables
+        for one in instance.model.variables
         if one.name == name
         for scalar in one.names
     ]
@@ -164,17 +164,17 @@ def moves(chain: Chain, targets: FloatArray) -> Callable[[float], FloatArray]:
 
 def test_it_starts_in_equilibrium_with_shafts_twisted_and_currents_and_voltages_set() -> None:
     chain = urm6()
-    unit = Instance(make_unit("driven_arm", robot=chain))
+    model = Instance(make_block("driven_arm", robot=chain))
     still = [0.0] * 6
     torques = np.array(inverse_dynamics(chain, chain.start, still, still), dtype=float)
     assert np.abs(torques).max() > 2.0  # gravity pulls
     np.testing.assert_allclose(
-        read(unit, "theta1") - read(unit, "phi"), torques / 2500.0, rtol=0.0, atol=1e-15
+        read(model, "theta1") - read(model, "phi"), torques / 2500.0, rtol=0.0, atol=1e-15
     )
-    np.testing.assert_allclose(read(unit, "i_a"), torques / 5.0, rtol=1e-12, atol=1e-15)
-    np.testing.assert_allclose(read(unit, "u"), 0.5 * torques / 5.0, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(read(unit, "Mk"), torques, rtol=1e-11, atol=1e-12)
-    np.testing.assert_allclose(read(unit, "phidd"), 0.0, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(read(model, "i_a"), torques / 5.0, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(read(model, "u"), 0.5 * torques / 5.0, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(read(model, "Mk"), torques, rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(read(model, "phidd"), 0.0, rtol=0.0, atol=1e-10)
 
 
 @pytest.mark.slow
@@ -182,10 +182,10 @@ def test_it_starts_in_equilibrium_with_shafts_twisted_and_currents_and_voltages_
 def test_an_arm_at_rest_stays_for_two_seconds() -> None:
     # the arms of test_three_ways.py, whose FMUs are in the session's cache
     for chain in (urm6(), sprung_arm()):
-        unit = make_unit("driven_arm", robot=chain)
-        with FmuRun(cached_fmu(unit, "native"), unit, {}) as fmu:
+        model = make_block("driven_arm", robot=chain)
+        with FmuRun(cached_fmu(model, "native"), model, {}) as fmu:
             found = fmu.over(PERIOD * np.arange(401, dtype=np.float64), {})
-        names = [name for one in unit.variables if one.causality == "output" for name in one.names]
+        names = [name for one in model.variables if one.causality == "output" for name in one.names]
         columns = [k for k, name in enumerate(names) if name.startswith(("phi[", "s["))]
         assert len(columns) == len(chain.start)
         turning = [
@@ -208,13 +208,13 @@ def test_a_held_pendulum_swings_with_the_root_of_k_over_j() -> None:
         drives=(PassiveJoint("q", k, 0.0),),
         gravity=(0.0, 0.0, 0.0),
     )
-    unit = Instance(make_unit("driven_arm", robot=chain))
-    put(unit, phi=1e-6)
+    model = Instance(make_block("driven_arm", robot=chain))
+    put(model, phi=1e-6)
     rate = np.sqrt(k / (m * r**2))
     for n in range(20):
-        unit.do_step(n * PERIOD, PERIOD)
+        model.do_step(n * PERIOD, PERIOD)
     # RK4 in 0.5 ms at 40 rad/s: (0.02)^5 / 120 a step, 200 steps
-    assert read(unit, "phi")[0] == pytest.approx(1e-6 * np.cos(rate * 0.1), abs=1e-14)
+    assert read(model, "phi")[0] == pytest.approx(1e-6 * np.cos(rate * 0.1), abs=1e-14)
 
 
 @pytest.mark.slow
@@ -243,13 +243,13 @@ def test_the_internal_step_is_one_at_which_a_stiff_joint_is_stable(
         inertials=(Inertial("q", 1e-4, (0.0, 0.0, 0.0), (inertia, inertia, inertia, 0.0, 0.0, 0.0)),),
         drives=(driven("q", drive) if rotor else PassiveJoint("q", stiffness, damping),),
     )
-    unit = make_unit("driven_arm", robot=chain)
-    assert 0.7 < unit.internal_step * rate / 1.4 < 1.3  # half of 2.8, and what couples with it
-    arm, coarse = Instance(unit), Instance(unit)
+    model = make_block("driven_arm", robot=chain)
+    assert 0.7 < model.internal_step * rate / 1.4 < 1.3  # half of 2.8, and what couples with it
+    arm, coarse = Instance(model), Instance(model)
     for one in (arm, coarse):  # no controller: its samples swing the link by themselves
         put(one, phi=1e-3, **(dict.fromkeys(("Kphi", "Kw", "Keps"), 0.0) if rotor else {}))
-    put(coarse, internal_step=4.0 * unit.internal_step)
-    arm.do_step(0.0, 200.0 * unit.internal_step)
+    put(coarse, internal_step=4.0 * model.internal_step)
+    arm.do_step(0.0, 200.0 * model.internal_step)
     assert abs(read(arm, "phi")[0]) < 1.1e-3
     with pytest.raises(UnitError, match="is not finite"):
         for n in range(200):
@@ -269,10 +269,10 @@ def test_a_force_on_the_tool_bends_the_springs_by_the_jacobian() -> None:
 
     q = root(missing, chain.start, tol=1e-14).x
     assert np.abs(q - chain.start).max() > 5e-4
-    unit = Instance(make_unit("driven_arm", robot=chain))
-    put(unit, phi=q, force=outside[:3], moment=outside[3:])
+    model = Instance(make_block("driven_arm", robot=chain))
+    put(model, phi=q, force=outside[:3], moment=outside[3:])
     # torques of some N.m are in balance to 1e-13, and M^-1 reaches 20
-    np.testing.assert_allclose(read(unit, "phidd"), 0.0, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(read(model, "phidd"), 0.0, rtol=0.0, atol=1e-10)
 
 
 def test_robots_without_drives_or_with_too_little_voltage_are_refused() -> None:
@@ -294,15 +294,17 @@ def test_robots_without_drives_or_with_too_little_voltage_are_refused() -> None:
         for k, volts in enumerate(needed, start=1)
         if volts > 48.0
     ]
-    for unit in ("chain_dynamics", "driven_arm"):
-        assert refused(unit, replace(urm6(), inertials=())) == [
+    for model in ("chain_dynamics", "driven_arm"):
+        assert refused(model, replace(urm6(), inertials=())) == [
             "robot urm6: key inertials: found none, allowed: the masses of the arm (in a URDF <inertial>)"
         ]
-        assert refused(unit, "urm6") == [f"unit {unit}: option robot: found 'urm6', allowed: a robot (Chain)"]
+        assert refused(model, "urm6") == [
+            f"unit {model}: option robot: found 'urm6', allowed: a robot (Chain)"
+        ]
 
 
-def refused(unit: str, robot: Any) -> list[str]:
-    return refusal(UrmpipeError, make_unit, unit, robot=robot).splitlines()
+def refused(model: str, robot: Any) -> list[str]:
+    return refusal(UrmpipeError, make_block, model, robot=robot).splitlines()
 
 
 # The system driven-arm
@@ -328,10 +330,10 @@ def system() -> System:
 
 
 def test_the_system_starts_where_the_unit_does() -> None:
-    unit = make_unit("driven_arm", robot=ur3())
+    model = make_block("driven_arm", robot=ur3())
     starts = {
         name: one
-        for variable in unit.variables
+        for variable in model.variables
         for name, one in zip(variable.names, variable.starts, strict=True)
     }
     blocks = {block.name: block.start for block in system().blocks}
@@ -347,14 +349,14 @@ def test_the_system_starts_where_the_unit_does() -> None:
 
 
 def dc_drive_starts() -> dict[str, float]:
-    return {one.name: one.starts[0] for one in make_unit("dc_drive").parameters}
+    return {one.name: one.starts[0] for one in make_block("dc_drive").parameters}
 
 
-def make(block: Block) -> Unit:
+def make(block: Block) -> BlockModel:
     options = dict(block.options)
     if "robot" in options:
         options["robot"] = load_robot(options["robot"])
-    return make_unit(block.unit, **options)
+    return make_block(block.unit, **options)
 
 
 def run_system(step: float, duration: float) -> Recorded:
@@ -366,8 +368,8 @@ TARGETS = np.array([0.5, 2.7, 0.6, 2.6, 0.4, 2.8])
 
 def system_of_urm6(step: float, duration: float) -> System:
     """Return the system, its blocks at rest where the unit `driven_arm` of `urm6()` is."""
-    unit = make_unit("driven_arm", robot=urm6())
-    at = {scalar: one.start_of(scalar) for scalar, one in unit.scalars if not isinstance(one, Output)}
+    model = make_block("driven_arm", robot=urm6())
+    at = {scalar: one.start_of(scalar) for scalar, one in model.scalars if not isinstance(one, Output)}
     still = [0.0, 0.0, 0.0]
     starts: dict[str, dict[str, Any]] = {"arm": {"phi": list(urm6().start), "force": still, "moment": still}}
     for k, (initial, target) in enumerate(zip(urm6().start, TARGETS.tolist(), strict=True), start=1):
@@ -378,21 +380,21 @@ def system_of_urm6(step: float, duration: float) -> System:
     return replace(system(), step=step, duration=duration, record_every=1, blocks=blocks)
 
 
-def make_of_urm6(block: Block) -> Unit:
-    return make_unit("chain_dynamics", robot=urm6()) if block.name == "arm" else make(block)
+def make_of_urm6(block: Block) -> BlockModel:
+    return make_block("chain_dynamics", robot=urm6()) if block.name == "arm" else make(block)
 
 
 def as_one_function(duration: float) -> FloatArray:
     """Return the joints at the controllers' samples, of the unit `driven_arm`."""
-    unit = make_unit("driven_arm", robot=urm6())
+    model = make_block("driven_arm", robot=urm6())
     t = PERIOD * np.arange(round(duration / PERIOD) + 1, dtype=np.float64)
     columns = {name: np.empty((len(t), 6)) for name in ("set_phi", "set_phid", "set_phidd")}
     for k, (initial, target) in enumerate(zip(urm6().start, TARGETS, strict=True)):
         wanted = trapezoid(t, 0.1, initial, target, 2.0, 10.0)
         for name, values in zip(columns, wanted, strict=True):
             columns[name][:, k] = values
-    names = [name for one in unit.variables if one.causality == "output" for name in one.names]
-    with FmuRun(cached_fmu(unit, "native"), unit, {"internal_step": 1e-4}) as fmu:
+    names = [name for one in model.variables if one.causality == "output" for name in one.names]
+    with FmuRun(cached_fmu(model, "native"), model, {"internal_step": 1e-4}) as fmu:
         found = fmu.over(t, columns)
     return found[:, [names.index(f"phi[{k}]") for k in range(1, 7)]]
 
@@ -453,15 +455,15 @@ def test_a_spring_beside_a_drive_takes_its_torque_from_the_drive_and_the_arm_sta
             assert own.rest == pytest.approx(other.rest - torque / 2500.0, abs=1e-15)
         else:
             assert own == other
-    unit = Instance(make_unit("driven_arm", robot=chain))
+    model = Instance(make_block("driven_arm", robot=chain))
     for n in range(10):
-        unit.do_step(n * PERIOD, PERIOD)
-    stayed = read(unit, "phi", "s")[[0, 2, 1]]
+        model.do_step(n * PERIOD, PERIOD)
+    stayed = read(model, "phi", "s")[[0, 2, 1]]
     np.testing.assert_allclose(
         stayed, chain.start, rtol=0.0, atol=1e-12
     )  # rounding of torques over 2500 N.m/rad
     np.testing.assert_allclose(
-        read(unit, "last", "last_s"), [one.voltage for one in relieved[:2]], rtol=0.0, atol=1e-9
+        read(model, "last", "last_s"), [one.voltage for one in relieved[:2]], rtol=0.0, atol=1e-9
     )  # of it by gains of 4 V/rad, and of accelerations
 
 
@@ -500,19 +502,19 @@ def test_the_unit_is_what_dop853_makes_of_the_equations_and_no_energy_is_lost() 
     drives = (turn, slide, PassiveJoint("wrist", 200.0, 5.0))
     chain = replace(sprung_arm(), drives=drives)
     wanted = moves(chain, np.array([0.6, -0.3, 0.0]))
-    whole, unit = OneSystem(chain, PUSH), Instance(make_unit("driven_arm", robot=chain))
-    put(unit, internal_step=2.5e-4, force=PUSH.force, moment=PUSH.moment)
+    whole, model = OneSystem(chain, PUSH), Instance(make_block("driven_arm", robot=chain))
+    put(model, internal_step=2.5e-4, force=PUSH.force, moment=PUSH.moment)
     before = whole.stored()
     for n in range(14):
         whole.sample(wanted(n * PERIOD))
         whole.go(PERIOD)
         (turning, sliding, _), names = wanted(n * PERIOD).T, ("set_{}", "set_{}d", "set_{}dd")
         for kind, points in (("phi", turning), ("s", sliding)):
-            put(unit, **{name.format(kind): value for name, value in zip(names, points, strict=True)})
-        unit.do_step(n * PERIOD, PERIOD)
-    np.testing.assert_allclose(read(unit, "last", "last_s"), whole.voltages[:2], rtol=0.0, atol=1e-7)
+            put(model, **{name.format(kind): value for name, value in zip(names, points, strict=True)})
+        model.do_step(n * PERIOD, PERIOD)
+    np.testing.assert_allclose(read(model, "last", "last_s"), whole.voltages[:2], rtol=0.0, atol=1e-7)
     # RK4 in 0.25 ms: (h / 2 ms)^4 of the armature's time, of values that change by some 1
-    found = read(unit, "phi", "s", "theta1", "theta1_s")[[0, 2, 1, 3, 4]]
+    found = read(model, "phi", "s", "theta1", "theta1_s")[[0, 2, 1, 3, 4]]
     np.testing.assert_allclose(found, whole.x[[0, 1, 2, 6, 7]], rtol=0.0, atol=1e-7)
     assert np.abs(whole.x[:3] - chain.start).min() > 0.01  # each joint moves, the held one in its spring
     work, lost, pushed, damped = whole.x[-4:]
@@ -525,7 +527,7 @@ def test_the_unit_is_what_dop853_makes_of_the_equations_and_no_energy_is_lost() 
     # none of them is lost in the bound of the balance
     assert min(map(abs, (pushed, damped, *stretched))) > 1e-3 * abs(work) > 1e-4
     assert abs(work - change - lost) <= 1e-8 * abs(work)
-    stored, given, heat = read(unit, "energy_stored", "energy_in", "energy_lost")
+    stored, given, heat = read(model, "energy_stored", "energy_in", "energy_lost")
     assert abs(given - (stored - before) - heat) <= 1e-6 * abs(given)
 
 
@@ -536,12 +538,12 @@ def test_a_stiff_spring_beside_a_drive_shortens_the_internal_step() -> None:
     chain = Chain(
         "stiff", (Joint("q"),), inertials=(Inertial("q", 1e-4, (0.0, 0.0, 0.0), inertia),), drives=(stiff,)
     )
-    unit = make_unit("driven_arm", robot=chain)
+    model = make_block("driven_arm", robot=chain)
     # 1.4 over the root of k_spring / J; the drive's own 2500 N.m/rad are 1e-4 of it
-    assert unit.internal_step == pytest.approx(1.4 / np.sqrt(1e7 / 0.1), rel=1e-2)
-    arm = Instance(unit)
+    assert model.internal_step == pytest.approx(1.4 / np.sqrt(1e7 / 0.1), rel=1e-2)
+    arm = Instance(model)
     put(arm, phi=1e-3, Kphi=0.0, Kw=0.0, Keps=0.0)
-    arm.do_step(0.0, 200.0 * unit.internal_step)
+    arm.do_step(0.0, 200.0 * model.internal_step)
     assert abs(read(arm, "phi")[0]) < 1.1e-3
 
 
@@ -577,7 +579,7 @@ def test_a_held_wrist_yields_to_a_force_by_its_square_of_the_length_and_no_drive
     lifted = force * (UPPER + LENGTH)  # N.m that the shoulder need not give
     # of currents of some 2 A, rounded
     assert before[0].current - under[0].current == pytest.approx(lifted / 5.0, rel=1e-6)
-    moving = Instance(make_unit("driven_arm", robot=chain))
+    moving = Instance(make_block("driven_arm", robot=chain))
     put(moving, **starts_under(chain, (0.0, 0.0, 30.0)))
     start = read(moving, "phi", "last")
     assert start[1] > 3e-3
@@ -619,15 +621,15 @@ def test_a_force_that_is_too_large_for_the_springs_is_refused() -> None:
 
 def states_of(chain: Chain) -> list[str]:
     """Return the scalars of the unit that go from sample to sample: states and held voltages."""
-    unit = make_unit("driven_arm", robot=chain)
-    kept = (*unit.states, *(one for one in unit.memories if one.name.startswith("last")))
+    model = make_block("driven_arm", robot=chain)
+    kept = (*model.states, *(one for one in model.memories if one.name.startswith("last")))
     return [name for one in kept if not one.name.startswith("energy") for name in one.names]
 
 
 def radius_of_the_unit(chain: Chain, round_: float) -> float:
     """Return the spectral radius of a round of samples by differences of the unit, to the shortest period."""
-    unit, names = make_unit("driven_arm", robot=chain), states_of(chain)
-    instance = Instance(unit)
+    model, names = make_block("driven_arm", robot=chain), states_of(chain)
+    instance = Instance(model)
     rest = np.array(instance.get([instance.reference(name) for name in names]), dtype=np.float64)
     moved = 1e-6 * np.hstack((np.eye(len(names)), -np.eye(len(names))))
     put(instance, internal_step=1e-4)
@@ -664,7 +666,7 @@ def test_above_a_spectral_radius_of_1_the_simulation_grows_by_it_and_below_it_di
     gains = np.array([0.75, gain])
     radii = [spectral_radius(with_gain(one), np.zeros(1)) for one in gains.tolist()]
     assert radii[0] < 1.0 < radii[1]
-    instance, sizes = Instance(make_unit("driven_arm", robot=with_gain(0.75))), []
+    instance, sizes = Instance(make_block("driven_arm", robot=with_gain(0.75))), []
     rest = read(instance, "last")[0]  # of any gain
     put(instance, phi=1e-7, internal_step=1e-3)  # twice the unit's own: a factor that differs by 1e-7
     instance.set([instance.reference("Kw[1]")], [gains])  # an element for each arm

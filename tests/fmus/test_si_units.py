@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from asserting import refusal
-from urmpipe_fmus.block import Input, Output, Parameter, Unit
+from urmpipe_fmus.block import BlockModel, Input, Output, Parameter
 from urmpipe_fmus.si_units import BaseUnit, base_unit, coherent, display_conversion, same_unit
 from urmpipe_models.errors import UnitError
 
@@ -222,7 +222,7 @@ def test_a_display_unit_of_another_quantity_is_refused() -> None:
 
 def test_a_unit_tells_all_variables_with_a_wrong_unit() -> None:
     with pytest.raises(UnitError) as caught:
-        Unit(
+        BlockModel(
             name="wrong",
             description="",
             variables=(

@@ -19,9 +19,9 @@ from loaded_fmu import Loaded
 from made_masses import with_drives, with_masses
 from random_units import PATIENT, random_columns, random_starts, random_units
 from sliding_arm import sliding_arm, sprung_arm
-from urmpipe_fmus.block import INTERNAL_STEP, Table, Unit, Variable
-from urmpipe_fmus.blocks import make_unit, unit_names
-from urmpipe_fmus.blocks.user import load_unit_file
+from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Table, Variable
+from urmpipe_fmus.blocks import block_names, make_block
+from urmpipe_fmus.blocks.user import load_block_file
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.run import Instance, run
@@ -72,18 +72,18 @@ UNITS: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 def test_every_unit_that_is_shipped_is_here() -> None:
-    assert {name for name, _ in UNITS.values()} == set(unit_names())
+    assert {name for name, _ in UNITS.values()} == set(block_names())
 
 
 @cache
-def unit_of(what: str) -> Unit:
+def unit_of(what: str) -> BlockModel:
     name, options = UNITS[what]
-    return make_unit(name, **options)
+    return make_block(name, **options)
 
 
-def times_of(unit: Unit) -> FloatArray:
+def times_of(model: BlockModel) -> FloatArray:
     """Communication points in [s]; few of an arm with masses, which takes Python some ms an internal step."""
-    count = 3 if unit.name in ("chain_dynamics", "driven_arm") else 41
+    count = 3 if model.name in ("chain_dynamics", "driven_arm") else 41
     return 0.005 * np.arange(count, dtype=np.float64)
 
 
@@ -103,12 +103,12 @@ def near(rng: np.random.Generator, variable: Variable) -> Any:
     return found if variable.size else float(found[0])
 
 
-def random_case(unit: Unit, seed: int, count: int) -> tuple[dict[str, Any], dict[str, FloatArray]]:
+def random_case(model: BlockModel, seed: int, count: int) -> tuple[dict[str, Any], dict[str, FloatArray]]:
     """Parameters, and inputs over some samples: what the unit meets, and steps of more than a turn."""
     rng = np.random.default_rng(seed)
-    start = {one.name: near(rng, one) for one in unit.parameters if one.name != INTERNAL_STEP}
+    start = {one.name: near(rng, one) for one in model.parameters if one.name != INTERNAL_STEP}
     columns = {}
-    for one in unit.inputs:
+    for one in model.inputs:
         flat = np.cumsum(rng.uniform(-1.0, 1.0, (count, one.width)), axis=0)
         if one.name == "raw":
             flat = np.mod(flat * 2.0 + np.pi, 2.0 * np.pi) - np.pi
@@ -116,29 +116,31 @@ def random_case(unit: Unit, seed: int, count: int) -> tuple[dict[str, Any], dict
     return start, columns
 
 
-def shown(unit: Unit, found: Mapping[str, FloatArray]) -> FloatArray:
+def shown(model: BlockModel, found: Mapping[str, FloatArray]) -> FloatArray:
     """What a run gave, a column a scalar."""
-    names = [one.name for one in unit.variables if one.causality == "output"]
+    names = [one.name for one in model.variables if one.causality == "output"]
     return np.column_stack([found[name] for name in names])
 
 
 @cache
 def case_and_run(what: str) -> tuple[dict[str, Any], dict[str, FloatArray], FloatArray]:
     """Return parameters, inputs and what a run gives for them: seconds of Python for an arm with masses."""
-    unit, t = unit_of(what), times_of(unit_of(what))
-    start, columns = random_case(unit, 0, len(t))
-    return start, columns, shown(unit, run(unit, t, columns, start))
+    model, t = unit_of(what), times_of(unit_of(what))
+    start, columns = random_case(model, 0, len(t))
+    return start, columns, shown(model, run(model, t, columns, start))
 
 
-def stepped(unit: Unit, t: FloatArray, columns: Mapping[str, Any], start: Mapping[str, Any]) -> FloatArray:
+def stepped(
+    model: BlockModel, t: FloatArray, columns: Mapping[str, Any], start: Mapping[str, Any]
+) -> FloatArray:
     """What an instance shows, set and stepped by hand."""
-    instance = Instance(unit, float(t[0]))
+    instance = Instance(model, float(t[0]))
     outputs = [
-        instance.reference(n) for one in unit.variables if one.causality == "output" for n in one.names
+        instance.reference(n) for one in model.variables if one.causality == "output" for n in one.names
     ]
 
     def put(values: Mapping[str, Any]) -> None:
-        for one in unit.given:
+        for one in model.given:
             if one.name in values:
                 flat = np.ravel(np.broadcast_to(values[one.name], (one.width,))).tolist()
                 instance.set([instance.reference(name) for name in one.names], flat)
@@ -159,18 +161,18 @@ def assert_same(got: FloatArray, expected: FloatArray) -> None:
     assert (worst <= SAME).all(), f"{worst.max()} at {np.unravel_index(worst.argmax(), worst.shape)}"
 
 
-def assert_fmu_gives(unit: Unit, path: Path, case: tuple[Any, Any], t: FloatArray) -> None:
+def assert_fmu_gives(model: BlockModel, path: Path, case: tuple[Any, Any], t: FloatArray) -> None:
     start, columns = case
-    with FmuRun(path, unit, start, float(t[0])) as fmu:
-        assert_same(fmu.over(t, columns), shown(unit, run(unit, t, columns, start)))
+    with FmuRun(path, model, start, float(t[0])) as fmu:
+        assert_same(fmu.over(t, columns), shown(model, run(model, t, columns, start)))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("what", UNITS)
 def test_a_run_gives_what_steps_give(what: str) -> None:
-    unit, t = unit_of(what), times_of(unit_of(what))
+    model, t = unit_of(what), times_of(unit_of(what))
     start, columns, expected = case_and_run(what)
-    assert_same(stepped(unit, t, columns, start), expected)
+    assert_same(stepped(model, t, columns, start), expected)
 
 
 @pytest.mark.slow
@@ -179,7 +181,7 @@ def test_a_run_gives_what_steps_give(what: str) -> None:
 def test_an_fmu_gives_what_a_run_gives_and_goes_on_bit_by_bit_from_a_saved_state(
     what: str, backend: Backend
 ) -> None:
-    unit, t = unit_of(what), times_of(unit_of(what))
+    model, t = unit_of(what), times_of(unit_of(what))
     start, columns, expected = case_and_run(what)
     half = len(t) // 2
     before, after = slice(half + 1), slice(half, None)  # the sample in the middle is set and read twice
@@ -187,7 +189,7 @@ def test_an_fmu_gives_what_a_run_gives_and_goes_on_bit_by_bit_from_a_saved_state
     def given(part: slice) -> dict[str, FloatArray]:
         return {name: rows[part] for name, rows in columns.items()}
 
-    with FmuRun(cached_fmu(unit, backend), unit, start) as fmu:
+    with FmuRun(cached_fmu(model, backend), model, start) as fmu:
         early = fmu.over(t[before], given(before))
         state = fmu.fmu.getFMUstate()
         kept = fmu.fmu.serializeFMUstate(state)
@@ -211,8 +213,8 @@ def test_an_fmu_gives_what_a_run_gives_and_goes_on_bit_by_bit_from_a_saved_state
 def test_a_step_begins_where_the_unit_stands(backend: Any, status: int | None) -> None:
     """To 1e-6 of it; else fmi2Error, and of pythonfmu's binary fmi2Discard, which is all that it has."""
     for start, step in ((0.0, 0.25), (100.0, 1e-3)):
-        unit = unit_of("a load")
-        one: Any = Loaded(cached_fmu(unit, backend), start) if status else Instance(unit, start)
+        model = unit_of("a load")
+        one: Any = Loaded(cached_fmu(model, backend), start) if status else Instance(model, start)
         one.do_step(start + 0.9e-6 * step, step)
         one.do_step(start + step, step)
         own = start + 2.0 * step
@@ -250,11 +252,11 @@ def test_masters_that_add_up_steps_and_those_that_multiply_stay_where_the_unit_s
 def test_at_the_calibration_pose_angles_of_half_a_turn_are_one_whatever_their_sign(
     robot: str,
 ) -> None:
-    unit = make_unit("kinematic_chain", robot=load_robot(robot), rates=True)
-    expected = np.concatenate([np.ravel(one) for one in run(unit, np.zeros(1)).values()])
-    with FmuRun(cached_fmu(unit, "native"), unit, {}) as fmu:
-        got = np.array(fmu.get(unit.computed))
-    angle = np.array([name[0] == "r" for one in unit.computed for name in one.names])
+    model = make_block("kinematic_chain", robot=load_robot(robot), rates=True)
+    expected = np.concatenate([np.ravel(one) for one in run(model, np.zeros(1)).values()])
+    with FmuRun(cached_fmu(model, "native"), model, {}) as fmu:
+        got = np.array(fmu.get(model.computed))
+    angle = np.array([name[0] == "r" for one in model.computed for name in one.names])
     assert_same(got[~angle], expected[~angle])
     turned = np.exp(1j * got[angle]) - np.exp(1j * expected[angle])
     assert (np.abs(turned) <= SAME).all()
@@ -264,12 +266,12 @@ def test_at_the_calibration_pose_angles_of_half_a_turn_are_one_whatever_their_si
 @pytest.mark.parametrize("backend", [pytest.param("native", marks=needs_native), "python"])
 @pytest.mark.parametrize("example", ["backlash.py", "low_pass.py"])
 def test_a_documented_unit_gives_as_an_fmu_what_a_run_gives(example: str, backend: Backend) -> None:
-    unit, t = load_unit_file(EXAMPLES / example), np.linspace(0.0, 0.2, 41, dtype=np.float64)
-    assert_fmu_gives(unit, cached_fmu(unit, backend), random_case(unit, 5, len(t)), t)
+    model, t = load_block_file(EXAMPLES / example), np.linspace(0.0, 0.2, 41, dtype=np.float64)
+    assert_fmu_gives(model, cached_fmu(model, backend), random_case(model, 5, len(t)), t)
 
 
 CASES = random_units().flatmap(
-    lambda unit: st.tuples(st.just(unit), st.tuples(random_starts(unit), random_columns(unit, 5)))
+    lambda model: st.tuples(st.just(model), st.tuples(random_starts(model), random_columns(model, 5)))
 )
 T = np.array([0.0, 0.01, 0.02, 0.05, 0.2])
 
@@ -277,9 +279,9 @@ T = np.array([0.0, 0.01, 0.02, 0.05, 0.2])
 @pytest.mark.slow
 @settings(max_examples=25, **PATIENT)  # most of the time goes into drawing a unit; those of core/ draw more
 @given(CASES)
-def test_a_random_unit_gives_stepped_what_a_run_gives(case: tuple[Unit, tuple[Any, Any]]) -> None:
-    unit, (start, columns) = case
-    assert_same(stepped(unit, T, columns, start), shown(unit, run(unit, T, columns, start)))
+def test_a_random_unit_gives_stepped_what_a_run_gives(case: tuple[BlockModel, tuple[Any, Any]]) -> None:
+    model, (start, columns) = case
+    assert_same(stepped(model, T, columns, start), shown(model, run(model, T, columns, start)))
 
 
 @pytest.mark.slow
@@ -287,11 +289,11 @@ def test_a_random_unit_gives_stepped_what_a_run_gives(case: tuple[Unit, tuple[An
 @settings(max_examples=4, **PATIENT)  # of functions one by one: native/test_functions.py
 @given(case=CASES)
 def test_a_random_unit_exported_is_valid_and_gives_what_a_run_gives(
-    case: tuple[Unit, tuple[Any, Any]], backend: Backend, tmp_path_factory: pytest.TempPathFactory
+    case: tuple[BlockModel, tuple[Any, Any]], backend: Backend, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     from fmpy.validation import validate_fmu
 
-    unit, values = case
-    path = build_fmu(unit, tmp_path_factory.mktemp("fmu"), backend=backend).path
+    model, values = case
+    path = build_fmu(model, tmp_path_factory.mktemp("fmu"), backend=backend).path
     assert validate_fmu(str(path)) == []
-    assert_fmu_gives(unit, path, values, T)
+    assert_fmu_gives(model, path, values, T)

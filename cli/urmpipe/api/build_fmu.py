@@ -11,7 +11,7 @@ from urmpipe.arm_placing import Robot
 from urmpipe.keyword_checks import PathLike, one_or_many, public
 from urmpipe.log_table import LogTable
 from urmpipe.systems.units import Backend, unit_of
-from urmpipe_fmus.block import Unit
+from urmpipe_fmus.block import BlockModel
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.outputs import guarded_output
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @public
 def build_fmu(
-    unit: Unit | PathLike,
+    unit: BlockModel | PathLike,
     robot: Robot | None = None,
     *,
     log: PathLike | LogTable | None = None,

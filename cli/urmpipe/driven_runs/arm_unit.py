@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_fmus.block import Unit
+from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.blocks.coordinates import kinds_of
 from urmpipe_fmus.blocks.driven_arm import driven_arm, starts_under
 from urmpipe_models.arm.chain import Chain
@@ -40,7 +40,7 @@ class ArmUnit:
     force: tuple[float, float, float]
 
     @cached_property
-    def unit(self) -> Unit:
+    def unit(self) -> BlockModel:
         """Its unit."""
         return driven_arm(self.robot)
 

@@ -51,9 +51,11 @@ def argument_names(ctx: click.Context) -> Iterable[str]:
 
 def option_names(ctx: click.Context) -> Iterable[str]:
     """Return the options of the unit on the line that -s gives: not its robot or log."""
-    from urmpipe_fmus.blocks import unit_options
+    from urmpipe_fmus.blocks import block_option_help
 
-    return [name for unit in operands(ctx) for name in unit_options(unit) if name not in ("robot", "table")]
+    return [
+        name for unit in operands(ctx) for name in block_option_help(unit) if name not in ("robot", "table")
+    ]
 
 
 def control_names(ctx: click.Context) -> Iterable[str]:

@@ -70,9 +70,9 @@ def robots() -> Iterable[str]:
 
 def _units() -> Iterable[str]:
     """Return the names of the units."""
-    from urmpipe_fmus.blocks import unit_names
+    from urmpipe_fmus.blocks import block_names
 
-    return unit_names()
+    return block_names()
 
 
 def _systems() -> Iterable[str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe.printing.terminal import LISTED, new_console, new_table, say
 from urmpipe.systems.units import FROM_LOG, example_of, example_subject
-from urmpipe_fmus.blocks import unit_help, unit_name, unit_names, unit_options
+from urmpipe_fmus.blocks import block_names, block_option_help, block_summary, normalise_block_name
 from urmpipe_fmus.build.description import TITLES as VARIABLE_HEADS
 from urmpipe_fmus.build.description import variable_row
 from urmpipe_fmus.cosim.checks import ELEMENT
@@ -30,7 +30,7 @@ COLUMNS_HELP = "columns of the log by name, such as u or u,i (default: its joint
 
 def options_of(name: str) -> dict[str, str]:
     """Return a line of help for each option of a unit, as the command line has them."""
-    found = dict(unit_options(name))
+    found = dict(block_option_help(name))
     if FROM_LOG[0] in found:
         del found[FROM_LOG[0]]
         found = {"log": LOG_HELP, **found, "columns": COLUMNS_HELP}
@@ -42,10 +42,10 @@ def units_dict() -> dict[str, Any]:
     units = [
         {
             "name": name,
-            "description": unit_help(name),
+            "description": block_summary(name),
             "options": [{"name": option, "help": said} for option, said in options_of(name).items()],
         }
-        for name in unit_names()
+        for name in block_names()
     ]
     return {"schema": 1, "units": units}
 
@@ -53,10 +53,10 @@ def units_dict() -> dict[str, Any]:
 def print_units() -> None:
     """Print each unit with a line, and its options."""
     table = new_table("Unit", "Description", "Option", "", title="Units")
-    for name in unit_names():
+    for name in block_names():
         options = list(options_of(name).items()) or [("", "")]
         for row, (option, said) in enumerate(options):
-            first = (name, unit_help(name)) if not row else ("", "")
+            first = (name, block_summary(name)) if not row else ("", "")
             shown = f"--{option}" if option in ("robot", "log") else option and f"-s {option}="
             table.add_row(*first, shown, said)
     new_console().print(table)
@@ -67,7 +67,7 @@ def print_units() -> None:
 def unit_dict(name: str) -> dict[str, Any]:
     """Return the object that `urmpipe fmu list UNIT --json` prints."""
     unit = example_of(name)
-    options = options_of(name) if unit_name(name) in unit_names() else {}
+    options = options_of(name) if normalise_block_name(name) in block_names() else {}
     return {
         "schema": 1,
         "name": unit.name,

@@ -25,7 +25,7 @@ from urmpipe_pipeline.runs.grid import row_clock
 from urmpipe_pipeline.simulations.simulation import SLOW
 
 if TYPE_CHECKING:
-    from urmpipe_fmus.block import Unit
+    from urmpipe_fmus.block import BlockModel
     from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
     from urmpipe_models.arm.chain import Chain
     from urmpipe_models.elementwise import IntArray
@@ -70,7 +70,7 @@ class Blocks:
         self._bundled, self._reading = bundled, reading or {}
         self._told = told or (lambda line: None)
         self._backend, self._slow = chosen_backend(backend)
-        self.units: dict[str, Unit] = {}
+        self.units: dict[str, BlockModel] = {}
         self.chains: dict[str, Chain] = {}
         self.files: list[Path] = []
         self.warnings: list[LogWarning] = []
@@ -129,7 +129,7 @@ class Blocks:
         """Take the log of an input."""
         self._columns[asked.destination] = self._table(asked.log, [asked.column])
 
-    def _unit(self, block: Block) -> Unit:
+    def _unit(self, block: Block) -> BlockModel:
         """Return the unit of a block."""
         options = dict(block.options)
         if block.file is not None:

@@ -12,8 +12,8 @@ from urmpipe.keyword_checks import PathLike
 from urmpipe.log_table import LogTable
 from urmpipe.systems.log_tables import read_mapped_table
 from urmpipe_datasets import LOGS
-from urmpipe_fmus.block import Unit
-from urmpipe_fmus.blocks import make_unit, unit_name, unit_options
+from urmpipe_fmus.block import BlockModel
+from urmpipe_fmus.blocks import block_option_help, make_block, normalise_block_name
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import DRIVE_KEYS, GAIN_KEYS, Drive, DrivenJoint, Gains
 from urmpipe_models.errors import Finding, Hint, OptionError
@@ -41,13 +41,13 @@ FROM_LOG = ("table", "columns")
 
 
 def unit_of(
-    unit: Unit | PathLike,
+    unit: BlockModel | PathLike,
     *,
     robot: Robot | None = None,
     log: PathLike | LogTable | None = None,
     options: Mapping[str, Any] | None = None,
     log_map: PathLike | LogMap | None = None,
-) -> Unit:
+) -> BlockModel:
     """Return a unit by name or from a file, made with its options.
 
     Args:
@@ -62,10 +62,10 @@ def unit_of(
         UrmpipeError: With everything that is wrong with the unit or its options.
     """
     given = dict(options or {})
-    if isinstance(unit, Unit) or Path(unit).suffix == ".py":
+    if isinstance(unit, BlockModel) or Path(unit).suffix == ".py":
         _refuse_options(unit, {"robot": robot, "log": log, **given})
-        return unit if isinstance(unit, Unit) else _from_file(Path(unit))
-    name = unit_name(str(unit))
+        return unit if isinstance(unit, BlockModel) else _from_file(Path(unit))
+    name = normalise_block_name(str(unit))
     refuse_operands(name, robot, log)
     arm = place_robot(robot)
     if log is not None:
@@ -76,23 +76,23 @@ def unit_of(
         given |= {"table": found.table, "columns": found.columns}
     elif arm is not None:
         given["robot"] = arm
-    return make_unit(name, **given)
+    return make_block(name, **given)
 
 
-def example_of(unit: str) -> Unit:
+def example_of(unit: str) -> BlockModel:
     """Return a unit with the options of an example, as its variables depend on them; from a file as it is.
 
     Raises:
         UrmpipeError: If there is no such unit, or with all that is wrong with a file.
     """
-    if unit_name(unit) == "driven_arm":
+    if normalise_block_name(unit) == "driven_arm":
         return unit_of(unit, robot=_driven(load_robot(DRIVEN)))
-    return unit_of(unit, **EXAMPLES.get(unit_name(unit), {}))
+    return unit_of(unit, **EXAMPLES.get(normalise_block_name(unit), {}))
 
 
 def example_subject(unit: str) -> tuple[str, str]:
     """Return the arm or the network of a unit's example, and which of them it is; empty if it has none."""
-    name = unit_name(unit)
+    name = normalise_block_name(unit)
     if name == "network_motion":
         return str(EXAMPLES[name]["options"]["network"]), "network"
     robot = DRIVEN if name == "driven_arm" else EXAMPLES.get(name, {}).get("robot", "")
@@ -104,7 +104,7 @@ def _driven(robot: Chain) -> Chain:
     starts = {
         one.name: one.starts[0]
         for name in ("dc_drive", "drive_controller")
-        for one in make_unit(name).parameters
+        for one in make_block(name).parameters
     }
     drive = Drive(*(starts[key] for key in DRIVE_KEYS))
     gains = Gains(*(starts[key] for key in GAIN_KEYS))
@@ -112,11 +112,11 @@ def _driven(robot: Chain) -> Chain:
     return replace(robot, drives=tuple(drives))
 
 
-def _from_file(path: Path) -> Unit:
+def _from_file(path: Path) -> BlockModel:
     """Return the unit of a user's file."""
-    from urmpipe_fmus.blocks.user import load_unit_file
+    from urmpipe_fmus.blocks.user import load_block_file
 
-    return load_unit_file(path)
+    return load_block_file(path)
 
 
 def column_names(columns: Any) -> list[str] | None:
@@ -133,8 +133,8 @@ def refuse_operands(name: str, robot: Robot | None, log: Any) -> None:
         UnitError: If there is no such unit.
         OptionError: With all that it lacks and all that it does not have.
     """
-    name = unit_name(name)
-    known = unit_options(name)
+    name = normalise_block_name(name)
+    known = block_option_help(name)
     takes = {"robot": "robot" in known, "log": FROM_LOG[0] in known}
     faults = []
     for option, value in (("robot", robot), ("log", log)):
@@ -155,9 +155,9 @@ def _shown(value: Any) -> Any:
     return value.name if isinstance(value, Chain) else value
 
 
-def _refuse_options(unit: Unit | PathLike, given: Mapping[str, Any]) -> None:
+def _refuse_options(unit: BlockModel | PathLike, given: Mapping[str, Any]) -> None:
     """Raise an `OptionError` if a unit that is complete is given options."""
     found = [name for name, value in given.items() if value is not None]
     if found:
-        who = unit.name if isinstance(unit, Unit) else unit
+        who = unit.name if isinstance(unit, BlockModel) else unit
         raise OptionError(f"unit {who}: found {', '.join(found)}, allowed: no options, it is complete")

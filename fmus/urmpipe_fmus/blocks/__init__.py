@@ -13,7 +13,7 @@ from inspect import Parameter, signature
 from types import ModuleType
 from typing import Any, cast
 
-from urmpipe_fmus.block import Unit
+from urmpipe_fmus.block import BlockModel
 from urmpipe_models.errors import UnitError, did_you_mean, not_among
 
 # Of each unit its module, and what it does.
@@ -38,18 +38,18 @@ _UNITS: dict[str, tuple[str, str]] = {
 }
 
 
-def unit_names() -> tuple[str, ...]:
+def block_names() -> tuple[str, ...]:
     """Return the names of the units."""
     return tuple(_UNITS)
 
 
-def unit_name(name: str) -> str:
+def normalise_block_name(name: str) -> str:
     """Return the name of a unit whose words are joined by - or _; what is no unit's name as it is."""
     joined = name.replace("-", "_")
     return joined if joined in _UNITS else name
 
 
-def unit_help(name: str) -> str:
+def block_summary(name: str) -> str:
     """Return what a unit does, in a line.
 
     Raises:
@@ -58,7 +58,7 @@ def unit_help(name: str) -> str:
     return _UNITS[_known(name)][1]
 
 
-def unit_options(name: str) -> Mapping[str, str]:
+def block_option_help(name: str) -> Mapping[str, str]:
     """Return a line of help for each option of a unit.
 
     Raises:
@@ -68,19 +68,19 @@ def unit_options(name: str) -> Mapping[str, str]:
     return cast("Mapping[str, str]", getattr(_module(known), f"{known.upper()}_OPTIONS", {}))
 
 
-def make_unit(name: str, /, **options: Any) -> Unit:
+def make_block(name: str, /, **options: Any) -> BlockModel:
     """Return a unit.
 
     Args:
         name: Its name.
-        options: See `unit_options`.
+        options: See `block_option_help`.
 
     Raises:
         UnitError: If there is no such unit, or with all that is wrong with its options.
     """
     name = _known(name)
-    known = unit_options(name)
-    make = cast("Callable[..., Unit]", getattr(_module(name), name))
+    known = block_option_help(name)
+    make = cast("Callable[..., BlockModel]", getattr(_module(name), name))
     needed = [one.name for one in signature(make).parameters.values() if one.default is Parameter.empty]
     allowed = ", ".join(known) or "none, it has no options"
     faults = [
@@ -101,6 +101,6 @@ def _module(name: str) -> ModuleType:
 
 def _known(name: str) -> str:
     """Return the name of a unit; `UnitError` if there is none."""
-    if (found := unit_name(name)) not in _UNITS:
+    if (found := normalise_block_name(name)) not in _UNITS:
         raise UnitError(f"unit: {not_among(name, _UNITS)}, or a .py file with a unit in it")
     return found

@@ -11,7 +11,7 @@ from dataclasses import replace
 from itertools import chain as joined
 from typing import Any, NamedTuple
 
-from urmpipe_fmus.block import Input, Output, Parameter, State, Unit, Values, Variable
+from urmpipe_fmus.block import BlockModel, Input, Output, Parameter, State, Values, Variable
 from urmpipe_fmus.blocks.coordinates import (
     KINDS,
     acceleration_outputs,
@@ -148,7 +148,7 @@ CHAIN_DYNAMICS_OPTIONS: Mapping[str, str] = {
 }
 
 
-def chain_dynamics(robot: Chain) -> Unit:
+def chain_dynamics(robot: Chain) -> BlockModel:
     """Return the unit: torques of the joints and a force on the tool in; their motion out.
 
     Inputs are the torques `tau` of the joints that turn and the forces `f` of those that slide, each from the
@@ -191,7 +191,7 @@ def chain_dynamics(robot: Chain) -> Unit:
             "energy_in": wrench_power(robot, q, qd, wrench_at(v)),
         }
 
-    return Unit(
+    return BlockModel(
         name="chain_dynamics",
         description=f"Motion of {robot.name or 'an arm'} under the torques of its joints",
         variables=(*masses.parameters, *_inputs(robot), *_outputs(robot), *_states(robot)),
@@ -208,7 +208,7 @@ def chain_dynamics(robot: Chain) -> Unit:
     )
 
 
-def from_robot_toml(robot: str) -> Unit:
+def from_robot_toml(robot: str) -> BlockModel:
     """Return `chain_dynamics` of the arm that a text of `robot_toml` describes, bit by bit."""
     return chain_dynamics(chain_from_dict(tomllib.loads(robot)))
 

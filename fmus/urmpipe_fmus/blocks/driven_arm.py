@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_fmus.block import Input, Memory, Output, Parameter, State, Unit, Values, Variable
+from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Parameter, State, Values, Variable
 from urmpipe_fmus.blocks.chain_dynamics import Masses, masses_of, tool_inputs, wrench_at
 from urmpipe_fmus.blocks.coordinates import (
     CoordinateKind,
@@ -329,7 +329,7 @@ LONGEST_STEP = 5e-4
 """The longest step of the integrator in [s]."""
 
 
-def driven_arm(robot: Chain) -> Unit:
+def driven_arm(robot: Chain) -> BlockModel:
     """Return the unit: set points of the driven joints and a force on the tool in; the arm's motion out.
 
     Dynamics of the arm, drives and controllers are one function with one integrator: nothing is held between
@@ -349,7 +349,7 @@ def driven_arm(robot: Chain) -> Unit:
     """
     an_arm("driven_arm", robot)
     model = _Model(robot, masses_of(robot), drive_groups(robot, at_rest(robot)))
-    return Unit(
+    return BlockModel(
         name="driven_arm",
         description=f"{robot.name or 'An arm'} with its drives and controllers",
         variables=tuple(model.variables()),
@@ -445,7 +445,7 @@ class _Model:
         return group.voltages(v, state.q, state.qd, self._accelerations(v))
 
 
-def from_robot_toml(robot: str) -> Unit:
+def from_robot_toml(robot: str) -> BlockModel:
     """Return `driven_arm` of the arm that a text of `robot_toml` describes, bit by bit."""
     return driven_arm(chain_from_dict(tomllib.loads(robot)))
 

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from urmpipe_fmus.block import Input, Memory, Output, Parameter, Recipe, State, Unit, Values
+from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Parameter, Recipe, State, Values
 from urmpipe_models.drives import (
     MIN_CONSTANT,
     MIN_PERIOD,
@@ -35,14 +35,14 @@ from urmpipe_models.drives import evaluate_setpoint as set_point_at
 from urmpipe_models.elementwise import Element
 
 
-def dc_drive() -> Unit:
+def dc_drive() -> BlockModel:
     """Return the unit: voltage, driven angle and its rate in; shaft torque, angle, rate and current out.
 
     All parameters but k are an assumption: a plausible set for a joint of an arm of that rigidity.
 
     Source: [Iso9283]_ eq. 14-18.
     """
-    return Unit(
+    return BlockModel(
         name="dc_drive",
         description="DC motor with gear and a damped elastic shaft, counted at the gear's output shaft",
         variables=(*_drive_parameters(), *_drive_inputs(), *_drive_outputs(), *_drive_states()),
@@ -149,7 +149,7 @@ NO_SAMPLE = -(2.0**53)
 """Below the number of every sample: a run may begin before 0 s."""
 
 
-def drive_controller() -> Unit:
+def drive_controller() -> BlockModel:
     """Return the unit: set and real position, velocity and acceleration in; voltage out.
 
     It samples at the multiples of its own period, whatever the communication step; where no communication
@@ -159,7 +159,7 @@ def drive_controller() -> Unit:
 
     Source: [Iso9283]_ eq. 20 with the corrected sign.
     """
-    return Unit(
+    return BlockModel(
         name="drive_controller",
         description="Sampled control of a drive's voltage by errors of position, velocity, acceleration",
         variables=(
@@ -228,12 +228,12 @@ def _voltage(v: Values) -> Element:
     return held_voltage(v.time, v.period, v.sample, fresh, v.last)
 
 
-def inertia() -> Unit:
+def inertia() -> BlockModel:
     """Return the unit: torques in; angle, rate and acceleration out.
 
     Source: [Iso9283]_ eq. 19, of one joint with a constant inertia.
     """
-    return Unit(
+    return BlockModel(
         name="inertia",
         description="Inertia that turns about a fixed axis in a bearing with viscous friction",
         variables=(*_inertia_parameters(), *_inertia_inputs(), *_inertia_outputs(), *_inertia_states()),
@@ -286,9 +286,9 @@ def _acceleration(v: Values) -> Element:
     return load_acceleration(v.J, v.d, v.omega, v.tau, v.tau_ext)
 
 
-def set_point() -> Unit:
+def set_point() -> BlockModel:
     """Return the unit: a function of time alone, with position, velocity and acceleration out."""
-    return Unit(
+    return BlockModel(
         name="set_point",
         description="Set point of a joint over time: a step, a ramp, or a trapezoid of velocity",
         variables=(*_set_point_parameters(), *_set_point_outputs()),

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from urmpipe_fmus.block import Input, Output, Parameter, Unit, Values, Variable
+from urmpipe_fmus.block import BlockModel, Input, Output, Parameter, Values, Variable
 from urmpipe_fmus.blocks.coordinates import (
     an_arm,
     arm_recipe,
@@ -157,7 +157,7 @@ def kinematic_chain(
     points: Sequence[str] | None = None,
     sensors: Sequence[str] | None = None,
     rates: bool = False,
-) -> Unit:
+) -> BlockModel:
     """Return the unit that computes points of an arm from its joints.
 
     Inputs are the angles `phi` of the joints that turn and the ways `s` of those that slide, each from the
@@ -195,7 +195,7 @@ def kinematic_chain(
             found |= _sensed(name[1:], places[name], motions[names.index(name)] if rates else None)
         return found
 
-    return Unit(
+    return BlockModel(
         name="kinematic_chain",
         description=f"Points of {robot.name or 'an arm'} from its joints",
         variables=(
@@ -211,7 +211,7 @@ def kinematic_chain(
     )
 
 
-def from_robot_toml(robot: str, **options: Any) -> Unit:
+def from_robot_toml(robot: str, **options: Any) -> BlockModel:
     """Return `kinematic_chain` of the arm that a text of `robot_toml` describes, bit by bit."""
     return kinematic_chain(chain_from_dict(tomllib.loads(robot)), **options)
 

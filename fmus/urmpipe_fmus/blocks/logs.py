@@ -13,13 +13,13 @@ from itertools import islice
 from typing import Any, NamedTuple
 
 from urmpipe_fmus.block import (
+    BlockModel,
     Input,
     Memory,
     Output,
     Parameter,
     Recipe,
     Table,
-    Unit,
     Values,
     ValueType,
     Variable,
@@ -53,7 +53,9 @@ class Column(NamedTuple):
     description: str = ""
 
 
-def log_source(table: Table, columns: Sequence[Column | Sequence[Any]], interpolate: bool = False) -> Unit:
+def log_source(
+    table: Table, columns: Sequence[Column | Sequence[Any]], interpolate: bool = False
+) -> BlockModel:
     """Return the unit that plays a log.
 
     Before the first row its values are those of the first, after the last those of the last. Angles that
@@ -87,7 +89,7 @@ def log_source(table: Table, columns: Sequence[Column | Sequence[Any]], interpol
             one.name: next(values) if one.size is None else tuple(islice(values, one.size)) for one in shown
         }
 
-    return Unit(
+    return BlockModel(
         name="log_source",
         description=f"A log of {len(table.t_ns)} rows, {'interpolated' if interpolate else 'held'}",
         variables=tuple(_output(one) for one in shown),
@@ -139,7 +141,7 @@ POINT = 1.0
 """Time is counted in communication points: what lies between two of them, `max_step` tells."""
 
 
-def repolarizer(joints: int) -> Unit:
+def repolarizer(joints: int) -> BlockModel:
     """Return the unit that adds whole periods to angles, so that they go on where they were.
 
     What `urmpipe_models.wraps.step` gives sample by sample, the samples being the communication points
@@ -154,7 +156,7 @@ def repolarizer(joints: int) -> Unit:
     Source: [UrmArm2021]_ eq. 15-18 with the corrections of the errata.
     """
     whole_number("repolarizer", "joints", joints)
-    return Unit(
+    return BlockModel(
         name="repolarizer",
         description="Joint angles without the jumps of joints that are limited to one period",
         variables=(*_parameters(), *_signals(joints), *_memories(joints)),
@@ -241,12 +243,12 @@ def _update(v: Values) -> Mapping[str, Sequence[Element]]:
     return fields
 
 
-def delta_meter() -> Unit:
+def delta_meter() -> BlockModel:
     """Return the unit that subtracts where a point is from where it should be.
 
     Source: [UrmArm2021]_ eq. 19-21, 23.
     """
-    return Unit(
+    return BlockModel(
         name="delta_meter",
         description="Deviation of a point from where it should be, and whether it is tolerated",
         variables=(

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_fmus.block import Input, Memory, Output, Recipe, Unit, Values, Variable
+from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Recipe, Values, Variable
 from urmpipe_fmus.blocks.coordinates import whole_number
 from urmpipe_models.elementwise import Element, Vector
 from urmpipe_models.errors import UnitError, not_among, shown
@@ -50,7 +50,7 @@ def network_motion(
     start: Mapping[str, Any] | None = None,
     points: Mapping[str, Any] | Sequence[str] | str | None = None,
     newton: int = NEWTON,
-) -> Unit:
+) -> BlockModel:
     """Return the unit that computes how a network follows its controls.
 
     Inputs are the controls that can be set: in [rad] or [m] if a control is an angle or a length, else the
@@ -98,19 +98,19 @@ def network_motion(
     return _unit(with_start(loaded, assembled.x[:, 0].tolist()), points, newton)
 
 
-def from_tables(network: str, points: Mapping[str, Any], newton: int) -> Unit:
+def from_tables(network: str, points: Mapping[str, Any], newton: int) -> BlockModel:
     """Return `network_motion` of a JSON text of `network_tables`, assembled where it starts."""
     return _unit(load_network(json.loads(network)), points, newton)
 
 
-def _unit(network: Network, points: Any, newton: int) -> Unit:
+def _unit(network: Network, points: Any, newton: int) -> BlockModel:
     """Return the unit of a network whose start is assembled."""
     whole_number("network_motion", "newton", newton)
     model = _Model(network, build_mechanism(network), _read_points(network, points), newton)
     if not model.inputs:
         raise _option_error("network", f"found {network.name} without a control to set, allowed: one or more")
     remembers = len(model.mechanism.free) > 0
-    return Unit(
+    return BlockModel(
         name="network_motion",
         description=f"Motion of {network.name} by its controls",
         variables=tuple(model.variables()),

@@ -1,4 +1,4 @@
-"""A user's own unit: one Python file with a `Unit` in it.
+"""A user's own unit: one Python file with a `BlockModel` in it.
 
 An FMU carries the text of this file and no other, so the file holds all that the unit needs; what it imports
 is installed. Its functions keep nothing between two calls: what is remembered is a `State` or a `Memory`.
@@ -19,14 +19,14 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_fmus.block import Recipe, Unit
+from urmpipe_fmus.block import BlockModel, Recipe
 from urmpipe_fmus.dependencies import Dependencies
 from urmpipe_fmus.run import Equations
 from urmpipe_models.errors import Finding, UnitError, UrmpipeError
 from urmpipe_models.files import read_contents
 
 
-def load_unit_file(path: str | Path) -> Unit:
+def load_block_file(path: str | Path) -> BlockModel:
     """Return the unit of a user's file, found fit to become an FMU.
 
     Args:
@@ -41,16 +41,16 @@ def load_unit_file(path: str | Path) -> Unit:
     neighbours = list(_neighbours(path, source))
     if neighbours:
         raise UnitError(*neighbours)
-    unit = unit_of_source(source, str(path))
+    model = block_from_source(source, str(path))
     try:
-        Dependencies(unit)
-        _check_keeps_nothing(unit)
+        Dependencies(model)
+        _check_keeps_nothing(model)
     except UnitError as error:
         raise UnitError(*(replace(one, file=one.file or str(path)) for one in error.findings)) from error
-    return replace(unit, recipe=Recipe(module=path.name, source=source))
+    return replace(model, recipe=Recipe(module=path.name, source=source))
 
 
-def unit_of_source(source: str, file: str) -> Unit:
+def block_from_source(source: str, file: str) -> BlockModel:
     """Return the one unit that a text of Python makes.
 
     Args:
@@ -67,7 +67,7 @@ def unit_of_source(source: str, file: str) -> Unit:
         exec(compile(source, file, "exec"), vars(module))  # the user asked for this file to be run
     except SyntaxError as error:
         found = Finding(
-            f"not valid Python: {error.msg}; allowed: Python with a Unit in it", file, error.lineno
+            f"not valid Python: {error.msg}; allowed: Python with a BlockModel in it", file, error.lineno
         )
         raise UnitError(found) from error
     except (Exception, SystemExit) as error:
@@ -124,10 +124,10 @@ def _told(error: BaseException, file: str) -> list[Finding]:
     if isinstance(error, UrmpipeError):
         return [one if one.file else replace(one, file=file, line=line) for one in error.findings]
     said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-    return [Finding(f"cannot be run: {said}; allowed: Python with a Unit in it", file, line)]
+    return [Finding(f"cannot be run: {said}; allowed: Python with a BlockModel in it", file, line)]
 
 
-def _only_unit(module: ModuleType, file: str) -> Unit:
+def _only_unit(module: ModuleType, file: str) -> BlockModel:
     """Return the one unit of a module; names with _ before them do not count.
 
     Raises:
@@ -136,35 +136,37 @@ def _only_unit(module: ModuleType, file: str) -> Unit:
     found = {
         id(value): (name, value)
         for name, value in vars(module).items()
-        if isinstance(value, Unit) and not name.startswith("_")
+        if isinstance(value, BlockModel) and not name.startswith("_")
     }
     if not found:
-        raise UnitError(Finding("found no Unit, allowed: one, such as unit = Unit(name=..., ...)", file))
+        raise UnitError(
+            Finding("found no BlockModel, allowed: one, such as unit = BlockModel(name=..., ...)", file)
+        )
     if len(found) > 1:
         names = ", ".join(name for name, _ in found.values())
         fault = f"found {len(found)} units: {names}; allowed: one (a name with _ before it does not count)"
         raise UnitError(Finding(fault, file))
-    [(_, unit)] = found.values()
-    return unit
+    [(_, model)] = found.values()
+    return model
 
 
-def _check_keeps_nothing(unit: Unit) -> None:
+def _check_keeps_nothing(model: BlockModel) -> None:
     """Compare what a unit's functions give of the same values, before and after others.
 
     Raises:
         UnitError: If they differ: something is kept that an FMU would not keep, or drawn at random.
     """
-    equations = Equations(unit)
-    starts: list[Any] = [np.float64(start) for one in unit.given for start in one.starts]
+    equations = Equations(model)
+    starts: list[Any] = [np.float64(start) for one in model.given for start in one.starts]
     others = [start + 0.5 + 0.01 * k for k, start in enumerate(starts)]
     for what in ("outputs", "derivatives", "update"):
         method = getattr(equations, what)
         first, _, again = (
-            method(time, given, None if unit.table is None else unit.table.rows_at(time))
+            method(time, given, None if model.table is None else model.table.rows_at(time))
             for time, given in ((0.0, starts), (0.5, others), (0.0, starts))
         )
         if not all(np.array_equal(a, b, equal_nan=True) for a, b in zip(first, again, strict=True)):
             raise UnitError(
-                f"unit {unit.name}: {what}: gives other results for the same values, allowed: a function that"
-                " keeps and draws nothing; what is remembered is a State or a Memory"
+                f"unit {model.name}: {what}: gives other results for the same values, allowed: a function"
+                " that keeps and draws nothing; what is remembered is a State or a Memory"
             )

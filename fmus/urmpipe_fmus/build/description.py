@@ -14,7 +14,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from urmpipe_fmus.block import INTERNAL_STEP, LARGEST_INTEGER, Input, Output, Unit, Variable
+from urmpipe_fmus.block import INTERNAL_STEP, LARGEST_INTEGER, BlockModel, Input, Output, Variable
 from urmpipe_fmus.dependencies import Dependencies
 from urmpipe_fmus.si_units import BASE_NAMES, base_unit, display_conversion
 
@@ -32,11 +32,13 @@ LOG_CATEGORIES = {
 }
 
 
-def model_description(unit: Unit, guid: str, backend: Backend, source_files: Sequence[str] = ()) -> str:
+def model_description(
+    model: BlockModel, guid: str, backend: Backend, source_files: Sequence[str] = ()
+) -> str:
     """Return the text of modelDescription.xml; the same for the same unit, GUID, backend and version.
 
     Args:
-        unit: The unit.
+        model: The block model.
         guid: What ties the binary to this description.
         backend: Who runs the unit.
         source_files: C files below sources/ that a binary is compiled from; empty if there are none.
@@ -44,31 +46,31 @@ def model_description(unit: Unit, guid: str, backend: Backend, source_files: Seq
     root = ET.Element(
         "fmiModelDescription",
         fmiVersion="2.0",
-        modelName=unit.name,
+        modelName=model.name,
         guid=guid,
-        description=markup_text(unit.description),
+        description=markup_text(model.description),
         generationTool=f"urmpipe {version('urmpipe')}",
         variableNamingConvention="structured",
     )
-    _co_simulation(root, unit, backend, source_files)
-    _unit_definitions(root, unit)
+    _co_simulation(root, model, backend, source_files)
+    _unit_definitions(root, model)
     categories = ET.SubElement(root, "LogCategories")
     for name, description in LOG_CATEGORIES.items():
         ET.SubElement(categories, "Category", name=name, description=description)
-    _default_experiment(root, unit)
+    _default_experiment(root, model)
     variables = ET.SubElement(root, "ModelVariables")
-    for reference, (name, one) in enumerate(unit.scalars):
+    for reference, (name, one) in enumerate(model.scalars):
         _scalar_variable(variables, reference, name, one)
-    _model_structure(root, unit)
+    _model_structure(root, model)
     ET.indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
 
 
-def default_experiment(unit: Unit) -> tuple[float, float]:
+def default_experiment(model: BlockModel) -> tuple[float, float]:
     """Return stop time and communication step in [s] of the default experiment: the table's, if any."""
-    if unit.table is None or len(unit.table.t_ns) < 2 or unit.table.t_ns[-1] <= 0:
+    if model.table is None or len(model.table.t_ns) < 2 or model.table.t_ns[-1] <= 0:
         return DURATION, STEP
-    return float(unit.table.t_ns[-1]) / 1e9, float(np.median(np.diff(unit.table.t_ns))) / 1e9
+    return float(model.table.t_ns[-1]) / 1e9, float(np.median(np.diff(model.table.t_ns))) / 1e9
 
 
 def markup_text(text: str) -> str:
@@ -81,7 +83,9 @@ def markup_text(text: str) -> str:
     )
 
 
-def _co_simulation(root: ET.Element, unit: Unit, backend: Backend, source_files: Sequence[str]) -> None:
+def _co_simulation(
+    root: ET.Element, model: BlockModel, backend: Backend, source_files: Sequence[str]
+) -> None:
     """Say what the FMU can do; what is not said is false."""
     only_python = ("needsExecutionTool", "canNotUseMemoryManagementFunctions")
     flags = dict.fromkeys(only_python, "true") if backend == "python" else {}
@@ -89,7 +93,7 @@ def _co_simulation(root: ET.Element, unit: Unit, backend: Backend, source_files:
         root,
         "CoSimulation",
         flags,
-        modelIdentifier=unit.name,
+        modelIdentifier=model.name,
         canHandleVariableCommunicationStepSize="true",
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",
@@ -100,9 +104,9 @@ def _co_simulation(root: ET.Element, unit: Unit, backend: Backend, source_files:
             ET.SubElement(files, "File", name=name)
 
 
-def _unit_definitions(root: ET.Element, unit: Unit) -> None:
+def _unit_definitions(root: ET.Element, model: BlockModel) -> None:
     """Define the units that variables have, each with its display units."""
-    used = sorted({one.unit for one in unit.variables if one.unit})
+    used = sorted({one.unit for one in model.variables if one.unit})
     if not used:
         return
     definitions = ET.SubElement(root, "UnitDefinitions")
@@ -113,7 +117,7 @@ def _unit_definitions(root: ET.Element, unit: Unit) -> None:
         attributes = {name: str(value) for name, value in exponents if value}
         attributes |= _scale(base.factor, base.offset)
         ET.SubElement(element, "BaseUnit", attributes)
-        displays = {one.display_unit for one in unit.variables if one.unit == spelling and one.display_unit}
+        displays = {one.display_unit for one in model.variables if one.unit == spelling and one.display_unit}
         for display in sorted(displays):
             scale = _scale(*display_conversion(spelling, display))
             ET.SubElement(element, "DisplayUnit", {"name": display, **scale})
@@ -124,8 +128,8 @@ def _scale(factor: float, offset: float) -> dict[str, str]:
     return ({"factor": repr(factor)} if factor != 1.0 else {}) | ({"offset": repr(offset)} if offset else {})
 
 
-def _default_experiment(root: ET.Element, unit: Unit) -> None:
-    stop, step = default_experiment(unit)
+def _default_experiment(root: ET.Element, model: BlockModel) -> None:
+    stop, step = default_experiment(model)
     ET.SubElement(root, "DefaultExperiment", startTime="0.0", stopTime=repr(stop), stepSize=repr(step))
 
 
@@ -165,18 +169,18 @@ def _number(one: Variable, value: float) -> str:
     return repr(float(value)) if one.type == "Real" else str(int(value))
 
 
-def _model_structure(root: ET.Element, unit: Unit) -> None:
+def _model_structure(root: ET.Element, model: BlockModel) -> None:
     """Say what the outputs depend on.
 
     At communication points the knowns are the inputs. A state is none, as its derivative is not exposed: an
     output that is one depends on nothing, and so does what is computed from states only. In the
     initialization all that has an exact start value is known too (FMI 2.0.4, section 2.2.8).
     """
-    index = {name: number for number, (name, _) in enumerate(unit.scalars, start=1)}
-    inputs = {name for one in unit.inputs for name in one.names}
-    depends = Dependencies(unit).outputs
+    index = {name: number for number, (name, _) in enumerate(model.scalars, start=1)}
+    inputs = {name for one in model.inputs for name in one.names}
+    depends = Dependencies(model).outputs
     structure = ET.SubElement(root, "ModelStructure")
-    outputs = [name for name, one in unit.scalars if one.causality == "output"]
+    outputs = [name for name, one in model.scalars if one.causality == "output"]
     for title, names, known in (("Outputs", outputs, inputs), ("InitialUnknowns", list(depends), set(index))):
         lines = ET.SubElement(structure, title) if names else structure
         for name in sorted(names, key=index.__getitem__):
@@ -193,15 +197,15 @@ TITLES = ("Name", "Part", "Unit", "Start", "Min", "Max", "Description")
 NUMBERS = ("Start", "Min", "Max")
 
 
-def documentation(unit: Unit) -> str:
+def documentation(model: BlockModel) -> str:
     """Return a page of HTML that needs nothing else: variables, equations, source, and what a step does."""
     page = _template().render(
-        unit=unit,
+        model=model,
         version=version("urmpipe"),
         titles=TITLES,
         numbers=NUMBERS,
-        rows=[list(zip(TITLES, variable_row(one), strict=True)) for one in unit.variables],
-        steps=_steps(unit),
+        rows=[list(zip(TITLES, variable_row(one), strict=True)) for one in model.variables],
+        steps=_steps(model),
     )
     return markup_text(page)
 
@@ -256,30 +260,30 @@ def _value(one: Variable, value: float, digits: int | None) -> str:
     return f"{said} ({factor * value + offset:.{digits or 7}g} {one.display_unit})"
 
 
-def _steps(unit: Unit) -> list[str]:
+def _steps(model: BlockModel) -> list[str]:
     """Return what happens from one communication point to the next."""
     lines = [
         "Outputs are those of the inputs as they stand: set inputs, get outputs, without a step in between."
     ]
-    if unit.table is not None:
-        first, last = (float(t) / 1e9 for t in unit.table.t_ns[[0, -1]])
+    if model.table is not None:
+        first, last = (float(t) / 1e9 for t in model.table.t_ns[[0, -1]])
         lines.append(
-            f"It reads a table of {len(unit.table.t_ns)} rows from {first:.9g} s to {last:.9g} s at the time"
+            f"It reads a table of {len(model.table.t_ns)} rows from {first:.9g} s to {last:.9g} s at the time"
             " of the communication point, rounded to nanoseconds; outside the table its first and last row"
             " hold."
         )
-    if unit.memories:
-        names = ", ".join(one.name for one in unit.memories)
+    if model.memories:
+        names = ", ".join(one.name for one in model.memories)
         lines.append(
             f"fmi2DoStep first takes the sample: the next values of {names}, from the inputs as set."
         )
-    if unit.states:
-        names = ", ".join(one.name for one in unit.states)
+    if model.states:
+        names = ", ".join(one.name for one in model.states)
         lines.append(
-            f"{'Then it' if unit.memories else 'fmi2DoStep'} integrates {names} with the classical"
+            f"{'Then it' if model.memories else 'fmi2DoStep'} integrates {names} with the classical"
             f" Runge-Kutta method in equal steps of at most the parameter {INTERNAL_STEP}, the inputs held."
             " A step after which a state is not finite is an error, and undone."
         )
-    if not unit.memories and not unit.states:
+    if not model.memories and not model.states:
         lines.append("It remembers nothing: fmi2DoStep only moves the time on.")
     return lines

@@ -29,7 +29,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_fmus.block import Recipe, Unit
+from urmpipe_fmus.block import BlockModel, Recipe
 from urmpipe_fmus.build.description import Backend, documentation, model_description
 from urmpipe_fmus.fmu_file import DAMAGED, content_guid, this_platform, write_fmu
 from urmpipe_models.arm.chain import Chain
@@ -43,9 +43,9 @@ if TYPE_CHECKING:
 ROBOT_FILE = "resources/robot.toml"
 
 
-def robot_file(unit: Unit) -> dict[str, bytes]:
+def robot_file(model: BlockModel) -> dict[str, bytes]:
     """Return the file of the arm that a unit was made of, if it was."""
-    robot = unit.recipe.arguments.get("robot") if unit.recipe else None
+    robot = model.recipe.arguments.get("robot") if model.recipe else None
     return {ROBOT_FILE: robot.encode()} if isinstance(robot, str) else {}
 
 
@@ -79,7 +79,7 @@ class BuiltFmu(Shown):
     """
 
     path: Path
-    unit: Unit
+    unit: BlockModel
     backend: Backend
     platforms: tuple[str, ...]
     guid: str
@@ -117,7 +117,7 @@ class BuiltFmu(Shown):
 
 
 def build_fmu(
-    unit: Unit,
+    model: BlockModel,
     target: Path,
     *,
     backend: Backend | None = None,
@@ -127,7 +127,7 @@ def build_fmu(
     """Build the FMU of a unit; the same unit, versions and compiler give the same bytes.
 
     Args:
-        unit: The unit.
+        model: The block model.
         target: The file, or a folder that exists: then UNIT.fmu in it.
         backend: Native or Python; None for native, or Python if native cannot be built here and no platform
             is named.
@@ -141,13 +141,13 @@ def build_fmu(
     """
     chosen, missing = chosen_backend(backend, platforms)
     if chosen == "native":
-        files, guid, found = _native(unit, platforms, told)
+        files, guid, found = _native(model, platforms, told)
     else:
-        files, guid, found = _python(unit, platforms)
-    note = missing and f"{unit.name}.fmu runs on Python, as no native one can be built here: {missing}"
-    path = target / f"{unit.name}.fmu" if target.is_dir() else target
+        files, guid, found = _python(model, platforms)
+    note = missing and f"{model.name}.fmu runs on Python, as no native one can be built here: {missing}"
+    path = target / f"{model.name}.fmu" if target.is_dir() else target
     write_fmu(path, files)
-    return BuiltFmu(path, unit, chosen, found, guid, note)
+    return BuiltFmu(path, model, chosen, found, guid, note)
 
 
 def chosen_backend(backend: Backend | None, platforms: Sequence[str] = ()) -> tuple[Backend, str]:
@@ -175,42 +175,42 @@ def chosen_backend(backend: Backend | None, platforms: Sequence[str] = ()) -> tu
 
 
 def _native(
-    unit: Unit, platforms: Sequence[str], told: Callable[[str], None] | None
+    model: BlockModel, platforms: Sequence[str], told: Callable[[str], None] | None
 ) -> tuple[dict[str, bytes], str, tuple[str, ...]]:
     """Return files, GUID and platforms of a native FMU: machine code, and the C that it is made from."""
     from urmpipe_fmus.native import guid_header, native_binaries, native_sources, this_platform
     from urmpipe_fmus.native.compile import GUID_HEADER
 
     chosen = tuple(dict.fromkeys(platforms)) or (this_platform(),)
-    sources = native_sources(unit)
+    sources = native_sources(model)
     compiled = [name.removeprefix("sources/") for name in sorted(sources) if name.endswith(".c")]
-    files, guid = _described(unit, "native", {**sources, **_table(unit)}, compiled)
-    files |= native_binaries(unit, sources, guid, chosen, told=told)
+    files, guid = _described(model, "native", {**sources, **_table(model)}, compiled)
+    files |= native_binaries(model, sources, guid, chosen, told=told)
     return files | {GUID_HEADER: guid_header(guid)}, guid, chosen
 
 
-def _python(unit: Unit, platforms: Sequence[str]) -> tuple[dict[str, bytes], str, tuple[str, ...]]:
+def _python(model: BlockModel, platforms: Sequence[str]) -> tuple[dict[str, bytes], str, tuple[str, ...]]:
     """Return files, GUID and platforms of a Python FMU: the unit's sources under pythonfmu's binaries."""
     from urmpipe_fmus.python_fmu.package import PLATFORMS, python_files
 
     chosen = tuple(dict.fromkeys(platforms)) or PLATFORMS
-    files, guid = _described(unit, "python", python_files(unit, chosen, _table(unit)), [])
+    files, guid = _described(model, "python", python_files(model, chosen, _table(model)), [])
     return files, guid, chosen
 
 
-def _table(unit: Unit) -> dict[str, bytes]:
+def _table(model: BlockModel) -> dict[str, bytes]:
     """Return the file of a unit's table, if it has one."""
     from urmpipe_fmus.block import TABLE_FILE, table_bytes
 
-    return {} if unit.table is None else {TABLE_FILE: table_bytes(unit.table)}
+    return {} if model.table is None else {TABLE_FILE: table_bytes(model.table)}
 
 
 def _described(
-    unit: Unit, backend: Backend, files: dict[str, bytes], source_files: Sequence[str]
+    model: BlockModel, backend: Backend, files: dict[str, bytes], source_files: Sequence[str]
 ) -> tuple[dict[str, bytes], str]:
     """Return files with their description, documentation and arm, and the GUID of them all."""
-    files = files | robot_file(unit) | {DOCUMENTATION: documentation(unit).encode()}
-    without = model_description(unit, "", backend, source_files)
+    files = files | robot_file(model) | {DOCUMENTATION: documentation(model).encode()}
+    without = model_description(model, "", backend, source_files)
     guid = content_guid({**files, DESCRIPTION: without.encode()})
     described = without.replace(' guid=""', f' guid="{guid}"', 1)  # the root's: values hold no quotes
     return {**files, DESCRIPTION: described.encode()}, guid
@@ -241,7 +241,7 @@ def cache_folder() -> Path:
 
 
 def cached_fmu(
-    unit: Unit, backend: Backend | None = None, *, told: Callable[[str], None] | None = None
+    model: BlockModel, backend: Backend | None = None, *, told: Callable[[str], None] | None = None
 ) -> Path:
     """Return the FMU of a unit for this platform, built if it is not in the cache, or damaged there.
 
@@ -249,7 +249,7 @@ def cached_fmu(
     do; its place is named by what was built. Nothing is ever removed: the folder may be, at any time.
 
     Args:
-        unit: The unit.
+        model: The block model.
         backend: Native or Python; None for native if it can be built here, else Python.
         told: Told the name of the unit before it is built, which takes its time.
 
@@ -262,15 +262,15 @@ def cached_fmu(
     folder = cache_folder() / "fmus"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        if not _is_told(unit.recipe):
-            tell(unit.name)
-            return _built_anew(unit, chosen, this_platform(), folder)
-        folder /= _key(unit, chosen, this_platform())
-        path, digest = folder / f"{unit.name}.fmu", folder / f"{unit.name}.sha256"
+        if not _is_told(model.recipe):
+            tell(model.name)
+            return _built_anew(model, chosen, this_platform(), folder)
+        folder /= _key(model, chosen, this_platform())
+        path, digest = folder / f"{model.name}.fmu", folder / f"{model.name}.sha256"
         if not _is_whole(path, digest):
-            tell(unit.name)
+            tell(model.name)
             folder.mkdir(exist_ok=True)
-            build_fmu(unit, path, backend=chosen, platforms=(this_platform(),))
+            build_fmu(model, path, backend=chosen, platforms=(this_platform(),))
             _write(digest, _hash_of(path))
     except OSError as error:
         said = f"cannot be written: {error.strerror or error}; the variable URMPIPE_CACHE names another place"
@@ -283,14 +283,14 @@ def _is_told(recipe: Recipe) -> bool:
     return bool(recipe.source) or recipe.module.partition(".")[0] in PACKAGES
 
 
-def _built_anew(unit: Unit, backend: Backend, target: str, folder: Path) -> Path:
+def _built_anew(model: BlockModel, backend: Backend, target: str, folder: Path) -> Path:
     """Build an FMU, and put it where its own hash says."""
     part = folder / f"{uuid.uuid4().hex}.part"
     try:
-        build_fmu(unit, part, backend=backend, platforms=(target,))
+        build_fmu(model, part, backend=backend, platforms=(target,))
         place = folder / _hash_of(part)[:32]
         place.mkdir(exist_ok=True)
-        return part.replace(place / f"{unit.name}.fmu")
+        return part.replace(place / f"{model.name}.fmu")
     finally:
         part.unlink(missing_ok=True)
 
@@ -314,12 +314,12 @@ def _write(path: Path, text: str) -> None:
     part.replace(path)
 
 
-def _key(unit: Unit, backend: Backend, target: str) -> str:
+def _key(model: BlockModel, backend: Backend, target: str) -> str:
     """Return the hash of all that the FMU of a unit is made from."""
-    recipe = unit.recipe
+    recipe = model.recipe
     made_of: list[Any] = [
         [recipe.module, recipe.function, dict(recipe.arguments), recipe.source],
-        [unit.name, unit.description, repr(unit.variables), unit.equations, unit.source],
+        [model.name, model.description, repr(model.variables), model.equations, model.source],
         [backend, target, platform.python_version(), sys.implementation.name, *_versions()],
         _compiler() if backend == "native" else "",
         _sources(),
@@ -328,11 +328,11 @@ def _key(unit: Unit, backend: Backend, target: str) -> str:
     if recipe.source and backend == "native":
         from urmpipe_fmus.native import native_sources
 
-        digest.update(content_guid(native_sources(unit)).encode())
-    if unit.table is not None:
-        digest.update(repr(unit.table.values.shape).encode())
-        digest.update(unit.table.t_ns.tobytes())
-        digest.update(unit.table.values.tobytes())
+        digest.update(content_guid(native_sources(model)).encode())
+    if model.table is not None:
+        digest.update(repr(model.table.values.shape).encode())
+        digest.update(model.table.t_ns.tobytes())
+        digest.update(model.table.values.tobytes())
     return digest.hexdigest()[:32]
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_fmus.block import Table, Unit
+from urmpipe_fmus.block import BlockModel, Table
 from urmpipe_fmus.cosim.checks import Interface, Link, Start, Variable, Wiring, read_interface
 from urmpipe_fmus.cosim.job import TYPES, BlockJob, ExchangeJob, Job, LoopJob, Transfer
 from urmpipe_fmus.cosim.order import Exchange, Loop, Order
@@ -21,7 +21,7 @@ from urmpipe_fmus.cosim.system import STEP, SYSTEMS, Block, LogInput, Port, Syst
 from urmpipe_models.errors import CosimulationError, Finding, Hint, UrmpipeError
 from urmpipe_models.files import placed
 
-Make = Callable[[Block], Unit | Path]
+Make = Callable[[Block], BlockModel | Path]
 
 NANOSECOND = 1e-9
 """So much may be missing from a duration's last step: a log's times are rounded to nanoseconds."""
@@ -171,7 +171,7 @@ def _interfaces(
     for block in (one for one in system.blocks if one.name not in system.unread):
         try:
             made = make(block)
-            if isinstance(made, Unit):
+            if isinstance(made, BlockModel):
                 ends += [float(made.table.t_ns[-1]) * 1e-9] if made.table is not None else []
                 made = _fmu_of(made)
             if made not in read:
@@ -191,7 +191,7 @@ def _quoted(where: str, error: UrmpipeError) -> list[Finding]:
     return [Finding(one.words("system file"), about=where) for one in error.findings]
 
 
-def _fmu_of(unit: Unit) -> Path:
+def _fmu_of(unit: BlockModel) -> Path:
     from urmpipe_fmus.build.fmu import cached_fmu
 
     return cached_fmu(unit)

@@ -15,7 +15,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from urmpipe_fmus.blocks import unit_name
+from urmpipe_fmus.blocks import normalise_block_name
 from urmpipe_models.errors import CosimulationError, Finding, Hint, did_you_mean, not_among, shown
 from urmpipe_models.files import is_there, meant_by, placed
 from urmpipe_models.measure_units import WRITTEN, quantity
@@ -420,7 +420,7 @@ class _System:
             start = {}
         return Block(
             name=name,
-            unit=unit_name(self._text(table, where, "unit", "")),
+            unit=normalise_block_name(self._text(table, where, "unit", "")),
             file=self._file(table, where, "file"),
             fmu=self._file(table, where, "fmu"),
             options=options,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from urmpipe_fmus.block import Rows, Unit
+from urmpipe_fmus.block import BlockModel, Rows
 from urmpipe_fmus.native.symbols import Symbol, exact_expressions, expression
 from urmpipe_fmus.run import Equations
 from urmpipe_models.errors import UnitError
@@ -28,7 +28,7 @@ class Traced(NamedTuple):
     update: Any
 
 
-def traced(unit: Unit) -> Traced:
+def traced(unit: BlockModel) -> Traced:
     """Trace the functions of a unit.
 
     Raises:
@@ -38,7 +38,7 @@ def traced(unit: Unit) -> Traced:
         return Traced(*(_function(unit, name) for name in Traced._fields))
 
 
-def _function(unit: Unit, name: str) -> Any:
+def _function(unit: BlockModel, name: str) -> Any:
     """Trace one function of a unit."""
     import casadi
 

@@ -9,7 +9,7 @@ from importlib.metadata import files as distribution_files
 from importlib.resources import files
 from pathlib import Path, PurePath
 
-from urmpipe_fmus.block import Recipe, Unit
+from urmpipe_fmus.block import BlockModel, Recipe
 from urmpipe_fmus.fmu_file import content_guid
 from urmpipe_fmus.python_fmu.closure import check_imports, imports_of, renamed, sources_of
 from urmpipe_fmus.python_fmu.entry import RECIPE_FILE
@@ -30,7 +30,7 @@ Slave = slave_of(globals(), locals())
 '''
 
 
-def python_files(unit: Unit, platforms: Sequence[str], table: Mapping[str, bytes]) -> dict[str, bytes]:
+def python_files(unit: BlockModel, platforms: Sequence[str], table: Mapping[str, bytes]) -> dict[str, bytes]:
     """Return binaries and resources of a unit's Python FMU by their path in it.
 
     What Python loads by name (the script, urmpipe's packages, the user's file) bears a hash of all of it: in
@@ -74,7 +74,7 @@ def python_files(unit: Unit, platforms: Sequence[str], table: Mapping[str, bytes
     return {**{f"resources/{name}": resources[name] for name in resources}, **table, **binaries}
 
 
-def _checked_recipe(unit: Unit) -> Recipe:
+def _checked_recipe(unit: BlockModel) -> Recipe:
     """Return the recipe as an FMU holds it, found to make the same variables."""
     recipe = unit.recipe
     try:
@@ -93,7 +93,7 @@ def _checked_recipe(unit: Unit) -> Recipe:
     return recipe
 
 
-def _remade(recipe: Recipe, unit: Unit, module_name: str) -> Unit:
+def _remade(recipe: Recipe, unit: BlockModel, module_name: str) -> BlockModel:
     """Return the unit made again, as the FMU will."""
     try:
         return remake(recipe, unit.name, unit.table, module_name)
@@ -116,7 +116,7 @@ def _renamed_file(name: str, content: bytes, mark: str) -> bytes:
     return renamed(content.decode(), mark).encode() if name.endswith(".py") else content
 
 
-def _binaries(unit: Unit, platforms: Sequence[str]) -> dict[str, bytes]:
+def _binaries(unit: BlockModel, platforms: Sequence[str]) -> dict[str, bytes]:
     """Return pythonfmu's binaries under the unit's name, and their licence."""
     unknown = [one for one in platforms if one not in PLATFORMS]
     if unknown:

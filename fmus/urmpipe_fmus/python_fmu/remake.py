@@ -6,11 +6,11 @@ import sys
 from importlib import import_module
 from types import ModuleType
 
-from urmpipe_fmus.block import Recipe, Table, Unit
+from urmpipe_fmus.block import BlockModel, Recipe, Table
 from urmpipe_models.errors import UnitError
 
 
-def remake(recipe: Recipe, name: str, table: Table | None, module_name: str) -> Unit:
+def remake(recipe: Recipe, name: str, table: Table | None, module_name: str) -> BlockModel:
     """Return the unit that a recipe makes.
 
     Args:
@@ -32,9 +32,9 @@ def remake(recipe: Recipe, name: str, table: Table | None, module_name: str) -> 
         given = {} if table is None else {"table": table}
         made = [getattr(module, recipe.function)(**recipe.arguments, **given)]
     else:
-        made = [one for one in vars(module).values() if isinstance(one, Unit)]
+        made = [one for one in vars(module).values() if isinstance(one, BlockModel)]
     for one in made:
-        if isinstance(one, Unit) and one.name == name:
+        if isinstance(one, BlockModel) and one.name == name:
             return one
     raise UnitError(
         f"unit {name}: found no unit of that name in {recipe.module}, allowed: its recipe makes it"

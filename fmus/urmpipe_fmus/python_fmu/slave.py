@@ -15,7 +15,7 @@ from functools import wraps
 from math import isfinite
 from typing import Any, ClassVar, NamedTuple
 
-from urmpipe_fmus.block import LARGEST_INTEGER, Unit, ValueType
+from urmpipe_fmus.block import LARGEST_INTEGER, BlockModel, ValueType
 from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import UnitError
 
@@ -70,7 +70,7 @@ class Fmi2Slave:
         log_queue: Messages for the log; the binary empties it at the end of each call.
     """
 
-    unit: ClassVar[Unit]
+    unit: ClassVar[BlockModel]
 
     def __init__(self, **_: Any) -> None:
         self.instance = Instance(self.unit)

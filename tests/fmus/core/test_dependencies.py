@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given, settings
 
 from random_units import PATIENT, random_units
-from urmpipe_fmus.block import Input, Memory, Output, Parameter, State, Table, Unit
+from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Parameter, State, Table
 from urmpipe_fmus.dependencies import FUNCTIONS, TIME, Dependencies
 from urmpipe_models.errors import UnitError
 
 
 def of(function: Callable[[Any], Any]) -> Dependencies:
     return Dependencies(
-        Unit(
+        BlockModel(
             name="u",
             description="",
             variables=(
@@ -33,7 +33,7 @@ def of(function: Callable[[Any], Any]) -> Dependencies:
 
 
 def test_every_function_of_a_unit_has_its_own_dependencies() -> None:
-    unit = Unit(
+    model = BlockModel(
         name="u",
         description="",
         variables=(
@@ -49,7 +49,7 @@ def test_every_function_of_a_unit_has_its_own_dependencies() -> None:
         update=lambda v: {"m": v.m + v.time},
         table=Table(np.array([0]), np.array([[1.0]])),
     )
-    found = Dependencies(unit)
+    found = Dependencies(model)
     assert found.outputs == {"y[1]": {"x", TIME}, "y[2]": {"u[2]", "m"}, "c": frozenset()}
     assert found.derivatives == {"x": {"k", "u[1]"}}
     assert found.update == {"m": {"m", TIME}}
@@ -150,13 +150,13 @@ def test_the_functions_that_are_allowed_are_those_that_become_c() -> None:
 @pytest.mark.slow
 @settings(max_examples=40, **PATIENT)
 @given(random_units())
-def test_what_an_expression_of_casadi_depends_on_is_remembered_and_nothing_else(unit: Unit) -> None:
+def test_what_an_expression_of_casadi_depends_on_is_remembered_and_nothing_else(model: BlockModel) -> None:
     casadi = pytest.importorskip("casadi")
     from urmpipe_fmus.native.symbols import exact_expressions
     from urmpipe_fmus.native.trace import traced
 
-    functions, found = traced(unit), Dependencies(unit)
-    names = [name for name, _ in unit.scalars]
+    functions, found = traced(model), Dependencies(model)
+    names = [name for name, _ in model.scalars]
     for function, remembered in (
         (functions.outputs, found.outputs),
         (functions.derivatives, found.derivatives),

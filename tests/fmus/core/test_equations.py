@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_fmus.block import Input, Memory, Output, Parameter, State, Unit
+from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Parameter, State
 from urmpipe_fmus.run import Equations
 from urmpipe_models.errors import UnitError
 
 
-def unit_of(outputs: Any) -> Unit:
-    return Unit(
+def unit_of(outputs: Any) -> BlockModel:
+    return BlockModel(
         name="u",
         description="",
         variables=(
@@ -26,7 +26,7 @@ def unit_of(outputs: Any) -> Unit:
 
 
 def test_elements_go_in_by_kind_and_come_out_in_order() -> None:
-    unit = Unit(
+    model = BlockModel(
         name="u",
         description="",
         variables=(
@@ -42,7 +42,7 @@ def test_elements_go_in_by_kind_and_come_out_in_order() -> None:
         update=lambda v: {"m": [v.m[1], v.m[0]]},
     )
     given = [1.0, 0.25, 2.0, 3.0, 4.0, 5.0]  # p, internal_step, i, s, m[1], m[2]
-    equations = Equations(unit)
+    equations = Equations(model)
     assert equations.outputs(0.0, given) == [21.0, 3.0, 5.0]
     assert equations.derivatives(7.0, given) == [7.0]
     assert equations.update(0.0, given) == [5.0, 4.0]
@@ -107,6 +107,6 @@ def test_a_failing_function_is_told_with_its_line() -> None:
 
 
 def test_a_division_by_zero_is_infinite_as_in_c_and_warns_nobody(recwarn: pytest.WarningsRecorder) -> None:
-    unit = unit_of(lambda v: {"y": 1.0 / v.x, "p": (np.log(v.x), np.where(v.x == 0.0, 5.0, 1.0 / v.x))})
-    assert Equations(unit).outputs(0.0, [np.float64(0.0)]) == [np.inf, -np.inf, 5.0]
+    model = unit_of(lambda v: {"y": 1.0 / v.x, "p": (np.log(v.x), np.where(v.x == 0.0, 5.0, 1.0 / v.x))})
+    assert Equations(model).outputs(0.0, [np.float64(0.0)]) == [np.inf, -np.inf, 5.0]
     assert not recwarn.list

@@ -13,14 +13,14 @@ from hypothesis import strategies as st
 
 from asserting import refusal
 from random_units import PATIENT, random_columns, random_starts, random_units
-from urmpipe_fmus.block import INTERNAL_STEP, Input, Memory, Output, Parameter, State, Unit
+from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Input, Memory, Output, Parameter, State
 from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import UnitError
 
 
-def mixed() -> Unit:
+def mixed() -> BlockModel:
     """A unit of every kind: y is fresh, m is the input of the point before, x the input's integral."""
-    return Unit(
+    return BlockModel(
         name="mixed",
         description="",
         variables=(
@@ -48,7 +48,7 @@ def shown(instance: Instance, *names: str) -> list[float]:
 
 
 def everything(instance: Instance) -> tuple[Any, ...]:
-    return (instance.time, *instance.get(range(len(instance.unit.scalars))))
+    return (instance.time, *instance.get(range(len(instance.model.scalars))))
 
 
 def test_an_output_is_that_of_the_inputs_as_they_stand_without_a_step() -> None:
@@ -175,27 +175,27 @@ def test_an_error_of_the_functions_undoes_the_step_too() -> None:
     def rates(v: Any) -> dict[str, Any]:
         return {"x": {0.0: 1.0}[float(v.x)]}  # fails once x has moved
 
-    unit = Unit(
+    model = BlockModel(
         name="u",
         description="",
         variables=(State(name="x", description=""), Memory(name="m", description="")),
         derivatives=rates,
         update=lambda v: {"m": v.m + 1.0},
     )
-    instance = Instance(unit)
+    instance = Instance(model)
     with pytest.raises(UnitError, match="unit u: derivatives: KeyError"):
         instance.do_step(0.0, 1.0)
     assert everything(instance)[:3] == (0.0, 0.0, 0.0)
 
 
 def test_an_output_that_is_not_finite_is_an_error_until_its_inputs_are_mended() -> None:
-    unit = Unit(
+    model = BlockModel(
         name="u",
         description="",
         variables=(Input(name="u", description=""), Output(name="y", description="")),
         outputs=lambda v: {"y": 1.0 / v.u},
     )
-    instance = Instance(unit, 2.5)
+    instance = Instance(model, 2.5)
     for _ in range(2):
         with pytest.raises(UnitError, match=r"^unit u: output y is not finite at 2.5 s$"):
             shown(instance, "y")
@@ -206,14 +206,14 @@ def test_an_output_that_is_not_finite_is_an_error_until_its_inputs_are_mended() 
 
 def error_at(step: float) -> float:
     """The error at t = 2 of x' = -2 t x^2, x(0) = 1, of which x = 1 / (1 + t^2)."""
-    unit = Unit(
+    model = BlockModel(
         name="ode",
         description="",
         variables=(State(name="x", description="", start=1.0),),
         derivatives=lambda v: {"x": -2.0 * v.time * v.x * v.x},
         internal_step=step,
     )
-    instance = Instance(unit)
+    instance = Instance(model)
     for k in range(4):
         instance.do_step(0.5 * k, 0.5)
     return abs(shown(instance, "x")[0] - 0.2)
@@ -229,7 +229,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_internal_step() -> None:
 
 def test_a_step_is_divided_into_equal_internal_steps() -> None:
     times: list[float] = []
-    unit = Unit(
+    model = BlockModel(
         name="u",
         description="",
         variables=(State(name="x", description=""),),
@@ -244,7 +244,7 @@ def test_a_step_is_divided_into_equal_internal_steps() -> None:
         (1.0, 0.35, 4),
     ):
         times.clear()
-        Instance(unit, time).do_step(time, step)
+        Instance(model, time).do_step(time, step)
         h = step / count
         assert times == [
             t for k in range(count) for t in (time + k * h, *2 * (time + k * h + 0.5 * h,), time + k * h + h)
@@ -255,20 +255,22 @@ def test_a_step_is_divided_into_equal_internal_steps() -> None:
 @settings(max_examples=40, **PATIENT)
 @given(
     random_units().flatmap(
-        lambda unit: st.tuples(st.just(unit), random_starts(unit), random_columns(unit, 6))
+        lambda model: st.tuples(st.just(model), random_starts(model), random_columns(model, 6))
     )
 )
-def test_a_restored_instance_goes_on_bit_by_bit(case: tuple[Unit, dict[str, Any], dict[str, Any]]) -> None:
-    unit, start, columns = case
-    instance = Instance(unit)
-    for one in unit.given:
+def test_a_restored_instance_goes_on_bit_by_bit(
+    case: tuple[BlockModel, dict[str, Any], dict[str, Any]],
+) -> None:
+    model, start, columns = case
+    instance = Instance(model)
+    for one in model.given:
         if one.name in start:
             instance.set([instance.reference(name) for name in one.names], np.ravel(start[one.name]).tolist())
 
     def go(first: int, last: int) -> list[Any]:
         seen = []
         for k in range(first, last):
-            for one in unit.inputs:
+            for one in model.inputs:
                 places = [instance.reference(name) for name in one.names]
                 instance.set(places, np.ravel(columns[one.name][k]).tolist())
             seen.append(everything(instance))
@@ -282,7 +284,7 @@ def test_a_restored_instance_goes_on_bit_by_bit(case: tuple[Unit, dict[str, Any]
     instance.restore(saved)
     assert go(3, 6) == expected
     assert pickle.dumps(saved) == kept  # going on has not changed what was saved
-    other = Instance(unit)
+    other = Instance(model)
     other.restore(pickle.loads(kept))
     instance = other
     assert go(3, 6) == expected

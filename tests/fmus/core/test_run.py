@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from asserting import refusal
 from random_units import PATIENT, random_columns, random_starts, random_units
-from urmpipe_fmus.block import Input, Memory, Output, Parameter, Unit
+from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Parameter
 from urmpipe_fmus.run import Instance, run
 from urmpipe_models.errors import UnitError
 
 
-def gain(**more: Any) -> Unit:
-    return Unit(
+def gain(**more: Any) -> BlockModel:
+    return BlockModel(
         name="gain",
         description="",
         variables=(
@@ -77,7 +77,7 @@ def test_what_does_not_fit_is_refused(t: Any, inputs: Any, start: Any, said: str
 
 
 def test_a_memory_makes_each_sample_wait_for_the_one_before() -> None:
-    unit = Unit(
+    model = BlockModel(
         name="sum",
         description="",
         variables=(
@@ -89,7 +89,7 @@ def test_a_memory_makes_each_sample_wait_for_the_one_before() -> None:
         update=lambda v: {"m": v.m + v.u},
     )
     u = np.array([1.0, 2.0, 4.0, 8.0])
-    found = run(unit, np.array([0.0, 0.1, 0.5, 0.6]), {"u": u}, {"m": 10.0})
+    found = run(model, np.array([0.0, 0.1, 0.5, 0.6]), {"u": u}, {"m": 10.0})
     assert found["y"].tolist() == [11.0, 13.0, 17.0, 25.0]
     assert found["m"].tolist() == [10.0, 11.0, 13.0, 17.0]
 
@@ -98,23 +98,23 @@ def test_a_memory_makes_each_sample_wait_for_the_one_before() -> None:
 @settings(max_examples=40, **PATIENT)
 @given(
     random_units(remembers=False).flatmap(
-        lambda unit: st.tuples(st.just(unit), random_starts(unit), random_columns(unit, 5))
+        lambda model: st.tuples(st.just(model), random_starts(model), random_columns(model, 5))
     )
 )
 def test_a_unit_without_memory_gives_at_once_what_it_gives_step_by_step(
-    case: tuple[Unit, dict[str, Any], dict[str, Any]],
+    case: tuple[BlockModel, dict[str, Any], dict[str, Any]],
 ) -> None:
-    unit, start, columns = case
+    model, start, columns = case
     t = np.array([0.0, 0.125, 0.25, 0.375, 0.5])  # t + h is exact
-    found, instance = run(unit, t, columns, start), Instance(unit)
-    for one in unit.given:
+    found, instance = run(model, t, columns, start), Instance(model)
+    for one in model.given:
         if one.name in start:
             instance.set([instance.reference(name) for name in one.names], np.ravel(start[one.name]).tolist())
     for k, time in enumerate(t):
-        for one in unit.inputs:
+        for one in model.inputs:
             places = [instance.reference(name) for name in one.names]
             instance.set(places, np.ravel(columns[one.name][k]).tolist())
-        for one in unit.computed:
+        for one in model.computed:
             seen = instance.get([instance.reference(name) for name in one.names])
             # NumPy computes a column's sine with other instructions than a number's: last places differ
             np.testing.assert_allclose(np.ravel(found[one.name][k]), seen, rtol=0.0, atol=1e-13)

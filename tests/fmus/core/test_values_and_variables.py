@@ -9,7 +9,17 @@ from typing import Any
 
 import pytest
 
-from urmpipe_fmus.block import INTERNAL_STEP, Input, Memory, Output, Parameter, State, Unit, Values, Variable
+from urmpipe_fmus.block import (
+    INTERNAL_STEP,
+    BlockModel,
+    Input,
+    Memory,
+    Output,
+    Parameter,
+    State,
+    Values,
+    Variable,
+)
 from urmpipe_models.errors import UnitError
 
 
@@ -57,7 +67,7 @@ def test_a_value_at_a_bound_is_allowed() -> None:
 
 def test_all_that_is_wrong_with_a_unit_is_told_at_once() -> None:
     with pytest.raises(UnitError) as error:
-        Unit(
+        BlockModel(
             name="größe",
             description="",
             variables=(
@@ -92,14 +102,14 @@ def test_all_that_is_wrong_with_a_unit_is_told_at_once() -> None:
 
 def test_a_unit_that_no_fmu_can_be_of_is_refused() -> None:
     with pytest.raises(UnitError) as error:
-        Unit(name="u", description="", variables=())
+        BlockModel(name="u", description="", variables=())
     assert str(error.value) == (
         "unit u: found no variables, allowed: one or more (FMI has no FMU without them)"
     )
     step: dict[str, Any] = {"name": INTERNAL_STEP, "description": "", "start": 1.0, "minimum": 0.5}
     for wrong in (Parameter(**step, size=2), Parameter(**step, type="Integer"), Input(**step)):
         with pytest.raises(UnitError) as error:
-            Unit(
+            BlockModel(
                 name="u",
                 description="",
                 variables=(State(name="x", description=""), wrong),
@@ -129,7 +139,7 @@ def test_what_cannot_be_a_variable_is_told(variable: Variable, said: str) -> Non
 
 def test_what_is_of_a_wrong_kind_is_told() -> None:
     with pytest.raises(UnitError) as error:
-        Unit(
+        BlockModel(
             name="u",
             description=None,  # type: ignore[arg-type]
             variables=(
@@ -151,14 +161,14 @@ def test_what_is_of_a_wrong_kind_is_told() -> None:
 
 
 def test_a_unit_with_states_has_the_integrators_step_as_a_fixed_parameter() -> None:
-    unit = Unit(
+    model = BlockModel(
         name="u",
         description="",
         variables=(State(name="x", description=""), Parameter(name="k", description="")),
         derivatives=lambda v: {"x": v.k},
         internal_step=2e-3,
     )
-    assert [name for name, _ in unit.scalars] == ["x", "k", INTERNAL_STEP]
-    step = unit.parameters[-1]
+    assert [name for name, _ in model.scalars] == ["x", "k", INTERNAL_STEP]
+    step = model.parameters[-1]
     assert (step.start, step.unit, step.minimum, step.variability) == (2e-3, "s", 1e-9, "fixed")
-    assert [one.name for one in unit.given] == ["k", INTERNAL_STEP, "x"]
+    assert [one.name for one in model.given] == ["k", INTERNAL_STEP, "x"]

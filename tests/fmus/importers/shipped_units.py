@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from made_masses import with_drives, with_masses
-from urmpipe_fmus.block import Input, Table, Unit
-from urmpipe_fmus.blocks import make_unit, unit_names
+from urmpipe_fmus.block import BlockModel, Input, Table
+from urmpipe_fmus.blocks import block_names, make_block
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -31,7 +31,7 @@ def swinging_joints(rows: int, joints: int = 6, period: float = STEP) -> Table:
     return Table(np.rint(t * 1e9).astype(np.int64), q)
 
 
-def shipped_unit(name: str) -> Unit:
+def shipped_unit(name: str) -> BlockModel:
     """Return a shipped unit by name, of six joints where it has some."""
     options: dict[str, Any] = {}
     if name == "kinematic_chain":
@@ -44,7 +44,7 @@ def shipped_unit(name: str) -> Unit:
         options = {"joints": 6}
     elif name == "network_motion":
         options = {"network": "four-bar"}
-    return make_unit(name, **options)
+    return make_block(name, **options)
 
 
 def sample_times(count: int, step: float = STEP) -> FloatArray:
@@ -54,7 +54,7 @@ def sample_times(count: int, step: float = STEP) -> FloatArray:
 
 def shipped() -> tuple[str, ...]:
     """Return the names of all shipped units."""
-    return unit_names()
+    return block_names()
 
 
 def drawn(one: Input, rng: np.random.Generator) -> FloatArray:
@@ -66,7 +66,7 @@ def drawn(one: Input, rng: np.random.Generator) -> FloatArray:
     return np.round(values) if one.type == "Integer" else values
 
 
-def drawn_inputs(unit: Unit, rows: int, seed: int = 5) -> dict[str, FloatArray]:
+def drawn_inputs(unit: BlockModel, rows: int, seed: int = 5) -> dict[str, FloatArray]:
     """Return values of all inputs that change every second row: shape (rows,), or (rows, size)."""
     rng = np.random.default_rng(seed)
     held: dict[str, FloatArray] = {}
@@ -77,7 +77,7 @@ def drawn_inputs(unit: Unit, rows: int, seed: int = 5) -> dict[str, FloatArray]:
     return held
 
 
-def columns(unit: Unit, values: dict[str, FloatArray]) -> dict[str, FloatArray]:
+def columns(unit: BlockModel, values: dict[str, FloatArray]) -> dict[str, FloatArray]:
     """Return values by variable as one column a scalar, by the scalar's name: shape (rows,)."""
     found: dict[str, FloatArray] = {}
     for one in unit.variables:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from urmpipe_fmus.block import Unit, Variable
+from urmpipe_fmus.block import BlockModel, Variable
 from urmpipe_models.elementwise import FloatArray
 
 
@@ -56,7 +56,7 @@ class Block:
     """
 
     fmu: Path
-    unit: Unit
+    unit: BlockModel
     inputs: Mapping[str, FloatArray] = field(default_factory=dict)
     start: Mapping[str, float] = field(default_factory=dict)
 
@@ -111,7 +111,7 @@ class System:
                     yield self.scalar(name, one)
 
 
-def alone(fmu: Path, unit: Unit, inputs: Mapping[str, FloatArray] | None = None) -> System:
+def alone(fmu: Path, unit: BlockModel, inputs: Mapping[str, FloatArray] | None = None) -> System:
     """Return a system of one FMU, the block `it`."""
     return System({"it": Block(fmu, unit, inputs or {})})
 

@@ -14,7 +14,7 @@ import pytest
 
 from peers import need_builds_for, said_by
 from shipped_units import CROSS_BUILT, shipped
-from urmpipe_fmus.blocks.user import load_unit_file
+from urmpipe_fmus.blocks.user import load_block_file
 from urmpipe_fmus.build.fmu import build_fmu
 from urmpipe_fmus.native import this_platform
 
@@ -99,7 +99,7 @@ print([[round(value, 9) for value in fmu.getReal([1, 2])] for fmu in (one, two)]
 """
 
 USER_UNIT = """
-from urmpipe_fmus.block import Input, Output, State, Unit
+from urmpipe_fmus.block import BlockModel, Input, Output, State
 
 
 def outputs(v):
@@ -110,7 +110,7 @@ def derivatives(v):
     return {{"x": {factor} * v.u}}
 
 
-unit = Unit(
+unit = BlockModel(
     name="{name}",
     description="A factor, and its integral",
     variables=(
@@ -136,6 +136,6 @@ def test_two_fmus_with_equal_inner_names_compute_their_own_in_one_process(
         source = tmp_path / folder / "same.py"
         source.write_text(USER_UNIT.format(name="same", factor=factor), encoding="utf-8")
         target = tmp_path / folder / "same.fmu"
-        paths.append(str(build_fmu(load_unit_file(source), target, backend=backend).path))  # type: ignore[arg-type]
+        paths.append(str(build_fmu(load_block_file(source), target, backend=backend).path))  # type: ignore[arg-type]
     said = said_by(sys.executable, "-c", SIDE_BY_SIDE, *paths)
     assert said.stdout.strip() == "[[6.0, 6.0], [-35.0, -35.0]]", said.stdout

@@ -15,7 +15,7 @@ from libcosim_master import run_libcosim
 from peers import need
 from shipped_units import STEP, columns, drawn_inputs, sample_times, shipped, shipped_unit
 from systems import System, Trace, alone
-from urmpipe_fmus.block import Unit
+from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.run import run
 from urmpipe_models.elementwise import FloatArray
 
@@ -34,7 +34,7 @@ def steps_of(name: str) -> int:
 
 
 @cache
-def inputs_and_run(name: str) -> tuple[Unit, dict[str, FloatArray], dict[str, FloatArray]]:
+def inputs_and_run(name: str) -> tuple[BlockModel, dict[str, FloatArray], dict[str, FloatArray]]:
     """Return a shipped unit, its inputs and its run over a log: seconds of Python for an arm with masses."""
     unit, rows = shipped_unit(name), steps_of(name) + 1
     held = drawn_inputs(unit, rows)

@@ -14,7 +14,7 @@ from peers import need, need_builds_for
 from shipped_units import STEP, sample_times, shipped_unit
 from systems import Block, Scalar, System, Trace, empty_trace
 from urmpipe_fmus.block import Table
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.native import this_platform
 from urmpipe_fmus.run import Instance
@@ -49,7 +49,7 @@ def wrapped_joints() -> tuple[Table, FloatArray]:
 def test_log_repolarizer_and_chain_give_the_tool_of_the_log(master: str, fmu_of: Callable[..., Path]) -> None:
     need(master)
     table, q = wrapped_joints()
-    source = make_unit("log_source", table=table, columns=[("q", "rad", 6)])
+    source = make_block("log_source", table=table, columns=[("q", "rad", 6)])
     need_builds_for(this_platform())
     played = cached_fmu(source, "native")
     names = ("repolarizer", "kinematic_chain")

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from shipped_units import CROSS_BUILT, STEP, columns, drawn_inputs, sample_times, shipped_unit
-from urmpipe_fmus.block import Unit
+from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.run import run
 from urmpipe_models.elementwise import FloatArray
 
@@ -41,7 +41,7 @@ def ecos_program() -> Path:
     return Path(found.origin).parent / "binaries" / "ecos.exe"
 
 
-def scenario(unit: Unit, inputs: Mapping[str, FloatArray]) -> str:
+def scenario(unit: BlockModel, inputs: Mapping[str, FloatArray]) -> str:
     """Return Ecos's description of inputs: each is set before the step whose time is its own within eps."""
     types = {name: TAGS[one.type] for name, one in unit.scalars}
     actions = [
@@ -63,7 +63,7 @@ def written(tag: str, value: float) -> str:
 
 
 def simulated(
-    fmu: Path, unit: Unit, inputs: Mapping[str, FloatArray], wine: Mapping[str, str]
+    fmu: Path, unit: BlockModel, inputs: Mapping[str, FloatArray], wine: Mapping[str, str]
 ) -> dict[str, FloatArray]:
     """Return what Ecos writes of an FMU, a column a scalar: from the start, then after each step."""
     folder = fmu.parent

@@ -11,7 +11,17 @@ import numpy as np
 import pytest
 
 from c_host import GUID, host
-from urmpipe_fmus.block import TABLE_FILE, Input, Memory, Output, Parameter, State, Table, Unit, table_bytes
+from urmpipe_fmus.block import (
+    TABLE_FILE,
+    BlockModel,
+    Input,
+    Memory,
+    Output,
+    Parameter,
+    State,
+    Table,
+    table_bytes,
+)
 from urmpipe_fmus.native import guid_header, native_binaries, native_missing, native_sources, this_platform
 
 
@@ -65,13 +75,13 @@ def c_host(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 
 @pytest.fixture(scope="session")
-def compiled() -> dict[int, tuple[Unit, dict[str, bytes]]]:
+def compiled() -> dict[int, tuple[BlockModel, dict[str, bytes]]]:
     """Units that were compiled before, each by its identity, and the files of its FMU."""
     return {}
 
 
 @pytest.fixture
-def built(tmp_path: Path, compiled: dict[int, tuple[Unit, dict[str, bytes]]]) -> Callable[..., Path]:
+def built(tmp_path: Path, compiled: dict[int, tuple[BlockModel, dict[str, bytes]]]) -> Callable[..., Path]:
     """Build a unit in an FMU's folder, without the description."""
     missing = native_missing()
     if missing:
@@ -79,19 +89,19 @@ def built(tmp_path: Path, compiled: dict[int, tuple[Unit, dict[str, bytes]]]) ->
 
     done: set[Path] = set()
 
-    def build(unit: Unit, folder: str = "") -> Path:
-        place = tmp_path / (folder or unit.name)
+    def build(model: BlockModel, folder: str = "") -> Path:
+        place = tmp_path / (folder or model.name)
         if place in done:  # a library that is loaded must not be written again
             return place
         done.add(place)
-        if id(unit) not in compiled:
-            sources = native_sources(unit)
-            files = {**sources, **native_binaries(unit, sources, GUID, [this_platform()])}
+        if id(model) not in compiled:
+            sources = native_sources(model)
+            files = {**sources, **native_binaries(model, sources, GUID, [this_platform()])}
             files["sources/guid.h"] = guid_header(GUID)
-            if unit.table is not None:
-                files[TABLE_FILE] = table_bytes(unit.table)
-            compiled[id(unit)] = unit, files
-        for name, content in compiled[id(unit)][1].items():
+            if model.table is not None:
+                files[TABLE_FILE] = table_bytes(model.table)
+            compiled[id(model)] = model, files
+        for name, content in compiled[id(model)][1].items():
             path = place / name
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(content)
@@ -105,8 +115,8 @@ def native(built: Callable[..., Path]) -> Iterator[Callable[..., Native]]:
     """Build a unit and make an instance of it."""
     made: list[Native] = []
 
-    def make(unit: Unit, **options: Any) -> Native:
-        made.append(Native(built(unit), unit.name, **options))
+    def make(model: BlockModel, **options: Any) -> Native:
+        made.append(Native(built(model), model.name, **options))
         return made[-1]
 
     yield make
@@ -115,7 +125,7 @@ def native(built: Callable[..., Path]) -> Iterator[Callable[..., Native]]:
 
 
 @pytest.fixture(scope="session")
-def oscillator() -> Unit:
+def oscillator() -> BlockModel:
     """A unit with something of every kind and type."""
 
     def outputs(v: Any) -> dict[str, Any]:
@@ -133,7 +143,7 @@ def oscillator() -> Unit:
     def update(v: Any) -> dict[str, Any]:
         return {"count": np.remainder(v.count + 1.0, 1000.0), "last": v.goal}
 
-    return Unit(
+    return BlockModel(
         name="oscillator",
         description="a mass on a spring",
         variables=(
@@ -158,7 +168,7 @@ def oscillator() -> Unit:
 
 
 @pytest.fixture(scope="session")
-def player() -> Unit:
+def player() -> BlockModel:
     """A unit that plays a table."""
 
     def outputs(v: Any) -> dict[str, Any]:
@@ -166,7 +176,7 @@ def player() -> Unit:
         pairs = zip(before, after, strict=True)
         return {"held": before[0], "between": tuple(a + v.table.fraction * (b - a) for a, b in pairs)}
 
-    return Unit(
+    return BlockModel(
         name="player",
         description="a table",
         variables=(
@@ -179,7 +189,7 @@ def player() -> Unit:
 
 
 @pytest.fixture(scope="session")
-def elementary() -> Unit:
+def elementary() -> BlockModel:
     """A unit with the elementary functions that a C library computes in its own way."""
     ones = ("sin", "cos", "tan", "arctan", "tanh", "arcsinh")
     damped = ("exp", "expm1", "sinh", "cosh")
@@ -200,7 +210,7 @@ def elementary() -> Unit:
         }
 
     names = outputs(type("Given", (), {"x": 0.5, "y": 0.5}))
-    return Unit(
+    return BlockModel(
         name="elementary",
         description="",
         variables=(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_fmus.block import Unit
+from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.run import Instance
 
 
@@ -17,17 +17,17 @@ def assert_same(found: Sequence[float], expected: Sequence[float]) -> None:
     np.testing.assert_allclose(np.array(found), np.array(expected), rtol=1e-12, atol=1e-12)
 
 
-def references(unit: Unit, *kinds: str) -> list[int]:
+def references(model: BlockModel, *kinds: str) -> list[int]:
     """The value references of the Reals of some causalities."""
-    return [k for k, (_, one) in enumerate(unit.scalars) if one.causality in kinds and one.type == "Real"]
+    return [k for k, (_, one) in enumerate(model.scalars) if one.causality in kinds and one.type == "Real"]
 
 
-def index(unit: Unit, name: str) -> int:
-    return [scalar for scalar, _ in unit.scalars].index(name)
+def index(model: BlockModel, name: str) -> int:
+    return [scalar for scalar, _ in model.scalars].index(name)
 
 
 @pytest.mark.slow
-def test_every_step_gives_what_the_instance_gives(native: Callable[..., Any], oscillator: Unit) -> None:
+def test_every_step_gives_what_the_instance_gives(native: Callable[..., Any], oscillator: BlockModel) -> None:
     fmu, instance = native(oscillator, start=0.25), Instance(oscillator, 0.25)
     shown = references(oscillator, "output", "local")
     goal, gear, time = index(oscillator, "goal"), index(oscillator, "gear"), 0.25
@@ -46,7 +46,7 @@ def test_every_step_gives_what_the_instance_gives(native: Callable[..., Any], os
 
 
 @pytest.mark.slow
-def test_outputs_are_those_of_the_inputs_just_set(native: Callable[..., Any], oscillator: Unit) -> None:
+def test_outputs_are_those_of_the_inputs_just_set(native: Callable[..., Any], oscillator: BlockModel) -> None:
     fmu = native(oscillator)
     goal, force, k = (index(oscillator, name) for name in ("goal", "force", "k"))
     fmu.fmu.setReal([goal], [3.0])
@@ -56,7 +56,7 @@ def test_outputs_are_those_of_the_inputs_just_set(native: Callable[..., Any], os
 
 
 def test_computed_integers_are_the_nearest_and_booleans_all_but_zero(
-    native: Callable[..., Any], oscillator: Unit
+    native: Callable[..., Any], oscillator: BlockModel
 ) -> None:
     fmu = native(oscillator)
     x, turns, far = (index(oscillator, name) for name in ("x[1]", "turns", "far"))
@@ -68,7 +68,7 @@ def test_computed_integers_are_the_nearest_and_booleans_all_but_zero(
 
 
 @pytest.mark.slow
-def test_a_table_gives_the_rows_that_python_finds(native: Callable[..., Any], player: Unit) -> None:
+def test_a_table_gives_the_rows_that_python_finds(native: Callable[..., Any], player: BlockModel) -> None:
     half = 10_000_000.5e-9
     times = [0.0, 4.999e-3, 0.01, np.nextafter(0.01, 0), 0.0175, 0.025, 0.03, half, -5e-9, -4.5e-9, -1.0]
     for time in times:
@@ -76,7 +76,7 @@ def test_a_table_gives_the_rows_that_python_finds(native: Callable[..., Any], pl
         assert fmu.fmu.getReal([0, 1, 2]) == [float(one) for one in instance.get([0, 1, 2])]
 
 
-def test_reset_goes_back_to_the_start(native: Callable[..., Any], oscillator: Unit) -> None:
+def test_reset_goes_back_to_the_start(native: Callable[..., Any], oscillator: BlockModel) -> None:
     fmu = native(oscillator)
     everything = [k for k, (_, one) in enumerate(oscillator.scalars) if one.type == "Real"]
     before = fmu.fmu.getReal(everything)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from c_host import GUID, host, ran, script, write
-from urmpipe_fmus.block import Unit
+from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.native import native_binaries, native_missing, native_sources, this_platform
 from urmpipe_fmus.native.compile import TARGETS
 from urmpipe_fmus.run import Instance
@@ -27,7 +27,7 @@ needs_zig = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs zigla
 @pytest.mark.slow
 @needs_compiler
 def test_the_same_unit_gives_the_same_bytes(
-    oscillator: Unit, built: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    oscillator: BlockModel, built: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     folder, sources = built(oscillator), native_sources(oscillator)
     assert {name: (folder / name).read_bytes() for name in sources} == sources
@@ -38,7 +38,7 @@ def test_the_same_unit_gives_the_same_bytes(
 
 
 @needs_compiler
-def test_only_fmi_is_visible(built: Callable[..., Path], oscillator: Unit) -> None:
+def test_only_fmi_is_visible(built: Callable[..., Path], oscillator: BlockModel) -> None:
     if shutil.which("nm") is None:
         pytest.skip("needs nm")
     (path,) = built(oscillator).glob("binaries/*/oscillator*")
@@ -51,7 +51,7 @@ def test_only_fmi_is_visible(built: Callable[..., Path], oscillator: Unit) -> No
 
 
 @pytest.mark.slow
-def test_the_error_of_a_compiler_is_told(oscillator: Unit, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_error_of_a_compiler_is_told(oscillator: BlockModel, monkeypatch: pytest.MonkeyPatch) -> None:
     if native_missing() is not None:
         pytest.skip(f"needs {native_missing()}")
     sources = {**native_sources(oscillator), "sources/model.c": b"int broken = ;\n"}
@@ -95,7 +95,7 @@ def test_what_is_missing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(scope="module")
-def crossed(oscillator: Unit) -> dict[str, bytes]:
+def crossed(oscillator: BlockModel) -> dict[str, bytes]:
     """Return the oscillator's binaries that zig makes for both platforms."""
     return native_binaries(oscillator, native_sources(oscillator), GUID, sorted(TARGETS))
 
@@ -103,9 +103,9 @@ def crossed(oscillator: Unit) -> dict[str, bytes]:
 @pytest.mark.slow
 @needs_zig
 def test_windows_and_linux_give_the_same_bits(
-    elementary: Unit,
-    oscillator: Unit,
-    player: Unit,
+    elementary: BlockModel,
+    oscillator: BlockModel,
+    player: BlockModel,
     crossed: dict[str, bytes],
     c_host: str,
     wine: Mapping[str, str],
@@ -114,18 +114,18 @@ def test_windows_and_linux_give_the_same_bits(
     # stripped like FMUs: zig builds its C libraries anew, in a minute, for programs that are not
     zig = [sys.executable, "-m", "ziglang", "cc", "-s", "-target", TARGETS["win64"]]
     windows = host(tmp_path, zig, "host.exe")
-    for unit in (elementary, oscillator, player):
-        folder = tmp_path / f"a {unit.name} \u00fc"
-        write(folder, unit, [] if unit is oscillator else ["linux64", "win64"])
-        for name, content in crossed.items() if unit is oscillator else ():
+    for model in (elementary, oscillator, player):
+        folder = tmp_path / f"a {model.name} \u00fc"
+        write(folder, model, [] if model is oscillator else ["linux64", "win64"])
+        for name, content in crossed.items() if model is oscillator else ():
             (folder / name).parent.mkdir(parents=True)
             (folder / name).write_bytes(content)
-        given = script(unit, 1000, 1)
+        given = script(model, 1000, 1)
         resources = (folder / "resources").as_uri()
-        on_linux = ran([c_host, str(folder / f"binaries/linux64/{unit.name}.so")], folder, given, resources)
+        on_linux = ran([c_host, str(folder / f"binaries/linux64/{model.name}.so")], folder, given, resources)
         # wine's drive Z: is the root of the file system
         local = resources.replace("file:///", "file:///Z:/")
-        library = folder / f"binaries/win64/{unit.name}.dll"
+        library = folder / f"binaries/win64/{model.name}.dll"
         (tmp_path / "unit.dll").write_bytes(library.read_bytes())
         on_windows = ran(["wine", windows, str(tmp_path / "unit.dll")], folder, given, local, wine)
         assert len(on_linux) == 3100
@@ -135,7 +135,7 @@ def test_windows_and_linux_give_the_same_bits(
 @pytest.mark.slow
 @needs_zig
 def test_cross_compiled_binaries_are_the_same_bytes_in_any_folder(
-    oscillator: Unit, crossed: dict[str, bytes], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    oscillator: BlockModel, crossed: dict[str, bytes], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     sources = native_sources(oscillator)
     assert sorted(crossed) == ["binaries/linux64/oscillator.so", "binaries/win64/oscillator.dll"]
@@ -147,7 +147,7 @@ def test_cross_compiled_binaries_are_the_same_bytes_in_any_folder(
 @pytest.mark.slow
 @needs_zig
 def test_zig_compiles_for_this_platform_where_there_is_no_other_compiler(
-    oscillator: Unit, crossed: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
+    oscillator: BlockModel, crossed: dict[str, bytes], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     if this_platform() not in TARGETS:
         pytest.skip("needs a platform that zig compiles for")
@@ -159,7 +159,9 @@ def test_zig_compiles_for_this_platform_where_there_is_no_other_compiler(
 
 @pytest.mark.slow
 @needs_compiler
-def test_a_host_in_c_sees_what_python_sees(oscillator: Unit, built: Callable[..., Path], c_host: str) -> None:
+def test_a_host_in_c_sees_what_python_sees(
+    oscillator: BlockModel, built: Callable[..., Path], c_host: str
+) -> None:
     folder = built(oscillator)
     (library,) = folder.glob("binaries/*/oscillator*")
     seen = ran([c_host, str(library)], folder, "set 2 3.5\nstep 0 0.05\nget 5 6 9\n")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_fmus.block import Input, Output, Unit
+from urmpipe_fmus.block import BlockModel, Input, Output
 from urmpipe_fmus.dependencies import FUNCTIONS, LOGICAL
 from urmpipe_fmus.native.symbols import Symbol, traceable
 from urmpipe_fmus.native.trace import traced
@@ -55,9 +55,9 @@ def applied_to_truth(name: str, x: Any, y: Any) -> Any:
 
 
 @pytest.fixture(scope="module")
-def all_functions() -> Unit:
+def all_functions() -> BlockModel:
     inputs = (Input(name="x", description=""), Input(name="y", description=""))
-    return Unit(
+    return BlockModel(
         name="all_functions",
         description="",
         variables=(
@@ -78,7 +78,7 @@ def test_what_is_traced_is_what_a_unit_may_use() -> None:
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of what is not finite, which is meant here
-def test_each_function_gives_what_numpy_gives(native: Callable[..., Any], all_functions: Unit) -> None:
+def test_each_function_gives_what_numpy_gives(native: Callable[..., Any], all_functions: BlockModel) -> None:
     fmu = native(all_functions)
     rng = np.random.default_rng(5)
     sizes = 10.0 ** rng.uniform(-9.0, 3.5, 25)
@@ -98,7 +98,7 @@ def test_each_function_gives_what_numpy_gives(native: Callable[..., Any], all_fu
 
 
 @pytest.mark.slow
-def test_signs_of_zero_are_kept(native: Callable[..., Any], all_functions: Unit) -> None:
+def test_signs_of_zero_are_kept(native: Callable[..., Any], all_functions: BlockModel) -> None:
     """atan2 tells them apart by half a turn."""
     assert native(all_functions).fmu.getReal([2 + len(FUNCTIONS)]) == [-np.pi]
 
@@ -107,7 +107,7 @@ def refused(function: Callable[[Any], Any]) -> str:
     """What is said of a function that cannot be traced."""
     with pytest.raises(UnitError) as error:
         traced(
-            Unit(
+            BlockModel(
                 name="one",
                 description="",
                 variables=(Input(name="x", description=""), Output(name="z", description="")),

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_fmus.block import Input, Output, State, Unit
+from urmpipe_fmus.block import BlockModel, Input, Output, State
 from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import UnitError
 
@@ -19,7 +19,7 @@ K, DAMPING, GOAL, ON, GEAR, X, COUNT, FORCE, FAR = 0, 1, 2, 3, 4, 5, 7, 9, 11
 
 
 def test_values_are_refused_as_the_instance_refuses_them(
-    native: Callable[..., Any], oscillator: Unit
+    native: Callable[..., Any], oscillator: BlockModel
 ) -> None:
     fmu, instance = native(oscillator), Instance(oscillator)
     for running in (False, True):
@@ -47,7 +47,7 @@ def test_values_are_refused_as_the_instance_refuses_them(
     assert fmu.fmu.getReal([FORCE]) == pytest.approx(instance.get([FORCE]), rel=1e-14)
 
 
-def test_other_types_are_refused(native: Callable[..., Any], oscillator: Unit) -> None:
+def test_other_types_are_refused(native: Callable[..., Any], oscillator: BlockModel) -> None:
     one = native(oscillator)
     fmu = one.fmu
     assert one.refused(lambda: fmu.setInteger([GEAR, GEAR], [4, 6])) == [
@@ -73,7 +73,9 @@ def test_other_types_are_refused(native: Callable[..., Any], oscillator: Unit) -
     assert fmu.getBoolean([ON]) == [1]
 
 
-def test_a_step_that_cannot_be_taken_changes_nothing(native: Callable[..., Any], oscillator: Unit) -> None:
+def test_a_step_that_cannot_be_taken_changes_nothing(
+    native: Callable[..., Any], oscillator: BlockModel
+) -> None:
     fmu = native(oscillator)
     fmu.step(0.0, 0.01)
     before = fmu.fmu.getReal([X, X + 1, FORCE])
@@ -90,9 +92,9 @@ def test_a_step_that_cannot_be_taken_changes_nothing(native: Callable[..., Any],
 
 
 @pytest.fixture
-def runaway() -> Unit:
+def runaway() -> BlockModel:
     """A unit whose state goes out of all bounds if it is pushed."""
-    return Unit(
+    return BlockModel(
         name="runaway",
         description="",
         variables=(
@@ -107,7 +109,7 @@ def runaway() -> Unit:
 
 
 @pytest.mark.slow
-def test_a_step_that_runs_away_is_undone(native: Callable[..., Any], runaway: Unit) -> None:
+def test_a_step_that_runs_away_is_undone(native: Callable[..., Any], runaway: BlockModel) -> None:
     fmu, instance = native(runaway), Instance(runaway)
     for one in (fmu.fmu.setReal, instance.set):
         one([0], [1e3])
@@ -122,7 +124,7 @@ def test_a_step_that_runs_away_is_undone(native: Callable[..., Any], runaway: Un
     assert fmu.fmu.getReal([1, 2]) == [1.0, 0.0]
 
 
-def test_calls_out_of_their_sequence_are_refused(native: Callable[..., Any], oscillator: Unit) -> None:
+def test_calls_out_of_their_sequence_are_refused(native: Callable[..., Any], oscillator: BlockModel) -> None:
     one = native(oscillator)
     fmu = one.fmu
     assert one.refused(fmu.enterInitializationMode) == [
@@ -151,7 +153,7 @@ def test_calls_out_of_their_sequence_are_refused(native: Callable[..., Any], osc
     fmu.setupExperiment(startTime=1.0)
 
 
-def test_a_step_past_the_stop_time_is_refused(native: Callable[..., Any], oscillator: Unit) -> None:
+def test_a_step_past_the_stop_time_is_refused(native: Callable[..., Any], oscillator: BlockModel) -> None:
     one = native(oscillator)
 
     def begin(**experiment: float) -> None:
@@ -176,7 +178,7 @@ def test_a_step_past_the_stop_time_is_refused(native: Callable[..., Any], oscill
     one.step(0.5, 0.25)
 
 
-def test_what_it_cannot_do_is_said(native: Callable[..., Any], oscillator: Unit) -> None:
+def test_what_it_cannot_do_is_said(native: Callable[..., Any], oscillator: BlockModel) -> None:
     one = native(oscillator)
     fmu = one.fmu
     for name, call in (
@@ -236,7 +238,7 @@ def failed_instance(folder: Path, name: str, blocks: int | None = None, **option
 
 @pytest.mark.slow
 def test_where_there_is_no_memory_there_is_no_instance_and_nothing_is_kept(
-    built: Callable[..., Path], player: Unit
+    built: Callable[..., Path], player: BlockModel
 ) -> None:
     folder = built(player)
     (said,) = failed_instance(folder, "player", blocks=0)
@@ -249,7 +251,9 @@ def test_where_there_is_no_memory_there_is_no_instance_and_nothing_is_kept(
     ]
 
 
-def test_a_long_message_ends_with_a_whole_character(built: Callable[..., Path], oscillator: Unit) -> None:
+def test_a_long_message_ends_with_a_whole_character(
+    built: Callable[..., Path], oscillator: BlockModel
+) -> None:
     for start in ("{", "{a"):
         (said,) = failed_instance(built(oscillator), "oscillator", guid=start + "\u00fc" * 5000)
         assert said.startswith(f"unit oscillator: GUID: found {start}\u00fc")
@@ -257,13 +261,15 @@ def test_a_long_message_ends_with_a_whole_character(built: Callable[..., Path], 
         assert said.endswith("\u00fc")
 
 
-def test_another_guid_is_refused(built: Callable[..., Path], oscillator: Unit) -> None:
+def test_another_guid_is_refused(built: Callable[..., Path], oscillator: BlockModel) -> None:
     assert failed_instance(built(oscillator), "oscillator", guid="{5}%") == [
         "unit oscillator: GUID: found {5}%%, allowed: {12345678-0000-0000-0000-000000000000}"
     ]
 
 
-def test_a_table_that_is_missing_cut_or_foreign_is_refused(built: Callable[..., Path], player: Unit) -> None:
+def test_a_table_that_is_missing_cut_or_foreign_is_refused(
+    built: Callable[..., Path], player: BlockModel
+) -> None:
     folder = built(player)
     table = folder / "resources" / "table.bin"
     content = table.read_bytes()
@@ -312,7 +318,7 @@ def first_value(folder: Path, resources: str | None) -> float | None:
     return value[0]
 
 
-def test_resources_are_found_in_any_form_of_a_uri(built: Callable[..., Path], player: Unit) -> None:
+def test_resources_are_found_in_any_form_of_a_uri(built: Callable[..., Path], player: BlockModel) -> None:
     folder = built(player, "a folder, 100% \u00fc\u4e2d#")
     resources = folder / "resources"
     uri = resources.as_uri()

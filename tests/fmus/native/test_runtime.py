@@ -13,8 +13,8 @@ import pytest
 
 from c_host import host, ran, script, write
 from sliding_arm import sliding_arm
-from urmpipe_fmus.block import Unit
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.block import BlockModel
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.native import native_missing
 
 HERE = Path(__file__).parent
@@ -50,9 +50,9 @@ pytestmark = pytest.mark.skipif(
 
 
 @pytest.fixture
-def units(oscillator: Unit, player: Unit, elementary: Unit) -> Sequence[Unit]:
+def units(oscillator: BlockModel, player: BlockModel, elementary: BlockModel) -> Sequence[BlockModel]:
     """Units with states and memories, a table, elementary functions, and an arm."""
-    return (oscillator, player, elementary, make_unit("kinematic_chain", robot=sliding_arm()))
+    return (oscillator, player, elementary, make_block("kinematic_chain", robot=sliding_arm()))
 
 
 def c_files(folder: Path) -> list[str]:
@@ -60,10 +60,10 @@ def c_files(folder: Path) -> list[str]:
 
 
 @pytest.mark.slow
-def test_the_sources_compile_without_a_warning(units: Sequence[Unit], tmp_path: Path) -> None:
-    for k, unit in enumerate(units):
-        folder = tmp_path / unit.name
-        write(folder, unit, [])
+def test_the_sources_compile_without_a_warning(units: Sequence[BlockModel], tmp_path: Path) -> None:
+    for k, model in enumerate(units):
+        folder = tmp_path / model.name
+        write(folder, model, [])
         # optimized, as some warnings come of it; but for model.c the sources are the same, with other sizes
         files = c_files(folder) if k < 2 else [str(folder / "sources" / "model.c")]
         flags = ["-std=c99", "-O2", "-ffp-contract=off", "-fPIC", *WARNINGS, "-Werror"]
@@ -74,17 +74,17 @@ def test_the_sources_compile_without_a_warning(units: Sequence[Unit], tmp_path: 
 
 
 @pytest.mark.slow
-def test_sanitizers_find_nothing(units: Sequence[Unit], tmp_path: Path) -> None:
+def test_sanitizers_find_nothing(units: Sequence[BlockModel], tmp_path: Path) -> None:
     program = host(tmp_path, [*SANITIZED, "-ldl"])
-    for unit in units:
-        folder = tmp_path / unit.name
-        write(folder, unit, [])
+    for model in units:
+        folder = tmp_path / model.name
+        write(folder, model, [])
         library = folder / "unit.so"
         together = folder / "sources" / "together.c"  # as an FMU is compiled
         together.write_text("".join(f'#include "{one}"\n' for one in c_files(folder)))
         subprocess.run([*SANITIZED, "-shared", "-fPIC", "-o", str(library), str(together), "-lm"], check=True)
         wrong = "set 0 nan\nset 99999 1.0\nget 4000000000\nstep nan 1\nstep 1 -1\nstep 0 1e300\n"
-        seen = ran([program, str(library)], folder, script(unit, 100, 2) + wrong)
+        seen = ran([program, str(library)], folder, script(model, 100, 2) + wrong)
         assert sum(line == "state 0 1" for line in seen) == 10
         assert sum(line.startswith("log 3 unit") for line in seen) >= 5
 
@@ -132,7 +132,7 @@ def grown(seen: Sequence[str]) -> int:
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc")
 def test_memory_is_flat_over_a_million_steps(
-    oscillator: Unit, built: Callable[..., Path], c_host: str
+    oscillator: BlockModel, built: Callable[..., Path], c_host: str
 ) -> None:
     folder = built(oscillator)
     (library,) = folder.glob("binaries/*/oscillator*")

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from urmpipe_fmus.block import Unit
+from urmpipe_fmus.block import BlockModel
 
 DAMPING, GOAL, X, FORCE, COUNT = 1, 2, 5, 9, 7
 EVERYTHING = [0, 1, 2, 5, 6, 8, 9, 12, 13]
@@ -27,7 +27,7 @@ def wander(fmu: Any, first: int, count: int) -> list[Any]:
     return seen
 
 
-def test_a_saved_state_continues_bit_by_bit(native: Callable[..., Any], oscillator: Unit) -> None:
+def test_a_saved_state_continues_bit_by_bit(native: Callable[..., Any], oscillator: BlockModel) -> None:
     fmu = native(oscillator)
     wander(fmu, 0, 20)
     state = fmu.fmu.getFMUstate()
@@ -37,7 +37,9 @@ def test_a_saved_state_continues_bit_by_bit(native: Callable[..., Any], oscillat
     fmu.fmu.freeFMUstate(state)
 
 
-def test_outputs_are_those_of_the_state_that_is_set(native: Callable[..., Any], oscillator: Unit) -> None:
+def test_outputs_are_those_of_the_state_that_is_set(
+    native: Callable[..., Any], oscillator: BlockModel
+) -> None:
     fmu = native(oscillator).fmu
     before = fmu.getReal([FORCE])
     fmu.setReal([GOAL], [4.0])
@@ -52,7 +54,9 @@ def test_outputs_are_those_of_the_state_that_is_set(native: Callable[..., Any], 
     fmu.freeFMUstate(state)
 
 
-def test_outputs_are_those_of_the_start_time_that_is_set(native: Callable[..., Any], player: Unit) -> None:
+def test_outputs_are_those_of_the_start_time_that_is_set(
+    native: Callable[..., Any], player: BlockModel
+) -> None:
     fmu = native(player).fmu
     fmu.reset()
     assert fmu.getReal([0]) == [2.0]
@@ -61,7 +65,7 @@ def test_outputs_are_those_of_the_start_time_that_is_set(native: Callable[..., A
 
 
 def test_a_state_of_before_the_initialization_goes_back_to_it(
-    native: Callable[..., Any], oscillator: Unit
+    native: Callable[..., Any], oscillator: BlockModel
 ) -> None:
     fmu = native(oscillator).fmu
     fmu.reset()
@@ -79,7 +83,7 @@ def test_a_state_of_before_the_initialization_goes_back_to_it(
 
 
 def test_a_serialized_state_continues_in_another_instance(
-    native: Callable[..., Any], oscillator: Unit
+    native: Callable[..., Any], oscillator: BlockModel
 ) -> None:
     one, other = native(oscillator), native(oscillator)
     wander(one, 0, 20)
@@ -93,7 +97,7 @@ def test_a_serialized_state_continues_in_another_instance(
     other.fmu.freeFMUstate(copy)
 
 
-def test_foreign_states_are_refused(native: Callable[..., Any], oscillator: Unit) -> None:
+def test_foreign_states_are_refused(native: Callable[..., Any], oscillator: BlockModel) -> None:
     fmu = native(oscillator)
     state = fmu.fmu.getFMUstate()
     content = fmu.fmu.serializeFMUstate(state)
@@ -111,7 +115,7 @@ def test_foreign_states_are_refused(native: Callable[..., Any], oscillator: Unit
     wander(fmu, 0, 3)
 
 
-def test_instances_are_independent_in_threads(native: Callable[..., Any], oscillator: Unit) -> None:
+def test_instances_are_independent_in_threads(native: Callable[..., Any], oscillator: BlockModel) -> None:
     alone = wander(native(oscillator), 0, 300)
     instances = [native(oscillator) for _ in range(8)]
     with ThreadPoolExecutor(8) as pool:
@@ -179,7 +183,7 @@ def test_every_block_of_memory_is_given_back(
     assert counted.held == set()
 
 
-def test_it_works_without_callbacks_and_logger(built: Callable[..., Path], oscillator: Unit) -> None:
+def test_it_works_without_callbacks_and_logger(built: Callable[..., Path], oscillator: BlockModel) -> None:
     folder = built(oscillator)
     (path,) = folder.glob("binaries/*/oscillator*")
     library = ctypes.CDLL(str(path))
@@ -200,7 +204,7 @@ def test_it_works_without_callbacks_and_logger(built: Callable[..., Path], oscil
 
 @pytest.mark.parametrize("guid", ["", "{9}"])
 def test_a_wrong_guid_without_a_logger_gives_none(
-    built: Callable[..., Path], oscillator: Unit, guid: str
+    built: Callable[..., Path], oscillator: BlockModel, guid: str
 ) -> None:
     (path,) = built(oscillator).glob("binaries/*/oscillator*")
     library = ctypes.CDLL(str(path))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_fmus.block import Recipe, Table, Unit
+from urmpipe_fmus.block import BlockModel, Recipe, Table
 
 UNIT_FILES = Path(__file__).parent / "unit_files"
 TABLE = Table(
@@ -21,20 +21,20 @@ TABLE = Table(
 NAMES = ("arm", "counter", "playback", "spring")
 
 
-def unit_of(name: str, **arguments: Any) -> Unit:
+def unit_of(name: str, **arguments: Any) -> BlockModel:
     """The unit of a file, with the recipe to make it again."""
     path = UNIT_FILES / f"{name}.py"
     held = runpy.run_path(str(path))
     function = "make" if "make" in held else ""
-    made: Unit = held["make"](table=TABLE, **arguments) if function else held["unit"]
+    made: BlockModel = held["make"](table=TABLE, **arguments) if function else held["unit"]
     return replace(made, recipe=Recipe(path.name, function, arguments, path.read_text(encoding="utf-8")))
 
 
 @pytest.fixture
-def make() -> Callable[..., Unit]:
+def make() -> Callable[..., BlockModel]:
     return unit_of
 
 
 @pytest.fixture(params=NAMES)
-def unit(request: pytest.FixtureRequest) -> Unit:
+def model(request: pytest.FixtureRequest) -> BlockModel:
     return unit_of(request.param)

@@ -16,8 +16,8 @@ from fmpy.validation import validate_fmu
 from asserting import there
 from loaded_fmu import Loaded
 from made_masses import with_drives, with_masses
-from urmpipe_fmus.block import Input, Output, Unit
-from urmpipe_fmus.blocks import make_unit, unit_names
+from urmpipe_fmus.block import BlockModel, Input, Output
+from urmpipe_fmus.blocks import block_names, make_block
 from urmpipe_fmus.blocks.logs import log_source
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.fmu_file import content_guid
@@ -26,7 +26,7 @@ from urmpipe_fmus.run import run
 from urmpipe_models.errors import FmuError
 from urmpipe_models.robots.catalogue import load_robot
 
-Make = Callable[..., Unit]
+Make = Callable[..., BlockModel]
 WHY = native_missing([this_platform()])
 needs_native = pytest.mark.skipif(WHY is not None, reason=f"needs the native backend: {WHY}")
 
@@ -42,8 +42,8 @@ def guid_in(path: Path) -> str:
 
 @pytest.mark.slow
 @needs_native
-def test_a_native_fmu_is_valid(unit: Unit) -> None:
-    assert validate_fmu(str(cached_fmu(unit, "native"))) == []
+def test_a_native_fmu_is_valid(model: BlockModel) -> None:
+    assert validate_fmu(str(cached_fmu(model, "native"))) == []
 
 
 @pytest.mark.slow
@@ -144,29 +144,29 @@ OPTIONS: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in unit_names() if name != "log_source"])
+@pytest.mark.parametrize("name", [name for name in block_names() if name != "log_source"])
 def test_every_shipped_unit_is_a_valid_python_fmu_that_starts_as_it_says(name: str) -> None:
-    unit = make_unit(name, **OPTIONS.get(name, {}))
-    path = cached_fmu(unit, "python")
+    model = make_block(name, **OPTIONS.get(name, {}))
+    path = cached_fmu(model, "python")
     assert validate_fmu(str(path)) == []
     fmu = Loaded(path)
     starts = {
         scalar: one.starts[one.names.index(scalar)]
-        for scalar, one in unit.scalars
-        if one not in unit.computed
+        for scalar, one in model.scalars
+        if one not in model.computed
     }
     assert fmu.get(list(starts)) == list(starts.values())
-    fmu.get([scalar for one in unit.computed for scalar in one.names])
+    fmu.get([scalar for one in model.computed for scalar in one.names])
     fmu.free()
 
 
 def test_a_log_source_as_python_fmu_plays_the_table_in_its_resources(make: Make, tmp_path: Path) -> None:
     table = there(make("playback").table)
-    unit = log_source(table, [("q", "rad"), ("x", "m")], interpolate=True)
-    path = build_fmu(unit, tmp_path, backend="python").path
+    model = log_source(table, [("q", "rad"), ("x", "m")], interpolate=True)
+    path = build_fmu(model, tmp_path, backend="python").path
     assert validate_fmu(str(path)) == []
     fmu = Loaded(path)
-    played = run(unit, np.array([k * 0.05 for k in range(8)]))
+    played = run(model, np.array([k * 0.05 for k in range(8)]))
     for k in range(8):
         assert fmu.get(["q", "x"]) == [played["q"][k], played["x"][k]]
         fmu.do_step(k * 0.05, 0.05)
@@ -180,13 +180,13 @@ def test_numbers_of_numpy_are_numbers_in_c_and_in_the_description(tmp_path: Path
     phi = Input(
         name="phi", description="", size=2, start=angles, minimum=np.deg2rad(-90), maximum=np.float64(1.5)
     )
-    unit = Unit(
+    model = BlockModel(
         name="angles",
         description="",
         variables=(phi, Output(name="y", description="")),
         outputs=lambda v: {"y": v.phi[0] + v.phi[1]},
     )
-    fmu = Loaded(build_fmu(unit, tmp_path, backend="native").path)
+    fmu = Loaded(build_fmu(model, tmp_path, backend="native").path)
     described = {one.name: one for one in fmu.described.modelVariables}["phi[1]"]
     assert [float(one) for one in (described.start, described.min, described.max)] == [
         np.pi / 6.0,

@@ -14,13 +14,13 @@ import pytest
 
 from asserting import refusal
 from loaded_fmu import Loaded
-from urmpipe_fmus.block import Recipe, Table, Unit
-from urmpipe_fmus.blocks import make_unit
-from urmpipe_fmus.blocks.user import load_unit_file
+from urmpipe_fmus.block import BlockModel, Recipe, Table
+from urmpipe_fmus.blocks import make_block
+from urmpipe_fmus.blocks.user import load_block_file
 from urmpipe_fmus.build.fmu import _key, cache_folder, cached_fmu
 from urmpipe_models.errors import FmuError
 
-Make = Callable[..., Unit]
+Make = Callable[..., BlockModel]
 
 
 @pytest.fixture(autouse=True)
@@ -45,13 +45,13 @@ def test_a_unit_is_built_once(make: Make, folder: Path) -> None:
 
 @pytest.mark.slow
 def test_other_tables_arguments_sources_variables_and_backends_are_other_fmus(make: Make) -> None:
-    unit = make("playback")
-    assert unit.table is not None
-    other_table = replace(unit, table=Table(unit.table.t_ns, unit.table.values + 1e-15))
-    shifted = replace(unit, table=Table(unit.table.t_ns + np.int64(1), unit.table.values))
-    other_source = replace(unit, recipe=replace(unit.recipe, source=unit.recipe.source + "\n# changed\n"))
-    units = [unit, other_table, shifted, other_source, make("playback", gain=2.0)]
-    keys = [_key(one, "python", "linux64") for one in units] + [_key(unit, "native", "linux64")]
+    model = make("playback")
+    assert model.table is not None
+    other_table = replace(model, table=Table(model.table.t_ns, model.table.values + 1e-15))
+    shifted = replace(model, table=Table(model.table.t_ns + np.int64(1), model.table.values))
+    other_source = replace(model, recipe=replace(model.recipe, source=model.recipe.source + "\n# changed\n"))
+    units = [model, other_table, shifted, other_source, make("playback", gain=2.0)]
+    keys = [_key(one, "python", "linux64") for one in units] + [_key(model, "native", "linux64")]
     assert len(set(keys)) == len(keys)
 
 
@@ -81,15 +81,15 @@ def test_a_unit_without_a_recipe_or_with_one_of_somebody_elses_module_is_never_t
     nobodys = replace(make("spring"), recipe=Recipe())
     elses = replace(nobodys, recipe=Recipe("somebody.elses", "spring"))
     other = replace(elses, derivatives=lambda v: {"x": v.v, "v": -v.x})
-    paths = [cached_fmu(unit, "native") for unit in (elses, other, nobodys)]
+    paths = [cached_fmu(model, "native") for model in (elses, other, nobodys)]
     assert paths[0] == paths[2] != paths[1]  # their places are named by what was built
     assert len(list((folder / "fmus").iterdir())) == 2
 
 
 READING = """from pathlib import Path
-from urmpipe_fmus.block import Input, Output, Unit
+from urmpipe_fmus.block import BlockModel, Input, Output
 gain = float(Path(__file__).with_name("gain.txt").read_text())
-unit = Unit(name="reading", description="", outputs=lambda v: {"y": gain * v.u},
+unit = BlockModel(name="reading", description="", outputs=lambda v: {"y": gain * v.u},
     variables=(Input(name="u", description="", start=1.0), Output(name="y", description="")))
 """
 
@@ -100,7 +100,7 @@ def test_a_file_that_reads_another_is_built_again_when_that_one_changed(tmp_path
     starts = []
     for gain in ("2.0", "3.0", "2.0"):
         (tmp_path / "gain.txt").write_text(gain, encoding="ascii")
-        path = cached_fmu(load_unit_file(tmp_path / "reading.py"), "native")
+        path = cached_fmu(load_block_file(tmp_path / "reading.py"), "native")
         fmu = Loaded(path)
         starts.append((path, fmu.get(["y"])))
         fmu.free()
@@ -117,17 +117,17 @@ def test_another_file_behind_the_command_of_the_compiler_is_another_fmu(
         compiler.write_text(text, encoding="ascii")
         compiler.chmod(0o755)
         monkeypatch.setenv("CC", f"env {compiler}")
-        keys.append(_key(make_unit("inertia"), "native", "linux64"))
+        keys.append(_key(make_block("inertia"), "native", "linux64"))
     assert keys[0] != keys[1]
 
 
 @pytest.mark.slow
 def test_a_hit_imports_nothing_that_traces_and_runs_no_function() -> None:
-    built = cached_fmu(make_unit("inertia"))
+    built = cached_fmu(make_block("inertia"))
     code = (
         "from urmpipe_fmus.build.fmu.fmu import cached_fmu\n"
-        "from urmpipe_fmus.blocks import make_unit\n"
-        "import sys; print(cached_fmu(make_unit('inertia')))\n"
+        "from urmpipe_fmus.blocks import make_block\n"
+        "import sys; print(cached_fmu(make_block('inertia')))\n"
         "print(*sorted({'casadi', 'fmpy', 'pythonfmu', 'jinja2', 'lxml', 'scipy'} & set(sys.modules)))\n"
     )
     said = subprocess.run(

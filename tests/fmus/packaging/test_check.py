@@ -17,8 +17,8 @@ import pytest
 
 from asserting import refusal
 from foreign_fmus import Foreign, Scalar, fmu
-from urmpipe_fmus.block import Recipe, Unit
-from urmpipe_fmus.blocks.user import unit_of_source
+from urmpipe_fmus.block import BlockModel, Recipe
+from urmpipe_fmus.blocks.user import block_from_source
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.check import check_fmu
 from urmpipe_fmus.fmu_file import write_fmu
@@ -26,17 +26,17 @@ from urmpipe_fmus.native import native_missing, this_platform
 from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import FmuError
 
-Make = Callable[..., Unit]
+Make = Callable[..., BlockModel]
 BACKENDS = ["python", "native"]
 
 
-def built(unit: Unit, folder: Path, backend: str = "python") -> Path:
+def built(model: BlockModel, folder: Path, backend: str = "python") -> Path:
     missing = native_missing([this_platform()])
     if backend == "native" and missing:
         pytest.skip(f"needs the native backend: {missing}")
     if backend == "native":
-        return Path(shutil.copy(cached_fmu(unit, "native"), folder))
-    return build_fmu(unit, folder, backend=backend).path  # type: ignore[arg-type]
+        return Path(shutil.copy(cached_fmu(model, "native"), folder))
+    return build_fmu(model, folder, backend=backend).path  # type: ignore[arg-type]
 
 
 def changed(path: Path, old: str, new: str) -> Path:
@@ -52,16 +52,16 @@ def changed(path: Path, old: str, new: str) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_a_good_fmu_has_no_problems_and_its_values_are_those_of_an_instance(
-    unit: Unit, tmp_path: Path, backend: str
+    model: BlockModel, tmp_path: Path, backend: str
 ) -> None:
-    found = check_fmu(built(unit, tmp_path, backend))
-    instance = Instance(unit)
-    everything = range(len(unit.scalars))
+    found = check_fmu(built(model, tmp_path, backend))
+    instance = Instance(model)
+    everything = range(len(model.scalars))
     before = [float(one) for one in instance.get(everything)]
     for k in range(found.steps):
         instance.do_step(k * found.step, found.step)
-    assert (found.problems, found.ran, found.name) == ((), True, unit.name)
-    assert [one.name for one in found.variables] == [name for name, _ in unit.scalars]
+    assert (found.problems, found.ran, found.name) == ((), True, model.name)
+    assert [one.name for one in found.variables] == [name for name, _ in model.scalars]
     # Native code may round the last bit of a function of the C library otherwise than NumPy.
     assert [one.before for one in found.variables] == pytest.approx(before, rel=1e-14, abs=1e-15)
     after = [float(one) for one in instance.get(everything)]
@@ -124,21 +124,21 @@ def test_an_fmu_of_another_tool_is_checked_too(tmp_path: Path) -> None:
 
 FAILING = '''"""A unit that fails on its way."""
 import os, time
-from urmpipe_fmus.block import Memory, Unit
+from urmpipe_fmus.block import BlockModel, Memory
 
 def failing(v):
     if isinstance(v.time, float) and v.time > 0.012:
         {how}
     return {{"n": v.n + 1.0}}
 
-unit = Unit(name="failing", description="", update=failing,
+unit = BlockModel(name="failing", description="", update=failing,
     variables=(Memory(name="n", description="", output=True),))
 '''
 
 
-def failing(how: str) -> Unit:
+def failing(how: str) -> BlockModel:
     source = FAILING.format(how=how)
-    return replace(unit_of_source(source, "failing.py"), recipe=Recipe("failing.py", source=source))
+    return replace(block_from_source(source, "failing.py"), recipe=Recipe("failing.py", source=source))
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from fmpy.validation import validate_fmu
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from urmpipe_fmus.block import Input, Output, Parameter, Unit
+from urmpipe_fmus.block import BlockModel, Input, Output, Parameter
 from urmpipe_fmus.build.description import model_description
 
 NOT_XML = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -33,15 +33,15 @@ def read_back(text: str, folder: Path) -> ModelDescription:
     return read_model_description(str(folder), validate=False)
 
 
-def test_fmpy_finds_nothing_wrong(unit: Unit, tmp_path: Path) -> None:
-    assert problems_of(model_description(unit, GUID, "native", ["model.c"]), tmp_path) == []
-    assert problems_of(model_description(unit, GUID, "python"), tmp_path) == []
+def test_fmpy_finds_nothing_wrong(model: BlockModel, tmp_path: Path) -> None:
+    assert problems_of(model_description(model, GUID, "native", ["model.c"]), tmp_path) == []
+    assert problems_of(model_description(model, GUID, "python"), tmp_path) == []
 
 
-def test_every_scalar_is_described_as_the_unit_says(unit: Unit, tmp_path: Path) -> None:
-    found = read_back(model_description(unit, GUID, "native"), tmp_path).modelVariables
-    assert [one.name for one in found] == [name for name, _ in unit.scalars]
-    for reference, (seen, (name, meant)) in enumerate(zip(found, unit.scalars, strict=True)):
+def test_every_scalar_is_described_as_the_unit_says(model: BlockModel, tmp_path: Path) -> None:
+    found = read_back(model_description(model, GUID, "native"), tmp_path).modelVariables
+    assert [one.name for one in found] == [name for name, _ in model.scalars]
+    for reference, (seen, (name, meant)) in enumerate(zip(found, model.scalars, strict=True)):
         start = meant.starts[meant.names.index(name)]
         assert seen.valueReference == reference
         assert (seen.type, seen.causality, seen.variability) == (
@@ -60,7 +60,7 @@ def test_every_scalar_is_described_as_the_unit_says(unit: Unit, tmp_path: Path) 
 
 
 def test_units_are_told_in_base_units_with_their_display_units(
-    make: Callable[..., Unit], tmp_path: Path
+    make: Callable[..., BlockModel], tmp_path: Path
 ) -> None:
     found = read_back(model_description(make("spring"), GUID, "native"), tmp_path).unitDefinitions
     bases = {one.name: one.baseUnit for one in found}
@@ -76,7 +76,7 @@ def dependencies(text: str, folder: Path, title: str) -> dict[str, set[str]]:
 
 
 def test_outputs_depend_on_inputs_and_initial_unknowns_on_all_that_is_known(
-    make: Callable[..., Unit], tmp_path: Path
+    make: Callable[..., BlockModel], tmp_path: Path
 ) -> None:
     text = model_description(make("spring"), GUID, "native")
     assert dependencies(text, tmp_path, "outputs") == {"x": set(), "a": {"F"}, "E": set()}
@@ -94,7 +94,7 @@ def test_outputs_depend_on_inputs_and_initial_unknowns_on_all_that_is_known(
     }
 
 
-def test_an_fmu_with_a_table_plays_it_by_default(make: Callable[..., Unit], tmp_path: Path) -> None:
+def test_an_fmu_with_a_table_plays_it_by_default(make: Callable[..., BlockModel], tmp_path: Path) -> None:
     found = read_back(model_description(make("playback"), GUID, "native"), tmp_path).defaultExperiment
     assert (found.startTime, found.stopTime, found.stepSize) == ("0.0", "0.3", "0.1")
 
@@ -103,7 +103,7 @@ def test_an_fmu_with_a_table_plays_it_by_default(make: Callable[..., Unit], tmp_
     ("backend", "needs_python", "sources"), [("native", False, ["model.c"]), ("python", True, [])]
 )
 def test_capabilities_are_those_of_the_backend(
-    make: Callable[..., Unit], tmp_path: Path, backend: str, needs_python: bool, sources: list[str]
+    make: Callable[..., BlockModel], tmp_path: Path, backend: str, needs_python: bool, sources: list[str]
 ) -> None:
     text = model_description(make("spring"), GUID, backend, sources)  # type: ignore[arg-type]
     assert [one.get("name") for one in ET.fromstring(text.encode()).findall(".//File")] == sources
@@ -117,7 +117,7 @@ def test_capabilities_are_those_of_the_backend(
 
 
 def test_bounds_are_told_where_they_are_some(tmp_path: Path) -> None:
-    unit = Unit(
+    model = BlockModel(
         name="bounded",
         description="",
         variables=(
@@ -126,7 +126,7 @@ def test_bounds_are_told_where_they_are_some(tmp_path: Path) -> None:
             Input(name="b", description="", type="Boolean", minimum=0, maximum=1),
         ),
     )
-    text = model_description(unit, GUID, "native")
+    text = model_description(model, GUID, "native")
     assert problems_of(text, tmp_path) == []
     found = read_back(text, tmp_path).modelVariables
     assert [(one.min, one.max) for one in found] == [("-0.5", None), ("-1", None), (None, None)]
@@ -136,13 +136,13 @@ def test_bounds_are_told_where_they_are_some(tmp_path: Path) -> None:
 @settings(deadline=None)
 @given(text=st.text(st.characters(exclude_categories=[])))
 def test_any_description_is_valid_and_what_xml_can_hold_of_it_comes_back(text: str) -> None:
-    unit = Unit(
+    model = BlockModel(
         name="named",
         description=text,
         variables=(Input(name="u", description=text), Output(name="y", description="")),
         outputs=lambda v: {"y": v.u},
     )
-    root = ET.fromstring(model_description(unit, GUID, "native").encode())
+    root = ET.fromstring(model_description(model, GUID, "native").encode())
     escaped = NOT_XML.sub(lambda found: ascii(found[0])[1:-1], text)
     assert root.get("description") == escaped
     assert root.find(".//ScalarVariable").get("description", "") == escaped  # type: ignore[union-attr]

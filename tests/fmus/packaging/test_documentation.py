@@ -11,14 +11,14 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from lxml import html  # type: ignore[import-untyped]
 
-from urmpipe_fmus.block import Input, Output, Parameter, Table, Unit
+from urmpipe_fmus.block import BlockModel, Input, Output, Parameter, Table
 from urmpipe_fmus.build.description import documentation
 
-Make = Callable[..., Unit]
+Make = Callable[..., BlockModel]
 
 
-def rows_of(unit: Unit) -> list[list[str]]:
-    page = html.fromstring(documentation(unit))
+def rows_of(model: BlockModel) -> list[list[str]]:
+    page = html.fromstring(documentation(model))
     return [[cell.text or "" for cell in row.findall("td")] for row in page.findall(".//tbody/tr")]
 
 
@@ -49,8 +49,10 @@ def test_types_and_bounds_are_told(make: Make) -> None:
     [(0.1, "0.1"), (1 / 3, "0.3333333333333333"), (1e-9, "1e-09"), (1234567.0, "1234567.0")],
 )
 def test_a_value_is_told_in_full(value: float, said: str) -> None:
-    unit = Unit(name="one", description="", variables=(Parameter(name="p", description="", start=value),))
-    assert rows_of(unit)[0][3] == said
+    model = BlockModel(
+        name="one", description="", variables=(Parameter(name="p", description="", start=value),)
+    )
+    assert rows_of(model)[0][3] == said
 
 
 def test_equations_and_source_are_shown_where_there_are_some(make: Make) -> None:
@@ -61,8 +63,8 @@ def test_equations_and_source_are_shown_where_there_are_some(make: Make) -> None
     assert [one.text for one in page.findall(".//h2")] == ["Variables", "A step"]
 
 
-def test_the_page_needs_nothing_else(unit: Unit) -> None:
-    page = html.fromstring(documentation(unit))
+def test_the_page_needs_nothing_else(model: BlockModel) -> None:
+    page = html.fromstring(documentation(model))
     assert [one.tag for one in page.iter() if one.get("src") or one.get("href")] == []
     assert page.find(".//meta[@name='viewport']").get("content") == "width=device-width, initial-scale=1"
 
@@ -76,7 +78,7 @@ NOT_MARKUP = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 @given(text=st.text(st.characters(exclude_categories=[], exclude_characters="\r")))  # \r is read as \n
 @example(text='<script>alert(1)</script> & "it\'s"')
 def test_any_text_is_shown_as_it_is(text: str) -> None:
-    unit = Unit(
+    model = BlockModel(
         name="named",
         description=text,
         variables=(Input(name="u", description=text), Output(name="y", description="")),
@@ -85,8 +87,8 @@ def test_any_text_is_shown_as_it_is(text: str) -> None:
         source=text,
         table=Table(np.array([0]), np.array([[0.0]])),
     )
-    page = html.fromstring(documentation(unit))
+    page = html.fromstring(documentation(model))
     shown = NOT_MARKUP.sub(lambda found: ascii(found[0])[1:-1], text)
     assert (page.find(".//p[@class='said']").text or "") == shown
-    assert rows_of(unit)[0][-1] == shown
+    assert rows_of(model)[0][-1] == shown
     assert page.findall(".//script") == []

@@ -12,12 +12,12 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from loaded_fmu import Loaded
-from urmpipe_fmus.block import Input, Parameter, Recipe, Unit
-from urmpipe_fmus.blocks.user import unit_of_source
+from urmpipe_fmus.block import BlockModel, Input, Parameter, Recipe
+from urmpipe_fmus.blocks.user import block_from_source
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.run import Instance
 
-Make = Callable[..., Unit]
+Make = Callable[..., BlockModel]
 HELPERS = str(Path(__file__).parents[1])
 DISCARD, FATAL = 2, 4
 REFUSED = "Fatal py exception encountered: [{}] PyObject_CallMethod\n{}"
@@ -34,25 +34,25 @@ def random_value(one: Input | Parameter, random: np.random.Generator) -> float:
 
 
 @pytest.mark.slow
-def test_fmpy_finds_nothing_wrong(unit: Unit) -> None:
-    assert validate_fmu(str(cached_fmu(unit, "python"))) == []
+def test_fmpy_finds_nothing_wrong(model: BlockModel) -> None:
+    assert validate_fmu(str(cached_fmu(model, "python"))) == []
 
 
 @pytest.mark.slow
-def test_the_same_unit_is_the_same_bytes(unit: Unit, tmp_path: Path) -> None:
-    first = build_fmu(unit, tmp_path, backend="python").path.read_bytes()
-    assert build_fmu(unit, tmp_path, backend="python").path.read_bytes() == first
+def test_the_same_unit_is_the_same_bytes(model: BlockModel, tmp_path: Path) -> None:
+    first = build_fmu(model, tmp_path, backend="python").path.read_bytes()
+    assert build_fmu(model, tmp_path, backend="python").path.read_bytes() == first
 
 
 @pytest.mark.slow
-def test_it_computes_what_an_instance_does_bit_by_bit(unit: Unit) -> None:
+def test_it_computes_what_an_instance_does_bit_by_bit(model: BlockModel) -> None:
     random = np.random.default_rng(5)
-    fmu, instance = Loaded(cached_fmu(unit, "python"), start=0.02), Instance(unit)
+    fmu, instance = Loaded(cached_fmu(model, "python"), start=0.02), Instance(model)
     instance.begin(0.02)
-    names = [name for name, _ in unit.scalars]
+    names = [name for name, _ in model.scalars]
     everything = range(len(names))
     for k in range(40):
-        for reference, (name, one) in enumerate(unit.scalars):
+        for reference, (name, one) in enumerate(model.scalars):
             if isinstance(one, Input) or (isinstance(one, Parameter) and one.tunable and k % 10 == 0):
                 value = random_value(one, random)
                 fmu.set(name, int(value) if one.type != "Real" else value)
@@ -74,9 +74,9 @@ def test_outputs_are_fresh_after_set_without_a_step(make: Make) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("serialized", [False, True])
-def test_a_state_that_is_restored_goes_on_bit_by_bit(unit: Unit, serialized: bool) -> None:
-    names = [name for name, _ in unit.scalars]
-    path = cached_fmu(unit, "python")
+def test_a_state_that_is_restored_goes_on_bit_by_bit(model: BlockModel, serialized: bool) -> None:
+    names = [name for name, _ in model.scalars]
+    path = cached_fmu(model, "python")
     fmu = Loaded(path)
     for k in range(5):
         fmu.do_step(k * 0.011, 0.011)
@@ -216,8 +216,8 @@ def test_a_step_that_fails_is_undone_and_told(make: Make) -> None:
 
 
 RAISING = '''"""A unit that fails."""
-from urmpipe_fmus.block import Input, Memory, Output, Unit
-unit = Unit(name="raising", description="", variables=(
+from urmpipe_fmus.block import BlockModel, Input, Memory, Output
+unit = BlockModel(name="raising", description="", variables=(
     Input(name="u", description="", start=1.0), Memory(name="n", description=""),
     Output(name="y", description="")),
     outputs=lambda v: {"y": {1.0: 5.0, 2.0: 6.0}[float(v.u)] if isinstance(v.u, float) else v.u},
@@ -228,8 +228,8 @@ def wrong():
 '''
 
 
-def from_text(source: str, file: str) -> Unit:
-    made = unit_of_source(source, file)
+def from_text(source: str, file: str) -> BlockModel:
+    made = block_from_source(source, file)
     return replace(made, recipe=Recipe(file, source=source))
 
 

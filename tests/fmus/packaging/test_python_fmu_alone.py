@@ -12,30 +12,30 @@ import pytest
 
 from asserting import refusal
 from loaded_fmu import Loaded
-from urmpipe_fmus.block import Recipe, Unit
-from urmpipe_fmus.blocks import make_unit
-from urmpipe_fmus.blocks.user import load_unit_file, unit_of_source
+from urmpipe_fmus.block import BlockModel, Recipe
+from urmpipe_fmus.blocks import make_block
+from urmpipe_fmus.blocks.user import block_from_source, load_block_file
 from urmpipe_fmus.build.fmu import build_fmu
 from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import FmuError, UnitError
 from urmpipe_models.robots.catalogue import load_robot
 
-Make = Callable[..., Unit]
+Make = Callable[..., BlockModel]
 HELPERS = str(Path(__file__).parents[1])
 
 
-def built(unit: Unit, folder: Path) -> Path:
+def built(model: BlockModel, folder: Path) -> Path:
     """Return the Python FMU of a unit."""
-    return build_fmu(unit, folder, backend="python").path
+    return build_fmu(model, folder, backend="python").path
 
 
-def from_text(source: str, file: str) -> Unit:
-    made = unit_of_source(source, file)
+def from_text(source: str, file: str) -> BlockModel:
+    made = block_from_source(source, file)
     return replace(made, recipe=Recipe(file, source=source))
 
 
 HELPED = '''"""A gain, with a helper of its own."""
-from urmpipe_fmus.block import Input, Output, Unit
+from urmpipe_fmus.block import BlockModel, Input, Output
 
 class Helper:
     gain = {gain}
@@ -43,7 +43,7 @@ class Helper:
 def helped(v):
     return {{"y": Helper.gain * v.u}}
 
-unit = Unit(name="helped", description="", outputs=helped,
+unit = BlockModel(name="helped", description="", outputs=helped,
     variables=(Input(name="u", description=""), Output(name="y", description="")))
 '''
 
@@ -88,25 +88,25 @@ os._exit(0)  # pythonfmu 0.7 touches freed memory when its library is unloaded a
 """
 
 
-def assert_runs_alone(unit: Unit, tmp_path: Path) -> None:
-    path, instance = built(unit, tmp_path), Instance(unit)
+def assert_runs_alone(model: BlockModel, tmp_path: Path) -> None:
+    path, instance = built(model, tmp_path), Instance(model)
     instance.do_step(0.0, 0.01)
     said = subprocess.run(
         [sys.executable, "-c", ALONE, HELPERS, str(path)], capture_output=True, text=True, check=False
     )
     assert said.returncode == 0, said.stderr
-    values = [float(one) for one in instance.get(range(len(unit.scalars)))]
+    values = [float(one) for one in instance.get(range(len(model.scalars)))]
     assert [float(one) for one in eval(said.stdout)] == values
 
 
 @pytest.mark.slow
-def test_it_runs_where_there_is_no_urmpipe(unit: Unit, tmp_path: Path) -> None:
-    assert_runs_alone(unit, tmp_path)
+def test_it_runs_where_there_is_no_urmpipe(model: BlockModel, tmp_path: Path) -> None:
+    assert_runs_alone(model, tmp_path)
 
 
 @pytest.mark.slow
 def test_a_robots_chain_runs_where_there_is_no_urmpipe(tmp_path: Path) -> None:
-    assert_runs_alone(make_unit("kinematic_chain", robot=load_robot("urm6"), rates=True), tmp_path)
+    assert_runs_alone(make_block("kinematic_chain", robot=load_robot("urm6"), rates=True), tmp_path)
 
 
 CYCLES = """
@@ -166,9 +166,11 @@ def test_a_recipe_that_makes_another_unit_is_refused(make: Make, tmp_path: Path)
 
 
 def test_a_file_that_imports_what_an_fmu_does_not_bring_is_refused(make: Make, tmp_path: Path) -> None:
-    unit = make("spring")
-    source = f"import scipy.signal\nfrom helper import x\n{unit.recipe.source}"
-    assert refusal(UnitError, built, replace(unit, recipe=replace(unit.recipe, source=source)), tmp_path) == (
+    model = make("spring")
+    source = f"import scipy.signal\nfrom helper import x\n{model.recipe.source}"
+    assert refusal(
+        UnitError, built, replace(model, recipe=replace(model.recipe, source=source)), tmp_path
+    ) == (
         "unit spring: found imports of helper, helper.x, scipy.signal in spring.py, allowed in a Python FMU:"
         " the standard library, numpy, urmpipe_datasets, urmpipe_fmus, urmpipe_models"
     )
@@ -177,12 +179,14 @@ def test_a_file_that_imports_what_an_fmu_does_not_bring_is_refused(make: Make, t
 def test_a_file_that_reads_another_beside_it_is_refused(
     make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    unit = make("spring")
-    text = f"from pathlib import Path\nPath(__file__).with_name('gain.txt').read_text()\n{unit.recipe.source}"
+    model = make("spring")
+    text = (
+        f"from pathlib import Path\nPath(__file__).with_name('gain.txt').read_text()\n{model.recipe.source}"
+    )
     (tmp_path / "gain.txt").write_text("2.0", encoding="ascii")
     (tmp_path / "spring.py").write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    assert refusal(UnitError, built, load_unit_file("spring.py"), tmp_path) == (
+    assert refusal(UnitError, built, load_block_file("spring.py"), tmp_path) == (
         "unit spring: found FileNotFoundError: [Errno 2] No such file or directory: '<FMU>/gain.txt' when"
         " made again from its recipe, allowed in a Python FMU: a recipe that needs nothing else; a native FMU"
         " holds what was read"

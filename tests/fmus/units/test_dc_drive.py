@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from urmpipe_fmus.block import State, Unit, Values
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.block import BlockModel, State, Values
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.dependencies import Dependencies
 from urmpipe_fmus.run import Instance, run
 from urmpipe_models.elementwise import FloatArray
@@ -25,8 +25,8 @@ HALVINGS = [2e-3 / 2**n for n in range(5)]
 BEGIN = {"theta1": 0.02, "omega1": -0.5, "i_a": 3.0, "u": 24.0, "theta2": 0.01, "omega2": 0.3}
 
 
-def instance_of(unit: Unit, values: Mapping[str, float]) -> Instance:
-    instance = Instance(unit)
+def instance_of(model: BlockModel, values: Mapping[str, float]) -> Instance:
+    instance = Instance(model)
     instance.set([instance.reference(name) for name in values], list(values.values()))
     return instance
 
@@ -59,7 +59,7 @@ def test_the_error_against_scipy_falls_with_the_fourth_power_of_the_internal_ste
     size = np.abs(expected).max()
     errors = []
     for internal_step in HALVINGS:
-        instance = instance_of(make_unit("dc_drive"), BEGIN | {"internal_step": internal_step})
+        instance = instance_of(make_block("dc_drive"), BEGIN | {"internal_step": internal_step})
         instance.do_step(0.0, STEP)
         errors.append(float(np.abs(read(instance, "theta1", "omega1", "i_a") - expected).max() / size))
     assert (orders(errors)[1:] > 3.8).all(), errors
@@ -68,7 +68,7 @@ def test_the_error_against_scipy_falls_with_the_fourth_power_of_the_internal_ste
 
 def test_with_small_internal_steps_it_agrees_with_scipy_to_one_in_a_billion() -> None:
     expected = by_scipy(BEGIN, STEP)
-    instance = instance_of(make_unit("dc_drive"), BEGIN | {"internal_step": 2e-5})
+    instance = instance_of(make_block("dc_drive"), BEGIN | {"internal_step": 2e-5})
     instance.do_step(0.0, STEP)
     # RK4 in steps of 20 us errs by less, and so does SciPy.
     np.testing.assert_allclose(read(instance, "theta1", "omega1", "i_a"), expected, rtol=1e-9, atol=0.0)
@@ -82,29 +82,29 @@ def load_motion(t: Any) -> tuple[Any, Any]:
 POWERS = ("electrical", "joule", "shaft", "work")
 
 
-def with_powers(unit: Unit) -> Unit:
+def with_powers(model: BlockModel) -> BlockModel:
     """Return a drive whose load moves on its own within a step, and that integrates its powers as well."""
 
     def moving(v: Values) -> Values:
         theta2, omega2 = load_motion(v.time)
-        names = [one.name for one in unit.given]
+        names = [one.name for one in model.given]
         return Values(
             v.time, {name: getattr(v, name) for name in names} | {"theta2": theta2, "omega2": omega2}
         )
 
     def derivatives(given: Values) -> dict[str, Any]:
-        assert unit.derivatives is not None and unit.outputs is not None
+        assert model.derivatives is not None and model.outputs is not None
         v = moving(given)
         powers = {
             "electrical": v.u * v.i_a,
             "joule": v.R * v.i_a**2,
             "shaft": v.l * (v.omega1 - v.omega2) ** 2,
-            "work": unit.outputs(v)["Mk"] * v.omega2,
+            "work": model.outputs(v)["Mk"] * v.omega2,
         }
-        return {**unit.derivatives(v), **powers}
+        return {**model.derivatives(v), **powers}
 
     works = tuple(State(name=name, description="Work", unit="J") for name in POWERS)
-    return replace(unit, variables=(*unit.variables, *works), derivatives=derivatives)
+    return replace(model, variables=(*model.variables, *works), derivatives=derivatives)
 
 
 def stored(instance: Instance, time: float) -> float:
@@ -115,10 +115,10 @@ def stored(instance: Instance, time: float) -> float:
 
 
 def test_the_energy_balance_closes_with_the_fourth_power_of_the_internal_step() -> None:
-    unit = with_powers(make_unit("dc_drive"))
+    model = with_powers(make_block("dc_drive"))
     open_by = []
     for internal_step in HALVINGS:
-        instance = instance_of(unit, BEGIN | {"internal_step": internal_step})
+        instance = instance_of(model, BEGIN | {"internal_step": internal_step})
         before = stored(instance, 0.0)
         instance.do_step(0.0, STEP)
         electrical, joule, shaft, work = read(instance, *POWERS)
@@ -130,7 +130,7 @@ def test_the_energy_balance_closes_with_the_fourth_power_of_the_internal_step() 
 
 
 def test_at_its_default_internal_step_a_controllers_period_is_exact_to_parts_in_a_hundred_thousand() -> None:
-    instance = instance_of(make_unit("dc_drive"), BEGIN)
+    instance = instance_of(make_block("dc_drive"), BEGIN)
     instance.do_step(0.0, 5e-3)
     found, expected = read(instance, "theta1", "omega1", "i_a"), by_scipy(BEGIN, 5e-3)
     # In a step of 0.5 ms RK4 leaves (h R / L)^5 / 120 = 8e-6 of the current's own mode out.
@@ -138,12 +138,12 @@ def test_at_its_default_internal_step_a_controllers_period_is_exact_to_parts_in_
 
 
 def test_the_torque_follows_the_driven_end_at_once_and_nothing_else_does() -> None:
-    found = Dependencies(make_unit("dc_drive"))
+    found = Dependencies(make_block("dc_drive"))
     inputs = {"u", "theta2", "omega2"}
     assert found.outputs["Mk"] & inputs == {"theta2", "omega2"}
     assert found.outputs["alpha1"] & inputs == {"theta2", "omega2"}
     assert found.derivatives["i_a"] & inputs == {"u"}
-    instance = instance_of(make_unit("dc_drive"), {"theta1": 0.3, "omega1": 2.0})
+    instance = instance_of(make_block("dc_drive"), {"theta1": 0.3, "omega1": 2.0})
     # the same sums in another order: the rounding of the last place
     assert read(instance, "Mk")[0] == pytest.approx(K * 0.3 + DAMPING * 2.0, rel=1e-15)
     instance.set([instance.reference("theta2"), instance.reference("omega2")], [0.1, 1.0])
@@ -160,7 +160,7 @@ def test_over_a_log_the_inputs_are_held_from_sample_to_sample() -> None:
         "theta2": rng.uniform(-0.1, 0.1, 5),
         "omega2": rng.uniform(-1, 1, 5),
     }
-    found = run(make_unit("dc_drive"), t, inputs, {"internal_step": 5e-5})
+    found = run(make_block("dc_drive"), t, inputs, {"internal_step": 5e-5})
     state = np.zeros(3)
     for k in range(4):
         held = {name: float(column[k]) for name, column in inputs.items()}
@@ -171,15 +171,15 @@ def test_over_a_log_the_inputs_are_held_from_sample_to_sample() -> None:
 
 @pytest.mark.parametrize("name", ["k", "l", "i_p", "C", "R", "L", "I1"])
 def test_every_constant_must_be_above_0(name: str) -> None:
-    instance = Instance(make_unit("dc_drive"))
+    instance = Instance(make_block("dc_drive"))
     with pytest.raises(UnitError) as error:
         instance.set([instance.reference(name)], [0.0])
     assert str(error.value) == (f"unit dc_drive: {name}: found 0, allowed: 1e-09 to inf")
 
 
 def test_a_step_that_diverges_is_refused_and_undone() -> None:
-    unit = make_unit("dc_drive")
-    instance = instance_of(unit, BEGIN | {"internal_step": 1.0, "L": 1e-9})
+    model = make_block("dc_drive")
+    instance = instance_of(model, BEGIN | {"internal_step": 1.0, "L": 1e-9})
     before = instance.save()
     with pytest.raises(UnitError, match=r"unit dc_drive: state .* is not finite"):
         instance.do_step(0.0, 100.0)

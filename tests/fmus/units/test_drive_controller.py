@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from asserting import refusal
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.run import Instance, run
 from urmpipe_models.errors import UnitError
 
@@ -19,7 +19,7 @@ def times(count: int, step: float, begin: float = 0.0) -> NDArray[np.float64]:
 
 
 def controller(**starts: float) -> Instance:
-    instance = Instance(make_unit("drive_controller"))
+    instance = Instance(make_block("drive_controller"))
     instance.set([instance.reference(name) for name in starts], list(starts.values()))
     return instance
 
@@ -51,7 +51,7 @@ def test_the_communication_step_changes_no_sample(parts: int) -> None:
     step = 5e-3 / parts
     t = times(200 * parts + 1, step)
     wanted = np.sin(17.0 * t)
-    found = run(make_unit("drive_controller"), t, {"set_theta": wanted}, GAINS)["u"]
+    found = run(make_block("drive_controller"), t, {"set_theta": wanted}, GAINS)["u"]
     samples = np.cumsum(np.sin(17.0 * np.arange(201) * 5e-3))
     # The limit is not met; the times of a sample differ in their last bit.
     np.testing.assert_allclose(found, np.repeat(samples, parts)[: len(t)], rtol=0.0, atol=1e-10)
@@ -59,25 +59,25 @@ def test_the_communication_step_changes_no_sample(parts: int) -> None:
 
 def test_a_communication_step_above_the_period_samples_at_every_point() -> None:
     t = times(6, 0.02)
-    found = run(make_unit("drive_controller"), t, {"set_theta": np.ones(6)}, GAINS)["u"]
+    found = run(make_block("drive_controller"), t, {"set_theta": np.ones(6)}, GAINS)["u"]
     np.testing.assert_array_equal(found, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
 
 
 def test_a_sample_that_no_communication_point_meets_is_taken_at_the_next() -> None:
     t = times(8, 3e-3)  # samples at 0, 5, 10, 15, 20 ms
-    found = run(make_unit("drive_controller"), t, {"set_theta": np.ones(8)}, GAINS)["u"]
+    found = run(make_block("drive_controller"), t, {"set_theta": np.ones(8)}, GAINS)["u"]
     np.testing.assert_array_equal(found, [1.0, 1.0, 2.0, 2.0, 3.0, 4.0, 4.0, 5.0])
 
 
 def test_a_run_that_begins_late_takes_one_sample_a_period_from_there() -> None:
     t = times(11, 1e-3, begin=10.0)
-    found = run(make_unit("drive_controller"), t, {"set_theta": np.ones(11)}, GAINS)["u"]
+    found = run(make_block("drive_controller"), t, {"set_theta": np.ones(11)}, GAINS)["u"]
     np.testing.assert_array_equal(found, np.repeat([1.0, 2.0, 3.0], [5, 5, 1]))
 
 
 def test_a_run_that_begins_before_0_takes_one_sample_a_period_from_there() -> None:
     t = times(11, 1e-3, begin=-0.02)
-    found = run(make_unit("drive_controller"), t, {"set_theta": np.ones(11)}, GAINS)["u"]
+    found = run(make_block("drive_controller"), t, {"set_theta": np.ones(11)}, GAINS)["u"]
     np.testing.assert_array_equal(found, np.repeat([1.0, 2.0, 3.0], [5, 5, 1]))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.dependencies import Dependencies
 from urmpipe_fmus.run import Instance, run
 
@@ -17,7 +17,7 @@ def constant(value: float) -> np.ndarray:
 
 
 def test_without_friction_a_constant_torque_makes_a_parabola() -> None:
-    found = run(make_unit("inertia"), T, {"tau": constant(3.0), "tau_ext": constant(-1.0)}, {"J": 4.0})
+    found = run(make_block("inertia"), T, {"tau": constant(3.0), "tau_ext": constant(-1.0)}, {"J": 4.0})
     # RK4 is exact for it; sums of 4000 internal steps round.
     np.testing.assert_allclose(found["theta"], 0.25 * T**2, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(found["omega"], 0.5 * T, rtol=0.0, atol=1e-12)
@@ -26,7 +26,7 @@ def test_without_friction_a_constant_torque_makes_a_parabola() -> None:
 
 def test_with_friction_the_speed_nears_torque_over_friction() -> None:
     start = {"J": 2.0, "d": 4.0, "omega": 3.0, "theta": 1.0}
-    found = run(make_unit("inertia"), T, {"tau": constant(8.0)}, start)
+    found = run(make_block("inertia"), T, {"tau": constant(8.0)}, start)
     omega = 2.0 + np.exp(-2.0 * T)
     # (h d / J)^5 / 120 a step of 0.5 ms: far below rounding.
     np.testing.assert_allclose(found["omega"], omega, rtol=0.0, atol=1e-12)
@@ -37,8 +37,8 @@ def test_with_friction_the_speed_nears_torque_over_friction() -> None:
 
 
 def test_the_acceleration_is_that_of_the_torques_as_they_stand() -> None:
-    assert Dependencies(make_unit("inertia")).outputs["alpha"] == {"J", "d", "omega", "tau", "tau_ext"}
-    instance = Instance(make_unit("inertia"))
+    assert Dependencies(make_block("inertia")).outputs["alpha"] == {"J", "d", "omega", "tau", "tau_ext"}
+    instance = Instance(make_block("inertia"))
     for torque in (5.0, -3.0):
         instance.set([instance.reference("tau")], [torque])
         # divided by 1: the rounding of the last place

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from sliding_arm import sliding_arm
-from urmpipe_fmus.block import Unit
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.block import BlockModel
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.blocks.kinematic_chain import kinematic_chain
 from urmpipe_fmus.run import Instance, run
 from urmpipe_models.arm.chain import Chain, Sphere, Visual
@@ -43,10 +43,10 @@ def inputs_of(robot: Chain, names: tuple[str, str], q: FloatArray) -> dict[str, 
 def test_points_and_sensors_are_those_of_the_kinematics_over_a_log(name: str) -> None:
     robot, rng = ROBOTS[name], np.random.default_rng(3)
     q, qd, qdd = rng.uniform(-3.0, 3.0, (3, 40, len(robot.coordinates)))
-    unit = kinematic_chain(robot, sensors=robot.point_names, rates=True)
+    model = kinematic_chain(robot, sensors=robot.point_names, rates=True)
     t = np.linspace(0.0, 1.0, 40, dtype=np.float64)
     given = inputs_of(robot, ("phi", "s"), q) | inputs_of(robot, ("phid", "sd"), qd)
-    found = run(unit, t, given | inputs_of(robot, ("phidd", "sdd"), qdd))
+    found = run(model, t, given | inputs_of(robot, ("phidd", "sdd"), qdd))
     skeleton = points_over_log(robot, q)
     for k, point in enumerate(robot.point_names):
         number, motion = point[1:], point_over_log(robot, q, qd, qdd, k)
@@ -66,24 +66,24 @@ def test_the_points_of_a_urm_arm_are_those_of_a_log_to_the_last_bit() -> None:
     assert np.array_equal(found["p7"], points_over_log(robot, q)[:, -1])
 
 
-def first(unit: Unit, name: str) -> list[float]:
+def first(model: BlockModel, name: str) -> list[float]:
     """What a variable starts with."""
-    instance = Instance(unit)
-    owner = next(one for one in unit.variables if one.name == name)
+    instance = Instance(model)
+    owner = next(one for one in model.variables if one.name == name)
     return [float(one) for one in instance.get([instance.reference(scalar) for scalar in owner.names])]
 
 
 def test_it_starts_at_the_calibration_pose_that_the_paper_prints() -> None:
-    unit = make_unit("kinematic_chain", robot=load_robot("urm6"))
-    assert first(unit, "phi") == [0.0, np.pi, 0.0, np.pi, 0.0, np.pi]
-    assert np.round(first(unit, "p7"), 9).tolist() == [0.167397124, 0.0, 1.102644902]
-    assert first(unit, "lengths") == [0.243215, *[0.21243] * 5, 0.042215]
-    assert np.degrees(first(unit, "tilts")).round(12).tolist() == [52.0] * 6
+    model = make_block("kinematic_chain", robot=load_robot("urm6"))
+    assert first(model, "phi") == [0.0, np.pi, 0.0, np.pi, 0.0, np.pi]
+    assert np.round(first(model, "p7"), 9).tolist() == [0.167397124, 0.0, 1.102644902]
+    assert first(model, "lengths") == [0.243215, *[0.21243] * 5, 0.042215]
+    assert np.degrees(first(model, "tilts")).round(12).tolist() == [52.0] * 6
 
 
 def test_lengths_and_tilts_are_tuned_while_it_runs() -> None:
-    unit, rng = kinematic_chain(load_robot("urm4")), np.random.default_rng(5)
-    instance = Instance(unit)
+    model, rng = kinematic_chain(load_robot("urm4")), np.random.default_rng(5)
+    instance = Instance(model)
     instance.do_step(0.0, 0.005)
     q, lengths, tilts = rng.uniform(-3.0, 3.0, 4), rng.uniform(0.1, 0.3, 5), rng.uniform(0.0, 1.5, 4)
     for name, values in (("phi", q), ("lengths", lengths), ("tilts", tilts)):
@@ -114,8 +114,8 @@ def test_the_frames_of_any_arm_are_tuned() -> None:
 
 
 def test_joints_that_turn_and_joints_that_slide_are_inputs_in_their_own_units() -> None:
-    unit = kinematic_chain(sliding_arm(), rates=True)
-    assert [(one.name, one.unit, one.size, one.starts) for one in unit.inputs] == [
+    model = kinematic_chain(sliding_arm(), rates=True)
+    assert [(one.name, one.unit, one.size, one.starts) for one in model.inputs] == [
         ("phi", "rad", 2, (0.3, -0.4)),
         ("phid", "rad/s", 2, (0.0, 0.0)),
         ("phidd", "rad/s2", 2, (0.0, 0.0)),
@@ -123,13 +123,13 @@ def test_joints_that_turn_and_joints_that_slide_are_inputs_in_their_own_units() 
         ("sd", "m/s", 1, (0.0,)),
         ("sdd", "m/s2", 1, (0.0,)),
     ]
-    assert unit.inputs[0].description == "Angles of the joints turn, wrist"
-    assert unit.inputs[3].description == "Ways of the joints slide"
+    assert model.inputs[0].description == "Angles of the joints turn, wrist"
+    assert model.inputs[3].description == "Ways of the joints slide"
 
 
 def test_outputs_are_the_points_and_sensors_that_were_asked_for_in_the_order_of_the_arm() -> None:
-    unit = kinematic_chain(load_robot("urm6"), points=["p7", "p2"], sensors=["p6", "p1"])
-    assert [one.name for one in unit.computed] == [
+    model = kinematic_chain(load_robot("urm6"), points=["p7", "p2"], sensors=["p6", "p1"])
+    assert [one.name for one in model.computed] == [
         *("p2", "p7"),
         *("rz1", "ry1", "rx1", "singular1"),
         *("rz6", "ry6", "rx6", "singular6"),
@@ -158,9 +158,9 @@ def test_at_ry_of_a_right_angle_the_convention_is_told() -> None:
 
 def test_the_looks_of_an_arm_and_their_files_are_not_in_the_recipe() -> None:
     robot = replace(load_robot("urm4"), visuals=(Visual(None, shape=Sphere(0.1)),))
-    unit = kinematic_chain(robot)
-    assert "visuals" not in unit.recipe.arguments["robot"]
-    assert unit.recipe == kinematic_chain(replace(robot, visuals=())).recipe
+    model = kinematic_chain(robot)
+    assert "visuals" not in model.recipe.arguments["robot"]
+    assert model.recipe == kinematic_chain(replace(robot, visuals=())).recipe
 
 
 def test_an_arm_of_a_urdf_is_taken() -> None:

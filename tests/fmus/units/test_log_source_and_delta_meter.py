@@ -28,24 +28,24 @@ def test_a_held_log_shows_each_row_until_the_next_and_its_ends_beyond_them() -> 
 
 
 def test_an_interpolated_log_goes_straight_from_row_to_row_and_meets_each_bit_by_bit() -> None:
-    unit = log_source(LOG, COLUMNS, interpolate=True)
-    found = run(unit, np.array([-1.0, 0.0, 0.0025, 0.005, 0.01, 0.02, 7.0]))
+    model = log_source(LOG, COLUMNS, interpolate=True)
+    found = run(model, np.array([-1.0, 0.0, 0.0025, 0.005, 0.01, 0.02, 7.0]))
     assert found["d"].tolist() == [10.0, 10.0, 15.0, 20.0, 20.0 + (5e6 / 15e6) * 30.0, 50.0, 50.0]
     t = LOG.t_ns / 1e9
-    assert np.array_equal(run(unit, t)["q"], LOG.values[:, :2])
+    assert np.array_equal(run(model, t)["q"], LOG.values[:, :2])
     inside = np.linspace(0.0, 0.02, 101, dtype=np.float64)
     straight = np.interp(inside, t, LOG.values[:, 2])
-    np.testing.assert_allclose(run(unit, inside)["d"], straight, rtol=0.0, atol=1e-13)  # rounding of 50
+    np.testing.assert_allclose(run(model, inside)["d"], straight, rtol=0.0, atol=1e-13)  # rounding of 50
 
 
 def test_the_columns_are_outputs_by_the_callers_names_that_depend_on_time() -> None:
-    unit = log_source(LOG, [["q", "rad", 2, "Angles"], ["d", "m"]])
-    assert [(one.name, one.unit, one.display_unit, one.size, one.description) for one in unit.computed] == [
+    model = log_source(LOG, [["q", "rad", 2, "Angles"], ["d", "m"]])
+    assert [(one.name, one.unit, one.display_unit, one.size, one.description) for one in model.computed] == [
         ("q", "rad", "deg", 2, "Angles"),
         ("d", "m", "", None, "Column d of the log"),
     ]
-    assert Dependencies(unit).outputs == {"q[1]": {TIME}, "q[2]": {TIME}, "d": {TIME}}
-    assert unit.description == "A log of 3 rows, held"
+    assert Dependencies(model).outputs == {"q[1]": {TIME}, "q[2]": {TIME}, "d": {TIME}}
+    assert model.description == "A log of 3 rows, held"
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ import pytest
 
 from fmu_run import FmuRun
 from urmpipe import network_drive
-from urmpipe_fmus.block import Unit
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.block import BlockModel
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.run import run
@@ -95,9 +95,9 @@ CASES: dict[str, tuple[Any, str, float]] = {
 """A network, its control that moves, and how far in [rad] or [m]."""
 
 
-def columns(unit: Unit, found: FloatArray) -> dict[str, FloatArray]:
+def columns(model: BlockModel, found: FloatArray) -> dict[str, FloatArray]:
     """Return what an FMU gave by scalar, shape (n,)."""
-    names = [name for one in unit.variables if one.causality == "output" for name in one.names]
+    names = [name for one in model.variables if one.causality == "output" for name in one.names]
     return dict(zip(names, found.T, strict=True))
 
 
@@ -124,16 +124,16 @@ def converged(
     return {scalars[k]: exact.x[k] for k in mechanism.free}
 
 
-def moved(name: str, backend: Backend) -> tuple[Unit, dict[str, FloatArray], dict[str, FloatArray]]:
+def moved(name: str, backend: Backend) -> tuple[BlockModel, dict[str, FloatArray], dict[str, FloatArray]]:
     """Return a unit, its inputs over a turn, and what its FMU gives."""
     network, control, way = CASES[name]
-    unit = make_unit("network_motion", network=network)
-    starts = {one.name: one.starts[0] for one in unit.inputs}
+    model = make_block("network_motion", network=network)
+    starts = {one.name: one.starts[0] for one in model.inputs}
     inputs = {key: np.full(POINTS + 1, start) for key, start in starts.items()}
     inputs[control] = starts[control] + np.linspace(0.0, way, POINTS + 1, dtype=np.float64)
-    with FmuRun(cached_fmu(unit, backend), unit, {}) as fmu:
+    with FmuRun(cached_fmu(model, backend), model, {}) as fmu:
         found = fmu.over(1e-3 * np.arange(POINTS + 1, dtype=np.float64), inputs)
-    return unit, inputs, columns(unit, found)
+    return model, inputs, columns(model, found)
 
 
 @pytest.mark.slow
@@ -168,9 +168,9 @@ def test_an_fmu_follows_its_control_as_closely_as_a_converged_solution(name: str
 
 
 def test_a_four_bar_is_that_of_the_law_of_cosines_over_two_turns() -> None:
-    unit = make_unit("network_motion", network="four-bar", points=["coupler:0.9,0,0"])
+    model = make_block("network_motion", network="four-bar", points=["coupler:0.9,0,0"])
     crank = 0.9 + np.linspace(0.0, 2.0 * TURN, 401, dtype=np.float64)
-    found = run(unit, 5e-3 * np.arange(401, dtype=np.float64), {"crank": crank})
+    found = run(model, 5e-3 * np.arange(401, dtype=np.float64), {"crank": crank})
     pin = np.stack((0.4 * np.cos(crank), 0.4 * np.sin(crank)))
     diagonal = np.hypot(pin[0] - 1.0, pin[1])
     inner = np.arccos((0.7**2 + diagonal**2 - 0.9**2) / (2.0 * 0.7 * diagonal))
@@ -186,9 +186,9 @@ def test_a_four_bar_is_that_of_the_law_of_cosines_over_two_turns() -> None:
 
 def test_a_motion_goes_straight_on_where_branches_meet() -> None:
     """Where all hinges of Bricard's linkage are at pi, t2 changes by -0.27 or by -3.7 times the turn."""
-    unit = make_unit("network_motion", network="bricard")
+    model = make_block("network_motion", network="bricard")
     turn = np.linspace(0.8, 5.0, 1001, dtype=np.float64)
-    found = run(unit, 1e-3 * np.arange(1001, dtype=np.float64), {"turn": turn})
+    found = run(model, 1e-3 * np.arange(1001, dtype=np.float64), {"turn": turn})
     assert (turn[0] < math.pi) & (turn[-1] > math.pi)
     assert found["residual"].max() < 1e-9
     h = turn[1] - turn[0]
@@ -210,7 +210,7 @@ def test_a_rotation_vector_follows_three_turns_and_stays_within_half_a_turn() ->
         },
     }  # fmt: skip
     turn = np.linspace(0.0, 3.0 * TURN, 601, dtype=np.float64)
-    found = run(make_unit("network_motion", network=parts), turn, {"turn": turn})["S"]
+    found = run(make_block("network_motion", network=parts), turn, {"turn": turn})["S"]
     assert np.linalg.norm(found, axis=1).max() <= math.pi + 1e-9
     rotation: FloatArray = np.array(exp3((found[:, 0], found[:, 1], found[:, 2])).rotation)
     # T of S is given in m, n and m x n of its frames, which are those of the ground: x, y, z
@@ -218,24 +218,24 @@ def test_a_rotation_vector_follows_three_turns_and_stays_within_half_a_turn() ->
 
 
 def test_a_jump_of_a_control_is_closed_after_some_points_and_stays_on_its_branch() -> None:
-    unit = make_unit("network_motion", network="four-bar")
+    model = make_block("network_motion", network="four-bar")
     crank = np.where(np.arange(20) < 5, 0.9, 2.1)
-    found = run(unit, 1e-3 * np.arange(20, dtype=np.float64), {"crank": crank})
+    found = run(model, 1e-3 * np.arange(20, dtype=np.float64), {"crank": crank})
     assert found["residual"][-1] < 1e-14
     assert 0.0 < found["theta4"][-1] < math.pi
     assert np.ptp(found["theta4"][8:]) < 1e-9
 
 
 def test_inputs_are_in_rad_and_m_where_a_control_has_one_of_them_and_start_as_requested() -> None:
-    unit = make_unit("network_motion", network=DOOR, controls={"opening": "30deg"})
-    assert [(one.name, one.unit) for one in unit.inputs] == [("opening", "rad")]
-    assert unit.inputs[0].starts[0] == pytest.approx(math.radians(30.0), abs=1e-15)
-    same = make_unit("network_motion", network=DOOR, controls={"opening": 30})
-    assert same.variables == unit.variables
-    assert "arm_shoulder_pan_joint" in [one.name for one in unit.computed]
-    plain = make_unit("network_motion", network="nine-revolute-controlled")
+    model = make_block("network_motion", network=DOOR, controls={"opening": "30deg"})
+    assert [(one.name, one.unit) for one in model.inputs] == [("opening", "rad")]
+    assert model.inputs[0].starts[0] == pytest.approx(math.radians(30.0), abs=1e-15)
+    same = make_block("network_motion", network=DOOR, controls={"opening": 30})
+    assert same.variables == model.variables
+    assert "arm_shoulder_pan_joint" in [one.name for one in model.computed]
+    plain = make_block("network_motion", network="nine-revolute-controlled")
     assert [(one.name, one.unit, one.starts) for one in plain.inputs] == [("turn", "rad", (-1.27,))]
-    legs = make_unit("network_motion", network=PLATFORM)
+    legs = make_block("network_motion", network=PLATFORM)
     assert {one.unit for one in legs.inputs} == {"m"}
     assert [(one.name, one.size, one.unit) for one in legs.computed[:2]] == [
         ("plate_p", 3, "m"),
@@ -244,7 +244,7 @@ def test_inputs_are_in_rad_and_m_where_a_control_has_one_of_them_and_start_as_re
 
 
 def test_start_values_of_joints_choose_the_branch() -> None:
-    crossed = make_unit(
+    crossed = make_block(
         "network_motion", network="four-bar", start={"theta4": "-130deg", "A": -1.4, "B": -1.0}
     )
     found = run(crossed, np.zeros(1))
@@ -262,12 +262,12 @@ def test_names_that_fmi_does_not_have_are_changed_and_stay_apart() -> None:
         },
     }
     with pytest.raises(UnitError, match="does not close"):
-        make_unit("network_motion", network=parts)
+        make_block("network_motion", network=parts)
     del parts["joints"]["é"]
-    unit = make_unit("network_motion", network=parts)
-    names = [one.name for one in unit.variables]
+    model = make_block("network_motion", network=parts)
+    names = [one.name for one in model.variables]
     assert names == ["time_", "v1_a_b", "residual_", "residual"]  # a tree that is driven has no memory
-    found = run(unit, np.zeros(1), {"time_": np.array([0.25])})
+    found = run(model, np.zeros(1), {"time_": np.array([0.25])})
     assert (found["v1_a_b"][0], found["residual_"][0], found["residual"][0]) == (0.25, 0.25, 0.0)
 
 
@@ -291,13 +291,13 @@ def test_names_that_fmi_does_not_have_are_changed_and_stay_apart() -> None:
 )  # fmt: skip
 def test_what_is_wrong_with_the_options_is_refused(options: dict[str, Any], message: str) -> None:
     with pytest.raises(UrmpipeError) as caught:
-        make_unit("network_motion", **options)
+        make_block("network_motion", **options)
     assert message in str(caught.value)
 
 
 def test_points_of_the_shell_are_words_with_commas_between_them() -> None:
-    listed = make_unit("network_motion", network="four-bar", points=["coupler:1,2,3", "input:0,0,1"])
-    words = make_unit(
+    listed = make_block("network_motion", network="four-bar", points=["coupler:1,2,3", "input:0,0,1"])
+    words = make_block(
         "network_motion", network="four-bar", points=["coupler:1", "2", "3", "input:0", "0", "1"]
     )
     assert words.variables == listed.variables

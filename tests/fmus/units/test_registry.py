@@ -10,8 +10,14 @@ import pytest
 
 from asserting import refusal
 from made_masses import with_drives, with_masses
-from urmpipe_fmus.block import Output, Table, Unit
-from urmpipe_fmus.blocks import make_unit, unit_help, unit_name, unit_names, unit_options
+from urmpipe_fmus.block import BlockModel, Output, Table
+from urmpipe_fmus.blocks import (
+    block_names,
+    block_option_help,
+    block_summary,
+    make_block,
+    normalise_block_name,
+)
 from urmpipe_models.errors import UnitError
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -28,69 +34,69 @@ def test_the_options_told_are_the_arguments_taken_and_a_unit_has_its_own_name() 
         "driven_arm": {"robot": ARM},
         "network_motion": {"network": "four-bar"},
     }
-    for name in unit_names():
-        unit = make_unit(name, **given.get(name, {}))
-        function = getattr(importlib.import_module(unit.recipe.module), name)
-        assert list(inspect.signature(function).parameters) == list(unit_options(name))
-        assert unit_help(name)
-        assert unit.name == name
+    for name in block_names():
+        model = make_block(name, **given.get(name, {}))
+        function = getattr(importlib.import_module(model.recipe.module), name)
+        assert list(inspect.signature(function).parameters) == list(block_option_help(name))
+        assert block_summary(name)
+        assert model.name == name
 
 
-def remade(unit: Unit) -> Unit:
-    recipe = unit.recipe
-    given = dict(recipe.arguments) | ({"table": unit.table} if unit.table else {})
-    made: Unit = getattr(importlib.import_module(recipe.module), recipe.function)(**given)
+def remade(model: BlockModel) -> BlockModel:
+    recipe = model.recipe
+    given = dict(recipe.arguments) | ({"table": model.table} if model.table else {})
+    made: BlockModel = getattr(importlib.import_module(recipe.module), recipe.function)(**given)
     return made
 
 
 @pytest.mark.parametrize("robot", ["urm6", "ur5e"])
 def test_a_unit_made_again_by_its_recipe_is_the_same_bit_by_bit(robot: str) -> None:
-    for unit in (
-        make_unit("kinematic_chain", robot=load_robot(robot), points=["p6", "p2"], rates=True),
-        make_unit("chain_dynamics", robot=with_masses(load_robot(robot))),
-        make_unit("driven_arm", robot=with_drives(with_masses(load_robot(robot)))),
-        make_unit("repolarizer", joints=3),
-        make_unit("network_motion", network="rccc", points={"tip": {"body": "c3.body", "point": [0, 1, 0]}}),
-        make_unit("delta_meter"),
-        make_unit("log_source", table=TABLE, columns=[["q", "rad"], ["d", "m", None, "a way"]]),
+    for model in (
+        make_block("kinematic_chain", robot=load_robot(robot), points=["p6", "p2"], rates=True),
+        make_block("chain_dynamics", robot=with_masses(load_robot(robot))),
+        make_block("driven_arm", robot=with_drives(with_masses(load_robot(robot)))),
+        make_block("repolarizer", joints=3),
+        make_block("network_motion", network="rccc", points={"tip": {"body": "c3.body", "point": [0, 1, 0]}}),
+        make_block("delta_meter"),
+        make_block("log_source", table=TABLE, columns=[["q", "rad"], ["d", "m", None, "a way"]]),
     ):
-        again = remade(unit)
-        assert again.variables == unit.variables
+        again = remade(model)
+        assert again.variables == model.variables
         assert (again.description, again.equations, again.source) == (
-            unit.description,
-            unit.equations,
-            unit.source,
+            model.description,
+            model.equations,
+            model.source,
         )
-        assert again.recipe == unit.recipe
+        assert again.recipe == model.recipe
 
 
 def test_an_unknown_unit_is_told_what_there_is() -> None:
     with pytest.raises(UnitError) as error:
-        make_unit("gearbox")
-    names = ", ".join(unit_names())
+        make_block("gearbox")
+    names = ", ".join(block_names())
     assert str(error.value) == f"unit: found 'gearbox', allowed: {names}, or a .py file with a unit in it"
-    for ask in (unit_help, unit_options):
+    for ask in (block_summary, block_option_help):
         with pytest.raises(UnitError, match="unit: found 'gearbox'"):
             ask("gearbox")
 
 
 def test_hyphens_stand_for_underscores() -> None:
-    assert make_unit("dc-drive").variables == make_unit("dc_drive").variables
-    assert (unit_name("dc-drive"), unit_name("gear-box")) == ("dc_drive", "gear-box")
-    assert unit_help("log-source") == unit_help("log_source")
-    assert unit_options("log-source") == unit_options("log_source")
+    assert make_block("dc-drive").variables == make_block("dc_drive").variables
+    assert (normalise_block_name("dc-drive"), normalise_block_name("gear-box")) == ("dc_drive", "gear-box")
+    assert block_summary("log-source") == block_summary("log_source")
+    assert block_option_help("log-source") == block_option_help("log_source")
 
 
 @pytest.mark.parametrize("name", ["DC_Drive", "dcdrive"])
 def test_the_unit_that_was_meant_is_told(name: str) -> None:
     with pytest.raises(UnitError, match=rf"^unit: found '{name}' \(did you mean dc_drive\?\), allowed: "):
-        make_unit(name)
+        make_block(name)
 
 
 def test_one_point_needs_no_list() -> None:
     arm = load_robot("urm4")
-    one = make_unit("kinematic_chain", robot=arm, points="p5", sensors="p4")
-    listed = make_unit("kinematic_chain", robot=arm, points=["p5"], sensors=["p4"])
+    one = make_block("kinematic_chain", robot=arm, points="p5", sensors="p4")
+    listed = make_block("kinematic_chain", robot=arm, points=["p5"], sensors=["p4"])
     assert one.variables == listed.variables
     found = [var.name for var in one.variables if isinstance(var, Output)]
     assert found == ["p5", "rz4", "ry4", "rx4", "singular4"]
@@ -98,7 +104,7 @@ def test_one_point_needs_no_list() -> None:
 
 def test_unknown_and_missing_options_are_all_told_at_once() -> None:
     with pytest.raises(UnitError) as error:
-        make_unit("repolarizer", axes=6, period=1.0)
+        make_block("repolarizer", axes=6, period=1.0)
     assert str(error.value).splitlines() == [
         "unit repolarizer: option axes: found, allowed: joints; a parameter is set where the unit runs, in"
         " a system by start = { axes = ... }, in another tool as the FMU's start value",
@@ -107,14 +113,14 @@ def test_unknown_and_missing_options_are_all_told_at_once() -> None:
         "unit repolarizer: option joints: not found, it needs the number of joints, such as 6",
     ]
     with pytest.raises(UnitError, match=r"^unit delta_meter: option name: found, allowed: none"):
-        make_unit("delta_meter", name="mine")
-    assert refusal(UnitError, make_unit, "delta_meter", tolerance=0.001) == (
+        make_block("delta_meter", name="mine")
+    assert refusal(UnitError, make_block, "delta_meter", tolerance=0.001) == (
         "unit delta_meter: option tolerance: found, allowed: none, it has no options; a parameter is set"
         " where the unit runs, in a system by start = { tolerance = ... }, in another tool as the FMU's"
         " start value"
     )
     with pytest.raises(UnitError, match=r"option joint: found \(did you mean joints\?\), allowed: joints;"):
-        make_unit("repolarizer", joint=6)
+        make_block("repolarizer", joint=6)
 
 
 @pytest.mark.parametrize(
@@ -162,4 +168,4 @@ def test_unknown_and_missing_options_are_all_told_at_once() -> None:
     ],
 )
 def test_options_that_make_no_sense_are_refused(name: str, options: dict[str, object], said: str) -> None:
-    assert refusal(UnitError, make_unit, name, **options) == f"unit {name}: {said}"
+    assert refusal(UnitError, make_block, name, **options) == f"unit {name}: {said}"

@@ -69,8 +69,8 @@ def test_before_the_first_turn_the_output_is_the_input_bit_by_bit_and_without_de
 
 
 def test_inputs_that_are_set_again_at_a_point_change_the_output_and_not_what_is_remembered() -> None:
-    unit = repolarizer(1)
-    instance = Instance(unit)
+    model = repolarizer(1)
+    instance = Instance(model)
     raw, q, turns = (instance.reference(f"{name}[1]") for name in ("raw", "q", "turns"))
     instance.set([raw], [3.1])
     instance.do_step(0.0, 0.005)

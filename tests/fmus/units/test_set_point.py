@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from urmpipe_fmus.blocks import make_unit
+from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.dependencies import TIME, Dependencies
 from urmpipe_fmus.run import Instance, run
 from urmpipe_models.drives import ramp, step, trapezoid
@@ -26,8 +26,8 @@ MOVE = {"begin": 0.25, "initial": 0.5, "target": -1.0, "speed": 1.5, "accelerati
 def test_each_kind_is_its_form_for_a_log_and_for_an_instance(
     kind: int, expected: tuple[np.ndarray, ...]
 ) -> None:
-    found = run(make_unit("set_point"), T, start=MOVE | {"kind": kind})
-    instance = Instance(make_unit("set_point"))
+    found = run(make_block("set_point"), T, start=MOVE | {"kind": kind})
+    instance = Instance(make_block("set_point"))
     names = ("theta", "omega", "alpha")
     instance.set([instance.reference(name) for name in (*MOVE, "kind")], [*MOVE.values(), float(kind)])
     for name, column in zip(names, expected, strict=True):
@@ -40,7 +40,7 @@ def test_each_kind_is_its_form_for_a_log_and_for_an_instance(
 
 def test_it_is_a_function_of_time_and_parameters_alone() -> None:
     parameters = {"kind", "begin", "initial", "target", "speed", "acceleration"}
-    assert Dependencies(make_unit("set_point")).outputs["theta"] == parameters | {TIME}
+    assert Dependencies(make_block("set_point")).outputs["theta"] == parameters | {TIME}
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ def test_it_is_a_function_of_time_and_parameters_alone() -> None:
     ],
 )
 def test_what_makes_no_move_is_refused(name: str, value: float, said: str) -> None:
-    instance = Instance(make_unit("set_point"))
+    instance = Instance(make_block("set_point"))
     with pytest.raises(UnitError) as error:
         instance.set([instance.reference(name)], [value])
     assert str(error.value) == f"unit set_point: {name}: {said}"

@@ -12,15 +12,15 @@ import pytest
 from hypothesis import given, settings
 
 from random_units import PATIENT, random_unit_sources
-from urmpipe_fmus.blocks.user import load_unit_file, unit_of_source
+from urmpipe_fmus.blocks.user import block_from_source, load_block_file
 from urmpipe_fmus.run import run
 from urmpipe_models.errors import UnitError
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 
 UNIT = """import numpy as np
-from urmpipe_fmus.block import Input, Output, Unit
-unit = Unit(
+from urmpipe_fmus.block import BlockModel, Input, Output
+unit = BlockModel(
     name="own",
     description="Own",
     variables=(Input(name="u", description="u"), Output(name="y", description="y")),
@@ -38,16 +38,16 @@ def written(folder: Path, text: str, name: str = "own.py") -> Path:
 def said(path: Path) -> list[str]:
     """What is wrong with a file, its folder left out."""
     with pytest.raises(UnitError) as error:
-        load_unit_file(path)
+        load_block_file(path)
     return [line.replace(str(path), path.name) for line in str(error.value).splitlines()]
 
 
 def test_the_backlash_of_the_documentation_holds_a_joint_until_the_slack_is_taken_up() -> None:
-    unit = load_unit_file(DOCS / "examples" / "backlash.py")
+    model = load_block_file(DOCS / "examples" / "backlash.py")
     t = np.linspace(0.0, 2.0, 401, dtype=np.float64)
     motor = np.sin(np.pi * t)[:, np.newaxis] * np.ones(6)
     play = 0.2
-    joint = run(unit, t, {"motor": motor}, {"play": play})["joint"]
+    joint = run(model, t, {"motor": motor}, {"play": play})["joint"]
     assert np.abs(joint - motor).max() <= play / 2 + 1e-15  # rounding of motor +- play / 2
     rising = (t > 0.1) & (t < 0.5)  # the slack of play / 2 = 0.1 is taken up at asin(0.1) / pi = 0.03 s
     np.testing.assert_allclose(joint[rising], motor[rising] - play / 2, rtol=0.0, atol=1e-15)
@@ -57,9 +57,9 @@ def test_the_backlash_of_the_documentation_holds_a_joint_until_the_slack_is_take
 
 
 def test_the_low_pass_of_the_documentation_follows_as_its_solution_does() -> None:
-    unit = load_unit_file(DOCS / "examples" / "low_pass.py")
+    model = load_block_file(DOCS / "examples" / "low_pass.py")
     t = np.linspace(0.0, 0.2, 41, dtype=np.float64)
-    y = run(unit, t, {"u": np.ones_like(t)}, {"T": 0.05})["y"]
+    y = run(model, t, {"u": np.ones_like(t)}, {"T": 0.05})["y"]
     # RK4 with h = 1 ms: the error is about t h^4 / (120 T^5) = 5e-9 at 0.2 s
     np.testing.assert_allclose(y, 1.0 - np.exp(-t / 0.05), rtol=0.0, atol=1e-8)
 
@@ -73,11 +73,11 @@ def test_the_page_shows_the_examples_as_they_are() -> None:
 
 def test_a_unit_carries_the_text_of_its_file_from_which_it_is_made_again(tmp_path: Path) -> None:
     path = written(tmp_path, UNIT.replace("OUT", "2.0 * v.u"))
-    unit = load_unit_file(path)
-    assert (unit.recipe.module, unit.recipe.function, unit.recipe.arguments) == ("own.py", "", {})
-    assert unit.recipe.source == path.read_text(encoding="utf-8")
-    again = unit_of_source(unit.recipe.source, "own.py")
-    assert again.variables == unit.variables
+    model = load_block_file(path)
+    assert (model.recipe.module, model.recipe.function, model.recipe.arguments) == ("own.py", "", {})
+    assert model.recipe.source == path.read_text(encoding="utf-8")
+    again = block_from_source(model.recipe.source, "own.py")
+    assert again.variables == model.variables
     assert run(again, np.array([0.0]), {"u": np.array([3.0])})["y"].tolist() == [6.0]
 
 
@@ -86,9 +86,9 @@ def test_a_unit_carries_the_text_of_its_file_from_which_it_is_made_again(tmp_pat
 @given(random_unit_sources())
 def test_any_file_with_a_sound_unit_is_taken(source: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        unit = load_unit_file(written(Path(folder), source))
-    assert unit.recipe.source == source
-    assert unit.variables == unit_of_source(source, "own.py").variables
+        model = load_block_file(written(Path(folder), source))
+    assert model.recipe.source == source
+    assert model.variables == block_from_source(source, "own.py").variables
 
 
 def test_two_files_of_one_name_keep_their_own_functions(tmp_path: Path) -> None:
@@ -97,44 +97,44 @@ def test_two_files_of_one_name_keep_their_own_functions(tmp_path: Path) -> None:
         (tmp_path / folder).mkdir()
         text = UNIT.replace("OUT", "scaled(v.u)") + f"def scaled(u):\n    return {factor} * u\n"
         paths.append(written(tmp_path / folder, text))
-    units = [load_unit_file(path) for path in paths]
+    units = [load_block_file(path) for path in paths]
     t, u = np.array([0.0]), {"u": np.array([1.0])}
-    assert [run(unit, t, u)["y"].tolist() for unit in units] == [[2.0], [3.0]]
+    assert [run(model, t, u)["y"].tolist() for model in units] == [[2.0], [3.0]]
 
 
 def test_a_file_may_hold_dataclasses_and_private_units(tmp_path: Path) -> None:
     text = (
         "from __future__ import annotations\nfrom dataclasses import dataclass\n"
-        + UNIT.replace("OUT", "GAIN.value * v.u").replace("unit = Unit", "_unit = Unit")
+        + UNIT.replace("OUT", "GAIN.value * v.u").replace("unit = BlockModel", "_unit = BlockModel")
         + "@dataclass\nclass Gain:\n    value: float\nGAIN = Gain(4.0)\nmine = yours = _unit\n"
     )
-    assert load_unit_file(written(tmp_path, text)).name == "own"
+    assert load_block_file(written(tmp_path, text)).name == "own"
 
 
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("", ["own.py: found no Unit, allowed: one, such as unit = Unit(name=..., ...)"]),
+        ("", ["own.py: found no BlockModel, allowed: one, such as unit = BlockModel(name=..., ...)"]),
         (
             "x = (1,\n",
-            ["own.py:1: not valid Python: '(' was never closed; allowed: Python with a Unit in it"],
+            ["own.py:1: not valid Python: '(' was never closed; allowed: Python with a BlockModel in it"],
         ),
         (
             "x = 1\ny = 1 / 0\n",
             [
                 "own.py:2: cannot be run: ZeroDivisionError: division by zero;"
-                " allowed: Python with a Unit in it"
+                " allowed: Python with a BlockModel in it"
             ],
         ),
         (
             "import sys\nsys.exit(3)\n",
-            ["own.py:2: cannot be run: SystemExit: 3; allowed: Python with a Unit in it"],
+            ["own.py:2: cannot be run: SystemExit: 3; allowed: Python with a BlockModel in it"],
         ),
         (
             "import no_such_package\n",
             [
                 "own.py:1: cannot be run: ModuleNotFoundError: No module named 'no_such_package';"
-                " allowed: Python with a Unit in it"
+                " allowed: Python with a BlockModel in it"
             ],
         ),
         (
@@ -181,14 +181,14 @@ def test_a_file_that_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, e
     assert said(written(tmp_path, text)) == expected
 
 
-THREE_FUNCTIONS = """from urmpipe_fmus.block import Unit
+THREE_FUNCTIONS = """from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.block import Input, Memory, Output, State
 
 def state(v):
     \"\"\"The derivative.\"\"\"
     return {"x": v.w}
 
-unit = Unit(
+unit = BlockModel(
     name="own",
     description="Own",
     variables=(
@@ -242,7 +242,7 @@ def test_an_import_from_beside_the_file_is_refused(tmp_path: Path, monkeypatch: 
 def test_a_file_may_bear_a_name_of_the_standard_library(tmp_path: Path) -> None:
     path = tmp_path / "random.py"
     path.write_text("import random\n" + UNIT.replace("OUT", "v.u"), encoding="utf-8")
-    assert load_unit_file(path).name == "own"
+    assert load_block_file(path).name == "own"
 
 
 def test_a_file_that_is_nested_too_deeply_is_told(tmp_path: Path) -> None:
@@ -257,5 +257,5 @@ def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
 
 
 def test_the_play_of_the_example_is_a_twentieth_of_a_degree() -> None:
-    unit = load_unit_file(DOCS / "examples" / "backlash.py")
-    assert unit.parameters[0].starts == (math.radians(0.05),)
+    model = load_block_file(DOCS / "examples" / "backlash.py")
+    assert model.parameters[0].starts == (math.radians(0.05),)

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_fmus.block import Input, Output, Parameter, Unit, Values
+from urmpipe_fmus.block import BlockModel, Input, Output, Parameter, Values
 
 
 def tip(v: Values) -> dict[str, Any]:
@@ -17,7 +17,7 @@ def tip(v: Values) -> dict[str, Any]:
     return {"p": (x, y), "reach": np.hypot(x, y), "first": v.length[0] * np.cos(v.phi[0])}
 
 
-unit = Unit(
+unit = BlockModel(
     name="arm",
     description="A plane arm of three joints",
     variables=(

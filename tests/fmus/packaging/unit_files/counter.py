@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from urmpipe_fmus.block import Input, Memory, Output, Parameter, Unit
+from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Parameter
 
-unit = Unit(
+unit = BlockModel(
     name="counter",
     description="Counts the samples at which it is on",
     variables=(

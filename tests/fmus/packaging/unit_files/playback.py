@@ -1,11 +1,11 @@
 """A table over time, read held and interpolated."""
 
-from urmpipe_fmus.block import Output, Parameter, Table, Unit
+from urmpipe_fmus.block import BlockModel, Output, Parameter, Table
 
 
-def make(table: Table, gain: float = 1.0) -> Unit:
+def make(table: Table, gain: float = 1.0) -> BlockModel:
     """Make a unit that plays the table's two columns, scaled."""
-    return Unit(
+    return BlockModel(
         name="playback",
         description="Plays a table",
         variables=(

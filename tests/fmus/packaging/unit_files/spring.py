@@ -1,8 +1,8 @@
 """A mass on a damped spring: continuous states, one of them an output."""
 
-from urmpipe_fmus.block import Input, Output, Parameter, State, Unit
+from urmpipe_fmus.block import BlockModel, Input, Output, Parameter, State
 
-unit = Unit(
+unit = BlockModel(
     name="spring",
     description="A mass on a damped spring",
     variables=(
