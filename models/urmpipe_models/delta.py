@@ -1,7 +1,4 @@
-"""The deviation that is allowed unless another one is given.
-
-The deviation delta between where a point should be and where it is, and whether it is tolerated.
-"""
+"""The deviation delta between where a point should be and where it is, and whether it is tolerated."""
 
 from __future__ import annotations
 
@@ -10,9 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from urmpipe_models.elementwise import Element, Vector, subtract
-
-DEFAULT_TOLERANCE = 0.0035
-"""Largest deviation allowed along x, y and z each in [m], +-3.5 mm. Source: [UrmArm2021]_ section 2.4."""
 
 
 class Delta(NamedTuple):

@@ -21,7 +21,7 @@ from urmpipe.keyword_checks import (
 )
 from urmpipe.output_files import guarded_outputs
 from urmpipe.reading import Reading, map_files, resolved
-from urmpipe_models.delta import DEFAULT_TOLERANCE
+from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.errors import Finding, Hint, OptionError, RecordingError, Voice, for_each
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.clocks import CLOCKS_DIFFER

@@ -11,7 +11,7 @@ from urmpipe.api.compare import Operand, compare, operands_of
 from urmpipe.arm_placing import Frame, Robot
 from urmpipe.keyword_checks import PathLike, public_reading
 from urmpipe.reading import Reading
-from urmpipe_models.delta import DEFAULT_TOLERANCE
+from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_pipeline.comparison.compare import Tcp
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.sync import SyncOption

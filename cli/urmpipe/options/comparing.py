@@ -11,7 +11,7 @@ from urmpipe.headings import Heading, option
 from urmpipe.options.completion import tolerances, words
 from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.types import OneOf, ParsedType, parsed
-from urmpipe_models.delta import DEFAULT_TOLERANCE
+from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.measure_units import WRITTEN, quantity
 
 SYNC_WORDS = ("stamps", "start", "auto")

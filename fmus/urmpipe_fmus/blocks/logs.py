@@ -25,7 +25,8 @@ from urmpipe_fmus.block import (
     Variable,
 )
 from urmpipe_fmus.blocks.coordinates import whole_number, yes_or_no
-from urmpipe_models.delta import DEFAULT_TOLERANCE, delta, outside
+from urmpipe_models import DEFAULT_TOLERANCE
+from urmpipe_models.delta import delta, outside
 from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import UnitError, shown
 from urmpipe_models.wraps import State, step

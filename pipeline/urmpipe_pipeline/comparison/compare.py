@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
-from urmpipe_models.delta import DEFAULT_TOLERANCE
+from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError, for_each
 from urmpipe_pipeline import text
 from urmpipe_pipeline.choices import check_choice

@@ -26,7 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from urmpipe_models.delta import DEFAULT_TOLERANCE
+from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.math3d import angle_between, slerp
 from urmpipe_pipeline.comparison.deviation import Share, ShareKind, Stretch, Verdict

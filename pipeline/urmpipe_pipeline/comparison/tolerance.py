@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from numbers import Real
 
-from urmpipe_models.delta import DEFAULT_TOLERANCE
+from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.errors import Finding, Hint, OptionError, shown
 from urmpipe_models.measure_units import WRITTEN, quantity, readings
 from urmpipe_pipeline.iso9283.criteria import UNITS as CRITERIA

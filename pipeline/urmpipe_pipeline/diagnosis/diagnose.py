@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from urmpipe_models.delta import DEFAULT_TOLERANCE
+from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.elementwise import FloatArray, spread_rows
 from urmpipe_pipeline import text
 from urmpipe_pipeline.diagnosis.edits import later_edits, turn_edits

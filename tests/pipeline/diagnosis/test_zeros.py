@@ -7,7 +7,7 @@ import pytest
 
 import urmpipe
 from altered_arm import rich_motion
-from urmpipe_models.delta import DEFAULT_TOLERANCE
+from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
