@@ -25,7 +25,7 @@ from made_masses import with_drives, with_masses
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.build.fmu import build_fmu
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.dynamics.equations import terms_over_log, torque_over_log
+from urmpipe_models.dynamics.equations import torque_terms_over_log, torques_over_log
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_writer import urdf_text
@@ -64,13 +64,13 @@ def inverse_part(count: int) -> tuple[list[str], list[Bound]]:
     tau = np.zeros((6, STATES), order="F")
     theirs = partial(pinocchio.rneaInParallel, 1, pool, *columns, tau)
     jobs = {
-        "urmpipe, one thread": partial(torque_over_log, chain, *given, threads=1),
+        "urmpipe, one thread": partial(torques_over_log, chain, *given, threads=1),
         "Pinocchio rneaInParallel, one thread": theirs,
-        "urmpipe, `torque_over_log`": partial(torque_over_log, chain, *given),
-        "urmpipe, `terms_over_log`": partial(terms_over_log, chain, *given),
+        "urmpipe, `torques_over_log`": partial(torques_over_log, chain, *given),
+        "urmpipe, `torque_terms_over_log`": partial(torque_terms_over_log, chain, *given),
     }
     taken = in_turn(jobs, count)
-    difference = float(np.abs(torque_over_log(chain, *given) - tau.T).max())
+    difference = float(np.abs(torques_over_log(chain, *given) - tau.T).max())
     lines = ["| of 1 000 000 states of urm6 | s, median (min-max) | states a second |", "|---|---|---|"]
     for name, times in taken.items():
         middle = statistics.median(times)

@@ -22,8 +22,8 @@ from toppra.algorithm import TOPPRA
 from toppra.constraint import DiscretizationType, JointAccelerationConstraint, JointVelocityConstraint
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.joints import JointLimits, PathJoints, fastest_law, joints_along
+from urmpipe_models.planning.from_rows import rows_to_path
+from urmpipe_models.planning.joints import JointLimits, PathJoints, joints_along, time_optimal_law
 from urmpipe_models.planning.path import cube_rows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.toml import robot_toml
@@ -65,7 +65,7 @@ def jobs() -> dict[str, PathJoints]:
     small = cube_rows("wall", 0.3, 0.03, np.array([0.45, 0.0, 0.3]), rotation=DOWN)
     high = cube_rows("wall", 0.3, 0.03, np.array([0.45, 0.0, 0.9]))
     rows = {"ur5e": small, "urm6": high}
-    return {name: joints_along(load_robot(name), path_of(rows[name])) for name in rows}
+    return {name: joints_along(load_robot(name), rows_to_path(rows[name])) for name in rows}
 
 
 def by_toppra(joints: PathJoints) -> float:
@@ -86,7 +86,7 @@ def by_urmpipe(joints: PathJoints) -> float:
     count = len(joints.chain.coordinates)
     limits = JointLimits(np.full(count, VELOCITY), np.full(count, ACCELERATION))
     stop = np.isin(joints.s, joints.s[[0, -1]])
-    return fastest_law(joints.s, joints.after, joints.before, stop, limits).duration
+    return time_optimal_law(joints.s, joints.after, joints.before, stop, limits).duration
 
 
 def median_of(taken: list[float]) -> str:

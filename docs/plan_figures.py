@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.path import LineArcPath, PathRows
 
 PICTURE = Path(__file__).resolve().parent / "pictures" / "plan.svg"
@@ -25,7 +25,7 @@ TEXT = 'font-family="sans-serif" font-size="13"'
 def panels() -> list[tuple[str, str, PathRows]]:
     """Return title, column and rows of each panel: one curve by both meanings, and the other variant."""
     corners = PathRows(CORNERS, RADIUS, corner=True)
-    path = path_of(corners)
+    path = rows_to_path(corners)
     first = CORNERS.copy()
     first[path.row[path.arcs]] = path.start[path.arcs]
     away = PathRows(CORNERS, RADIUS / 2.0, corner=True, variant=np.array([2, 2, 1, 2]))
@@ -49,7 +49,7 @@ def line(points: FloatArray, column: int, style: str) -> str:
 
 def panel(column: int, title: str, name: str, rows: PathRows) -> list[str]:
     """Return a panel: the lines through the rows, the path, its rows with their radii."""
-    path: LineArcPath = path_of(rows)
+    path: LineArcPath = rows_to_path(rows)
     marks = [f'<text x="{15 + WIDTH * column}" y="20" {TEXT} font-weight="bold">{title}</text>']
     if rows.corner:
         marks.append(line(rows.position, column, 'stroke="#999" stroke-dasharray="5 4"'))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.dynamics.equations import mass_centres_over_log
+from urmpipe_models.dynamics.equations import centres_of_mass_over_log
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import in_html
 from urmpipe_pipeline.lettering import Box, box_about, freest, width_of
@@ -378,6 +378,6 @@ def chain_masses(chain: Chain, q: FloatArray) -> list[Mass]:
     """Return the masses of an arm, if it has some, at joint values in [rad] or [m], shape (joints,)."""
     if not chain.inertials:
         return []
-    centres = mass_centres_over_log(chain, q[np.newaxis])[0]
+    centres = centres_of_mass_over_log(chain, q[np.newaxis])[0]
     masses = [float(one.mass) for one in chain.inertials]
     return [Mass(spot_at(place), mass) for place, mass in zip(centres, masses, strict=True) if mass > 0.0]

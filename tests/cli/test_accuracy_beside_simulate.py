@@ -13,7 +13,7 @@ from flat_arm import ARM, MASSES, drive
 from urmpipe_fmus.native import native_missing
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import DRIVE_KEYS, GAIN_KEYS, DrivenJoint
-from urmpipe_models.dynamics.driven_arm import at_rest
+from urmpipe_models.dynamics.driven_arm import find_equilibrium
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.robots.catalogue import load_robot
@@ -76,7 +76,7 @@ def system_of_blocks(arm: Chain, steps: int) -> str:
         f"start = {{ phi = [{start}], force = [0.0, 0.0, 0.0], moment = [0.0, 0.0, 0.0] }}\n"
     ]
     inputs, connections = ["[inputs]\n"], ["[connections]\n"]
-    for k, (one, rest) in enumerate(zip(arm.drives, at_rest(arm), strict=True), start=1):
+    for k, (one, rest) in enumerate(zip(arm.drives, find_equilibrium(arm), strict=True), start=1):
         assert isinstance(one, DrivenJoint)
         gains = dict(zip(GAIN_KEYS, one.gains, strict=True))
         keys = gains | {"period": one.period, "u_max": one.largest_voltage, "last": rest.voltage}

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from asserting import there
 from pages import command_lines, indented, run_in_process
 from urmpipe_models.errors import LogError
-from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.laws import ARCS, Arcs, trapezoid_law
 from urmpipe_models.planning.path import PLANES
 from urmpipe_pipeline.planned_paths.given_path import given_path
@@ -75,7 +75,7 @@ def test_the_orientations_of_the_page_are_read(tmp_path: Path) -> None:
 def test_a_tool_turns_the_shorter_way_and_never_in_place(tmp_path: Path) -> None:
     header, first, *_ = TURNED.splitlines()
     turned = [f"0.5{first[3:]}", f"0.5{first[3:]}".replace(",0,3.14", f",{2.0 * math.pi!r},3.14")]
-    turning = there(path_of(rows_of(tmp_path, "\n".join((header, first, turned[1]))).rows).turning)
+    turning = there(rows_to_path(rows_of(tmp_path, "\n".join((header, first, turned[1]))).rows).orientation)
     quaternions = turning.quaternions(np.linspace(0.0, 0.1, 5))
     np.testing.assert_allclose(quaternions, quaternions[:1].repeat(5, axis=0), rtol=0, atol=1e-15)
     in_place = "\n".join((header, first, turned[0], turned[0].replace(",0,3.14", ",1,3.14")))
@@ -94,7 +94,7 @@ def test_the_picture_is_what_its_script_draws() -> None:
 
 @pytest.mark.parametrize("arcs", ARCS)
 def test_the_times_of_the_page_are_those_of_the_contour(arcs: Arcs) -> None:
-    law = trapezoid_law(path_of(given_path(CUBES[0]).rows), 0.5, 6.0, arcs)
+    law = trapezoid_law(rows_to_path(given_path(CUBES[0]).rows), 0.5, 6.0, arcs)
     assert f"{law.duration:.6f} s" in PAGE
 
 

@@ -41,16 +41,16 @@ from urmpipe_models.dynamics.driven_arm import (
     Motor,
     Spring,
     arm_energy,
-    at_rest,
+    find_equilibrium,
     joint_accelerations,
     joint_torques,
-    motor_rates,
-    powers,
+    motor_derivatives,
+    power_flow,
     shaft_torques,
     spectral_radius,
 )
 from urmpipe_models.dynamics.equations import inverse_dynamics
-from urmpipe_models.dynamics.links import Wrench, links_of, wrench_power
+from urmpipe_models.dynamics.links import Wrench, chain_to_links, wrench_power
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import RobotError, UnitError, UrmpipeError
 from urmpipe_models.kinematics.forward import forward, jacobian
@@ -97,8 +97,8 @@ class OneSystem:
 
     def __init__(self, chain: Chain, wrench: Wrench) -> None:
         self.chain, self.wrench, self.n = chain, wrench, len(chain.coordinates)
-        self.links = links_of(chain)
-        self.rests = at_rest(chain)
+        self.links = chain_to_links(chain)
+        self.rests = find_equilibrium(chain)
         by_joint = {one.joint: one for one in chain.drives}
         self.joints = [by_joint[name] for name in chain.coordinates]
         self.driven = [k for k, one in enumerate(self.joints) if isinstance(one, DrivenJoint)]
@@ -123,15 +123,15 @@ class OneSystem:
 
     def rates(self, _t: float, x: FloatArray) -> FloatArray:
         state = self.state(x)
-        motors = np.array([*motor_rates(state).values()]).T
-        flows = powers(self.chain, state, self.wrench)
+        motors = np.array([*motor_derivatives(state).values()]).T
+        flows = power_flow(self.chain, state, self.wrench)
         pushed = wrench_power(self.chain, state.q, state.qd, self.wrench)
         damped = sum(
             one.damping * rate**2
             for one, rate in zip(state.actuators, state.qd, strict=True)
             if isinstance(one, Spring)
         )
-        heat = [flows.given, flows.lost, pushed, damped]
+        heat = [flows.supplied, flows.dissipated, pushed, damped]
         return np.concatenate((state.qd, self.accelerations(state), *motors, heat))
 
     def sample(self, wanted: FloatArray) -> None:
@@ -258,7 +258,7 @@ def test_the_internal_step_is_one_at_which_a_stiff_joint_is_stable(
 
 def test_a_force_on_the_tool_bends_the_springs_by_the_jacobian() -> None:
     chain = with_drives(with_masses(load_robot("urm6")), held=load_robot("urm6").coordinates)
-    rest, still = np.array([one.rest for one in at_rest(chain)]), [0.0] * 6
+    rest, still = np.array([one.rest for one in find_equilibrium(chain)]), [0.0] * 6
     outside = np.array([5.0, -3.0, 8.0, 0.4, 0.0, -0.2])
 
     def missing(q: FloatArray) -> FloatArray:
@@ -287,7 +287,7 @@ def test_robots_without_drives_or_with_too_little_voltage_are_refused() -> None:
         DrivenJoint(one, DRIVE._replace(resistance=1e3), 5e-3, Gains(7.5, 0.75, 0.01), 48.0)
         for one in load_robot("urm6").coordinates
     )
-    needed = [abs(one.current) * 1e3 for one in at_rest(urm6())]
+    needed = [abs(one.current) * 1e3 for one in find_equilibrium(urm6())]
     assert max(needed) > 48.0 > min(needed)
     assert refused("driven_arm", replace(urm6(), drives=weak)) == [
         f"robot urm6: drives.phi{k}: needs {volts:.4g} V to hold the arm at its start, allowed: u_max, 48 V"
@@ -444,7 +444,7 @@ PUSH = Wrench((20.0, -15.0, 25.0), (1.0, -2.0, 1.5))
 @pytest.mark.slow
 def test_a_spring_beside_a_drive_takes_its_torque_from_the_drive_and_the_arm_stays_at_rest() -> None:
     chain = sprung_arm()
-    relieved, plain = at_rest(chain), at_rest(without_springs(chain))
+    relieved, plain = find_equilibrium(chain), find_equilibrium(without_springs(chain))
     for one, own, other, q in zip(chain.drives, relieved, plain, chain.start, strict=True):
         if isinstance(one, DrivenJoint):
             torque = one.spring.stiffness * (one.spring.rest - q)
@@ -569,7 +569,7 @@ def wristed() -> Chain:
 @pytest.mark.slow
 def test_a_held_wrist_yields_to_a_force_by_its_square_of_the_length_and_no_drive_moves() -> None:
     chain, force = wristed(), 1e-2
-    before, under = at_rest(chain), at_rest(chain, Wrench((0.0, 0.0, force)))
+    before, under = find_equilibrium(chain), find_equilibrium(chain, Wrench((0.0, 0.0, force)))
     assert before[1].q == 0.0
     tip = forward(chain, [one.q for one in under])[-1].translation
     # the shift is 3.6e-7 m: the second order is 1e-6 of it, and settling to 1e-12 rad as much
@@ -595,17 +595,17 @@ def test_a_spring_weaker_than_the_weight_it_hangs_by_bears_a_small_force() -> No
         "pendulum", (Joint("hanging", axis=(0.0, 1.0, 0.0)),), tip=translation(0.5, 0.0, 0.0),
         start=(math.pi / 2,), inertials=(mass,), drives=(PassiveJoint("hanging", 9.0, 1.0),),
     )  # fmt: skip
-    (under,) = at_rest(chain, Wrench((0.1, 0.0, 0.0)))
+    (under,) = find_equilibrium(chain, Wrench((0.1, 0.0, 0.0)))
     # along x, which raises the tip: F l over both rigidities; the next order is that angle squared
     assert math.pi / 2 - under.q == pytest.approx(0.05 / (9.0 + 3.0 * 9.81 * 0.5), rel=1e-5)
 
 
 def test_a_force_that_is_too_large_for_the_springs_is_refused() -> None:
     weak = replace(wristed(), drives=(driven("shoulder"), PassiveJoint("wrist", 50.0, 1.0)))
-    assert at_rest(weak, Wrench((0.0, 0.0, 10.0)))[1].q == pytest.approx(0.06, abs=1e-3)
+    assert find_equilibrium(weak, Wrench((0.0, 0.0, 10.0)))[1].q == pytest.approx(0.06, abs=1e-3)
     said = "robot wristed: force: found more than the springs of its held joints bear, allowed: less"
-    assert refusal(RobotError, at_rest, weak, Wrench((0.0, 0.0, 1e3))) == said
-    volts = refusal(RobotError, at_rest, wristed(), Wrench((0.0, 0.0, -1e3)))
+    assert refusal(RobotError, find_equilibrium, weak, Wrench((0.0, 0.0, 1e3))) == said
+    volts = refusal(RobotError, find_equilibrium, wristed(), Wrench((0.0, 0.0, -1e3)))
     needed = 0.5 / 5.0 * (1e3 * UPPER)  # V of the force at the wrist alone
     match = re.fullmatch(
         r"robot wristed: drives.shoulder: needs ([\d.]+) V to hold the arm at its start,"

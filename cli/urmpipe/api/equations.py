@@ -13,7 +13,14 @@ from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.files import write_export
 from urmpipe_models.lagrange.derivation import TERMS, TermName
-from urmpipe_models.lagrange.formulas import Cost, Operations, c_code, equations_text, open_form, summed
+from urmpipe_models.lagrange.formulas import (
+    Cost,
+    Operations,
+    c_code,
+    equations_text,
+    open_form,
+    sum_operations,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -41,12 +48,12 @@ class Equations(Shown):
     @property
     def operations(self) -> Operations:
         """What all of it costs as expanded sums."""
-        return summed(one.operations for one in self.terms)
+        return sum_operations(one.operations for one in self.terms)
 
     @property
     def reduced(self) -> Operations:
         """What all of it costs as C computes it."""
-        return summed(one.reduced for one in self.terms)
+        return sum_operations(one.reduced for one in self.terms)
 
     def _headline(self) -> str:
         """Return the arm, its coordinates, and what the formulas cost."""

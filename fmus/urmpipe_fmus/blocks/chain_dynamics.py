@@ -26,12 +26,12 @@ from urmpipe_fmus.blocks.coordinates import (
 )
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import MIN_CONSTANT
-from urmpipe_models.dynamics.equations import check_motion, forward_dynamics
+from urmpipe_models.dynamics.equations import check_solvable, forward_dynamics
 from urmpipe_models.dynamics.links import (
     Links,
     Wrench,
+    chain_to_links,
     kinetic_energy,
-    links_of,
     potential_energy,
     wrench_power,
 )
@@ -88,7 +88,7 @@ def masses_of(robot: Chain) -> Masses:
                 for one, mass, centre in zip(moving, given[0], given[2:], strict=True)
             )
             chain = replace(arm, inertials=tuple(inertials), gravity=v.gravity)
-            found = last = elements, Arm(chain, links_of(chain))
+            found = last = elements, Arm(chain, chain_to_links(chain))
         return found[1]
 
     masses = Parameter(
@@ -165,7 +165,7 @@ def chain_dynamics(robot: Chain) -> BlockModel:
     Source: [Iso9283]_ eq. 13, solved for the accelerations.
     """
     an_arm("chain_dynamics", robot)
-    check_motion(robot)
+    check_solvable(robot)
     masses = masses_of(robot)
 
     def accelerations(v: Values) -> list[Element]:

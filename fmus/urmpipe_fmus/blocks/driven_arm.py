@@ -47,17 +47,17 @@ from urmpipe_models.drives import (
 from urmpipe_models.dynamics.driven_arm import (
     Actuator,
     ArmState,
+    JointEquilibrium,
     Motor,
-    MotorRates,
-    Rest,
+    MotorDerivatives,
     Spring,
     arm_energy,
-    at_rest,
+    find_equilibrium,
     joint_accelerations,
-    motor_rates,
-    powers,
+    max_stable_step,
+    motor_derivatives,
+    power_flow,
     shaft_torques,
-    stable_step,
 )
 from urmpipe_models.dynamics.links import Wrench
 from urmpipe_models.elementwise import Element, Vector
@@ -91,8 +91,8 @@ class DriveGroup:
 
     kind: CoordinateKind
     robot: Chain
-    driven: Mapping[int, tuple[DrivenJoint, Rest]]
-    held: Mapping[int, tuple[PassiveJoint, Rest]]
+    driven: Mapping[int, tuple[DrivenJoint, JointEquilibrium]]
+    held: Mapping[int, tuple[PassiveJoint, JointEquilibrium]]
 
     @property
     def suffix(self) -> str:
@@ -246,7 +246,7 @@ class DriveGroup:
         found = {f"Mk{self.suffix}": tuple(torques[k] for k in sorted((*self.driven, *self.held)))}
         return found | ({f"u{self.suffix}": tuple(voltages)} if self.driven else {})
 
-    def derivatives(self, rates: Mapping[int, MotorRates]) -> dict[str, tuple[Element, ...]]:
+    def derivatives(self, rates: Mapping[int, MotorDerivatives]) -> dict[str, tuple[Element, ...]]:
         """Return how the states of the drives change, of the rates by index of the coordinate."""
         own = [rates[k] for k in self.driven]
         names = ("theta1", "omega1", "i_a") if own else ()
@@ -298,7 +298,7 @@ class DriveGroup:
         return of_joints(self.robot, indices)
 
 
-def drive_groups(robot: Chain, rests: Sequence[Rest]) -> list[DriveGroup]:
+def drive_groups(robot: Chain, rests: Sequence[JointEquilibrium]) -> list[DriveGroup]:
     """Return the drives and springs of an arm by kind of joint.
 
     Args:
@@ -308,8 +308,8 @@ def drive_groups(robot: Chain, rests: Sequence[Rest]) -> list[DriveGroup]:
     by_joint = {one.joint: one for one in robot.drives}
     found = []
     for kind in kinds_of(robot):
-        driven: dict[int, tuple[DrivenJoint, Rest]] = {}
-        held: dict[int, tuple[PassiveJoint, Rest]] = {}
+        driven: dict[int, tuple[DrivenJoint, JointEquilibrium]] = {}
+        held: dict[int, tuple[PassiveJoint, JointEquilibrium]] = {}
         for k in kind.of(robot):
             own = by_joint[robot.coordinates[k]]
             if isinstance(own, DrivenJoint):
@@ -348,7 +348,7 @@ def driven_arm(robot: Chain) -> BlockModel:
     Source: [Iso9283]_ eq. 13-20, eq. 20 with the corrected sign.
     """
     an_arm("driven_arm", robot)
-    model = _Model(robot, masses_of(robot), drive_groups(robot, at_rest(robot)))
+    model = _Model(robot, masses_of(robot), drive_groups(robot, find_equilibrium(robot)))
     return BlockModel(
         name="driven_arm",
         description=f"{robot.name or 'An arm'} with its drives and controllers",
@@ -356,7 +356,7 @@ def driven_arm(robot: Chain) -> BlockModel:
         outputs=model.outputs,
         derivatives=model.derivatives,
         update=model.update if any(group.driven for group in model.groups) else None,
-        internal_step=min(LONGEST_STEP, 0.5 * stable_step(robot)),
+        internal_step=min(LONGEST_STEP, 0.5 * max_stable_step(robot)),
         equations=(
             "M(q) q'' + h(q, q') + g(q) - J^T F = Mk + Ms    (eq. 13, 19; F acts on the tool from outside)",
             "Mk = k (theta1 - q) + l (omega1 - q')    (eq. 14); held: Mk = k_held (rest - q) - l_held q'",
@@ -415,9 +415,9 @@ class _Model:
         found: dict[str, Any] = dict(scattered(self.robot, state.qd))
         found |= scattered(self.robot, self._accelerations(v), "d")
         for group in self.groups:
-            found |= group.derivatives(motor_rates(state))
-        flows = powers(self.robot, state, wrench_at(v))
-        return {**found, "energy_in": flows.given, "energy_lost": flows.lost}
+            found |= group.derivatives(motor_derivatives(state))
+        flows = power_flow(self.robot, state, wrench_at(v))
+        return {**found, "energy_in": flows.supplied, "energy_lost": flows.dissipated}
 
     def update(self, v: Values) -> Mapping[str, Any]:
         """Take the samples that are due."""
@@ -462,7 +462,7 @@ def starts_under(robot: Chain, force: Vector) -> dict[str, tuple[Element, ...]]:
     Raises:
         RobotError: If a voltage cannot hold the arm so, or the springs cannot.
     """
-    rests = at_rest(robot, Wrench(force))
+    rests = find_equilibrium(robot, Wrench(force))
     found: dict[str, tuple[Element, ...]] = {"force": force, "moment": (0.0, 0.0, 0.0)}
     for group in drive_groups(robot, rests):
         found |= {one.name: one.starts for one in (*group.states(), *group.memories())}

@@ -35,7 +35,7 @@ from urmpipe_models.drives import (
     shaft_torque,
     stored_energy,
 )
-from urmpipe_models.dynamics.equations import check_motion, forward_dynamics, inverse_dynamics, mass_matrix
+from urmpipe_models.dynamics.equations import check_solvable, forward_dynamics, inverse_dynamics, mass_matrix
 from urmpipe_models.dynamics.links import Links, Wrench, kinetic_energy, potential_energy, wrench_power
 from urmpipe_models.elementwise import Element, FloatArray
 from urmpipe_models.errors import Finding, RobotError
@@ -103,7 +103,7 @@ class ArmState(NamedTuple):
     actuators: Sequence[Actuator]
 
 
-class MotorRates(NamedTuple):
+class MotorDerivatives(NamedTuple):
     """How the state of a drive changes: theta1' [rad/s], theta1'' [rad/s2], i_a' [A/s]; or with m for rad."""
 
     angle: Element
@@ -111,19 +111,19 @@ class MotorRates(NamedTuple):
     current: Element
 
 
-class Powers(NamedTuple):
+class PowerFlow(NamedTuple):
     """What goes into an arm with drives, and what becomes heat.
 
     Attributes:
-        given: By the voltages and the wrench, in [W].
-        lost: In armatures, shafts and dampers, in [W].
+        supplied: By the voltages and the wrench, in [W].
+        dissipated: In armatures, shafts and dampers, in [W].
     """
 
-    given: Element
-    lost: Element
+    supplied: Element
+    dissipated: Element
 
 
-class Rest(NamedTuple):
+class JointEquilibrium(NamedTuple):
     """Where a joint of an arm at rest stands, and what holds it there.
 
     Attributes:
@@ -191,14 +191,14 @@ def joint_accelerations(
     return forward_dynamics(chain, state.q, state.qd, joint_torques(state), wrench, arm)
 
 
-def motor_rates(state: ArmState) -> dict[int, MotorRates]:
+def motor_derivatives(state: ArmState) -> dict[int, MotorDerivatives]:
     """Return how the drives change, eq. 15 and 18, by index of the coordinates that have any.
 
     Args:
         state: The arm and what turns it.
     """
     return {
-        k: MotorRates(
+        k: MotorDerivatives(
             one.rate,
             shaft_acceleration(one.drive, one.current, torque),
             current_rate(one.drive, one.voltage, one.rate, one.current),
@@ -208,23 +208,23 @@ def motor_rates(state: ArmState) -> dict[int, MotorRates]:
     }
 
 
-def powers(chain: Chain, state: ArmState, wrench: Wrench | None = None) -> Powers:
-    """Return the powers that an arm with its drives is given and loses: `arm_energy` changes by given - lost.
+def power_flow(chain: Chain, state: ArmState, wrench: Wrench | None = None) -> PowerFlow:
+    """Return the powers of an arm with its drives: `arm_energy` changes by supplied - dissipated.
 
     Args:
         chain: The arm.
         state: The arm and what turns it.
         wrench: What acts on the tool centre point from outside.
     """
-    given = 0.0 if wrench is None else wrench_power(chain, state.q, state.qd, wrench)
-    lost = 0.0
+    supplied = 0.0 if wrench is None else wrench_power(chain, state.q, state.qd, wrench)
+    dissipated = 0.0
     for one, qd in zip(state.actuators, state.qd, strict=True):
         if isinstance(one, Motor):
-            given = given + one.voltage * one.current
-            lost = lost + dissipated_power(one.drive, one.rate, one.current, qd)
+            supplied = supplied + one.voltage * one.current
+            dissipated = dissipated + dissipated_power(one.drive, one.rate, one.current, qd)
         else:
-            lost = lost + one.damping * qd * qd
-    return Powers(given, lost)
+            dissipated = dissipated + one.damping * qd * qd
+    return PowerFlow(supplied, dissipated)
 
 
 def arm_energy(chain: Chain, state: ArmState) -> Element:
@@ -244,7 +244,7 @@ def arm_energy(chain: Chain, state: ArmState) -> Element:
     return energy
 
 
-def at_rest(chain: Chain, wrench: Wrench | None = None) -> list[Rest]:
+def find_equilibrium(chain: Chain, wrench: Wrench | None = None) -> list[JointEquilibrium]:
     """Return what holds an arm at its start pose: shafts twisted by gravity, currents and voltages set.
 
     theta1 = q + tau / k, i_a = tau / (i_p C), U = R i_a, tau without what a relief spring gives. Under
@@ -271,7 +271,7 @@ def at_rest(chain: Chain, wrench: Wrench | None = None) -> list[Rest]:
         if name not in by_joint
     ]
     try:
-        check_motion(chain)
+        check_solvable(chain)
     except RobotError as error:
         faults += error.findings
     if faults:
@@ -297,7 +297,7 @@ def at_rest(chain: Chain, wrench: Wrench | None = None) -> list[Rest]:
     return rests
 
 
-def stable_step(chain: Chain) -> float:
+def max_stable_step(chain: Chain) -> float:
     """Return about how long a step of RK4 in [s] may be at the start pose, joint by joint.
 
     2.8 over the largest eigenvalue of a joint with its drive or spring, all others free: (M^-1)_ii is what
@@ -334,13 +334,13 @@ def _alone(one: JointDrive, lightness: float) -> FloatArray:
     )
 
 
-def _held(one: PassiveJoint | DrivenJoint, q: float, torque: float) -> Rest:
+def _held(one: PassiveJoint | DrivenJoint, q: float, torque: float) -> JointEquilibrium:
     """Return what gives a joint a torque at rest."""
     if isinstance(one, PassiveJoint):
-        return Rest(q, q + torque / one.stiffness, 0.0, 0.0)
+        return JointEquilibrium(q, q + torque / one.stiffness, 0.0, 0.0)
     torque -= one.spring.stiffness * (one.spring.rest - q)
     current = torque / motor_torque(one.drive, 1.0)
-    return Rest(q, q + torque / one.drive.stiffness, current, one.drive.resistance * current)
+    return JointEquilibrium(q, q + torque / one.drive.stiffness, current, one.drive.resistance * current)
 
 
 def _torques(chain: Chain, q: Sequence[float], wrench: Wrench | None = None) -> list[float]:

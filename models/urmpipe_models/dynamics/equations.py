@@ -30,12 +30,12 @@ from urmpipe_models.dynamics.links import (
     Links,
     Symmetric,
     Wrench,
+    centres_of_mass,
+    chain_to_links,
     kinetic_energy,
-    links_of,
-    mass_centres,
     potential_energy,
-    summed,
-    turned,
+    rotate_inertia,
+    sum_symmetric,
 )
 from urmpipe_models.elementwise import (
     THREADS,
@@ -59,7 +59,7 @@ from urmpipe_models.kinematics.forward import apply_joint, joint_values
 from urmpipe_models.math3d import Transform
 
 
-class PosedLinks(NamedTuple):
+class LinkPoses(NamedTuple):
     """The moving parts of an arm in a pose.
 
     Attributes:
@@ -102,11 +102,11 @@ def inverse_dynamics(
 
     Source: [Iso9283]_ eq. 13, by the algorithm of [Luh1980]_.
     """
-    return needed_torques(posed_links(chain, q), qd, qdd, wrench)
+    return inverse_dynamics_at(compute_link_poses(chain, q), qd, qdd, wrench)
 
 
-def needed_torques(
-    posed: PosedLinks, qd: Sequence[Element], qdd: Sequence[Element], wrench: Wrench | None = None
+def inverse_dynamics_at(
+    posed: LinkPoses, qd: Sequence[Element], qdd: Sequence[Element], wrench: Wrench | None = None
 ) -> list[Element]:
     """Return `inverse_dynamics` of an arm in a pose."""
     chain, arm, frames = posed
@@ -127,7 +127,7 @@ def needed_torques(
     return torques
 
 
-def posed_links(chain: Chain, q: Sequence[Element], arm: Links | None = None) -> PosedLinks:
+def compute_link_poses(chain: Chain, q: Sequence[Element], arm: Links | None = None) -> LinkPoses:
     """Return the moving parts of an arm in a pose.
 
     Args:
@@ -138,14 +138,14 @@ def posed_links(chain: Chain, q: Sequence[Element], arm: Links | None = None) ->
     Raises:
         RobotError: If the arm has no masses.
     """
-    arm = arm or links_of(chain)
+    arm = arm or chain_to_links(chain)
     values = dict(zip((joint.name for joint in chain.joints), joint_values(chain, q), strict=True))
     frames = [apply_joint(link.joint.origin, link.joint, values[link.joint.name]) for link in arm.links]
-    return PosedLinks(chain, arm, frames)
+    return LinkPoses(chain, arm, frames)
 
 
 def _link_forces(
-    posed: PosedLinks, qd: Sequence[Element], qdd: Sequence[Element]
+    posed: LinkPoses, qd: Sequence[Element], qdd: Sequence[Element]
 ) -> list[tuple[Vector, Vector]]:
     """Return the force on each link and its moment about the origin of the link's frame."""
     chain, arm, frames = posed
@@ -180,7 +180,7 @@ def _needed(link: Link, omega: Vector, alpha: Vector, a: Vector) -> tuple[Vector
     return force, add(spin, cross(link.moment, a))
 
 
-def _less_tool(posed: PosedLinks, needed: tuple[Vector, Vector], wrench: Wrench) -> tuple[Vector, Vector]:
+def _less_tool(posed: LinkPoses, needed: tuple[Vector, Vector], wrench: Wrench) -> tuple[Vector, Vector]:
     """Return what the last link still needs where a wrench acts on the tool."""
     chain, arm, frames = posed
     force, moment = wrench
@@ -192,7 +192,7 @@ def _less_tool(posed: PosedLinks, needed: tuple[Vector, Vector], wrench: Wrench)
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
+class SpatialField:
     """A field of velocity or acceleration of a rigid body: G r + b.
 
     Attributes:
@@ -203,25 +203,25 @@ class Field:
     gradient: tuple[Vector, Vector, Vector] = (ZERO, ZERO, ZERO)
     offset: Vector = ZERO
 
-    def __add__(self, other: Field) -> Field:
+    def __add__(self, other: SpatialField) -> SpatialField:
         """Return the sum of two fields."""
         rows = zip(self.gradient, other.gradient, strict=True)
         x, y, z = (add(*pair) for pair in rows)
-        return Field((x, y, z), add(self.offset, other.offset))
+        return SpatialField((x, y, z), add(self.offset, other.offset))
 
-    def scaled(self, factor: Element) -> Field:
+    def scaled(self, factor: Element) -> SpatialField:
         """Return the field times a factor."""
         x, y, z = (scale(factor, row) for row in self.gradient)
-        return Field((x, y, z), scale(factor, self.offset))
+        return SpatialField((x, y, z), scale(factor, self.offset))
 
-    def after(self, other: Field) -> Field:
+    def after(self, other: SpatialField) -> SpatialField:
         """Return G (G' r + b'): how this motion turns the velocities of another."""
         turn = Transform(self.gradient)
-        return Field((turn @ Transform(other.gradient)).rotation, turn.rotate(other.offset))
+        return SpatialField((turn @ Transform(other.gradient)).rotation, turn.rotate(other.offset))
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class SpatialInertia:
     """Masses, about the common origin in the axes of the world.
 
     Attributes:
@@ -234,23 +234,25 @@ class Body:
     moment: Vector = ZERO
     second: Symmetric = (ZERO, ZERO, ZERO)
 
-    def __add__(self, other: Body) -> Body:
+    def __add__(self, other: SpatialInertia) -> SpatialInertia:
         """Return both bodies as one."""
-        return Body(
-            plus(self.mass, other.mass), add(self.moment, other.moment), summed(self.second, other.second)
+        return SpatialInertia(
+            plus(self.mass, other.mass),
+            add(self.moment, other.moment),
+            sum_symmetric(self.second, other.second),
         )
 
 
 @dataclass(frozen=True, slots=True)
-class Force:
+class SpatialForce:
     """A force in [N] and its moment about the common origin in [N.m], along the axes of the world."""
 
     force: Vector = ZERO
     moment: Vector = ZERO
 
-    def __add__(self, other: Force) -> Force:
+    def __add__(self, other: SpatialForce) -> SpatialForce:
         """Return the sum of two forces."""
-        return Force(add(self.force, other.force), add(self.moment, other.moment))
+        return SpatialForce(add(self.force, other.force), add(self.moment, other.moment))
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,20 +271,20 @@ class MovingLink:
     turns: bool
     axis: Vector
     slide: Vector
-    body: Body
+    body: SpatialInertia
 
-    def field(self, rate: Element) -> Field:
+    def field(self, rate: Element) -> SpatialField:
         """Return the velocities of all that the joint carries, of a rate of the coordinate."""
         x, y, z = scale(rate, self.axis)
         skew = ((0.0, minus(0.0, z), y), (z, 0.0, minus(0.0, x)), (minus(0.0, y), x, 0.0))
-        return Field(skew, scale(rate, self.slide))
+        return SpatialField(skew, scale(rate, self.slide))
 
-    def torque(self, force: Force) -> Element:
+    def torque(self, force: SpatialForce) -> Element:
         """Return what a force on all that the joint carries is for its coordinate, in [N.m] or [N]."""
         return plus(dot(self.axis, force.moment), dot(self.slide, force.force))
 
 
-def moving_links(posed: PosedLinks) -> tuple[list[MovingLink], Vector]:
+def moving_links(posed: LinkPoses) -> tuple[list[MovingLink], Vector]:
     """Return the moving joints and bodies of an arm from the base outwards, and where its tool is [m]."""
     chain, arm, (first, *others) = posed
     found, pose = [], Transform(chain.base.rotation)
@@ -296,7 +298,7 @@ def moving_links(posed: PosedLinks) -> tuple[list[MovingLink], Vector]:
     return found, pose.point(arm.tool.translation)
 
 
-def inertial_force(body: Body, field: Field) -> Force:
+def inertial_force(body: SpatialInertia, field: SpatialField) -> SpatialForce:
     """Return the force and moment that give a body accelerations G r + b in [m/s2].
 
     See the formulas of this module.
@@ -312,7 +314,7 @@ def inertial_force(body: Body, field: Field) -> Force:
         add(row, (times(b[k], hx), times(b[k], hy), times(b[k], hz))) for k, row in enumerate(rows)
     )
     force = add(turn.rotate(body.moment), scale(body.mass, b))
-    return Force(force, (minus(zy, yz), minus(xz, zx), minus(yx, xy)))
+    return SpatialForce(force, (minus(zy, yz), minus(xz, zx), minus(yx, xy)))
 
 
 def _second_moments(inertia: Symmetric) -> Symmetric:
@@ -323,18 +325,18 @@ def _second_moments(inertia: Symmetric) -> Symmetric:
     return (half[0], xy, xz), (xy, half[1], yz), (xz, yz, half[2])
 
 
-def _placed(pose: Transform, mass: Element, moment: Vector, second: Symmetric) -> Body:
+def _placed(pose: Transform, mass: Element, moment: Vector, second: Symmetric) -> SpatialInertia:
     """Return a body that is given in a frame: S' = R S R^T + R h p^T + p (R h)^T + m p p^T."""
     p, own = pose.translation, pose.rotate(moment)
     moment = add(own, scale(mass, p))  # R h + m p
-    (xx, xy, xz), (_, yy, yz), (_, _, zz) = turned(pose, second)
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = rotate_inertia(pose, second)
 
     def shifted(value: Element, i: int, k: int) -> Element:
         """Return an entry of S': (R h)_i p_k + p_i (R h + m p)_k are added."""
         return plus(value, plus(times(own[i], p[k]), times(p[i], moment[k])))
 
     xy, xz, yz = shifted(xy, 0, 1), shifted(xz, 0, 2), shifted(yz, 1, 2)
-    return Body(
+    return SpatialInertia(
         mass, moment, ((shifted(xx, 0, 0), xy, xz), (xy, shifted(yy, 1, 1), yz), (xz, yz, shifted(zz, 2, 2)))
     )
 
@@ -358,15 +360,15 @@ def mass_matrix(chain: Chain, q: Sequence[Element]) -> list[list[Element]]:
 
     Source: [Iso9283]_ eq. 13, D_1, by the composite bodies of [Walker1982]_.
     """
-    return posed_matrix(posed_links(chain, q))
+    return mass_matrix_at(compute_link_poses(chain, q))
 
 
-def posed_matrix(posed: PosedLinks) -> list[list[Element]]:
+def mass_matrix_at(posed: LinkPoses) -> list[list[Element]]:
     """Return `mass_matrix` of an arm in a pose."""
     links, _ = moving_links(posed)
     count = len(posed.chain.coordinates)
     matrix: list[list[Element]] = [[0.0] * count for _ in range(count)]
-    beyond = Body()
+    beyond = SpatialInertia()
     for j in reversed(range(len(links))):
         beyond += links[j].body
         force = inertial_force(beyond, links[j].field(1.0))
@@ -378,7 +380,7 @@ def posed_matrix(posed: PosedLinks) -> list[list[Element]]:
     return matrix
 
 
-def coordinate_sizes(chain: Chain, q: Sequence[Element]) -> list[Element]:
+def mass_matrix_scales(chain: Chain, q: Sequence[Element]) -> list[Element]:
     """Return what the masses that each coordinate moves could make its entry of M, wherever its axes are.
 
     |z|^2 times the trace of their second moments about the common origin (see `screws`) of a joint that
@@ -391,9 +393,9 @@ def coordinate_sizes(chain: Chain, q: Sequence[Element]) -> list[Element]:
     Returns:
         One element per coordinate, in [kg.m2] or [kg].
     """
-    links, _ = moving_links(posed_links(chain, q))
+    links, _ = moving_links(compute_link_poses(chain, q))
     sizes: list[Element] = [0.0] * len(chain.coordinates)
-    beyond = Body()
+    beyond = SpatialInertia()
     for link in reversed(links):
         beyond += link.body
         (xx, _, _), (_, yy, _), (_, _, zz) = beyond.second
@@ -436,20 +438,20 @@ def forward_dynamics(
 
     Source: [Iso9283]_ eq. 19, solved for the accelerations.
     """
-    posed = posed_links(chain, q, arm)
-    needed = needed_torques(posed, qd, [0.0] * len(q), wrench)
+    posed = compute_link_poses(chain, q, arm)
+    needed = inverse_dynamics_at(posed, qd, [0.0] * len(q), wrench)
     left = [minus(given, other) for given, other in zip(tau, needed, strict=True)]
-    return solved(posed_matrix(posed), left)
+    return solve_ldl(mass_matrix_at(posed), left)
 
 
-def solved(matrix: Sequence[Sequence[Element]], right: Sequence[Element]) -> list[Element]:
+def solve_ldl(matrix: Sequence[Sequence[Element]], right: Sequence[Element]) -> list[Element]:
     """Return x of M x = b for a symmetric positive definite M, by M = L D L^T, elementwise.
 
     Args:
         matrix: The rows of M, in any units.
         right: b.
     """
-    lower, pivots = factors(matrix)
+    lower, pivots = factor_ldl(matrix)
     x: list[Element] = list(right)
     for i in range(len(x)):
         for k in range(i):
@@ -461,7 +463,7 @@ def solved(matrix: Sequence[Sequence[Element]], right: Sequence[Element]) -> lis
     return x
 
 
-def factors(matrix: Sequence[Sequence[Element]]) -> tuple[list[list[Element]], list[Element]]:
+def factor_ldl(matrix: Sequence[Sequence[Element]]) -> tuple[list[list[Element]], list[Element]]:
     """Return L below its diagonal of ones, and the pivots D, of a symmetric M = L D L^T."""
     lower: list[list[Element]] = []
     pivots: list[Element] = []
@@ -481,7 +483,7 @@ def factors(matrix: Sequence[Sequence[Element]]) -> tuple[list[list[Element]], l
     return lower, pivots
 
 
-def check_motion(chain: Chain) -> None:
+def check_solvable(chain: Chain) -> None:
     """Refuse an arm whose motion cannot be solved: no inertia resists a joint's own motion.
 
     Raises:
@@ -511,11 +513,11 @@ def _without_inertia(chain: Chain, q: Sequence[FloatArray]) -> Iterator[str]:
     """
     count = len(q[0])
     matrix = [[np.broadcast_to(entry, count) for entry in row] for row in mass_matrix(chain, q)]
-    sizes = coordinate_sizes(chain, q)
+    sizes = mass_matrix_scales(chain, q)
     kept: list[int] = []
     for i, name in enumerate(chain.coordinates):
         own = [*kept, i]
-        *_, pivot = factors([[matrix[row][column] for column in own] for row in own])[1]
+        *_, pivot = factor_ldl([[matrix[row][column] for column in own] for row in own])[1]
         if np.max(pivot - NO_MASS * sizes[i]) <= 0.0:
             yield name
         else:
@@ -565,11 +567,11 @@ def torque_terms(
 
     Source: [Iso9283]_ eq. 13: D_1, D_2, D_(1+k), E and J^T F, the last with the sign of a force from outside.
     """
-    links, place = moving_links(posed_links(chain, q))
-    inertia, centrifugal, coriolis = Field(), Field(), Field()
-    rates = [Field() for _ in chain.coordinates]
-    weight = Field(offset=scale(-1.0, chain.gravity))
-    forces: list[tuple[Force, ...]] = []
+    links, place = moving_links(compute_link_poses(chain, q))
+    inertia, centrifugal, coriolis = SpatialField(), SpatialField(), SpatialField()
+    rates = [SpatialField() for _ in chain.coordinates]
+    weight = SpatialField(offset=scale(-1.0, chain.gravity))
+    forces: list[tuple[SpatialForce, ...]] = []
     for link in links:
         own, c = link.field(qd[link.coordinate]), link.coordinate
         inertia += link.field(qdd[c])
@@ -580,30 +582,30 @@ def torque_terms(
         rates[c] += own
         fields = (inertia, centrifugal, coriolis, weight)
         forces.append(tuple(inertial_force(link.body, field) for field in fields))
-    tool = [Force()] * len(links)
+    tool = [SpatialForce()] * len(links)
     if wrench is not None:
         tool[-1] = _against(wrench, place)
     terms = [*zip(*forces, strict=True), tool]
     return TorqueTerms(*(_torques(links, each, len(chain.coordinates)) for each in terms))
 
 
-def _torques(links: Sequence[MovingLink], forces: Sequence[Force], count: int) -> list[Element]:
+def _torques(links: Sequence[MovingLink], forces: Sequence[SpatialForce], count: int) -> list[Element]:
     """Return what each coordinate gives where every link needs a force."""
     torques: list[Element] = [0.0] * count
-    beyond = Force()
+    beyond = SpatialForce()
     for link, force in zip(reversed(links), reversed(forces), strict=True):
         beyond += force
         torques[link.coordinate] = plus(torques[link.coordinate], link.torque(beyond))
     return torques
 
 
-def _against(wrench: Wrench, place: Vector) -> Force:
+def _against(wrench: Wrench, place: Vector) -> SpatialForce:
     """Return what the last link needs against what acts on the tool at its place."""
     moment = add(wrench.moment, cross(place, wrench.force))
-    return Force(scale(-1.0, wrench.force), scale(-1.0, moment))
+    return SpatialForce(scale(-1.0, wrench.force), scale(-1.0, moment))
 
 
-def torque_over_log(
+def torques_over_log(
     chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray, threads: int = THREADS
 ) -> FloatArray:
     """Return the torques of the joints over a log, in [N.m] or [N], shape (n, joints).
@@ -623,8 +625,10 @@ def torque_over_log(
     ).T
 
 
-def terms_over_log(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray) -> dict[str, FloatArray]:
-    """Return the terms of `torque_over_log` by name (see `TorqueTerms`), in [N.m] or [N].
+def torque_terms_over_log(
+    chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray
+) -> dict[str, FloatArray]:
+    """Return the terms of `torques_over_log` by name (see `TorqueTerms`), in [N.m] or [N].
 
     Args:
         chain: The arm, with masses.
@@ -657,7 +661,7 @@ def energies_over_log(chain: Chain, q: FloatArray, qd: FloatArray) -> tuple[Floa
     return kinetic, potential
 
 
-def mass_centres_over_log(chain: Chain, q: FloatArray) -> FloatArray:
+def centres_of_mass_over_log(chain: Chain, q: FloatArray) -> FloatArray:
     """Return the mass centres of an arm in the world over a log, in [m], shape (n, inertials, 3).
 
     Args:
@@ -665,7 +669,7 @@ def mass_centres_over_log(chain: Chain, q: FloatArray) -> FloatArray:
         q: Joint values in [rad] or [m], shape (n, joints).
     """
     count = len(chain.inertials)
-    flat = _over(lambda q: [one for centre in mass_centres(chain, q) for one in centre], 3 * count, q)
+    flat = _over(lambda q: [one for centre in centres_of_mass(chain, q) for one in centre], 3 * count, q)
     return flat.T.reshape(len(q), count, 3)
 
 

@@ -88,7 +88,7 @@ def check_masses(chain: Chain) -> None:
         )
 
 
-def links_of(chain: Chain) -> Links:
+def chain_to_links(chain: Chain) -> Links:
     """Return the moving parts of an arm; masses before the first moving joint stand still and are left out.
 
     m = sum m_k, h = sum m_k c_k, I = sum I_k + m_k (c_k^2 1 - c_k c_k^T), with centres and inertias in the
@@ -130,11 +130,13 @@ def _body(bodies: Sequence[_Placed]) -> tuple[Element, Vector, Symmetric]:
     for frame, one in bodies:
         centre = frame.point(one.centre)
         mass, moment = plus(mass, one.mass), add(moment, scale(one.mass, centre))
-        inertia = summed(inertia, turned(frame, one.matrix), about_origin(one.mass, centre))
+        inertia = sum_symmetric(
+            inertia, rotate_inertia(frame, one.matrix), point_mass_inertia(one.mass, centre)
+        )
     return mass, moment, inertia
 
 
-def turned(frame: Transform, matrix: Symmetric) -> Symmetric:
+def rotate_inertia(frame: Transform, matrix: Symmetric) -> Symmetric:
     """Return R A R^T: a symmetric matrix, given in a frame, seen from where the frame stands."""
     turn = Transform(frame.rotation)
     rows = Transform((turn @ Transform(matrix) @ Transform(turn.columns)).rotation).rotation
@@ -142,7 +144,7 @@ def turned(frame: Transform, matrix: Symmetric) -> Symmetric:
     return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
 
 
-def about_origin(mass: Element, centre: Vector) -> Symmetric:
+def point_mass_inertia(mass: Element, centre: Vector) -> Symmetric:
     """Return m (c^2 1 - c c^T) in [kg.m2], the inertia about the origin of a mass in [kg] at c in [m]."""
     x, y, z = centre
     mx, my, mz = scale(mass, centre)
@@ -151,7 +153,7 @@ def about_origin(mass: Element, centre: Vector) -> Symmetric:
     return (plus(yy, zz), xy, xz), (xy, plus(xx, zz), yz), (xz, yz, plus(xx, yy))
 
 
-def summed(*matrices: Symmetric) -> Symmetric:
+def sum_symmetric(*matrices: Symmetric) -> Symmetric:
     """Return the sum of symmetric matrices."""
     total: Symmetric = (ZERO, ZERO, ZERO)
     for one in matrices:
@@ -207,7 +209,7 @@ def mass_motions(chain: Chain, q: Sequence[Element], qd: Sequence[Element]) -> l
     return found
 
 
-def mass_centres(chain: Chain, q: Sequence[Element]) -> list[Vector]:
+def centres_of_mass(chain: Chain, q: Sequence[Element]) -> list[Vector]:
     """Return the centres of the masses of an arm in the world [m], in the order of `chain.inertials`.
 
     Args:
@@ -273,7 +275,7 @@ def potential_energy(chain: Chain, q: Sequence[Element]) -> Element:
     """
     check_masses(chain)
     energy: Element = 0.0
-    for one, centre in zip(chain.inertials, mass_centres(chain, q), strict=True):
+    for one, centre in zip(chain.inertials, centres_of_mass(chain, q), strict=True):
         energy = minus(energy, times(one.mass, dot(chain.gravity, centre)))
     return energy
 

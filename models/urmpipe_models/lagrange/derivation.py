@@ -32,7 +32,7 @@ Angle = tuple[float, ...]
 """A sum of joint values: a factor for each coordinate."""
 
 
-class Turn(NamedTuple):
+class AxisRotation(NamedTuple):
     """A rotation Rot(axis, angle) inner, with the same axis since its joints are parallel.
 
     Attributes:
@@ -45,12 +45,12 @@ class Turn(NamedTuple):
     angle: Angle
     inner: Transform = Transform()
 
-    def __matmul__(self, rotation: Transform) -> Turn:
+    def __matmul__(self, rotation: Transform) -> AxisRotation:
         """Return the turn that a constant rotation follows."""
         return self._replace(inner=rounded(self.inner @ Transform(rotation.rotation)))
 
 
-class Step(NamedTuple):
+class JointStep(NamedTuple):
     """A joint on the way from the base to the tip.
 
     Attributes:
@@ -64,17 +64,17 @@ class Step(NamedTuple):
     """
 
     joint: Joint
-    before: Turn
-    at: Turn
+    before: AxisRotation
+    at: AxisRotation
     begins: bool
-    after: Turn
+    after: AxisRotation
     value: Angle
     offset: float
 
 
-def steps(chain: Chain) -> Iterator[Step]:
+def iter_joint_steps(chain: Chain) -> Iterator[JointStep]:
     """Yield the joints of an arm from the base to the tip, with the turns before and after each."""
-    turn = Turn((0.0, 0.0, 1.0), (0.0,) * len(chain.coordinates))
+    turn = AxisRotation((0.0, 0.0, 1.0), (0.0,) * len(chain.coordinates))
     for joint in chain.joints:
         value, offset = _value(chain, joint)
         before, at = turn, turn @ joint.origin
@@ -83,11 +83,11 @@ def steps(chain: Chain) -> Iterator[Step]:
             sign = _sense(at, joint)
             begins = sign == 0
             if begins:
-                turn = Turn(joint.axis, value, rounded(rotation_about(joint.axis, offset)))
+                turn = AxisRotation(joint.axis, value, rounded(rotation_about(joint.axis, offset)))
             else:
                 angle = tuple(_snapped(a + sign * b) for a, b in zip(at.angle, value, strict=True))
                 turn = at._replace(angle=angle) @ rotation_about(joint.axis, offset)
-        yield Step(joint, before, at, begins, turn, value, offset)
+        yield JointStep(joint, before, at, begins, turn, value, offset)
 
 
 def rounded(rotation: Transform) -> Transform:
@@ -101,7 +101,7 @@ def _snapped(value: float) -> float:
     return float(round(value)) if abs(value - round(value)) < ROUNDING else value
 
 
-def _sense(turn: Turn, joint: Joint) -> int:
+def _sense(turn: AxisRotation, joint: Joint) -> int:
     """Return 1 or -1 for a joint that turns about the axis of a turn, one way or the other; else 0."""
     cosine = dot(turn.inner.rotate(joint.axis), turn.axis)
     across = max(abs(a - cosine * b) for a, b in zip(turn.inner.rotate(joint.axis), turn.axis, strict=True))
@@ -181,7 +181,7 @@ class Variables:
         """Return cos and sin of an angle: of none the constants 1 and 0."""
         if not any(angle):
             return self.constant(1.0), self.constant(0.0)
-        sign, known = oriented(angle)
+        sign, known = normalise_sign(angle)
         k = 2 * self.angles.index(known)
         return self.ring.gens[k], self.constant(sign) * self.ring.gens[k + 1]
 
@@ -196,7 +196,7 @@ class Variables:
 
     def rate(self, factors: Angle) -> Polynomial:
         """Return the rate of a joint, in [rad/s] or [m/s]."""
-        return total(
+        return sum_polynomials(
             (self.constant(f) * rate for f, rate in zip(factors, self.rates, strict=True) if f), self
         )
 
@@ -219,13 +219,13 @@ class Variables:
         return {motion: self.ring.from_dict(part) for motion, part in found.items()}
 
 
-def oriented(angle: Angle) -> tuple[float, Angle]:
+def normalise_sign(angle: Angle) -> tuple[float, Angle]:
     """Return the sign of the first factor that is not 0, and the angle times it."""
     sign = 1.0 if next(filter(None, angle)) > 0.0 else -1.0
     return sign, tuple(sign * factor + 0.0 for factor in angle)  # + 0.0: no -0.0
 
 
-def total(of: Iterable[Polynomial], variables: Variables, of_masses: bool = False) -> Polynomial:
+def sum_polynomials(of: Iterable[Polynomial], variables: Variables, of_masses: bool = False) -> Polynomial:
     """Return the sum of polynomials, without the coefficients that rounding leaves of sums that cancel.
 
     Args:
@@ -248,10 +248,10 @@ def total(of: Iterable[Polynomial], variables: Variables, of_masses: bool = Fals
 def scalar_product(a: Iterable[Polynomial], b: Iterable[Polynomial], variables: Variables) -> Polynomial:
     """Return the sum of the products of the elements of two vectors."""
     pairs = zip(a, b, strict=True)
-    return total((y.mul_term(part) for x, y in pairs for part in x.terms()), variables)
+    return sum_polynomials((y.mul_term(part) for x, y in pairs for part in x.terms()), variables)
 
 
-def variables_of(chain: Chain) -> Variables:
+def chain_to_variables(chain: Chain) -> Variables:
     """Return the variables of an arm.
 
     Raises:
@@ -263,10 +263,10 @@ def variables_of(chain: Chain) -> Variables:
     except ImportError:
         needs = 'with sympy: pip install "urmpipe[planning]"'
         raise OptionError(Finding(found="equations without sympy", allowed=needs)) from None
-    found = [*steps(chain)]
+    found = [*iter_joint_steps(chain)]
     pairs = [*dict.fromkeys(_parallel(found))]
-    turned = [one.after.angle for one in found] + [difference(*pair) for pair in pairs]
-    angles = dict.fromkeys(oriented(angle)[1] for angle in turned if any(angle))
+    turned = [one.after.angle for one in found] + [subtract_angles(*pair) for pair in pairs]
+    angles = dict.fromkeys(normalise_sign(angle)[1] for angle in turned if any(angle))
     sliding = {k for one in found if one.joint.kind == "prismatic" for k, f in enumerate(one.value) if f}
     slides, count = tuple(sorted(sliding)), len(chain.coordinates)
     names = [f"{kind}{k}" for k in range(len(angles)) for kind in ("c", "s")]
@@ -274,12 +274,12 @@ def variables_of(chain: Chain) -> Variables:
     return Variables(ring([*names, *WRENCH], RR)[0], tuple(angles), slides, count, tuple(pairs))
 
 
-def difference(first: Angle, second: Angle) -> Angle:
+def subtract_angles(first: Angle, second: Angle) -> Angle:
     """Return the second angle less the first."""
     return tuple(b - a for a, b in zip(first, second, strict=True))
 
 
-def _parallel(found: Sequence[Step]) -> Iterator[tuple[Angle, Angle]]:
+def _parallel(found: Sequence[JointStep]) -> Iterator[tuple[Angle, Angle]]:
     """Yield the pairs of different angles about the same axis; an angle of 0 is none."""
     group: list[Angle] = []
     for step in found:
@@ -298,7 +298,7 @@ Matrix: TypeAlias = list[Triple]
 """The rows of a rotation."""
 
 
-class Body(NamedTuple):
+class MovingBody(NamedTuple):
     """What a joint moves.
 
     Attributes:
@@ -308,13 +308,13 @@ class Body(NamedTuple):
         spin: The angular velocity in the axes of the moving frame, in [rad/s].
     """
 
-    step: Step
+    step: JointStep
     rotation: Matrix
     place: Triple
     spin: Triple
 
 
-def bodies(chain: Chain, variables: Variables) -> Iterator[Body]:
+def iter_bodies(chain: Chain, variables: Variables) -> Iterator[MovingBody]:
     """Yield what each joint moves, from the base outwards.
 
     T_1i = A_1 A_2 ... A_i, and omega_i = B_i^T (omega_(i-1) + (0, 0, theta_i')^T), here about any axis.
@@ -322,52 +322,61 @@ def bodies(chain: Chain, variables: Variables) -> Iterator[Body]:
 
     Source: [Iso9283]_ eq. 8 and 12.
     """
-    begin, origin = matrix(Transform().rotation, variables), column(ZERO, variables)  # where a turn begins
-    spin = place = column(ZERO, variables)  # in the axes of that frame
-    for step in steps(chain):
-        shift = column(step.joint.origin.translation, variables)
-        place = shifted(place, _rotation(step.before, variables), shift, variables)
+    begin, origin = (
+        constant_matrix(Transform().rotation, variables),
+        constant_column(ZERO, variables),
+    )  # where a turn begins
+    spin = place = constant_column(ZERO, variables)  # in the axes of that frame
+    for step in iter_joint_steps(chain):
+        shift = constant_column(step.joint.origin.translation, variables)
+        place = shift_origin(place, _rotation(step.before, variables), shift, variables)
         if step.begins:
             spin = _spin(step.at, spin, variables)
-            origin = shifted(origin, begin, place, variables)
-            begin, place = _product(begin, _rotation(step.at, variables), variables), column(ZERO, variables)
+            origin = shift_origin(origin, begin, place, variables)
+            begin, place = (
+                _product(begin, _rotation(step.at, variables), variables),
+                constant_column(ZERO, variables),
+            )
         rotation = _rotation(step.after, variables)
         if step.joint.kind == "prismatic":
             value = variables.value(step.value, step.offset)
             slide = [variables.constant(x) * value for x in step.joint.axis]
-            place = shifted(place, rotation, slide, variables)
-        yield Body(
+            place = shift_origin(place, rotation, slide, variables)
+        yield MovingBody(
             step,
             _product(begin, rotation, variables),
-            shifted(origin, begin, place, variables),
+            shift_origin(origin, begin, place, variables),
             _spin(step.after, spin, variables),
         )
 
 
-def column(of: Vector, variables: Variables) -> Triple:
+def constant_column(of: Vector, variables: Variables) -> Triple:
     """Return a constant vector."""
     return [variables.constant(x) for x in of]
 
 
-def matrix(of: Sequence[Vector], variables: Variables) -> Matrix:
+def constant_matrix(of: Sequence[Vector], variables: Variables) -> Matrix:
     """Return a constant matrix."""
-    return [column(row, variables) for row in of]
+    return [constant_column(row, variables) for row in of]
 
 
-def apply(of: Matrix, vector: Sequence[Polynomial], variables: Variables) -> Triple:
+def multiply_column(of: Matrix, vector: Sequence[Polynomial], variables: Variables) -> Triple:
     """Return a matrix times a column."""
     return [scalar_product(row, vector, variables) for row in of]
 
 
-def shifted(place: Triple, rotation: Matrix, shift: Triple, variables: Variables) -> Triple:
+def shift_origin(place: Triple, rotation: Matrix, shift: Triple, variables: Variables) -> Triple:
     """Return a place and what follows it in turned axes."""
-    return [total(one, variables) for one in zip(place, apply(rotation, shift, variables), strict=True)]
+    return [
+        sum_polynomials(one, variables)
+        for one in zip(place, multiply_column(rotation, shift, variables), strict=True)
+    ]
 
 
 def velocity(place: Triple, variables: Variables) -> Triple:
     """Return dr/dt = sum_j (dr/dq_j) q_j', in [m/s]. Source: [Iso9283]_ eq. 9-11, by differentiation."""
     return [
-        total(
+        sum_polynomials(
             (part * rate for j, rate in enumerate(variables.rates) for part in variables.derivative(x, j)),
             variables,
         )
@@ -380,16 +389,17 @@ def _product(a: Matrix, b: Matrix, variables: Variables) -> Matrix:
     return [[scalar_product(row, one, variables) for one in zip(*b, strict=True)] for row in a]
 
 
-def _spin(turn: Turn, before: Triple, variables: Variables) -> Triple:
+def _spin(turn: AxisRotation, before: Triple, variables: Variables) -> Triple:
     """Return the angular velocity behind a turn, in the axes of what it turns."""
     rate = variables.rate(turn.angle)
     added = [
-        total((x, variables.constant(a) * rate), variables) for x, a in zip(before, turn.axis, strict=True)
+        sum_polynomials((x, variables.constant(a) * rate), variables)
+        for x, a in zip(before, turn.axis, strict=True)
     ]
     return [scalar_product(one, added, variables) for one in zip(*_rotation(turn, variables), strict=True)]
 
 
-def _rotation(turn: Turn, variables: Variables) -> Matrix:
+def _rotation(turn: AxisRotation, variables: Variables) -> Matrix:
     """Return Rot(axis, angle) inner: c 1 + s [a]x + (1 - c) a a^T of a unit vector a, times a constant."""
     c, s = variables.cosine_sine(turn.angle)
     x, y, z = turn.axis
@@ -403,7 +413,7 @@ def _rotation(turn: Turn, variables: Variables) -> Matrix:
         ]
         for i in range(3)
     ]
-    return _product(rows, matrix(turn.inner.rotation, variables), variables)
+    return _product(rows, constant_matrix(turn.inner.rotation, variables), variables)
 
 
 class Energies(NamedTuple):
@@ -432,41 +442,48 @@ def energies(chain: Chain, variables: Variables) -> Energies:
     Source: [Iso9283]_ eq. 8-12.
     """
     world = rounded(Transform(chain.base.columns))  # from the world's axes to the base's
-    found = {one.step.joint.name: one for one in bodies(chain, variables)}
+    found = {one.step.joint.name: one for one in iter_bodies(chain, variables)}
     carried = [(found[one.joint], one) for one in chain.inertials if one.joint is not None]
     gravity = world.rotate(chain.gravity)
-    kinetic = total((_kinetic(*pair, variables) for pair in carried), variables, of_masses=True)
-    potential = total((_potential(*pair, gravity, variables) for pair in carried), variables, of_masses=True)
+    kinetic = sum_polynomials((_kinetic(*pair, variables) for pair in carried), variables, of_masses=True)
+    potential = sum_polynomials(
+        (_potential(*pair, gravity, variables) for pair in carried), variables, of_masses=True
+    )
     tool = _point(found[chain.joints[-1].name], (chain.tip @ chain.tool).translation, variables)
-    turn = matrix(world.rotation, variables)
-    force, moment = (apply(turn, part, variables) for part in (variables.wrench[:3], variables.wrench[3:]))
+    turn = constant_matrix(world.rotation, variables)
+    force, moment = (
+        multiply_column(turn, part, variables) for part in (variables.wrench[:3], variables.wrench[3:])
+    )
     moved = [*velocity(tool, variables), *_turning([*found.values()], variables)]
     return Energies(kinetic, potential, scalar_product([*force, *moment], moved, variables))
 
 
-def _kinetic(body: Body, one: Inertial, variables: Variables) -> Polynomial:
+def _kinetic(body: MovingBody, one: Inertial, variables: Variables) -> Polynomial:
     """Return 1/2 m v^2 + 1/2 omega^T I omega of a mass, in [J]."""
     speed = velocity(_point(body, one.centre, variables), variables)
-    turned = apply(matrix(one.matrix, variables), body.spin, variables)
+    turned = multiply_column(constant_matrix(one.matrix, variables), body.spin, variables)
     momenta = [*(variables.constant(one.mass) * x for x in speed), *turned]
     return variables.constant(0.5) * scalar_product(momenta, [*speed, *body.spin], variables)
 
 
-def _potential(body: Body, one: Inertial, gravity: Vector, variables: Variables) -> Polynomial:
+def _potential(body: MovingBody, one: Inertial, gravity: Vector, variables: Variables) -> Polynomial:
     """Return -m g^T r of a mass, in [J]."""
     weight = [variables.constant(-one.mass * x) for x in gravity]
     return scalar_product(weight, _point(body, one.centre, variables), variables)
 
 
-def _point(body: Body, place: Vector, variables: Variables) -> Triple:
+def _point(body: MovingBody, place: Vector, variables: Variables) -> Triple:
     """Return where a point in [m] of a body is, in the base [m]."""
-    return shifted(body.place, body.rotation, column(place, variables), variables)
+    return shift_origin(body.place, body.rotation, constant_column(place, variables), variables)
 
 
-def _turning(found: Sequence[Body], variables: Variables) -> Triple:
+def _turning(found: Sequence[MovingBody], variables: Variables) -> Triple:
     """Return the angular velocity of the last body, along the base: each joint's rate on its axis."""
     turning = [(rotation, step) for step, rotation, *_ in found if step.joint.kind == "revolute"]
-    axes = [apply(rotation, column(step.joint.axis, variables), variables) for rotation, step in turning]
+    axes = [
+        multiply_column(rotation, constant_column(step.joint.axis, variables), variables)
+        for rotation, step in turning
+    ]
     rates = [variables.rate(step.value) for _, step in turning]
     return [scalar_product([axis[k] for axis in axes], rates, variables) for k in range(3)]
 
@@ -498,16 +515,16 @@ def _equation(energies: Energies, variables: Variables, i: int) -> Equation:
     inertia = scalar_product(map(momentum.diff, rates), variables.accelerations, variables)
     moved = [one * rate for j, rate in enumerate(rates) for one in variables.derivative(momentum, j)]
     still = [-one for one in variables.derivative(energies.kinetic, i)]
-    speeds = variables.by_motion(total([*moved, *still], variables))
+    speeds = variables.by_motion(sum_polynomials([*moved, *still], variables))
     centrifugal, coriolis = (
-        total((part for motion, part in speeds.items() if (max(motion) == 2) == square), variables)
+        sum_polynomials((part for motion, part in speeds.items() if (max(motion) == 2) == square), variables)
         for square in (True, False)
     )
     return {
         "inertia": inertia,
         "centrifugal": centrifugal,
         "coriolis": coriolis,
-        "gravity": total(variables.derivative(energies.potential, i), variables),
+        "gravity": sum_polynomials(variables.derivative(energies.potential, i), variables),
         "tool": -energies.power.diff(rates[i]),
     }
 
@@ -520,7 +537,7 @@ class Identity(NamedTuple):
     equal: Polynomial
 
 
-def simplified(of: Polynomial, variables: Variables) -> Polynomial:
+def simplify_polynomial(of: Polynomial, variables: Variables) -> Polynomial:
     """Return a polynomial with a shorter factor of each product of rates, accelerations and wrench.
 
     Of each angle s^2 = 1 - c^2 and c^2 = 1 - s^2, of angles a and b about the same axis
@@ -532,7 +549,9 @@ def simplified(of: Polynomial, variables: Variables) -> Polynomial:
         variables: Its variables.
     """
     known = [*_differences(variables), *_squares(variables)]
-    return total((_shortest(part, known, variables) for part in variables.by_motion(of).values()), variables)
+    return sum_polynomials(
+        (_shortest(part, known, variables) for part in variables.by_motion(of).values()), variables
+    )
 
 
 def _shortest(of: Polynomial, known: Sequence[Identity], variables: Variables) -> Polynomial:
@@ -541,7 +560,7 @@ def _shortest(of: Polynomial, known: Sequence[Identity], variables: Variables) -
     while len(of) < before:
         before = len(of)
         for identity in known:
-            of = min(of, total(_replaced(of, identity), variables), key=len)
+            of = min(of, sum_polynomials(_replaced(of, identity), variables), key=len)
     return of
 
 
@@ -567,8 +586,8 @@ def _squares(variables: Variables) -> Iterator[Identity]:
 def _differences(variables: Variables) -> Iterator[Identity]:
     """Yield what products of the cosines and sines of two angles about the same axis are equal to."""
     for a, b in variables.parallel:
-        (ca, sa), (cb, sb), (c, s) = map(variables.cosine_sine, (a, b, difference(a, b)))
-        (sign_a, own_a), (sign_b, own_b) = oriented(a), oriented(b)
+        (ca, sa), (cb, sb), (c, s) = map(variables.cosine_sine, (a, b, subtract_angles(a, b)))
+        (sign_a, own_a), (sign_b, own_b) = normalise_sign(a), normalise_sign(b)
         i, j = (2 * variables.angles.index(own) for own in (own_a, own_b))
         yield Identity(j + 1, i + 1, (c - cb * ca) * (sign_a * sign_b))
         yield Identity(j, i, c - sb * sa)

@@ -33,11 +33,11 @@ from urmpipe_models.lagrange.derivation import (
     TermName,
     Terms,
     Variables,
+    chain_to_variables,
     energies,
     equations,
-    simplified,
-    steps,
-    variables_of,
+    iter_joint_steps,
+    simplify_polynomial,
 )
 
 
@@ -58,7 +58,7 @@ def coordinate_names(variables: Variables, coordinates: Sequence[str]) -> list[s
     return list(coordinates) if plain else [f"q{k}" for k in range(1, len(coordinates) + 1)]
 
 
-def text_names(variables: Variables, coordinates: Sequence[str]) -> list[str]:
+def variable_names(variables: Variables, coordinates: Sequence[str]) -> list[str]:
     """Return the name of each variable in text.
 
     Args:
@@ -83,7 +83,7 @@ def c_symbols(variables: Variables) -> list[Any]:
     return [Symbol(name) for name in names]
 
 
-def angle_words(angle: Angle, coordinates: Sequence[str]) -> str:
+def format_angle(angle: Angle, coordinates: Sequence[str]) -> str:
     """Return an angle as a sum, such as theta1 + theta2 or 0.5*theta1 - theta2."""
     words = ""
     for factor, name in zip(angle, coordinates, strict=True):
@@ -121,7 +121,7 @@ class Operations(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class FactoredExpressions:
     """Formulas with their common parts computed once.
 
     Attributes:
@@ -140,17 +140,17 @@ class Program:
             parts = [result]
             for part in parts:  # grows by what each part uses
                 parts += [waiting.pop(symbol) for symbol in part.free_symbols & waiting.keys()]
-            found.append(summed(map(of_expression, parts)))
+            found.append(sum_operations(map(count_expression_operations, parts)))
         return found
 
 
-def summed(counts: Iterable[Operations]) -> Operations:
+def sum_operations(counts: Iterable[Operations]) -> Operations:
     """Return the operations of several formulas together."""
     additions, multiplications = zip(Operations(0, 0), *counts, strict=True)
     return Operations(sum(additions), sum(multiplications))
 
 
-def program(formulas: Sequence[Terms], symbols: Sequence[Expression]) -> Program:
+def factor_common_terms(formulas: Sequence[Terms], symbols: Sequence[Expression]) -> FactoredExpressions:
     """Return formulas with their products drawn out and their common parts computed once.
 
     Args:
@@ -160,16 +160,16 @@ def program(formulas: Sequence[Terms], symbols: Sequence[Expression]) -> Program
     from sympy import cse, numbered_symbols
 
     expressions = [_nested(one, symbols) for one in formulas]
-    return Program(*cse(expressions, numbered_symbols("x"), order="none"))
+    return FactoredExpressions(*cse(expressions, numbered_symbols("x"), order="none"))
 
 
-def of_terms(of: Terms) -> Operations:
+def count_polynomial_operations(of: Terms) -> Operations:
     """Return the operations of an expanded sum: of c x^2 y three multiplications, with c = 1 or -1 two."""
     factors = (sum(key) + (abs(coefficient) != 1.0) for key, coefficient in of.items())
     return Operations(max(len(of) - 1, 0), sum(max(count - 1, 0) for count in factors))
 
 
-def of_expression(of: Expression) -> Operations:
+def count_expression_operations(of: Expression) -> Operations:
     """Return the operations of an expression of sums, products and whole powers."""
     from sympy import preorder_traversal
 
@@ -247,13 +247,13 @@ class OpenForm:
     chain: Chain
     variables: Variables
     formulas: dict[TermName, list[Terms]]
-    programs: dict[TermName, Program]
+    programs: dict[TermName, FactoredExpressions]
     costs: tuple[Cost, ...]
 
     def cost(self, term: TermName) -> tuple[Operations, Operations]:
         """Return what a term of all coordinates costs, before and after the reduction."""
         own = [one for one in self.costs if one.term == term]
-        return summed(one.operations for one in own), summed(one.reduced for one in own)
+        return sum_operations(one.operations for one in own), sum_operations(one.reduced for one in own)
 
 
 def open_form(chain: Chain, terms: Sequence[TermName] = TERMS) -> OpenForm:
@@ -274,18 +274,20 @@ def open_form(chain: Chain, terms: Sequence[TermName] = TERMS) -> OpenForm:
     if count > MOST:
         allowed = f"up to {MOST} in the open form"
         raise RobotError(Finding(about=f"robot {chain.name}", found=f"{count} coordinates", allowed=allowed))
-    turns = sum(step.begins for step in steps(chain))
+    turns = sum(step.begins for step in iter_joint_steps(chain))
     if count + turns > MOST_TURNS:
         found = f"{count} coordinates and {turns} turns about axes that are not parallel to the one before"
         allowed = f"up to {MOST_TURNS} of both in the open form"
         raise RobotError(Finding(about=f"robot {chain.name}", found=found, allowed=allowed))
-    variables = variables_of(chain)
+    variables = chain_to_variables(chain)
     expanded = equations(energies(chain, variables), variables)
-    formulas = {term: [_numbers(simplified(one[term], variables)) for one in expanded] for term in terms}
-    programs = {term: program(formulas[term], c_symbols(variables)) for term in terms}
+    formulas = {
+        term: [_numbers(simplify_polynomial(one[term], variables)) for one in expanded] for term in terms
+    }
+    programs = {term: factor_common_terms(formulas[term], c_symbols(variables)) for term in terms}
     after = {term: programs[term].operations() for term in terms}
     costs = tuple(
-        Cost(name, term, of_terms(_numbers(expanded[i][term])), after[term][i])
+        Cost(name, term, count_polynomial_operations(_numbers(expanded[i][term])), after[term][i])
         for i, name in enumerate(chain.coordinates)
         for term in terms
     )
@@ -304,7 +306,7 @@ def equations_text(form: OpenForm) -> str:
     cosine and sine of their sum.
     """
     coordinates = coordinate_names(form.variables, form.chain.coordinates)
-    names = text_names(form.variables, coordinates)
+    names = variable_names(form.variables, coordinates)
     lines = [f"# {line}".rstrip() for line in _head(form, coordinates)]
     for i, name in enumerate(coordinates):
         lines += ["", f"tau_{name} = {' + '.join(form.formulas)}"]
@@ -328,7 +330,7 @@ def _head(form: OpenForm, coordinates: Sequence[str]) -> Iterator[str]:
     }
     for k, (name, angle) in enumerate(zip(angle_names(form.variables), form.variables.angles, strict=True)):
         if k in used:
-            words = angle_words(angle, coordinates)
+            words = format_angle(angle, coordinates)
             yield f"c{name} = cos({words}), s{name} = sin({words})"
     if "tool" in form.formulas:
         yield "fx, fy, fz in N, mx, my, mz in N.m: act on the tool centre point from outside, in world axes"
@@ -488,7 +490,7 @@ def _sines(form: OpenForm, used: set[str]) -> Iterator[str]:
     for name, angle in zip(angle_names(form.variables), form.variables.angles, strict=True):
         for kind, function in (("c", "cos"), ("s", "sin")):
             if f"{kind}{name}" in used:
-                yield f"{INDENT}const double {kind}{name} = {function}({angle_words(angle, coordinates)});"
+                yield f"{INDENT}const double {kind}{name} = {function}({format_angle(angle, coordinates)});"
 
 
 def _assignment(target: str, value: Expression) -> str:

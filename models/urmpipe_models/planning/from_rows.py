@@ -16,10 +16,10 @@ from urmpipe_models.planning.path import (
     PathRows,
     arc_at_corner,
     arc_from,
-    largest_radius,
-    towards,
-    turning_of,
-    unit,
+    interpolate_orientations,
+    max_arc_radius,
+    normalise,
+    perpendicular_towards,
 )
 
 SHORTEST = 1e-12
@@ -30,7 +30,7 @@ each arc passes it on to the next: 1e4 times as much is left for that.
 """
 
 
-def path_of(rows: PathRows) -> LineArcPath:
+def rows_to_path(rows: PathRows) -> LineArcPath:
     """Return the path of lines and arcs through rows.
 
     Rows that are corners tell the lines between them, whose arcs are cut in. Where a row is the first point
@@ -50,7 +50,7 @@ def path_of(rows: PathRows) -> LineArcPath:
     return made.path(rows)
 
 
-def path_faults(rows: PathRows) -> list[Finding]:
+def validate_rows(rows: PathRows) -> list[Finding]:
     """Return every row that makes no path, with its reason.
 
     Its radius is too large, the path goes straight on or reverses there but it has a radius, it repeats the
@@ -64,7 +64,7 @@ def path_faults(rows: PathRows) -> list[Finding]:
 
 def _made(rows: PathRows) -> tuple[_Segments, list[Finding]]:
     """Return the segments of rows, and what is wrong with the rows."""
-    faults = [*end_faults(rows), *_repeated(rows)]
+    faults = [*validate_ends(rows), *_repeated(rows)]
     radius = rows.radius.copy()
     radius[[0, -1]] = 0.0
     inner = replace(rows, radius=radius)
@@ -77,7 +77,7 @@ def _rounding(rows: PathRows) -> float:
     return SHORTEST * max(1.0, float(np.abs(rows.position).max()))
 
 
-def end_faults(rows: PathRows) -> Iterator[Finding]:
+def validate_ends(rows: PathRows) -> Iterator[Finding]:
     """Yield which ends of a path have a radius: there is no line before, or behind."""
     for row in sorted({0, len(rows) - 1} if len(rows) else ()):
         if rows.radius[row] > 0.0:
@@ -133,7 +133,7 @@ class _Segments:
             row,
             at,
             stops,
-            None if rows.rotation is None else turning_of(rows.rotation, at),
+            None if rows.rotation is None else interpolate_orientations(rows.rotation, at),
         )
 
 
@@ -227,9 +227,9 @@ def _too_short(rows: PathRows, row: int, arcs: Sequence[int], needed: float, leg
 
 def _no_arc(rows: PathRows, row: int, tangent: FloatArray, onward: FloatArray) -> Finding:
     """Say that the next row lies along the direction of the motion, or within the circle of an arc."""
-    if towards(tangent, unit(onward)) is None:
+    if perpendicular_towards(tangent, normalise(onward)) is None:
         return _parallel(rows, row, tangent, onward)
-    radius, most = _unlike(float(rows.radius[row]), largest_radius(tangent, onward))
+    radius, most = _unlike(float(rows.radius[row]), max_arc_radius(tangent, onward))
     found = f"{radius} m, with row {row + 2} inside its circle"
     return Finding(row=row + 1, column=_column(rows), found=found, allowed=f"up to {most} m")
 

@@ -28,7 +28,7 @@ from urmpipe_models.ik.path import JointPath, solve_path
 from urmpipe_models.ik.solutions import LIMIT_ROUNDING, Targets, joint_limits, pose_errors
 from urmpipe_models.kinematics.forward import bias_over_log, jacobian_over_log
 from urmpipe_models.planning.laws import PathMotion, Phase, TimeLaw
-from urmpipe_models.planning.path import LineArcPath, part_at
+from urmpipe_models.planning.path import LineArcPath, segment_index
 
 NUDGE = 1e-6
 """Step of the fastest joint, in [rad] or [m], for a difference of Jacobians: error 1e-12, rounding 1e-10."""
@@ -50,7 +50,7 @@ PLAIN = 1e-5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class JointSlopes:
+class JointPathDerivatives:
     """Joint values by arc length.
 
     Attributes:
@@ -75,13 +75,13 @@ class JointSlopes:
 
 def targets_at(path: LineArcPath, s: FloatArray) -> Targets:
     """Return where the tool shall be at arc lengths in [m], shape (n,)."""
-    rotation = None if path.turning is None else path.turning.matrices(s)
+    rotation = None if path.orientation is None else path.orientation.matrices(s)
     return Targets(path.points(s).position, rotation)
 
 
-def joint_slopes(
+def joint_path_derivatives(
     chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray, moves: BoolArray, *, before: bool = False
-) -> JointSlopes:
+) -> JointPathDerivatives:
     """Return the slopes of joint values that lead the tool along a path with the least motion.
 
     With x' = (t, turn rate) and x'' = (curvature, 0): q' = J+ x', and differentiated once more, with
@@ -98,17 +98,19 @@ def joint_slopes(
     """
     points = path.points(s, before=before)
     first, second = points.tangent, points.curvature
-    if path.turning is not None:
-        first = np.hstack((first, path.turning.rates(s, before=before)))
+    if path.orientation is not None:
+        first = np.hstack((first, path.orientation.rates(s, before=before)))
         second = np.hstack((second, np.zeros_like(second)))
     dq, ddq = np.full(q.shape, np.nan), np.full(q.shape, np.nan)
     known = np.isfinite(q).all(axis=1)
     for rows in _alike(moves, np.flatnonzero(known)):
         dq[rows], ddq[rows] = _slopes(chain, q[rows], first[rows], second[rows], moves[rows[0]])
-    return JointSlopes(q, dq, ddq)
+    return JointPathDerivatives(q, dq, ddq)
 
 
-def polished(chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray, moves: BoolArray) -> FloatArray:
+def refine_on_path(
+    chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray, moves: BoolArray
+) -> FloatArray:
     """Return joint values with the tool on the path to the last digits, by Newton steps q + J+ (x - FK(q)).
 
     Each step leaves the square of what it finds. What is nearer than `NEAR` stays, and so does, in a singular
@@ -127,7 +129,7 @@ def polished(chain: Chain, path: LineArcPath, q: FloatArray, s: FloatArray, move
     better, off = q.copy(), np.flatnonzero(np.isfinite(q).all(axis=1))
     for _ in range(STEPS):
         miss = np.hstack(pose_errors(chain, better[off], targets_at(path, s[off])))
-        miss = miss[:, : 3 if path.turning is None else 6]
+        miss = miss[:, : 3 if path.orientation is None else 6]
         far = np.abs(miss).max(axis=1) > NEAR
         off, miss = off[far], miss[far]
         for chosen in _alike(moves[off], np.arange(len(off))):
@@ -225,7 +227,7 @@ class PathJoints:
         s: Places of the grid in [m], rising, shape (n + 1,): among them all rows and ends of segments.
         grid: The joints at these places, a sample a place.
         moves: Which joints move along each interval, shape (n, joints): not those that rest on a limit.
-        touches: Along which intervals a joint comes to a limit or leaves it, shape (n,).
+        limit_contacts: Along which intervals a joint comes to a limit or leaves it, shape (n,).
         after: Slopes where each interval begins, n rows.
         before: Slopes where each one ends, n rows.
     """
@@ -235,9 +237,9 @@ class PathJoints:
     s: FloatArray
     grid: JointPath
     moves: BoolArray
-    touches: BoolArray
-    after: JointSlopes
-    before: JointSlopes
+    limit_contacts: BoolArray
+    after: JointPathDerivatives
+    before: JointPathDerivatives
 
     @property
     def reached(self) -> bool:
@@ -268,14 +270,14 @@ class PathJoints:
         moved = np.abs(step).max(axis=1)
         wanted = np.ceil(np.maximum(moved / FINE, bend / BENT))
         missed = np.abs(step - 0.5 * length[:, None] * (self.after.dq + self.before.dq)).max(axis=1)
-        unknown = self.touches | (missed > MISSED * moved)
+        unknown = self.limit_contacts | (missed > MISSED * moved)
         determinant = self.grid.singularity.determinant
         if determinant is not None:
             unknown |= determinant[1:] * determinant[:-1] < 0.0
         parts = np.where(unknown, PARTS, np.clip(wanted, 1, PARTS))
         return np.where(length > SHORTEST, parts, 1).astype(np.intp)
 
-    def at(self, s: FloatArray) -> JointSlopes:
+    def at(self, s: FloatArray) -> JointPathDerivatives:
         """Return joint values and their slopes, at the end of a segment those after it.
 
         With the way w = s - s_k into interval k, h long, the values are
@@ -288,13 +290,13 @@ class PathJoints:
         Returns:
             Slopes of n rows; NaN where an end of the interval is not reached.
         """
-        k = part_at(self.s, s)
+        k = segment_index(self.s, s)
         way, length = s - self.s[k], np.diff(self.s)[k]
         q = _ahead(self.after, k, way) + (way / length)[:, None] * self._missed()[k]
         lower, upper = joint_limits(self.chain)
-        q = polished(self.chain, self.path, np.clip(q, lower, upper), s, self.moves[k])
+        q = refine_on_path(self.chain, self.path, np.clip(q, lower, upper), s, self.moves[k])
         q = np.clip(q, lower, upper)  # the last digits of a joint that comes to a limit
-        return joint_slopes(self.chain, self.path, q, s, self.moves[k])
+        return joint_path_derivatives(self.chain, self.path, q, s, self.moves[k])
 
     def _missed(self) -> FloatArray:
         """Return what the slopes at the begin of each interval miss its end by, shape (n, joints).
@@ -344,34 +346,43 @@ def _followed(
 ) -> PathJoints:
     """Return the joints on a grid of arc lengths in [m], shape (n + 1,)."""
     grid = solve_path(chain, targets_at(path, s), np.arange(len(s)), start=start, progress=progress)
-    moves, touches = _moving(chain, grid.q)
-    after = joint_slopes(chain, path, grid.q[:-1], s[:-1], moves)
+    moves, limit_contacts = _moving(chain, grid.q)
+    after = joint_path_derivatives(chain, path, grid.q[:-1], s[:-1], moves)
     return PathJoints(
-        chain, path, s, grid, moves, touches, after, _before(chain, path, s, grid.q, moves, after)
+        chain, path, s, grid, moves, limit_contacts, after, _before(chain, path, s, grid.q, moves, after)
     )
 
 
 def _before(
-    chain: Chain, path: LineArcPath, s: FloatArray, q: FloatArray, moves: BoolArray, after: JointSlopes
-) -> JointSlopes:
+    chain: Chain,
+    path: LineArcPath,
+    s: FloatArray,
+    q: FloatArray,
+    moves: BoolArray,
+    after: JointPathDerivatives,
+) -> JointPathDerivatives:
     """Return the slopes where each interval ends: those after it, unless they may step there."""
     steps = np.append((moves[1:] != moves[:-1]).any(axis=1), True)
     steps |= np.isin(s[1:], np.append(path.bounds, path.at))
-    own = joint_slopes(chain, path, q[1:][steps], s[1:][steps], moves[steps], before=True)
+    own = joint_path_derivatives(chain, path, q[1:][steps], s[1:][steps], moves[steps], before=True)
     dq, ddq = np.roll(after.dq, -1, axis=0), np.roll(after.ddq, -1, axis=0)
     dq[steps], ddq[steps] = own.dq, own.ddq
-    return JointSlopes(q[1:], dq, ddq)
+    return JointPathDerivatives(q[1:], dq, ddq)
 
 
-def rests_of(path: LineArcPath) -> FloatArray:
+def required_stops(path: LineArcPath) -> FloatArray:
     """Return where joints with finite accelerations have to rest in [m], shape (k,).
 
     At stops, and where the tool's turn changes its rate.
     """
-    return path.stops if path.turning is None else np.append(path.stops, path.at[path.turning.uneven])
+    return (
+        path.stops
+        if path.orientation is None
+        else np.append(path.stops, path.at[path.orientation.uneven_rows])
+    )
 
 
-def _ahead(slopes: JointSlopes, k: IndexArray, way: FloatArray) -> FloatArray:
+def _ahead(slopes: JointPathDerivatives, k: IndexArray, way: FloatArray) -> FloatArray:
     """Return q + w q' + w^2 q'' / 2 from the rows k on, shape (n, joints)."""
     w = way[:, None]
     return np.asarray(slopes.q[k] + w * (slopes.dq[k] + 0.5 * w * slopes.ddq[k]))
@@ -413,7 +424,7 @@ STILL = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Bounds:
+class PhasePlaneBounds:
     """What holds on n intervals of a grid: |u + slope x| <= most, and x <= fastest where they begin.
 
     Attributes:
@@ -444,8 +455,12 @@ class JointLimits:
     tangential: float = np.inf
 
 
-def fastest_law(
-    s: FloatArray, after: JointSlopes, before: JointSlopes, stop: BoolArray, limits: JointLimits
+def time_optimal_law(
+    s: FloatArray,
+    after: JointPathDerivatives,
+    before: JointPathDerivatives,
+    stop: BoolArray,
+    limits: JointLimits,
 ) -> TimeLaw:
     """Return the law in the least time.
 
@@ -459,7 +474,7 @@ def fastest_law(
     Source: [PhamPham2018]_.
     """
     step = np.diff(s)
-    bounds = bounds_of(step, after, before, limits)
+    bounds = interval_bounds(step, after, before, limits)
     x = _run(step, bounds, stop)
     v = np.sqrt(x)
     moves = v[1:] + v[:-1] > 0.0
@@ -472,7 +487,7 @@ def fastest_law(
     return TimeLaw(phases)
 
 
-def _from_rest_to_rest(bounds: Bounds, i: int, s: float, step: float) -> list[Phase]:
+def _from_rest_to_rest(bounds: PhasePlaneBounds, i: int, s: float, step: float) -> list[Phase]:
     """Return how an interval from s on in [m] is passed from rest to rest: faster to its middle, then slower.
 
     With u constant x rises to u step: |u + slope x| <= most holds where u (1 + |slope| step) <= most.
@@ -483,7 +498,9 @@ def _from_rest_to_rest(bounds: Bounds, i: int, s: float, step: float) -> list[Ph
     return [Phase(half, s, 0.0, u), Phase(half, s + 0.5 * step, u * half, -u)]
 
 
-def bounds_of(step: FloatArray, after: JointSlopes, before: JointSlopes, limits: JointLimits) -> Bounds:
+def interval_bounds(
+    step: FloatArray, after: JointPathDerivatives, before: JointPathDerivatives, limits: JointLimits
+) -> PhasePlaneBounds:
     """Return the bounds that limits set at both ends of each interval.
 
     At its end x + 2 step u stands for x: |(dq + 2 step ddq) u + ddq x| <= a.
@@ -510,10 +527,10 @@ def bounds_of(step: FloatArray, after: JointSlopes, before: JointSlopes, limits:
         )
     fastest[:-1] = np.minimum(fastest[:-1], alone)
     tool = np.zeros((len(step), 1))
-    return Bounds(np.hstack((slope, tool)), np.hstack((most, tool + limits.tangential)), fastest)
+    return PhasePlaneBounds(np.hstack((slope, tool)), np.hstack((most, tool + limits.tangential)), fastest)
 
 
-def _run(step: FloatArray, bounds: Bounds, stop: BoolArray) -> FloatArray:
+def _run(step: FloatArray, bounds: PhasePlaneBounds, stop: BoolArray) -> FloatArray:
     """Return x in [m2/s2] on the grid, shape (n + 1,); 0 at stops."""
     half = 0.5 / step
     most = np.where(stop, 0.0, bounds.fastest)
@@ -529,7 +546,7 @@ def _run(step: FloatArray, bounds: Bounds, stop: BoolArray) -> FloatArray:
     return x
 
 
-def _feasible(bounds: Bounds, half: FloatArray) -> FloatArray:
+def _feasible(bounds: PhasePlaneBounds, half: FloatArray) -> FloatArray:
     """Return the largest x at which any u is allowed that leaves x + 2 step u at 0 or above, shape (n,).
 
     Each pair of bounds has to leave room: -most_j - slope_j x <= most_k - slope_k x.
@@ -549,7 +566,7 @@ SIDE = 1e-9
 """How far from the time at which phases meet both are looked at, as a share of it."""
 
 
-def limits_of_joints(chain: Chain, speed: float = np.inf, tangential: float = np.inf) -> JointLimits:
+def chain_to_limits(chain: Chain, speed: float = np.inf, tangential: float = np.inf) -> JointLimits:
     """Return the largest rates and accelerations of an arm, and of its tool along the path.
 
     Args:
@@ -565,7 +582,7 @@ def limits_of_joints(chain: Chain, speed: float = np.inf, tangential: float = np
     )
 
 
-def law_of_limits(joints: PathJoints, speed: float = np.inf, tangential: float = np.inf) -> TimeLaw:
+def joint_limited_law(joints: PathJoints, speed: float = np.inf, tangential: float = np.inf) -> TimeLaw:
     """Return the law in the least time within the rates and accelerations of the joints.
 
     The limits hold on the grid of the joints; between its places they are exceeded by less than its step
@@ -577,13 +594,13 @@ def law_of_limits(joints: PathJoints, speed: float = np.inf, tangential: float =
         speed: The largest s' in [m/s], too; infinity for none.
         tangential: The largest s'' in [m/s2], too; infinity for none.
     """
-    stop = np.isin(joints.s, rests_of(joints.path))
+    stop = np.isin(joints.s, required_stops(joints.path))
     stop[joints.rate_steps] = True
-    limits = limits_of_joints(joints.chain, speed, tangential)
-    return fastest_law(joints.s, joints.after, joints.before, stop, limits)
+    limits = chain_to_limits(joints.chain, speed, tangential)
+    return time_optimal_law(joints.s, joints.after, joints.before, stop, limits)
 
 
-class Usage(NamedTuple):
+class LimitUtilisation(NamedTuple):
     """The largest use of a limit along a path.
 
     Attributes:
@@ -597,7 +614,7 @@ class Usage(NamedTuple):
     joint: int
 
 
-def largest_usage(joints: PathJoints, law: TimeLaw, *, between: bool = False) -> Usage:
+def max_limit_utilisation(joints: PathJoints, law: TimeLaw, *, between: bool = False) -> LimitUtilisation:
     """Return the largest use of a joint's limit by a law.
 
     It is looked for in the middle and just inside both ends of each interval of the grid, and on both sides
@@ -610,9 +627,9 @@ def largest_usage(joints: PathJoints, law: TimeLaw, *, between: bool = False) ->
 
     Source: [Iso9283]_ section 4, steps 17 and 18.
     """
-    limits = limits_of_joints(joints.chain)
+    limits = chain_to_limits(joints.chain)
     if not np.isfinite([limits.velocity, limits.acceleration]).any():
-        return Usage(0.0, 0.0, 0)
+        return LimitUtilisation(0.0, 0.0, 0)
     s, step = joints.s, INSIDE * np.diff(joints.s)
     middle = 0.5 * (s[1:] + s[:-1])
     looked = [_usage(joints.at(middle), law.at(law.time_at(middle)), limits)]
@@ -625,9 +642,9 @@ def largest_usage(joints: PathJoints, law: TimeLaw, *, between: bool = False) ->
     return max(looked)
 
 
-def _usage(slopes: JointSlopes, motion: PathMotion, limits: JointLimits) -> Usage:
+def _usage(slopes: JointPathDerivatives, motion: PathMotion, limits: JointLimits) -> LimitUtilisation:
     """Return the largest use of a limit, of n places."""
     rates, accelerations = slopes.rates(motion.v, motion.a)
     share = np.maximum(np.abs(rates) / limits.velocity, np.sqrt(np.abs(accelerations) / limits.acceleration))
     place, joint = np.unravel_index(int(share.argmax()), share.shape)
-    return Usage(float(share[place, joint]), float(motion.s[place]), int(joint))
+    return LimitUtilisation(float(share[place, joint]), float(motion.s[place]), int(joint))

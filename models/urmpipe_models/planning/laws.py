@@ -124,13 +124,13 @@ class TimeLaw:
         found = np.where(s >= last - MET * whole, self.ends[k], self.ends[k] - self._table[k, 0] + high)
         return np.where(s <= begin[0], 0.0, found)
 
-    def slower(self, factor: float) -> TimeLaw:
+    def scaled(self, factor: float) -> TimeLaw:
         """Return the same law with all speeds multiplied by a factor: t / f, f v, f^2 a, f^3 j."""
         scale = np.array([1.0 / factor, 1.0, factor, factor**2, factor**3, 1.0, 1.0])
         return TimeLaw([Phase(*row) for row in (self._table * scale).tolist()])
 
 
-def swing_at(speed: FloatArray | float, a: float, radius: float) -> FloatArray:
+def swing_phase(speed: FloatArray | float, a: float, radius: float) -> FloatArray:
     """Return w of a swing that speeds up, -K to 0, at speeds v: cn(w) = v / sqrt(a r) [-], shape (n,).
 
     Args:
@@ -180,7 +180,7 @@ ARCS: tuple[Arcs, ...] = ("tangential", "total")
 """What a largest acceleration holds on an arc: s'' alone, or sqrt(s''^2 + (s'^2 / r)^2)."""
 
 
-class Piece(NamedTuple):
+class SpeedSegment(NamedTuple):
     """A piece of a stretch.
 
     Attributes:
@@ -194,7 +194,9 @@ class Piece(NamedTuple):
     fastest: float
 
 
-def stretches(path: LineArcPath, velocity: float, acceleration: float, arcs: Arcs) -> Iterator[list[Piece]]:
+def split_at_stops(
+    path: LineArcPath, velocity: float, acceleration: float, arcs: Arcs
+) -> Iterator[list[SpeedSegment]]:
     """Yield the pieces from each stop to the next.
 
     Where s'' alone is held all of a stretch is one piece; else each segment is one, an arc with the largest
@@ -209,10 +211,10 @@ def stretches(path: LineArcPath, velocity: float, acceleration: float, arcs: Arc
     bounds = np.searchsorted(path.bounds, path.stops).tolist()  # a stop is a bound, to the last bit
     for first, last in pairwise(bounds):
         if arcs == "tangential":
-            yield [Piece(float(path.bounds[last] - path.bounds[first]), math.inf, velocity)]
+            yield [SpeedSegment(float(path.bounds[last] - path.bounds[first]), math.inf, velocity)]
         else:
             own = zip(path.length[first:last].tolist(), path.radius[first:last].tolist(), strict=True)
-            yield [Piece(length, r, min(velocity, math.sqrt(acceleration * r))) for length, r in own]
+            yield [SpeedSegment(length, r, min(velocity, math.sqrt(acceleration * r))) for length, r in own]
 
 
 class _Limited(Protocol):
@@ -226,7 +228,9 @@ class _Limited(Protocol):
 AnyPiece = TypeVar("AnyPiece", bound=_Limited)
 
 
-def speeds(pieces: Sequence[AnyPiece], reached: Callable[[AnyPiece, float], float]) -> list[float]:
+def max_boundary_speeds(
+    pieces: Sequence[AnyPiece], reached: Callable[[AnyPiece, float], float]
+) -> list[float]:
     """Return the largest speeds in [m/s] where pieces begin, and where the last one ends, 0 at both ends.
 
     By one pass along the pieces, and one back.
@@ -263,15 +267,15 @@ def trapezoid_law(
     """
     phases: list[Phase] = []
     begin = 0.0
-    for pieces in stretches(path, velocity, acceleration, arcs):
-        met = speeds(pieces, lambda piece, speed: _reached(piece, speed, acceleration))
+    for pieces in split_at_stops(path, velocity, acceleration, arcs):
+        met = max_boundary_speeds(pieces, lambda piece, speed: _reached(piece, speed, acceleration))
         for piece, (entry, leave) in zip(pieces, pairwise(met), strict=True):
             phases += piece_phases(piece, begin, entry, leave, acceleration)
             begin += piece.length
     return TimeLaw(phases)
 
 
-def _reached(piece: Piece, speed: float, a: float) -> float:
+def _reached(piece: SpeedSegment, speed: float, a: float) -> float:
     """Return the largest speed in [m/s] at the end of a piece that begins with one."""
     if math.isinf(piece.radius):
         return min(piece.fastest, math.sqrt(speed * speed + 2.0 * a * piece.length))
@@ -280,7 +284,7 @@ def _reached(piece: Piece, speed: float, a: float) -> float:
     return min(piece.fastest, math.sqrt(most * math.sin(min(angle, 0.5 * math.pi))))
 
 
-def piece_phases(piece: Piece, begin: float, entry: float, leave: float, a: float) -> Iterator[Phase]:
+def piece_phases(piece: SpeedSegment, begin: float, entry: float, leave: float, a: float) -> Iterator[Phase]:
     """Yield how a piece is passed in the least time: faster, on, slower; none of no duration.
 
     Args:
@@ -301,7 +305,7 @@ def piece_phases(piece: Piece, begin: float, entry: float, leave: float, a: floa
         yield down._replace(s=begin + piece.length - down.s)
 
 
-def _line_rise(piece: Piece, entry: float, leave: float, a: float) -> tuple[float, Phase, Phase]:
+def _line_rise(piece: SpeedSegment, entry: float, leave: float, a: float) -> tuple[float, Phase, Phase]:
     """Return the largest speed along a line, and how it is reached and left; `s` is their way."""
     peak = min(piece.fastest, math.sqrt(0.5 * (entry * entry + leave * leave) + a * piece.length))
     peak = max(peak, entry, leave)
@@ -309,14 +313,14 @@ def _line_rise(piece: Piece, entry: float, leave: float, a: float) -> tuple[floa
     return peak, up, Phase((peak - leave) / a, 0.5 * (peak + leave) * (peak - leave) / a, peak, -a)
 
 
-def _arc_rise(piece: Piece, entry: float, leave: float, a: float) -> tuple[float, Phase, Phase]:
+def _arc_rise(piece: SpeedSegment, entry: float, leave: float, a: float) -> tuple[float, Phase, Phase]:
     """Return the same of an arc along which the total acceleration is held."""
     radius, most = piece.radius, a * piece.radius
     first, last, cap = (math.asin(min(v * v / most, 1.0)) for v in (entry, leave, piece.fastest))
     angle = max(min(cap, 0.5 * (first + last) + piece.length / radius), first, last)
     peak = math.sqrt(most * math.sin(angle))
     rate = math.sqrt(2.0 * a / radius)
-    begin, end, top = swing_at(np.array([entry, leave, peak]), a, radius).tolist()
+    begin, end, top = swing_phase(np.array([entry, leave, peak]), a, radius).tolist()
     up = Phase((top - begin) / rate, 0.5 * radius * (angle - first), 0.0, a, 0.0, radius, begin)
     return peak, up, Phase((top - end) / rate, 0.5 * radius * (angle - last), 0.0, a, 0.0, radius, -top)
 
@@ -349,9 +353,9 @@ def jerk_law(path: LineArcPath, velocity: float, acceleration: float, jerk: floa
     """
     phases: list[Phase] = []
     begin = 0.0
-    for stretch in stretches(path, velocity, acceleration, arcs):
+    for stretch in split_at_stops(path, velocity, acceleration, arcs):
         pieces = [*_held(stretch, acceleration)]
-        met = speeds(pieces, lambda piece, speed: _reached_jerk(piece, speed, jerk))
+        met = max_boundary_speeds(pieces, lambda piece, speed: _reached_jerk(piece, speed, jerk))
         for piece, (entry, leave) in zip(pieces, pairwise(met), strict=True):
             phases += _planned(piece, entry, leave, jerk, begin)
             begin += piece.length
@@ -366,7 +370,7 @@ class _Piece(NamedTuple):
     fastest: float
 
 
-def _held(stretch: Sequence[Piece], acceleration: float) -> Iterator[_Piece]:
+def _held(stretch: Sequence[SpeedSegment], acceleration: float) -> Iterator[_Piece]:
     """Yield the pieces of a stretch with the s'' that each may have."""
     lines = [k for k, piece in enumerate(stretch) if math.isinf(piece.radius)]
     for k, piece in enumerate(stretch):

@@ -102,13 +102,13 @@ def _array(values: ArrayLike) -> FloatArray:
         return np.array(np.nan)
 
 
-UNEVEN = 2e-5
+EVEN_TURN_TOLERANCE = 2e-5
 """Turns from row to row that differ by less, in [rad], may be one even turn whose angles have six digits:
 each is then off by up to 5e-6, and a difference of turns has three of them, that of the middle row twice."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Turning:
+class OrientationPath:
     """Orientations at places of a path, and how fast the tool turns from each to the next.
 
     Attributes:
@@ -124,11 +124,11 @@ class Turning:
 
     def rates(self, s: FloatArray, *, before: bool = False) -> FloatArray:
         """Return the rate in [rad/m], shape (n, 3), at arc lengths in [m], shape (n,); at a row after it."""
-        return np.asarray(self.rate[part_at(self.at, s, before=before)])
+        return np.asarray(self.rate[segment_index(self.at, s, before=before)])
 
     def quaternions(self, s: FloatArray) -> FloatArray:
         """Return the orientation at arc lengths in [m], shape (n,), as x, y, z, w [-], shape (n, 4)."""
-        k = part_at(self.at, s)
+        k = segment_index(self.at, s)
         turned = self.rate[k] * (s - self.at[k])[:, None]
         return product(quaternions(turned, "vector"), self.quat_xyzw[k])
 
@@ -137,17 +137,17 @@ class Turning:
         return matrices(self.quaternions(s))
 
     @property
-    def uneven(self) -> IndexArray:
+    def uneven_rows(self) -> IndexArray:
         """Rows, from 0, that the tool passes while the rate of its turn changes [-], shape (k,).
 
         By an angle that is more than rounding of the rows: over the shorter way to a row beside it.
         """
         way = np.diff(self.at)
         change = np.linalg.norm(np.diff(self.rate, axis=0), axis=1) * np.minimum(way[:-1], way[1:])
-        return np.flatnonzero(change > UNEVEN) + 1
+        return np.flatnonzero(change > EVEN_TURN_TOLERANCE) + 1
 
 
-def part_at(bounds: FloatArray, s: FloatArray, *, before: bool = False) -> IndexArray:
+def segment_index(bounds: FloatArray, s: FloatArray, *, before: bool = False) -> IndexArray:
     """Return the part between bounds in which each arc length is, shape (n,).
 
     Args:
@@ -159,7 +159,7 @@ def part_at(bounds: FloatArray, s: FloatArray, *, before: bool = False) -> Index
     return np.asarray(np.clip(found, 0, len(bounds) - 2))
 
 
-def turning_of(rotation: FloatArray, at: FloatArray) -> Turning:
+def interpolate_orientations(rotation: FloatArray, at: FloatArray) -> OrientationPath:
     """Return how the tool turns by the shorter way from row to row, evenly along the path.
 
     Args:
@@ -168,7 +168,7 @@ def turning_of(rotation: FloatArray, at: FloatArray) -> Turning:
     """
     quats = continuous_quaternions(quaternions(rotation.reshape(-1, 9), "matrix"))
     turn = rotation_vectors(product(quats[1:], conjugate(quats[:-1])))
-    return Turning(at, quats, turn / np.diff(at)[:, None])
+    return OrientationPath(at, quats, turn / np.diff(at)[:, None])
 
 
 STRAIGHT = 1e-9
@@ -213,12 +213,12 @@ class Arc:
         return self.radius * math.tan(0.5 * self.angle)
 
 
-def unit(vector: FloatArray) -> FloatArray:
+def normalise(vector: FloatArray) -> FloatArray:
     """Return the direction of a vector, shape (3,), with length 1 [-]."""
     return vector / np.linalg.norm(vector)
 
 
-def towards(tangent: FloatArray, onward: FloatArray) -> FloatArray | None:
+def perpendicular_towards(tangent: FloatArray, onward: FloatArray) -> FloatArray | None:
     """Return the unit vector across a direction to the side of another [-], shape (3,); None if parallel.
 
     Args:
@@ -226,7 +226,7 @@ def towards(tangent: FloatArray, onward: FloatArray) -> FloatArray | None:
         onward: Unit vector [-], shape (3,).
     """
     across = onward - (onward @ tangent) * tangent
-    return None if np.linalg.norm(across) <= STRAIGHT else unit(across)
+    return None if np.linalg.norm(across) <= STRAIGHT else normalise(across)
 
 
 def arc_at_corner(
@@ -244,7 +244,7 @@ def arc_at_corner(
         radius: In [m].
         variant: 2 to turn towards `onward`, 1 to turn away from it.
     """
-    side = towards(tangent, onward)
+    side = perpendicular_towards(tangent, onward)
     if side is None:
         return None
     turn = math.atan2(float(onward @ side), float(onward @ tangent))
@@ -276,7 +276,7 @@ def arc_from(
 
     Source: [Iso9283]_ section 2, section 4 steps 3 to 6.
     """
-    side = towards(tangent, unit(onward))
+    side = perpendicular_towards(tangent, normalise(onward))
     if side is None:
         return None
     normal = side if variant == PROPER else -side
@@ -289,7 +289,7 @@ def arc_from(
     return Arc(start, tangent, normal, radius, angle), way
 
 
-def largest_radius(tangent: FloatArray, onward: FloatArray) -> float:
+def max_arc_radius(tangent: FloatArray, onward: FloatArray) -> float:
     """Return the largest radius in [m] with which `arc_from` reaches its point, (a^2 + b^2) / (2 b).
 
     Args:
@@ -331,7 +331,7 @@ class LineArcPath:
         at: Where each of the n rows is along the path in [m], rising, shape (n,); of a corner the middle of
             its arc.
         stop_row: The rows at which the path stops, from 0, shape (k,), the first and the last among them.
-        turning: How the tool is turned along it; None if that is left open.
+        orientation: How the tool is turned along it; None if that is left open.
 
     Source: [Iso9283]_ section 2, eq. 1-4.
     """
@@ -344,7 +344,7 @@ class LineArcPath:
     row: IndexArray
     at: FloatArray
     stop_row: IndexArray
-    turning: Turning | None = None
+    orientation: OrientationPath | None = None
 
     def __len__(self) -> int:
         return len(self.length)
@@ -387,7 +387,7 @@ class LineArcPath:
 
     def segment_at(self, s: FloatArray, *, before: bool = False) -> IndexArray:
         """Return the segment at each arc length in [m], shape (n,); where two meet the later or the first."""
-        return part_at(self.bounds, s, before=before)
+        return segment_index(self.bounds, s, before=before)
 
     def points(self, s: FloatArray, *, before: bool = False) -> PathPoints:
         """Return place, direction and curvature at arc lengths.
@@ -467,7 +467,7 @@ def cube_rows(
 
     Source: [Iso9283]_ section 2, eq. 5, and section 5.
     """
-    if wrong := list(cube_faults(kind, plane, side, radius)):
+    if wrong := list(validate_cube(kind, plane, side, radius)):
         raise OptionError(*wrong)
     sections = PLANES[kind]
     u, v = np.array(sections[plane or next(iter(sections))], dtype=float)
@@ -480,7 +480,7 @@ def cube_rows(
     return PathRows(corners, radius, rotation=rotation)
 
 
-def cube_faults(kind: str, plane: str | None, side: float, radius: float) -> Iterator[Finding]:
+def validate_cube(kind: str, plane: str | None, side: float, radius: float) -> Iterator[Finding]:
     """Yield what is wrong with a contour.
 
     Args:

@@ -26,7 +26,7 @@ from urmpipe_models.arm.chain import (
     Sphere,
     Visual,
 )
-from urmpipe_models.dynamics.links import Symmetric, turned
+from urmpipe_models.dynamics.links import Symmetric, rotate_inertia
 from urmpipe_models.errors import Finding, Hint, RobotError, did_you_mean, listed, shown
 from urmpipe_models.math3d import Transform
 from urmpipe_models.robots.urdf_tree import (
@@ -125,7 +125,7 @@ def _inertial(tree: UrdfTree, carrier: CarrierLink) -> tuple[list[Inertial], lis
     if found is None:
         return [], wrong
     frame = carrier.frame @ found.origin
-    (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = turned(frame, found.inertia)
+    (ixx, ixy, ixz), (_, iyy, iyz), (_, _, izz) = rotate_inertia(frame, found.inertia)
     inertial = Inertial(
         carrier.joint, found.mass, frame.translation, (ixx, iyy, izz, ixy, ixz, iyz), f"link {carrier.link}"
     )

@@ -12,7 +12,7 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import line_of
 from urmpipe_models.errors import Voice
-from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.path import LineArcPath, PathRows
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion, Errors
 from urmpipe_pipeline.comparison.deviation import Verdict
@@ -84,7 +84,7 @@ class Accuracy(Result):
     @cached_property
     def path(self) -> LineArcPath:
         """The lines and arcs through its rows."""
-        return path_of(self.rows)
+        return rows_to_path(self.rows)
 
     @cached_property
     def errors(self) -> tuple[Errors, ...]:

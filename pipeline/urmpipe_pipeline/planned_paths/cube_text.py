@@ -12,7 +12,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, OptionError, not_among
 from urmpipe_models.math3d import matrices, quaternions
 from urmpipe_models.measure_units import WRITTEN, quantity
-from urmpipe_models.planning.path import PLANES, PathRows, cube_faults, cube_rows
+from urmpipe_models.planning.path import PLANES, PathRows, cube_rows, validate_cube
 from urmpipe_pipeline.planned_paths.row_checks import FARTHEST
 
 CUBE = "cube:"
@@ -40,7 +40,7 @@ def read_cube(text: str) -> tuple[str, PathRows]:
     values = dict(_values(given, faults))
     plane = given.get(PLANE)
     faults += _missing(given)
-    faults += cube_faults(kind, plane, values.get("a", math.nan), values.get("r", math.nan))
+    faults += validate_cube(kind, plane, values.get("a", math.nan), values.get("r", math.nan))
     if faults:
         raise OptionError(*(replace(fault, parameter="path") for fault in faults))
     a, r, *centre = (values[key] for key in LENGTH_KEYS)

@@ -11,7 +11,7 @@ import numpy as np
 from urmpipe_models.elementwise import BoolArray
 from urmpipe_models.ik.branch_walk import find_true_runs
 from urmpipe_models.ik.path import JointPath
-from urmpipe_models.planning.joints import PathJoints, Usage
+from urmpipe_models.planning.joints import LimitUtilisation, PathJoints
 from urmpipe_models.planning.laws import TimeLaw
 from urmpipe_pipeline.text import in_words
 
@@ -71,7 +71,7 @@ def obstacles_of(joints: PathJoints, law: TimeLaw) -> Iterator[Obstacle]:
         yield _obstacle(joints, law, float(s[first]), "singular", words, names[moved_most])
 
 
-def too_slow(joints: PathJoints, law: TimeLaw, usage: Usage, factor: float) -> Obstacle:
+def too_slow(joints: PathJoints, law: TimeLaw, usage: LimitUtilisation, factor: float) -> Obstacle:
     """Return the obstacle that speeds would have to fall by a factor [-] for a joint.
 
     Args:

@@ -13,10 +13,16 @@ from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, OptionError, PathError
 from urmpipe_models.ik.solutions import SearchOptions
 from urmpipe_models.ik.solve import solve
-from urmpipe_models.planning.from_rows import path_of
-from urmpipe_models.planning.joints import PathJoints, joints_along, largest_usage, law_of_limits, targets_at
+from urmpipe_models.planning.from_rows import rows_to_path
+from urmpipe_models.planning.joints import (
+    PathJoints,
+    joint_limited_law,
+    joints_along,
+    max_limit_utilisation,
+    targets_at,
+)
 from urmpipe_models.planning.laws import PathMotion, TimeLaw, jerk_law, trapezoid_law
-from urmpipe_models.planning.path import UNEVEN, LineArcPath
+from urmpipe_models.planning.path import EVEN_TURN_TOLERANCE, LineArcPath
 from urmpipe_pipeline.joint_log import LogWarning, seconds
 from urmpipe_pipeline.planned_paths.obstacles import WORTH_MOVING, Obstacle, obstacles_of, too_slow
 from urmpipe_pipeline.planned_paths.path_file import GivenPath
@@ -56,7 +62,7 @@ def joints_of(given: GivenPath, request: Request, progress: Progress = None) -> 
     """
     if request.arm is None:
         return None
-    path = path_of(given.rows)
+    path = rows_to_path(given.rows)
     _refuse_out_of_reach(given, path, request.arm, request.start)
     return joints_along(request.arm, path, request.start, progress)
 
@@ -78,7 +84,7 @@ def plan_path(
 
     Source: [Iso9283]_ section 4, steps 7 to 18.
     """
-    path, arm, timing = path_of(given.rows), request.arm, request.timing
+    path, arm, timing = rows_to_path(given.rows), request.arm, request.timing
     joints = joints_of(given, request, progress) if joints is None else joints
     timed, samples = _within_limits(path, joints, _timed(path, joints, timing))
     law = timed.law
@@ -146,7 +152,7 @@ def _timed(path: LineArcPath, joints: PathJoints | None, timing: Timing) -> _Tim
     if joints is None or obstacles or timing.law != "limits":
         return _Timed(usual, law, tuple(obstacles))
     speed, rise = timing.velocity_limit or math.inf, timing.acceleration_limit or math.inf
-    return _Timed(timing, law_of_limits(joints, speed, rise))
+    return _Timed(timing, joint_limited_law(joints, speed, rise))
 
 
 def _within_limits(path: LineArcPath, joints: PathJoints | None, timed: _Timed) -> tuple[_Timed, _Samples]:
@@ -158,16 +164,16 @@ def _within_limits(path: LineArcPath, joints: PathJoints | None, timed: _Timed) 
     law, scaled, tsp = timed.law, 1.0, timed.timing.tsp
     if joints is None or timed.obstacles:
         return timed, _sampled(path, joints, law, tsp)
-    usage = largest_usage(joints, law, between=timed.timing.law == "limits")
+    usage = max_limit_utilisation(joints, law, between=timed.timing.law == "limits")
     if usage.share > FOLLOWED:
         scaled = SPARE / usage.share
         if scaled < WORTH_MOVING:
             slow = too_slow(joints, law, usage, scaled)
             return replace(timed, obstacles=(slow,)), _sampled(path, joints, law, tsp)
-        law = law.slower(scaled)
+        law = law.scaled(scaled)
     samples = _sampled(path, joints, law, tsp)
     while samples.joints is not None and (share := samples.joints.speed_share) > FOLLOWED:
-        law, scaled = law.slower(SPARE / share), scaled * SPARE / share
+        law, scaled = law.scaled(SPARE / share), scaled * SPARE / share
         samples = _sampled(path, joints, law, tsp)
     return replace(timed, law=law, scaled=scaled), samples
 
@@ -188,7 +194,7 @@ def _sampled(path: LineArcPath, joints: PathJoints | None, law: TimeLaw, tsp: fl
         return _Samples(t_ns, motion, None)
     slopes = joints.at(s)
     rates = slopes.rates(motion.v, motion.a)
-    return _Samples(t_ns, motion, PlannedJoints(joints.chain, slopes.q, *rates, path.turning is not None))
+    return _Samples(t_ns, motion, PlannedJoints(joints.chain, slopes.q, *rates, path.orientation is not None))
 
 
 def _warnings(path: LineArcPath, joints: PathJoints | None, timed: _Timed) -> Iterator[LogWarning]:
@@ -196,7 +202,11 @@ def _warnings(path: LineArcPath, joints: PathJoints | None, timed: _Timed) -> It
     yield from _half_turns(path)
     if timed.timing.law == "limits":
         return
-    uneven = [] if path.turning is None else [int(k) for k in path.turning.uneven if k not in path.stop_row]
+    uneven = (
+        []
+        if path.orientation is None
+        else [int(k) for k in path.orientation.uneven_rows if k not in path.stop_row]
+    )
     if uneven:
         rows = rows_text(np.array(uneven) + 1)
         words = f"the tool's angular rate steps in {rows} while it moves, and so do the joints' rates"
@@ -220,10 +230,10 @@ def _beyond_efforts(timed: _Timed, samples: _Samples) -> list[LogWarning]:
 
 def _half_turns(path: LineArcPath) -> Iterator[LogWarning]:
     """Yield from which rows the tool turns by 180 deg to the next."""
-    if path.turning is None:
+    if path.orientation is None:
         return
-    turned = np.linalg.norm(path.turning.rate, axis=1) * np.diff(path.at)
-    rows = np.flatnonzero(turned > math.pi - UNEVEN)
+    turned = np.linalg.norm(path.orientation.rate, axis=1) * np.diff(path.at)
+    rows = np.flatnonzero(turned > math.pi - EVEN_TURN_TOLERANCE)
     if len(rows):
         words = f"the tool turns by 180 deg from {rows_text(rows + 1)} to the next: either way is as short"
         yield LogWarning("half-turn", words)

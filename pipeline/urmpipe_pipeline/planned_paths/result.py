@@ -13,7 +13,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import line_of
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Voice
-from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.laws import Arcs, PathMotion
 from urmpipe_models.planning.path import LineArcPath, PathRows
 from urmpipe_pipeline.comparison.deviation import Verdict
@@ -87,7 +87,7 @@ class PlannedPath(Result):
     @cached_property
     def path(self) -> LineArcPath:
         """The lines and arcs through its rows."""
-        return path_of(self.rows)
+        return rows_to_path(self.rows)
 
     @property
     def t(self) -> FloatArray:
@@ -102,8 +102,8 @@ class PlannedPath(Result):
     @property
     def quat_xyzw(self) -> FloatArray | None:
         """How the tool shall be turned, as x, y, z, w [-], shape (n, 4); None where that is left open."""
-        turning = self.path.turning
-        return None if turning is None else turning.quaternions(self.motion.s)
+        orientation = self.path.orientation
+        return None if orientation is None else orientation.quaternions(self.motion.s)
 
     @property
     def row(self) -> IntArray:

@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, OptionError, PathError
 from urmpipe_models.ik.solutions import Targets, validate_targets
-from urmpipe_models.planning.from_rows import end_faults, path_faults
+from urmpipe_models.planning.from_rows import validate_ends, validate_rows
 from urmpipe_models.planning.path import VARIANTS, PathRows
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.text import counted
@@ -42,10 +42,10 @@ def curve_faults(rows: PathRows) -> tuple[Finding, ...]:
     """
     if len(rows) < FEWEST:
         few = Finding(found=counted(len(rows), "row"), allowed=f"{FEWEST} or more")
-        return (few, *end_faults(rows))
+        return (few, *validate_ends(rows))
     if far := [*_far_away(rows)]:
-        return (*far, *end_faults(rows))
-    return tuple(path_faults(rows) if np.isfinite(rows.position).all() else end_faults(rows))
+        return (*far, *validate_ends(rows))
+    return tuple(validate_rows(rows) if np.isfinite(rows.position).all() else validate_ends(rows))
 
 
 def _far_away(rows: PathRows) -> Iterator[Finding]:

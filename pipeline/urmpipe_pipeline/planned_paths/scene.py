@@ -136,8 +136,8 @@ def _obstacle_spots(plan: PlannedPath) -> tuple[Spot, ...]:
 
 def _quaternions(plan: PlannedPath, at: IndexArray) -> FloatArray | None:
     """Return how the tool is turned at rows, x, y, z, w [-], shape (n, 4): as planned, else by kinematics."""
-    if plan.path.turning is not None:
-        return plan.path.turning.quaternions(plan.path.at)
+    if plan.path.orientation is not None:
+        return plan.path.orientation.quaternions(plan.path.at)
     if plan.joints is None or not plan.reached[at].all():
         return None
     rotation = poses_over_log(plan.joints.chain, plan.joints.q[at])[1]

@@ -9,7 +9,7 @@ from functools import cache, partial
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.dynamics.equations import energies_over_log, terms_over_log
+from urmpipe_models.dynamics.equations import energies_over_log, torque_terms_over_log
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
@@ -65,7 +65,7 @@ def joint_torques_figure(run: Run, robot: Chain, tau: FloatArray) -> Figure:
 
 def terms_figure(run: Run, robot: Chain, tau: FloatArray) -> Figure:
     """Return the terms of each joint's torque, in [N.m] or [N], shape (g, joints), stacked."""
-    terms = cache(partial(terms_over_log, robot, run.q, run.qd, run.qdd))
+    terms = cache(partial(torque_terms_over_log, robot, run.q, run.qd, run.qdd))
     views = []
     for j, (name, unit) in enumerate(zip(run.log.joints, run.torque_units, strict=True)):
         parts = Computed(len(run.t_ns), partial(_terms_of, terms, j))

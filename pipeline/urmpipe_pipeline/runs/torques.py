@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.dynamics.equations import torque_over_log
+from urmpipe_models.dynamics.equations import torques_over_log
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Hint
 from urmpipe_pipeline import text
@@ -81,7 +81,7 @@ def torques_of_log(robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: Floa
     """
     if robot is None or not robot.inertials or q.shape[1] == 0:
         return None
-    tau = torque_over_log(robot, q, qd, qdd)
+    tau = torques_over_log(robot, q, qd, qdd)
     return tau if np.isfinite(tau).any() else None
 
 

@@ -13,9 +13,9 @@ import pytest
 from made_masses import with_masses
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.dynamics.equations import (
+    centres_of_mass_over_log,
     forward_dynamics,
     inverse_dynamics,
-    mass_centres_over_log,
     mass_matrix,
     torque_terms,
 )
@@ -185,7 +185,7 @@ def test_energies_and_centres_are_those_of_pinocchio(states: States) -> None:
     np.testing.assert_allclose(level, level[0], rtol=0.0, atol=1e-12 * np.abs(potential).max())
     moving = [k for k, one in enumerate(states.chain.inertials) if one.joint in moved_by(states.chain)]
     masses = np.array([states.chain.inertials[k].mass for k in moving])
-    found = masses @ mass_centres_over_log(states.chain, states.q)[:, moving] / masses.sum()
+    found = masses @ centres_of_mass_over_log(states.chain, states.q)[:, moving] / masses.sum()
     whole = [pinocchio.centerOfMass(states.model, states.data, row).copy() for row in states.q]
     assert_same(found, np.array(whole))
 

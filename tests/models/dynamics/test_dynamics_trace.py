@@ -20,20 +20,20 @@ from urmpipe_models.dynamics.driven_arm import (
     Spring,
     arm_energy,
     joint_accelerations,
-    motor_rates,
-    powers,
+    motor_derivatives,
+    power_flow,
 )
 from urmpipe_models.dynamics.equations import (
-    coordinate_sizes,
     forward_dynamics,
     inverse_dynamics,
     mass_matrix,
+    mass_matrix_scales,
     torque_terms,
 )
 from urmpipe_models.dynamics.links import (
     Wrench,
+    centres_of_mass,
     kinetic_energy,
-    mass_centres,
     mass_motions,
     potential_energy,
     wrench_power,
@@ -76,10 +76,10 @@ def test_equations_of_motion_trace(arm: Chain) -> None:
     assert_traced(lambda q, v, a, w: inverse_dynamics(chain, q, v, a, wrench_of(w)), [n, n, n, 6])
     assert_traced(lambda q, v, a, w: torque_terms(chain, q, v, a, wrench_of(w)), [n, n, n, 6])
     assert_traced(lambda q, v, a, w: forward_dynamics(chain, q, v, a, wrench_of(w)), [n, n, n, 6])
-    assert_traced(lambda q: [mass_matrix(chain, q), coordinate_sizes(chain, q)], [n])
+    assert_traced(lambda q: [mass_matrix(chain, q), mass_matrix_scales(chain, q)], [n])
     assert_traced(lambda q, v: [kinetic_energy(chain, q, v), potential_energy(chain, q)], [n, n])
     assert_traced(lambda q, v, w: wrench_power(chain, q, v, wrench_of(w)), [n, n, 6])
-    assert_traced(lambda q: mass_centres(chain, q), [n])
+    assert_traced(lambda q: centres_of_mass(chain, q), [n])
     assert_traced(
         lambda q, v: [(one.centre, one.velocity, one.omega) for one in mass_motions(chain, q, v)], [n, n]
     )
@@ -125,8 +125,8 @@ def test_a_driven_arm_traces_with_its_drives_as_parameters() -> None:
     def everything(*values: Any) -> list[Any]:
         state = state_of(*values)
         wrench = Wrench((1.0, 2.0, 3.0))
-        rates = [list(one) for one in motor_rates(state).values()]
-        flows = [*powers(chain, state, wrench), arm_energy(chain, state)]
+        rates = [list(one) for one in motor_derivatives(state).values()]
+        flows = [*power_flow(chain, state, wrench), arm_energy(chain, state)]
         return [joint_accelerations(chain, state, wrench), rates, flows]
 
     sizes = [6, 6, 20, 7]

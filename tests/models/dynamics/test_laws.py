@@ -14,22 +14,22 @@ from made_masses import body, with_masses
 from sliding_arm import sliding_arm
 from urmpipe_models.arm.chain import Chain, Inertial, Joint, JointKind, Mimic
 from urmpipe_models.dynamics.equations import (
-    check_motion,
+    check_solvable,
     energies_over_log,
-    factors,
+    factor_ldl,
     forward_dynamics,
     inverse_dynamics,
     mass_matrix,
-    solved,
-    terms_over_log,
-    torque_over_log,
+    solve_ldl,
     torque_terms,
+    torque_terms_over_log,
+    torques_over_log,
 )
 from urmpipe_models.dynamics.links import (
     Wrench,
+    centres_of_mass,
+    chain_to_links,
     kinetic_energy,
-    links_of,
-    mass_centres,
     mass_motions,
     potential_energy,
     wrench_power,
@@ -139,7 +139,7 @@ def test_centres_move_as_points_of_the_chain_do(seed: int) -> None:
     np.testing.assert_allclose(found.centre, motion.pose.translation, rtol=0.0, atol=ROUNDED)
     np.testing.assert_allclose(found.velocity, motion.velocity, rtol=0.0, atol=ROUNDED)
     assert np.linalg.norm(found.omega) == pytest.approx(np.linalg.norm(motion.omega), abs=ROUNDED)
-    (centre,) = mass_centres(carrying, q)
+    (centre,) = centres_of_mass(carrying, q)
     np.testing.assert_array_equal(centre, found.centre)
 
 
@@ -148,7 +148,7 @@ def test_centres_move_as_points_of_the_chain_do(seed: int) -> None:
 def test_forward_dynamics_undo_the_inverse(seed: int) -> None:
     chain = random_arm(seed)
     try:
-        check_motion(chain)
+        check_solvable(chain)
     except RobotError:  # slides along one line, with no mass between them
         return
     q, qd, tau = random_state(chain, seed)
@@ -174,7 +174,7 @@ def test_bodies_that_are_fixed_to_one_frame_are_one_body() -> None:
     chain = load_robot("urm6")
     rng = np.random.default_rng(4)
     some = [body("phi3", rng), body("effector", rng), body("phi6", rng)]
-    links = links_of(replace(chain, inertials=tuple(some))).links
+    links = chain_to_links(replace(chain, inertials=tuple(some))).links
     assert [link.mass for link in links] == [0.0, 0.0, some[0].mass, 0.0, 0.0, some[1].mass + some[2].mass]
 
 
@@ -182,7 +182,7 @@ def test_long_logs_are_as_each_row() -> None:
     chain = with_masses(load_robot("urm6"))
     rng = np.random.default_rng(5)
     q, qd, qdd = rng.normal(size=(3, 40_000, 6))  # more than two blocks
-    tau, terms = torque_over_log(chain, q, qd, qdd), terms_over_log(chain, q, qd, qdd)
+    tau, terms = torques_over_log(chain, q, qd, qdd), torque_terms_over_log(chain, q, qd, qdd)
     np.testing.assert_allclose(sum(terms.values()), tau, rtol=0.0, atol=1e-11)
     kinetic, potential = energies_over_log(chain, q, qd)
     for k in (0, 20_000, 39_999):
@@ -215,12 +215,12 @@ def test_factors_solve_positive_definite_systems(seed: int, size: int) -> None:
     rng = np.random.default_rng(seed)
     root = rng.normal(size=(size, size))
     matrix, right = root @ root.T + 0.1 * np.eye(size), rng.normal(size=size)
-    lower, pivots = factors(matrix.tolist())
+    lower, pivots = factor_ldl(matrix.tolist())
     full = np.eye(size)
     for i, row in enumerate(lower):
         full[i, :i] = row
     np.testing.assert_allclose(full @ np.diag(pivots) @ full.T, matrix, rtol=0.0, atol=1e-12)
-    found = solved(matrix.tolist(), right.tolist())
+    found = solve_ldl(matrix.tolist(), right.tolist())
     np.testing.assert_allclose(matrix @ found, right, rtol=0.0, atol=1e-13 * np.linalg.cond(matrix))
 
 
@@ -242,11 +242,11 @@ def test_joints_that_move_no_mass_are_named() -> None:
         inertials=(Inertial("slide", 1.0, (0.5, 0.0, 0.0)),),
     )
     with pytest.raises(RobotError) as error:
-        check_motion(chain)
+        check_solvable(chain)
     assert str(error.value).splitlines() == [
         f"robot bare: joint {name}: {NO_INERTIA}" for name in ("again", "spin")
     ]
-    check_motion(with_masses(sliding_arm()))
+    check_solvable(with_masses(sliding_arm()))
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -256,10 +256,10 @@ def test_a_point_on_the_axis_of_the_last_joint_is_found_wherever_the_arm_stands(
     point = Inertial("wrist_3_joint", 0.5, (0.0, 0.0, 0.05))
     far = from_offset((100.0 * np.random.default_rng(seed).normal(size=3)).tolist())
     with pytest.raises(RobotError) as error:
-        check_motion(replace(chain, inertials=(*some, point)).placed(far))
+        check_solvable(replace(chain, inertials=(*some, point)).placed(far))
     assert str(error.value) == f"robot ur5e: joint wrist_3_joint: {NO_INERTIA}"
     speck = Inertial("wrist_3_joint", 1e-3, (0.0, 0.0, 0.05), (1e-9, 1e-9, 1e-9, 0.0, 0.0, 0.0))
-    check_motion(replace(chain, inertials=(*some, speck)).placed(far))
+    check_solvable(replace(chain, inertials=(*some, speck)).placed(far))
 
 
 def test_an_arm_that_starts_where_a_joint_moves_nothing_is_refused() -> None:
@@ -268,9 +268,9 @@ def test_an_arm_that_starts_where_a_joint_moves_nothing_is_refused() -> None:
     joints = [Joint(name, axis=axis) for name, axis in zip(names, np.eye(3)[[2, 1, 2]].tolist(), strict=True)]
     chain = Chain("wrist", tuple(joints), inertials=(body("w3", np.random.default_rng(1)),))
     with pytest.raises(RobotError) as error:
-        check_motion(chain)
+        check_solvable(chain)
     assert str(error.value) == (f"robot wrist: joint w3: at its start pose {NO_INERTIA}")
-    check_motion(replace(chain, start=(0.0, 0.5, 0.0)))
+    check_solvable(replace(chain, start=(0.0, 0.5, 0.0)))
 
 
 def test_a_frame_far_before_the_first_joint_costs_no_digits() -> None:
@@ -290,7 +290,7 @@ def test_an_arm_without_masses_says_which_key_is_missing() -> None:
         lambda: forward_dynamics(chain, still, still, still),
         lambda: torque_terms(chain, still, still, still),
         lambda: kinetic_energy(chain, still, still),
-        lambda: check_motion(chain),
+        lambda: check_solvable(chain),
     ):
         with pytest.raises(RobotError) as error:
             ask()

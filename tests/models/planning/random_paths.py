@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn
 
-from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.path import PathRows
 
 legs = st.integers(50, 500).map(lambda mm: mm / 1000.0)
@@ -45,7 +45,7 @@ def corner_rows(draw: DrawFn, variants: bool = False) -> PathRows:
 
 def by_first_points(rows: PathRows) -> PathRows:
     """Return the same path by the first points of its arcs, as the paper tells it."""
-    path = path_of(rows)
+    path = rows_to_path(rows)
     position = rows.position.copy()
     position[path.row[path.arcs]] = path.start[path.arcs]
     return PathRows(position, rows.radius, variant=rows.variant)

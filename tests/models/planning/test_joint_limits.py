@@ -14,16 +14,16 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IndexArray
 from urmpipe_models.ik.solutions import pose_errors
 from urmpipe_models.planning import joints as path_joints
-from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.joints import (
     JointLimits,
-    JointSlopes,
+    JointPathDerivatives,
     PathJoints,
-    fastest_law,
+    joint_limited_law,
     joints_along,
-    largest_usage,
-    law_of_limits,
+    max_limit_utilisation,
     targets_at,
+    time_optimal_law,
 )
 from urmpipe_models.planning.laws import TimeLaw, trapezoid_law
 from urmpipe_models.planning.path import LineArcPath, PathRows
@@ -41,7 +41,7 @@ def arm(name: str, velocity: float, acceleration: float) -> Chain:
 
 def square(x: float, z: float, turned: bool) -> LineArcPath:
     points = np.column_stack((SQUARE[:, 0] + x, SQUARE[:, 1], np.full(6, z)))
-    return path_of(PathRows(points, 0.03, corner=True, rotation=DOWN if turned else None))
+    return rows_to_path(PathRows(points, 0.03, corner=True, rotation=DOWN if turned else None))
 
 
 CASES = {
@@ -186,8 +186,8 @@ def test_the_law_of_limits_is_as_fast_as_toppra(case: str, way: str, limits: tup
     if way == "line":
         ends = np.array([[0.0, 0.1, 0.0], [0.1, -0.2, 0.0]])
         path = joints.path
-        joints = joints_along(joints.chain, path_of(PathRows(path.points(path.stops).position + ends)))
-    law = law_of_limits(joints)
+        joints = joints_along(joints.chain, rows_to_path(PathRows(path.points(path.stops).position + ends)))
+    law = joint_limited_law(joints)
     s = np.append([phase.s for phase in law.phases], joints.path.total)
     wanted = by_toppra(
         joints, s, DiscretizationType.Interpolation if way == "line" else DiscretizationType.Collocation
@@ -212,7 +212,7 @@ def on_grid(joints: PathJoints, law: TimeLaw) -> tuple[FloatArray, FloatArray]:
 def test_the_law_of_limits_runs_at_its_limits(case: str) -> None:
     """On its grid no limit is exceeded, and nearly everywhere one is used up."""
     joints = limited(case, 1.0, 5.0)
-    rates, accelerations = on_grid(joints, law_of_limits(joints))
+    rates, accelerations = on_grid(joints, joint_limited_law(joints))
     assert rates.max() < 1.0 + 1e-6  # so far inside an interval they are looked at
     assert accelerations.max() < 1.0 + 1e-6
     used = np.maximum(rates.max(axis=1), accelerations.max(axis=1))
@@ -220,7 +220,7 @@ def test_the_law_of_limits_runs_at_its_limits(case: str) -> None:
 
 
 def test_speed_and_acceleration_of_the_tool_hold_too() -> None:
-    law = law_of_limits(limited("poses", 5.0, 50.0), 0.2, 1.0)
+    law = joint_limited_law(limited("poses", 5.0, 50.0), 0.2, 1.0)
     found = law.at(np.linspace(0.0, law.duration, 5000))
     assert found.v.max() <= 0.2 * (1.0 + 1e-9)
     assert np.abs(found.a).max() <= 1.0 + 1e-9
@@ -232,10 +232,10 @@ def test_speed_and_acceleration_of_the_tool_hold_too() -> None:
 def test_it_rests_at_stops_and_where_the_turn_changes_its_rate() -> None:
     points = np.array([[0.4, -0.2, 0.3], [0.5, 0.0, 0.3], [0.4, 0.2, 0.3], [0.3, 0.1, 0.3]])
     turned = np.array([DOWN, DOWN, DOWN @ [[0, -1, 0], [1, 0, 0], [0, 0, 1]], DOWN])
-    path = path_of(PathRows(points, np.array([0, 0.05, 0, 0]), corner=True, rotation=turned))
-    law = law_of_limits(joints_along(arm("ur5e", 3.0, 10.0), path))
-    assert path.turning is not None
-    assert path.turning.uneven.tolist() == [1, 2]
+    path = rows_to_path(PathRows(points, np.array([0, 0.05, 0, 0]), corner=True, rotation=turned))
+    law = joint_limited_law(joints_along(arm("ur5e", 3.0, 10.0), path))
+    assert path.orientation is not None
+    assert path.orientation.uneven_rows.tolist() == [1, 2]
     np.testing.assert_allclose(law.at(law.time_at(path.at)).v, 0.0, atol=1e-6)
 
 
@@ -269,10 +269,10 @@ def test_the_largest_usage_is_that_of_many_places(case: str) -> None:
     found = law.at(np.linspace(0.0, law.duration, 20_000)[1:-1])
     rates, accelerations = joints.at(found.s).rates(found.v, found.a)
     wanted = max(np.abs(rates).max() / 1.0, np.sqrt(np.abs(accelerations).max() / 2.0))
-    usage = largest_usage(joints, law)
+    usage = max_limit_utilisation(joints, law)
     assert usage.share == pytest.approx(wanted, rel=1e-3)  # the square of a fortieth of an arc, and its half
     assert usage.share == pytest.approx(
-        largest_usage(joints, law.slower(0.5)).share / 0.5, rel=1e-6
+        max_limit_utilisation(joints, law.scaled(0.5)).share / 0.5, rel=1e-6
     )  # in proportion
 
 
@@ -283,7 +283,7 @@ def narrow_panda() -> tuple[PathJoints, TimeLaw]:
     joints = [replace(one, acceleration=10.0) for one in chain.joints]
     joints[2] = replace(joints[2], lower=-0.02, upper=0.02)
     found = joints_along(replace(chain, joints=tuple(joints)), square(0.3, 0.4, turned=False))
-    return found, law_of_limits(found)
+    return found, joint_limited_law(found)
 
 
 @pytest.mark.slow
@@ -311,7 +311,7 @@ def test_the_contact_with_a_limit_is_found() -> None:
 
 def test_slopes_that_contradict_a_step_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside its axis the first joint of irb60 turns by pi; by steps far longer it goes straight on."""
-    path = path_of(PathRows(np.array([[0.6, 1e-7, 1.6], [-0.3, 1e-7, 1.6]])))
+    path = rows_to_path(PathRows(np.array([[0.6, 1e-7, 1.6], [-0.3, 1e-7, 1.6]])))
     monkeypatch.setattr(path_joints, "ROUNDS", 1)
     found = joints_along(load_robot("irb60"), path)
     assert np.abs(np.diff(found.grid.q, axis=0)).max() < path_joints.FINE
@@ -325,14 +325,14 @@ def test_slopes_that_contradict_a_step_are_seen(monkeypatch: pytest.MonkeyPatch)
 def test_phases_that_meet_are_looked_at_from_both_sides(size: float) -> None:
     """Also of a path of 1 um: the largest usage is that of many times, to the square of their step."""
     rows = PathRows(np.array([[0.4, 0.1, 0.4]] * 4) + size * CORNERS, 0.03 * size, corner=True, rotation=DOWN)
-    joints = joints_along(arm("ur5e", 1e3, size), path_of(rows))
+    joints = joints_along(arm("ur5e", 1e3, size), rows_to_path(rows))
     law = trapezoid_law(joints.path, size, 6.0 * size, "total")
     begin = np.append(0.0, law.ends[:-1])
     shares = np.linspace(1e-6, 1.0 - 1e-6, 200)[:, None]
     found = law.at((begin + shares * (law.ends - begin)).ravel())
     _, accelerations = joints.at(found.s).rates(found.v, found.a)
     wanted = np.sqrt(np.abs(accelerations).max() / size)
-    assert largest_usage(joints, law).share == pytest.approx(wanted, rel=1e-3)
+    assert max_limit_utilisation(joints, law).share == pytest.approx(wanted, rel=1e-3)
 
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [0.2, 0.0, 0.0], [0.2, 0.2, 0.1], [0.0, 0.3, 0.1]])
@@ -342,9 +342,9 @@ def test_places_after_each_other_may_all_be_rests() -> None:
     """One joint along the path, up to 5 rad/s2 and 0.2 rad/s: a triangle, slower where that is too fast."""
     s = np.array([0.0, 0.002, 0.006, 0.4])
     slope = np.ones((3, 1))
-    slopes = JointSlopes(np.zeros((3, 1)), slope, np.zeros((3, 1)))
+    slopes = JointPathDerivatives(np.zeros((3, 1)), slope, np.zeros((3, 1)))
     limits = JointLimits(np.array([0.2]), np.array([5.0]))
-    law = fastest_law(s, slopes, slopes, np.full(4, True), limits)
+    law = time_optimal_law(s, slopes, slopes, np.full(4, True), limits)
     for end, length in zip(law.ends[1::2], np.diff(s), strict=True):
         begin = end - 2.0 * np.sqrt(length / min(5.0, 0.04 / length))
         found = law.at(np.array([begin + 1e-9, 0.5 * (begin + end), end - 1e-9]))

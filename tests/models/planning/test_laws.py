@@ -15,16 +15,16 @@ from random_paths import corner_rows
 from test_line_arc import CONTOUR
 from urmpipe_models.drives import trapezoid
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.laws import (
     ARCS,
     Arcs,
     Phase,
-    Piece,
+    SpeedSegment,
     TimeLaw,
     jerk_law,
     piece_phases,
-    swing_at,
+    swing_phase,
     trapezoid_law,
 )
 from urmpipe_models.planning.path import LineArcPath, PathRows
@@ -39,7 +39,7 @@ places = st.lists(st.floats(0.0, 1.0), min_size=5, max_size=5)
 
 
 def contour() -> LineArcPath:
-    return path_of(PathRows(np.array(CONTOUR), 0.03))
+    return rows_to_path(PathRows(np.array(CONTOUR), 0.03))
 
 
 def made(path: LineArcPath, v: float, a: float, j: float | None, held: Arcs) -> TimeLaw:
@@ -77,7 +77,7 @@ def test_ruckig_without_a_limit_of_jerk_takes_the_same_time(
     given_.current_velocity, given_.target_velocity, given_.target_position = [start], [end], [length]
     given_.max_velocity, given_.max_acceleration, given_.max_jerk = [v], [a], [math.inf]
     Ruckig(1).calculate(given_, found)
-    phases = TimeLaw([*piece_phases(Piece(length, math.inf, v), 0.0, start, end, a)])
+    phases = TimeLaw([*piece_phases(SpeedSegment(length, math.inf, v), 0.0, start, end, a)])
     assert phases.duration == pytest.approx(found.duration, abs=1e-9)
     reached = phases.at(np.array([phases.duration]))
     # rounding; of the speed also what it has of the place, e: sqrt(2 a e)
@@ -101,7 +101,7 @@ def test_the_contour_by_ruckig_without_a_limit_of_jerk() -> None:
 def test_a_law_runs_the_whole_path_from_rest_to_rest(
     rows: PathRows, v: float, a: float, j: float | None, held: Arcs
 ) -> None:
-    path = path_of(rows)
+    path = rows_to_path(rows)
     law = made(path, v, a, j, held)
     ends = law.at(np.array([0.0, law.duration]))
     # s to Ruckig's ends; v where s is short of its end by rounding e: sqrt(2 a e)
@@ -115,7 +115,7 @@ def test_a_law_runs_the_whole_path_from_rest_to_rest(
 @some
 @given(corner_rows(), speeds, rises, st.none() | jerks, arcs)
 def test_a_law_keeps_its_limits(rows: PathRows, v: float, a: float, j: float | None, held: Arcs) -> None:
-    path = path_of(rows)
+    path = rows_to_path(rows)
     law = made(path, v, a, j, held)
     t = np.union1d(np.linspace(0.0, law.duration, 2000), law.ends)
     found = law.at(t)
@@ -137,7 +137,7 @@ def test_a_law_keeps_its_limits(rows: PathRows, v: float, a: float, j: float | N
 @given(corner_rows(), speeds, rises, st.none() | jerks, arcs)
 def test_derivatives_belong_together(rows: PathRows, v: float, a: float, j: float | None, held: Arcs) -> None:
     """By central differences inside each phase; speed is continuous, with a jerk the acceleration, too."""
-    law = made(path_of(rows), v, a, j, held)
+    law = made(rows_to_path(rows), v, a, j, held)
     begin = np.append(0.0, law.ends[:-1])
     long = np.diff(np.append(begin, law.duration)) > 1e-4
     middle, h = (0.5 * (begin + law.ends))[long], 1e-6
@@ -159,7 +159,7 @@ def test_derivatives_belong_together(rows: PathRows, v: float, a: float, j: floa
 def test_a_swing_keeps_the_total_acceleration(entry: float, a: float, radius: float) -> None:
     """And its derivatives belong together: j to the differences of a."""
     v = entry * math.sqrt(a * radius)
-    w = float(swing_at(v, a, radius))
+    w = float(swing_phase(v, a, radius))
     rate = math.sqrt(2.0 * a / radius)
     law = TimeLaw([Phase(-2.0 * w / rate + 1e-6, 0.0, 0.0, a, 0.0, radius, w)])
     t = np.linspace(0.0, law.duration, 4001)
@@ -179,8 +179,8 @@ def test_a_swing_keeps_the_total_acceleration(entry: float, a: float, radius: fl
 def test_a_slower_law_is_the_same_in_slower_time(
     rows: PathRows, v: float, a: float, j: float | None, held: Arcs, factor: float
 ) -> None:
-    law = made(path_of(rows), v, a, j, held)
-    slow = law.slower(factor)
+    law = made(rows_to_path(rows), v, a, j, held)
+    slow = law.scaled(factor)
     assert slow.duration == pytest.approx(law.duration / factor, rel=1e-12)
     t = np.linspace(0.0, law.duration, 50)[1:-1]
     one, other = law.at(t), slow.at(t / factor)
@@ -196,7 +196,7 @@ def test_a_slower_law_is_the_same_in_slower_time(
 def test_times_of_places_lead_back(
     rows: PathRows, v: float, a: float, j: float | None, held: Arcs, shares: list[float]
 ) -> None:
-    path = path_of(rows)
+    path = rows_to_path(rows)
     law = made(path, v, a, j, held)
     s = path.total * np.array(shares)
     np.testing.assert_allclose(law.at(law.time_at(s)).s, s, atol=1e-8)
@@ -205,7 +205,7 @@ def test_times_of_places_lead_back(
 def test_the_pieces_that_no_speed_can_be_constant_on() -> None:
     """A path of arcs alone, from rest to rest: the swing is the fastest law, the law of jerk a slower one."""
     rows = PathRows(np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 1, 0], [1, 1, 0.0]]), 0.5, corner=True)
-    path = path_of(rows)
+    path = rows_to_path(rows)
     swung, smooth = trapezoid_law(path, 9.0, 2.0, "total"), jerk_law(path, 9.0, 2.0, 1e4, "total")
     assert trapezoid_law(path, 9.0, 2.0).duration < swung.duration < smooth.duration
     # w from -K to 0 takes half of a quarter, on with sqrt(a r) = 1 m/s, and so back
@@ -235,9 +235,9 @@ def test_a_path_with_its_stops_is_run_in_stretches() -> None:
     """Each stretch as if it were alone."""
     points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
     rows = PathRows(points, np.array([0, 0.2, 0, 0]), corner=True)
-    whole = trapezoid_law(path_of(rows), 0.5, 2.0)
+    whole = trapezoid_law(rows_to_path(rows), 0.5, 2.0)
     first = replace(rows, position=points[:3], radius=rows.radius[:3], variant=rows.variant[:3])
-    alone = trapezoid_law(path_of(first), 0.5, 2.0)
+    alone = trapezoid_law(rows_to_path(first), 0.5, 2.0)
     np.testing.assert_allclose(values(whole)[:3], values(alone), atol=1e-12)
     assert whole.duration == pytest.approx(alone.duration + 1.0 / 0.5 + 0.5 / 2.0, abs=1e-12)
 
@@ -249,7 +249,7 @@ def test_a_stretch_may_be_as_short_as_two_rows_are_apart(first: float, j: float 
     """Alone, and before another one: its own time and that of the other one."""
     points = [[0.0, 0.0, 0.0], [first, 0.0, 0.0], [1.0, 1.0, 0.0]]
     whole, short, other = (
-        made(path_of(PathRows(rows)), 0.5, 6.0, j, held) for rows in (points, points[:2], points[1:])
+        made(rows_to_path(PathRows(rows)), 0.5, 6.0, j, held) for rows in (points, points[:2], points[1:])
     )
     assert 0.0 < short.duration < 1e-3  # 4 cbrt(s / 2 / j), 6e-4 s
     assert whole.duration == pytest.approx(short.duration + other.duration, abs=1e-9)

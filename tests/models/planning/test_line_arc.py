@@ -14,7 +14,7 @@ from random_paths import by_first_points, corner_rows
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import PathError
 from urmpipe_models.math3d import angle_between, from_offset, matrices, quaternions
-from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.path import LineArcPath, PathRows
 
 some = settings(max_examples=40)
@@ -32,7 +32,7 @@ def along(path: LineArcPath, count: int = 400) -> FloatArray:
 
 def test_the_papers_contour() -> None:
     """Five lines and four arcs that close; lengths after errata of the paper."""
-    path = path_of(PathRows(np.array(CONTOUR), 0.03))
+    path = rows_to_path(PathRows(np.array(CONTOUR), 0.03))
     assert path.kinds == ["line", "arc"] * 4 + ["line"]
     arc = 0.015 * np.pi
     np.testing.assert_allclose(path.length, [0.27, arc, 0.54, arc, 0.54, arc, 0.54, arc, 0.27], atol=ROUNDING)
@@ -48,7 +48,7 @@ def test_the_papers_contour() -> None:
 @some
 @given(corner_rows(variants=True))
 def test_the_direction_goes_on_where_segments_meet(rows: PathRows) -> None:
-    path = path_of(rows)
+    path = rows_to_path(rows)
     inner = path.bounds[1:-1]
     moving = inner[~np.isin(inner, path.stops)]
     before, after = path.points(moving, before=True), path.points(moving)
@@ -61,7 +61,7 @@ def test_the_direction_goes_on_where_segments_meet(rows: PathRows) -> None:
 @some
 @given(corner_rows(variants=True))
 def test_points_are_on_their_arc_at_unit_speed(rows: PathRows) -> None:
-    path = path_of(rows)
+    path = rows_to_path(rows)
     s = along(path)
     points, k = path.points(s), path.segment_at(s)
     np.testing.assert_allclose(np.linalg.norm(points.tangent, axis=1), 1.0, atol=ROUNDING)
@@ -79,7 +79,7 @@ def test_points_are_on_their_arc_at_unit_speed(rows: PathRows) -> None:
 @given(corner_rows(variants=True), st.floats(0.01, 0.99))
 def test_derivatives_are_those_of_the_place(rows: PathRows, share: float) -> None:
     """By central differences inside every segment, whose error is h^2 / (6 r^2) and h^2 / (6 r^3)."""
-    path = path_of(rows)
+    path = rows_to_path(rows)
     s = path.bounds[:-1] + share * path.length
     h = 1e-4 * np.minimum(np.minimum(share, 1.0 - share) * path.length, np.minimum(path.radius, 1.0))
     ahead, behind, here = path.points(s + h), path.points(s - h), path.points(s)
@@ -96,7 +96,7 @@ def test_derivatives_are_those_of_the_place(rows: PathRows, share: float) -> Non
 @given(corner_rows())
 def test_the_length_is_that_of_a_fine_polygon(rows: PathRows) -> None:
     """A polygon through all bounds is shorter by less than (step / r)^2 / 24 of each arc."""
-    path = path_of(rows)
+    path = rows_to_path(rows)
     s = np.unique(np.concatenate((along(path, 2000), path.bounds)))
     polygon = float(np.linalg.norm(np.diff(path.points(s).position, axis=0), axis=1).sum())
     arcs = path.arcs
@@ -110,7 +110,7 @@ def test_the_length_is_that_of_a_fine_polygon(rows: PathRows) -> None:
 @some
 @given(corner_rows(variants=True))
 def test_both_meanings_of_a_radius_give_one_curve(rows: PathRows) -> None:
-    one, other = path_of(rows), path_of(by_first_points(rows))
+    one, other = rows_to_path(rows), rows_to_path(by_first_points(rows))
     assert one.kinds == other.kinds
     s = along(one)
     # the lines of the other follow from one another: what rounds in one, the next has at its end
@@ -121,10 +121,10 @@ def test_both_meanings_of_a_radius_give_one_curve(rows: PathRows) -> None:
 @some
 @given(corner_rows(variants=True))
 def test_reversed_rows_give_the_reversed_curve(rows: PathRows) -> None:
-    path = path_of(rows)
+    path = rows_to_path(rows)
     back = PathRows(rows.position[::-1], rows.radius[::-1], corner=True, variant=rows.variant[::-1])
     s = along(path)
-    there, returned = path.points(s), path_of(back).points(path.total - s)
+    there, returned = path.points(s), rows_to_path(back).points(path.total - s)
     np.testing.assert_allclose(returned.position, there.position, atol=1e-11)  # sums of up to 20 m of path
     inside = np.abs(s[:, None] - path.bounds).min(axis=1) > 1e-11
     np.testing.assert_allclose(returned.tangent[inside], -there.tangent[inside], atol=1e-9)
@@ -135,12 +135,12 @@ def test_reversed_rows_give_the_reversed_curve(rows: PathRows) -> None:
 @given(corner_rows())
 def test_reversed_first_points_are_the_last_points(rows: PathRows) -> None:
     """Told by the paper's meaning, the way back begins its arcs where the way there ends them."""
-    path = path_of(rows)
+    path = rows_to_path(rows)
     arcs = path.arcs
     position = rows.position.copy()
     ends = path.points(path.bounds[arcs + 1], before=True).position
     position[path.row[arcs]] = ends
-    back = path_of(PathRows(position[::-1], rows.radius[::-1]))
+    back = rows_to_path(PathRows(position[::-1], rows.radius[::-1]))
     s = along(path)
     np.testing.assert_allclose(back.points(path.total - s).position, path.points(s).position, atol=1e-9)
 
@@ -153,8 +153,8 @@ def test_a_rigid_motion_of_the_rows_moves_the_curve(rows: PathRows, motion: list
     R: FloatArray = np.array(frame.rotation)
     p: FloatArray = np.array(frame.translation)
     moved = PathRows(rows.position @ R.T + p, rows.radius, corner=True, variant=rows.variant)
-    s = along(path_of(rows))
-    found, wanted = path_of(moved).points(s), path_of(rows).points(s).position @ R.T + p
+    s = along(rows_to_path(rows))
+    found, wanted = rows_to_path(moved).points(s), rows_to_path(rows).points(s).position @ R.T + p
     np.testing.assert_allclose(
         found.position, wanted, atol=1e-9
     )  # radii are sharpened by up to 20 of a corner
@@ -165,12 +165,12 @@ def test_a_rigid_motion_of_the_rows_moves_the_curve(rows: PathRows, motion: list
 @given(corner_rows())
 def test_rows_stand_where_they_say(rows: PathRows) -> None:
     """Stops at their own points, corners at the middle of their arcs, first points where these begin."""
-    path = path_of(rows)
+    path = rows_to_path(rows)
     np.testing.assert_allclose(path.points(path.stops).position, rows.position[path.stop_row], atol=1e-11)
     rounded = np.flatnonzero(rows.radius > 0.0)
     middle = 0.5 * (path.bounds[path.arcs] + path.bounds[path.arcs + 1])
     np.testing.assert_allclose(path.at[rounded], middle, atol=ROUNDING)
-    first = path_of(by_first_points(rows))
+    first = rows_to_path(by_first_points(rows))
     np.testing.assert_allclose(first.at[rounded], first.bounds[first.arcs], atol=ROUNDING)
 
 
@@ -179,7 +179,7 @@ def test_an_improper_arc_turns_away_and_round() -> None:
     rows = PathRows(
         np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.0]]), np.array([0, 0.1, 0]), corner=True, variant=1
     )
-    path = path_of(rows)
+    path = rows_to_path(rows)
     np.testing.assert_allclose(path.length, [1.1, 0.15 * np.pi, 1.1], atol=ROUNDING)
     np.testing.assert_allclose(path.normal[1], [0.0, -1.0, 0.0], atol=ROUNDING)
     np.testing.assert_allclose(
@@ -190,7 +190,7 @@ def test_an_improper_arc_turns_away_and_round() -> None:
 def test_arcs_may_touch_and_reach_a_stop() -> None:
     """Two half turns of 0.5 m without any line: a path of arcs alone."""
     rows = PathRows(np.array([[0, 0, 0], [0.5, 0, 0], [0.5, 1, 0], [1, 1, 0.0]]), 0.5, corner=True)
-    path = path_of(rows)
+    path = rows_to_path(rows)
     assert path.kinds == ["arc", "arc"]
     np.testing.assert_allclose(path.length, 0.25 * np.pi, atol=ROUNDING)
     np.testing.assert_allclose(path.at, [0, np.pi / 8, 3 * np.pi / 8, np.pi / 2], atol=ROUNDING)
@@ -205,7 +205,7 @@ def test_arcs_touch_in_a_plane_of_any_place(corner: bool) -> None:
     for angle in np.linspace(0.1, 6.1, 20):
         frame = from_offset([6e5, 5e6, 100.0, angle, 0.3 * angle, 0.2])
         moved = points @ np.array(frame.rotation).T + np.array(frame.translation)
-        path = path_of(PathRows(moved, 0.5, corner))
+        path = rows_to_path(PathRows(moved, 0.5, corner))
         assert path.kinds == ["line", "arc", "arc", "line"]
         # a coordinate is known to 1e-9 m
         np.testing.assert_allclose(path.length, [0.5, 0.25 * np.pi, 0.25 * np.pi, 0.5], atol=1e-8)
@@ -217,42 +217,42 @@ def test_arcs_touch_in_a_plane_of_any_place(corner: bool) -> None:
 def test_the_tool_turns_evenly_from_row_to_row(rows: PathRows, angles: list[float]) -> None:
     turned = np.array(angles).reshape(20, 3)[: len(rows)]
     rotation = matrices(quaternions(turned, "zyx"))
-    path = path_of(PathRows(rows.position, rows.radius, corner=True, rotation=rotation))
-    assert path.turning is not None
-    at = path.turning.matrices(path.at)
+    path = rows_to_path(PathRows(rows.position, rows.radius, corner=True, rotation=rotation))
+    assert path.orientation is not None
+    at = path.orientation.matrices(path.at)
     np.testing.assert_allclose(at[:-1], rotation[:-1], atol=ROUNDING)
     np.testing.assert_allclose(at[-1], rotation[-1], atol=1e-9)  # after a whole turn by the last rate
     middle = 0.5 * (path.at[1:] + path.at[:-1])
-    quats = path.turning.quaternions(middle)
+    quats = path.orientation.quaternions(middle)
     ends = quaternions(rotation.reshape(-1, 9), "matrix")
-    along_it = np.insert(path.turning.quaternions(path.at), np.arange(1, len(rows)), quats, axis=0)
+    along_it = np.insert(path.orientation.quaternions(path.at), np.arange(1, len(rows)), quats, axis=0)
     turned_by = np.einsum("ij,ij->i", along_it[1:], along_it[:-1])
     assert turned_by.min() >= math.sqrt(0.5) - ROUNDING  # one sign: half of at most half a turn a step
     halves = np.stack((angle_between(ends[:-1], quats), angle_between(quats, ends[1:])))
     np.testing.assert_allclose(halves[0], halves[1], atol=1e-7)  # acos-like near 0
-    speed = np.linalg.norm(path.turning.rate, axis=1) * np.diff(path.at)
+    speed = np.linalg.norm(path.orientation.rate, axis=1) * np.diff(path.at)
     np.testing.assert_allclose(speed, angle_between(ends[:-1], ends[1:]), atol=1e-7)
 
 
 def faults(points: Sequence[Sequence[float]], radius: Sequence[float], corner: bool = False) -> list[str]:
     with pytest.raises(PathError) as raised:
-        path_of(PathRows(np.array(points, dtype=float), np.array(radius), corner=corner))
+        rows_to_path(PathRows(np.array(points, dtype=float), np.array(radius), corner=corner))
     return [str(one) for one in raised.value.findings]
 
 
 @pytest.mark.parametrize(("digits", "uneven"), [(15, False), (6, False), (4, True)])
 def test_an_even_turn_may_be_rounded_to_six_digits(digits: int, uneven: bool) -> None:
     points = np.array([[2, 0, 3], [4, 0, 3], [4, 4, 3], [0, 4, 3], [0, 0, 3], [2, 0, 3.0]]) / 10.0
-    angle = 2.0 * path_of(PathRows(points, 0.05, corner=True)).at
+    angle = 2.0 * rows_to_path(PathRows(points, 0.05, corner=True)).at
     turned = matrices(quaternions(np.round(angle, digits)[:, None] * [0.0, 0.0, 1.0], "vector"))
-    path = path_of(PathRows(points, 0.05, corner=True, rotation=turned))
-    assert path.turning is not None
-    assert bool(len(path.turning.uneven)) == uneven
+    path = rows_to_path(PathRows(points, 0.05, corner=True, rotation=turned))
+    assert path.orientation is not None
+    assert bool(len(path.orientation.uneven_rows)) == uneven
 
 
 def test_a_half_turn_rounds_no_corner() -> None:
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 0.2, 0], [0, 1.2, 0], [1, 2, 0.0]])
-    path = path_of(PathRows(points, np.array([0, 0.1, 0, 0.2, 0])))
+    path = rows_to_path(PathRows(points, np.array([0, 0.1, 0, 0.2, 0])))
     np.testing.assert_allclose(path.length[path.arcs[0]], 0.1 * np.pi, atol=ROUNDING)
     assert np.isnan(path.corners).all(axis=1).tolist() == [True, False]
 
@@ -330,13 +330,13 @@ def test_a_first_point_is_judged_only_where_the_direction_is_known() -> None:
         "row 2, column r: found 0.5 m, with row 3 inside its circle, allowed: up to 0.1 m",
         "row 5, column r: found 0.2 m, with row 6 inside its circle, allowed: up to 0.05 m",
     ]
-    path_of(PathRows(np.array(points), np.array([0, 0.05, 0.01, 0, 0.01, 0])))
+    rows_to_path(PathRows(np.array(points), np.array([0, 0.05, 0.01, 0, 0.01, 0])))
 
 
 def test_a_radius_may_be_wrong_on_the_way_of_an_arc() -> None:
     """Rows 2, 3 and 4 are on no line, but row 4 is ahead of where the arc before row 3 ends."""
     arc: list[list[float]] = [[0, 0, 0], [1, 0, 0], [1.1, 0.5, 0]]
-    ahead = path_of(PathRows(np.array(arc), np.array([0, 0.1, 0]))).tangent[-1]
+    ahead = rows_to_path(PathRows(np.array(arc), np.array([0, 0.1, 0]))).tangent[-1]
     assert faults([*arc, (np.array(arc[-1]) + 0.5 * ahead).tolist()], [0, 0.1, 0.03, 0]) == [
         "row 3, column r: found a radius of 0.03 m where the path goes straight on,"
         " allowed: 0, or row 4 off that line"
@@ -348,6 +348,6 @@ def test_the_largest_radius_is_that_through_the_next_row(a: float, x: float, y: 
     """Just below it there is a path, just above there is none."""
     points = np.array([[-a, 0, 0], [0, 0, 0], [x, y, 0]])
     most = (x * x + y * y) / (2.0 * y)
-    path_of(PathRows(points, 0.999 * most))
+    rows_to_path(PathRows(points, 0.999 * most))
     with pytest.raises(PathError):
-        path_of(PathRows(points, 1.001 * most))
+        rows_to_path(PathRows(points, 1.001 * most))

@@ -15,7 +15,7 @@ from hypothesis.strategies import SearchStrategy
 
 from asserting import refusal
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
-from urmpipe_models.dynamics.links import check_masses, links_of
+from urmpipe_models.dynamics.links import chain_to_links, check_masses
 from urmpipe_models.errors import RobotError
 from urmpipe_models.math3d import translation
 from urmpipe_models.robots.toml import chain_from_dict, chain_to_dict
@@ -210,7 +210,7 @@ def test_a_second_mass_of_a_joint_is_a_link_fixed_to_the_first(tmp_path: Path) -
 
 def assert_same_inertias(chain: Chain, model: Any) -> None:
     """Hold mass, moment and inertia about the origin of each moving link against those of Pinocchio."""
-    for one in links_of(chain).links:
+    for one in chain_to_links(chain).links:
         other = model.inertias[model.getJointId(one.joint.name)]
         np.testing.assert_allclose(one.mass, other.mass, rtol=SAME)
         np.testing.assert_allclose(one.moment, other.mass * other.lever, rtol=0.0, atol=SAME)

@@ -24,7 +24,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError, PathError
 from urmpipe_models.ik.solutions import Targets, pose_errors
 from urmpipe_models.math3d import matrices, quaternions
-from urmpipe_models.planning.from_rows import path_of
+from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.path import PathRows, cube_rows
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.planned_paths.given_path import given_path
@@ -304,7 +304,7 @@ def test_the_law_of_limits_stops_where_the_turn_changes_and_does_not_warn() -> N
 def test_an_even_turn_that_was_rounded_is_no_step(digits: int) -> None:
     points = np.array([[0.4, -0.2, 0.3], [0.5, -0.1, 0.3], [0.5, 0.0, 0.3], [0.4, 0.2, 0.3]])
     radius = np.array([0.0, 0.02, 0.02, 0.0])
-    at = path_of(PathRows(points, radius, corner=True)).at
+    at = rows_to_path(PathRows(points, radius, corner=True)).at
     turned = matrices(quaternions(np.round(2.0 * at, digits)[:, None] * [0.0, 0.0, 1.0], "vector")) @ DOWN
     rows = PathRows(points, radius, corner=True, rotation=turned)
     plan = planned(limited("ur5e", acceleration=8.0), rows, law="limits")

@@ -15,7 +15,7 @@ from recorded import columns, entities, static, times_of, views
 from toys import STEP_NS, eye_of, recorded, shown, toy
 from urmpipe_models.arm.chain import Box, Chain, Inertial, Joint, Mesh, Sphere, Visual
 from urmpipe_models.arm.solids import build_placeholder_solids
-from urmpipe_models.dynamics.equations import mass_centres_over_log
+from urmpipe_models.dynamics.equations import centres_of_mass_over_log
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_models.math3d import from_offset, quaternions
@@ -358,7 +358,7 @@ def test_mass_centres_are_dots_as_large_as_balls_that_move_with_the_arm(
     path = write_recording(run, tmp_path / "run.rrd")
     drawn = np.searchsorted(run.t_ns, times_of(path, f"{SCENE}/robot/masses"))
     assert len(drawn) > 20
-    centres = mass_centres_over_log(chain, run.q[drawn])
+    centres = centres_of_mass_over_log(chain, run.q[drawn])
     moved = column(path, "robot/masses", "Points3D:positions")
     np.testing.assert_allclose(moved, centres, rtol=0, atol=1e-6)  # single precision
     radii = np.array(static(path, f"{SCENE}/robot/masses", "Points3D:radii"))

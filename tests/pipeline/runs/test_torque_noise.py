@@ -12,7 +12,7 @@ import pytest
 from arm_motion import clock
 from asserting import there
 from presented import cells, figures
-from urmpipe_models.dynamics.equations import torque_over_log
+from urmpipe_models.dynamics.equations import torques_over_log
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Hint
 from urmpipe_models.robots.catalogue import load_robot
@@ -79,7 +79,7 @@ def test_noise_and_fixed_decimals_are_said_with_the_torques_that_smoothing_leave
 ) -> None:
     run = ingest_log([log_of(tmp_path, q, form)], robot=UR10)
     rough, calm = (
-        torque_over_log(UR10, run.q, *derivatives(run.q, TSP, way)) for way in ("central", "savgol")
+        torques_over_log(UR10, run.q, *derivatives(run.q, TSP, way)) for way in ("central", "savgol")
     )
     np.testing.assert_array_equal(run.tau, rough)
     (warning,) = noisy(run)
@@ -91,7 +91,7 @@ def test_noise_and_fixed_decimals_are_said_with_the_torques_that_smoothing_leave
     assert warning.hints == (Hint("derivative", "savgol", "smooths the accelerations"),)
     followed = ingest_log([log_of(tmp_path, q, form)], robot=UR10, derivative="savgol")
     assert noisy(followed) == []
-    true = torque_over_log(UR10, smooth(), *derivatives(smooth(), TSP))
+    true = torques_over_log(UR10, smooth(), *derivatives(smooth(), TSP))
     assert np.abs(rms(there(followed.tau)) - rms(true)).max() < 0.02 * rms(true).max()
 
 
@@ -106,7 +106,7 @@ def test_a_fast_motion_with_few_samples_is_no_noise(tmp_path: Path) -> None:
     q = START + 0.1 * np.sin(2.0 * np.pi * t[:, np.newaxis] + np.arange(6))
     run = ingest_log([log_of(tmp_path, q, "%.12f", t=t)], robot=UR10)
     assert noisy(run) == []
-    calm = torque_over_log(UR10, run.q, *derivatives(run.q, 0.05, "savgol"))
+    calm = torques_over_log(UR10, run.q, *derivatives(run.q, 0.05, "savgol"))
     assert rms(there(run.tau) - calm)[0] > rms(calm)[0]
 
 

@@ -20,7 +20,7 @@ from panda_log import URDF, motion, panda, panda_csv
 from presented import cells, figures, scene_of
 from recorded import rows_of
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
-from urmpipe_models.dynamics.equations import energies_over_log, torque_over_log
+from urmpipe_models.dynamics.equations import energies_over_log, torques_over_log
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.planning.path import PathRows
 from urmpipe_models.robots.catalogue import load_robot
@@ -325,7 +325,7 @@ def test_another_robot_gets_its_own_torques(run: Run) -> None:
 def test_a_plan_has_the_torques_of_its_exact_rates() -> None:
     plan = planned(load_robot("ur10"), SMALL)
     joints, run = there(plan.joints), plan.as_run()
-    expected = torque_over_log(joints.chain, joints.q, joints.qd, joints.qdd)
+    expected = torques_over_log(joints.chain, joints.q, joints.qd, joints.qdd)
     np.testing.assert_array_equal(run.tau, expected)
     assert np.isfinite(expected).all()
 
@@ -420,7 +420,7 @@ def test_no_term_is_computed_before_it_is_shown(run: Run, monkeypatch: pytest.Mo
     def refused(*_: object) -> Any:
         raise AssertionError("computed")
 
-    for name in ("terms_over_log", "energies_over_log"):
+    for name in ("torque_terms_over_log", "energies_over_log"):
         monkeypatch.setattr(f"urmpipe_pipeline.runs.torque_figures.{name}", refused)
     assert len(figures(present(run).body)) == 6
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.arm.chain import Box, Chain, Mesh
-from urmpipe_models.dynamics.equations import mass_centres_over_log
+from urmpipe_models.dynamics.equations import centres_of_mass_over_log
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_models.math3d import matrices
@@ -195,7 +195,7 @@ def drawn_arm(arm: Arm) -> DrawnArm | None:
     poses = q[moving.rows]
     colours = _point_colours(arm.chain, arm.colour)
     skeleton = points_over_log(arm.chain, poses)
-    masses = mass_centres_over_log(arm.chain, poses) if arm.masses else np.empty((len(poses), 0, 3))
+    masses = centres_of_mass_over_log(arm.chain, poses) if arm.masses else np.empty((len(poses), 0, 3))
     names = (joint.name for joint in arm.chain.joints)
     bodies = bodies_over_log(arm.chain, poses, dict(zip(names, map(opaque, colours), strict=False)))
     solid = not own_shapes(arm.chain)
