@@ -1,8 +1,10 @@
-"""What stands in a file that a command wrote: named columns of values. Nothing of urmpipe reads it.
+"""What a file that a command wrote contains: named columns of values. Nothing of urmpipe reads it.
 
-A column is a dict: its `kind` (of `compare_snapshots.KINDS`), how many values it has (`n`), their `hash`, and
-the `values` if they are few. An array has its `shape`, hashes of its `columns` and of its values row by row,
-whatever its shape (`flat`), and one of its times (`t`).
+A column is a dict with its `kind` (of `compare_snapshots.KINDS`). A text column has the `hash` of its values,
+and the `values` if they are few. A column of numbers has its `values`. An array or column of many numbers
+has what stays on every machine: its `shape`, how many values are no number (`nan`), and in `figures` the
+largest |a| and four projections, three of a and one of |a|: sum(s_i a_i) / sqrt(n), with signs s_i = +-1 that
+never change. `times` are the figures of its times in [ns].
 """
 
 from __future__ import annotations
@@ -10,12 +12,15 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
+import math
 import re
 import xml.etree.ElementTree as ET
-from base64 import b64decode
+import zipfile
+from base64 import b64decode, b64encode
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from functools import cache
 from html import unescape
 from pathlib import Path
 from typing import Any
@@ -26,11 +31,13 @@ import scipy.io
 from numpy.typing import NDArray
 
 Columns = dict[str, dict[str, Any]]
-FEW = 4000
-"""Letters of values that are kept beside their hash."""
+MAX_LETTERS = 4000  # of a text column, from where on only its hash is kept
+MAX_NUMBERS = 6  # of a column, from where on it is kept as an array: so many figures has one
+DIGITS = 10  # significant ones: one more than a comparison needs
 
 NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
 LOOKS = {"colors", "widths", "radii", "aggregation_policy", "markers", "marker_sizes", "xyz", "show_labels"}
+# What docs/python.md names of each result; of other classes, all fields.
 ATTRIBUTES = {
     "Run": "t q qd qdd tcp audit warnings log",
     "Comparison": "verdict runs ranking baseline warnings",
@@ -42,10 +49,9 @@ ATTRIBUTES = {
     "Exported": "path files columns",
     "Chain": "joints coordinates start",
 }
-"""What docs/python.md names of each result; of other classes, all fields."""
 
+# Takes out of a text what differs from run to run; `snapshot` sets it.
 normal: Callable[[str], str] = str
-"""Takes out of a text what differs from run to run; `snapshot` sets it."""
 
 
 def contents(path: Path) -> Columns:
@@ -59,32 +65,53 @@ def contents(path: Path) -> Columns:
 def column(kind: str, values: Sequence[str]) -> dict[str, Any]:
     """Return a column of texts."""
     words = "\n".join(values)
-    found = {"kind": kind, "n": len(values), "hash": _sha(words.encode("utf-8", "surrogatepass"))}
-    return found | ({"values": list(values)} if len(words) <= FEW or kind in {"shown", "traces"} else {})
+    found = {"kind": kind, "n": len(values), "hash": _hash(words.encode("utf-8", "surrogatepass"))}
+    return found | ({"values": list(values)} if len(words) <= MAX_LETTERS or kind == "shown" else {})
+
+
+def numbers(texts: Sequence[str]) -> dict[str, Any]:
+    """Return a column of numbers, some of which may be missing."""
+    if len(texts) > MAX_NUMBERS:
+        return array(
+            np.array([math.nan if word in {"", "null"} else float(word) for word in texts]), kind="numbers"
+        )
+    return {
+        "kind": "numbers",
+        "values": [word if word in {"", "null"} else f"{float(word):.{DIGITS}g}" for word in texts],
+    }
 
 
 def array(
-    values: NDArray[Any], times: NDArray[Any] | None = None, kind: str = "arrays", more: bytes = b""
+    values: NDArray[Any], times: NDArray[Any] | None = None, kind: str = "arrays", widths: str = ""
 ) -> dict[str, Any]:
-    """Return an array with a row a time, hashed to the bit, whatever the type that holds its numbers."""
-    flat = values.reshape(len(values) if values.ndim else 1, -1) if values.size else np.empty((0, 1))
-    if flat.dtype.kind in "OUSM":
-        return column("words", [normal(str(one)) for one in flat.ravel().tolist()])
-    if flat.dtype.kind in "fb" or not (np.abs(flat) > 2.0**53).any():
-        flat = flat.astype(np.float64)
-    each = [
-        _sha(np.ascontiguousarray(one).tobytes() + more)
-        for one in (flat.T if flat.shape[1] <= 64 else [flat])
-    ]
-    found = {
+    """Return an array with a row a time, its numbers as floats; `widths` are those of rows that differ."""
+    if values.dtype.kind in "OUSM":
+        return column("words", [normal(str(value)) for value in values.ravel().tolist()])
+    flat = values.astype(np.float64).ravel()
+    missing = int(np.count_nonzero(~np.isfinite(flat)))
+    return {
         "kind": kind,
-        "n": len(flat),
-        "shape": list(values.shape),
-        "columns": each,
-        "hash": _sha("".join(each).encode()),
-        "flat": _sha(np.ascontiguousarray(flat).tobytes()),
-    }
-    return found if times is None else found | {"t": _sha(times.tobytes())}
+        "shape": "x".join(map(str, values.shape)) + widths,
+        "nan": missing,
+        "figures": _figures(np.where(np.isfinite(flat), flat, 0.0)),
+    } | ({} if times is None else {"times": _figures(times.astype(np.float64))})
+
+
+def _figures(flat: NDArray[np.float64]) -> list[float]:
+    """Return the largest |a| and the four projections of an array."""
+    if not flat.size:
+        return []
+    signs = _signs(1 << (flat.size - 1).bit_length())[:, : flat.size]
+    figures = [np.abs(flat).max(), *(signs[:3] @ flat), signs[3] @ np.abs(flat)]
+    figures[1:] = [figure / math.sqrt(flat.size) for figure in figures[1:]]
+    return [float(f"{figure:.{DIGITS}g}") for figure in figures]
+
+
+@cache
+def _signs(count: int) -> NDArray[np.float64]:
+    """Return four rows of signs, the first ones alike for every count."""
+    bits = np.random.PCG64(46).random_raw(count)
+    return np.where(bits[None, :] >> np.array([[60], [61], [62], [63]], np.uint64) & np.uint64(1), 1.0, -1.0)
 
 
 def text(words: str) -> Columns:
@@ -142,7 +169,9 @@ def _grouped(pairs: Iterable[tuple[str, Any]]) -> Columns:
         else:
             texts[name].append(value)
     return found | {
-        name: column("numbers" if all(map(_is_number, some)) and set(some) - {"", "null"} else "words", some)
+        name: numbers(some)
+        if all(map(_is_number, some)) and set(some) - {"", "null"}
+        else column("words", some)
         for name, some in texts.items()
     }
 
@@ -157,7 +186,11 @@ def _is_number(word: str) -> bool:
 def _table(path: Path) -> Columns:
     """Return the columns of a CSV, or those of a TUM, which has no names."""
     with path.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.reader(file)) if path.suffix == ".csv" else [line.split() for line in file]
+        rows = (
+            list(csv.reader(file))
+            if path.suffix == ".csv"
+            else [line.split() for line in file if not line.startswith("#")]
+        )
     names = rows.pop(0) if path.suffix == ".csv" and rows else ["" for _ in max(rows, key=len, default=[])]
     cells = (
         (f"{name} #{k}", normal(row[k]) if k < len(row) else "")
@@ -168,9 +201,13 @@ def _table(path: Path) -> Columns:
 
 
 def _xml(path: Path) -> Columns:
+    return _elements(ET.parse(path))
+
+
+def _elements(read: ET.ElementTree[Any]) -> Columns:
     """Return the attributes and texts of an XML file; its properties by their names."""
     pairs: list[tuple[str, str]] = []
-    for one in ET.parse(path).iter():
+    for one in read.iter():
         named = (
             {one.attrib["name"]: one.attrib["value"]}
             if one.tag == "property"
@@ -199,10 +236,21 @@ def _page(path: Path) -> Columns:
     source = path.read_text(encoding="utf-8")
     specs = re.findall(r'<script type="application/json">(.*?)</script>', source, re.DOTALL)
     traces = [tree(json.loads(spec, object_hook=_unpacked)["data"]) for spec in specs]
-    drawn = [f"{one['shape']} {one['hash']}" for found in traces for one in found.values() if "shape" in one]
+    drawn = {
+        f"trace {k} {name}": one | {"kind": "traces"}
+        for k, found in enumerate(traces)
+        for name, one in found.items()
+        if "figures" in one
+    }
     seen = re.sub(r"<(script|style|head)\b.*?</\1>|<[^>]*>", "\n", source, flags=re.DOTALL)
     words = text(re.sub(r"\s*\n\s*", "\n", unescape(seen)))
-    return {"traces": column("traces", sorted(drawn))} | words
+    return drawn | words
+
+
+def _fmu(path: Path) -> Columns:
+    """Return the model description of an FMU: its attributes in their order."""
+    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+        return _elements(ET.parse(file))
 
 
 def _unpacked(value: dict[str, Any]) -> Any:
@@ -226,7 +274,10 @@ def _recording(path: Path) -> Columns:
         for about, cells in zip(batch.schema, batch.columns, strict=True):
             if about.metadata[b"rerun:kind"] == b"data" and about.name != "metadata":
                 there = cells.is_valid().to_numpy(zero_copy_only=False)
-                parts[f"{chunk.entity_path} {about.name}"].append((t[there], *_flat(cells.drop_null())))
+                name = f"{chunk.entity_path} {about.name}"
+                if name.endswith(" checksum"):  # of bytes, which hold the time of writing
+                    continue
+                parts[name].append((t[there], *_flat(cells.drop_null())))
     return {name: _joined(name, some) for name, some in parts.items() if any(part[2].size for part in some)}
 
 
@@ -250,11 +301,11 @@ def _joined(name: str, parts: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any
     kind = "arrays" if component in {"scalars", "packed"} else "looks" if component in LOOKS else "scene"
     if len(np.unique(widths)) == 1 and widths[0]:
         return array(values.reshape(len(t), -1), t[order], kind)
-    return array(values, t[order], kind, widths[order].tobytes())
+    return array(values, t[order], kind, f" widths {_hash(widths[order].tobytes())}")
 
 
-def _sha(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()[:16]
+def _hash(data: bytes) -> str:
+    return b64encode(hashlib.sha256(data).digest())[:8].decode()
 
 
 READERS: Mapping[str, Callable[[Path], Columns]] = {
@@ -266,5 +317,6 @@ READERS: Mapping[str, Callable[[Path], Columns]] = {
     ".html": _page,
     ".svg": _page,
     ".rrd": _recording,
+    ".fmu": _fmu,
     ".columns": lambda path: json.loads(path.read_text()),
 }

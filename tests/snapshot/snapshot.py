@@ -1,9 +1,8 @@
 """Write down what urmpipe answers: python tests/snapshot/snapshot.py CHECKOUT -o FOLDER [PATTERN ...].
 
 Each case of cases.toml runs in a folder of its own, each command in a process of its own, as `python -m
-urmpipe`. What it printed and wrote becomes FOLDER/cases/CASE.json. `compare_snapshots.py` holds two such
-folders against each other, or one against before.json: the hashes of the code before its redesign, written by
---hashes. They hold on machines that round alike.
+urmpipe`. What it printed and wrote becomes FOLDER/cases/CASE.json. `compare_snapshots.py` compares two such
+folders, or one with net.json: what --net keeps of a folder, valid on every machine.
 """
 
 from __future__ import annotations
@@ -33,18 +32,23 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import contents
-from compare_snapshots import hashes, load
+from compare_snapshots import load, pack
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "datasets" / "urmpipe_datasets"
 SHARED = ROOT.parent / "shared"
-SAID: dict[str, Any] = tomllib.loads((Path(__file__).parent / "cases.toml").read_text(encoding="utf-8"))
-HEAVY = ("rerun.chunk", "rerun.blueprint", "pandas", "plotly", "pyarrow.csv", "pyarrow.compute")
-"""What commands import while they run: imported once, before they fork."""
+SPEC: dict[str, Any] = tomllib.loads((Path(__file__).parent / "cases.toml").read_text(encoding="utf-8"))
+HEAVY = (
+    "rerun.chunk",
+    "rerun.blueprint",
+    "pandas",
+    "plotly",
+    "pyarrow.csv",
+    "pyarrow.compute",
+)  # imported once
 
 LARGE = {".rrd", ".html", ".fmu", ".csv", ".parquet", ".mat", ".tum"}
-PATIENCE = 300
-"""How long a command may take in [s]."""
+TIMEOUT = 300  # [s], of a command
 
 
 class Case(NamedTuple):
@@ -57,14 +61,14 @@ class Case(NamedTuple):
 
 def all_cases() -> Iterator[Case]:
     """Yield the cases of cases.toml."""
-    for name, lines in SAID["cases"].items():
+    for name, lines in SPEC["cases"].items():
         yield _case(name, lines)
-    for family, about in SAID["families"].items():
+    for family, about in SPEC["families"].items():
         lines = (
-            SAID["families"][about["lines"]]["lines"] if isinstance(about["lines"], str) else about["lines"]
+            SPEC["families"][about["lines"]]["lines"] if isinstance(about["lines"], str) else about["lines"]
         )
         for name, given in about.get("cases", {}).items():
-            yield _case(f"{family}.{name}", lines, name=name, given=given.format(**SAID["words"]))
+            yield _case(f"{family}.{name}", lines, name=name, given=given.format(**SPEC["words"]))
         yield from _cases_of_files(family, lines, about.get("files", ""))
 
 
@@ -82,7 +86,7 @@ def _cases_of_files(family: str, lines: list[str], pattern: str) -> Iterator[Cas
         if files:
             anchor = next(one for one in (ROOT / "tests", DATA, ROOT.parent) if files[0].is_relative_to(one))
             given = " ".join(f"../../in/{path.relative_to(anchor).as_posix()}" for path in files)
-            robots = SAID["families"]["specimen"]["robots"]
+            robots = SPEC["families"]["specimen"]["robots"]
             robot = next((robot for part, robot in robots.items() if re.search(part, given)), "ur5e")
             name = ".".join(Path(stem).relative_to(anchor).parts[1 + private :])
             yield _case(f"{family}.{name}", lines, private, name=files[0].stem, given=given, robot=robot)
@@ -90,7 +94,7 @@ def _cases_of_files(family: str, lines: list[str], pattern: str) -> Iterator[Cas
 
 def _case(title: str, lines: list[str], private: bool = False, **words: str) -> Case:
     """Return a case with its lines filled in and written out."""
-    said = [line.format(**SAID["words"], **words) for line in lines]
+    said = [line.format(**SPEC["words"], **words) for line in lines]
     return Case(title, [one for line in said for one in _written_out(line)], private)
 
 
@@ -99,13 +103,12 @@ def _written_out(line: str) -> list[str]:
     first, _, rest = line.partition(" ")
     if first == "both":
         return [f"{rest} --json", rest]
-    if first == "leave":
-        kinds = [f"export {rest} -o {rest[:-4]}.{kind} --json" for kind in ("csv", "parquet", "mat", "tum")]
-        rows = [
-            f"export {rest} --rows file -o {rest[:-4]}-file.{kind} --json"
-            for kind in ("csv", "parquet", "mat", "tum")
-        ]
-        return [f"report {rest} -o {rest[:-4]}.html --json", *kinds, *rows]
+    if first in {"leave", "leave-all"}:
+        kinds = ("csv", "parquet") if first == "leave" else ("csv", "parquet", "mat", "tum")
+        lines = [f"export {rest} -o {rest[:-4]}.{kind} --json" for kind in kinds]
+        if first == "leave-all":
+            lines += [f"export {rest} --rows file -o {rest[:-4]}-file.{kind} --json" for kind in kinds]
+        return [f"report {rest} -o {rest[:-4]}.html --json", *lines]
     return [line]
 
 
@@ -114,11 +117,12 @@ def lay_inputs(folder: Path) -> None:
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(DATA / "logs", folder / "logs")
     shutil.copytree(ROOT / "tests" / "specimens", folder / "specimens")
+    shutil.copy(ROOT / "tests" / "snapshot" / "models.py", folder)
     (folder / "shared").symlink_to(SHARED)
-    for name, words in SAID["files"].items():
+    for name, words in SPEC["files"].items():
         (folder / name).parent.mkdir(exist_ok=True)
         (folder / name).write_text(words, encoding="utf-8")
-    for name, circle in SAID["circles"].items():
+    for name, circle in SPEC["circles"].items():
         (folder / name).write_text(_circle(**circle), encoding="utf-8")
 
 
@@ -178,18 +182,19 @@ def record(folder: Path, keep: bool, case: Case) -> str:
     os.chdir(at)
     os.environ["URMPIPE_CACHE"] = str(folder / "cache")
     exits = [str(run_apart(f"{number:03}", line)) for number, line in enumerate(case.lines)]
-    found = {"exits": contents.column("numbers", exits), "commands": contents.column("words", case.lines)}
+    found = {"exits": {"kind": "numbers", "values": exits}, "commands": contents.column("words", case.lines)}
     for path in sorted(one for one in at.rglob("*") if one.is_file()):
         name = path.relative_to(at).as_posix()
         try:
-            read = {} if path.suffix == ".fmu" else contents.contents(path)
+            read = contents.contents(path)
         except Exception as error:  # whatever a later urmpipe writes, the other files are recorded
             read = {"cannot be read": contents.column("words", [repr(error)])}
         found |= {f"{name}|{column}": values for column, values in read.items()}
         if case.private or (path.suffix in LARGE and not keep):
             path.unlink()
     for values in found.values() if case.private else ():
-        values.pop("values", None)
+        if "hash" in values:
+            values.pop("values", None)
     at.with_name(f"{case.name}.json").write_text(json.dumps(found), encoding="utf-8")
     return case.name
 
@@ -203,7 +208,7 @@ def run_apart(name: str, line: str) -> int:
     try:
         for stream, suffix in ((1, "out"), (2, "err")):
             os.dup2(os.open(f"{name}.{suffix}", os.O_WRONLY | os.O_CREAT), stream)
-        signal.alarm(PATIENCE)
+        signal.alarm(TIMEOUT)
         sys.argv = ["urmpipe", *shlex.split(line)]
         if line.startswith("python "):
             run_script(Path(sys.argv[2]))
@@ -243,7 +248,7 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=lambda given: Path(given).resolve(), required=True)
     parser.add_argument("-j", "--jobs", type=int, default=1)
     parser.add_argument("--keep", action="store_true", help="keep the large files, too")
-    parser.add_argument("--hashes", type=Path, help="write the hashes of the whole snapshot into this file")
+    parser.add_argument("--net", type=Path, help="write what is kept of the whole snapshot into this file")
     given = parser.parse_intermixed_args()
     began = time.monotonic()
     lay_inputs(given.output / "in")
@@ -256,8 +261,8 @@ def main() -> None:
         for done, name in enumerate(pool.imap_unordered(partial(record, given.output, given.keep), cases), 1):
             print(f"\r{done}/{len(cases)} {name:60}", end="", file=sys.stderr, flush=True)
     print(f"\n{len(cases)} cases in {time.monotonic() - began:.0f} s", file=sys.stderr)
-    if given.hashes:
-        given.hashes.write_text(hashes(load(given.output)), encoding="utf-8")
+    if given.net:
+        given.net.write_text(pack(load(given.output)), encoding="utf-8")
 
 
 if __name__ == "__main__":
