@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from html import unescape
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -152,6 +153,12 @@ def test_solves_with_the_last_values_as_start_stay_on_one_branch() -> None:
         # sin(B) > 0 on the branch of the start; the other assembly is at -B, far away
         assert math.sin(found.assemblies[0].values["B"][0]) > 0.0
         assert len(found.distances) == 2 and found.distances[1] > 5.0 * found.distances[0]
+
+
+def test_a_report_states_the_start_values_of_the_search(urmpipe: Run) -> None:
+    assert urmpipe("network", "solve", "four-bar", "--start", "theta4=-2", "-o", "s.rrd").code == 0
+    assert urmpipe("report", "s.rrd").code == 0
+    assert '{"theta4": [-2.0]}' in unescape(Path("s.html").read_text(encoding="utf-8"))
 
 
 def test_what_does_not_close_fails_with_its_loop_and_gap(urmpipe: Run, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_fmus.block import Table
-from urmpipe_fmus.blocks import make_block, block_names
+from urmpipe_fmus.blocks import block_names, make_block
 from urmpipe_fmus.run import run
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.delta import delta, outside
@@ -20,11 +20,11 @@ from urmpipe_models.drives import (
     DrivenJoint,
     Gains,
     JointMotion,
-    current_rate,
-    motor_torque,
-    load_acceleration,
-    dissipated_power,
     control_voltage,
+    current_rate,
+    dissipated_power,
+    load_acceleration,
+    motor_torque,
     ramp,
     shaft_acceleration,
     shaft_torque,
@@ -58,7 +58,7 @@ from urmpipe_models.elementwise import cosine_sine
 from urmpipe_models.hand_eye import hand_eye, rotation_miss
 from urmpipe_models.ik.closed import closed_form
 from urmpipe_models.ik.path import solve_path
-from urmpipe_models.ik.solutions import SearchOptions, Targets, pose_errors, forward_targets
+from urmpipe_models.ik.solutions import SearchOptions, Targets, forward_targets, pose_errors
 from urmpipe_models.ik.solve import solve
 from urmpipe_models.kinematics.forward import (
     bias_over_log,

@@ -118,7 +118,7 @@ def option_words(name: str, value: Any, kinds: Mapping[str, str] | None = None) 
 def _in_unit(value: Any, name: str, units: Mapping[str, str]) -> Any:
     if isinstance(value, Mapping) and name in ("read", "tolerance"):  # the keys of others are no options
         return {key: _in_unit(one, key, units) for key, one in value.items()}
-    if name not in units or isinstance(value, (str, bool)) or value is None:
+    if name not in units or isinstance(value, (str, bool, Mapping)) or value is None:
         return value
     if isinstance(value, (list, tuple)):
         return f"{', '.join(f'{one:.6g}' for one in value)} {units[name]}"
