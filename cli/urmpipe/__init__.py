@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.display import Shown
+from urmpipe_models.display import Displayable
 from urmpipe_pipeline.presentation.result import Result
 
 if TYPE_CHECKING:
@@ -171,7 +171,7 @@ def _draw(result: Result, title: str | None, width: str | float, font: float) ->
     return plot(present(whole(result)), title, width, font)
 
 
-Shown.page = staticmethod(_page)
+Displayable.page = staticmethod(_page)
 Result.draw = staticmethod(_draw)
 
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import Finding, Hint, OptionError, shown
+from urmpipe_models.errors import Finding, Hint, OptionError, format_value
 from urmpipe_models.ik.solutions import ROTATION_TOLERANCE
-from urmpipe_models.math3d import Transform, from_offset, rpy_of
+from urmpipe_models.math3d import Transform, from_offset, matrix_to_rpy
 from urmpipe_models.robots.catalogue import load_robot
 
 Robot = Chain | str | Path
@@ -98,9 +98,9 @@ def frame_of(name: str, given: Frame | None) -> Transform | None:
     try:
         values = np.asarray(given, dtype=float)
     except (TypeError, ValueError):
-        raise OptionError(Finding(parameter=name, found=shown(given), allowed=FRAME_ALLOWED)) from None
+        raise OptionError(Finding(parameter=name, found=format_value(given), allowed=FRAME_ALLOWED)) from None
     if values.shape not in ((3,), (6,), (4, 4)) or not np.isfinite(values).all():
-        found = f"{shown(given)} of shape {values.shape}"
+        found = f"{format_value(given)} of shape {values.shape}"
         raise OptionError(Finding(parameter=name, found=found, allowed=f"{FRAME_ALLOWED}, all finite"))
     if values.ndim == 1:
         return from_offset(values.tolist())
@@ -117,5 +117,5 @@ def offset_of(frame: Transform) -> tuple[float, ...]:
     """Return a frame as X, Y, Z in [m], with RX, RY, RZ in [rad] if it turns; nothing for none at all."""
     if frame == Transform():
         return ()
-    turn = () if frame.rotation == Transform().rotation else rpy_of(frame.rotation)
+    turn = () if frame.rotation == Transform().rotation else matrix_to_rpy(frame.rotation)
     return tuple(float(value) + 0.0 for value in (*frame.translation, *turn))  # + 0.0: no -0.0 in the file

@@ -103,11 +103,11 @@ def deciding_defaults(
     Raises:
         OptionError: With everything that is wrong with any of the files.
     """
-    from urmpipe_models.errors import for_each
+    from urmpipe_models.errors import map_collecting_errors
 
     decided: set[str] = set()
     by_file = {}
-    each = for_each(lambda path: defaults_for(command, path, commands), files)
+    each = map_collecting_errors(lambda path: defaults_for(command, path, commands), files)
     for path, values in zip(files, each, strict=True):
         if own := {name: value for name, value in values.items() if name not in decided}:
             by_file[path] = own
@@ -127,9 +127,9 @@ def defaults_for(command: click.Command, path: Path, commands: Mapping[str, clic
         OptionError: With everything that is wrong with the file.
     """
     from urmpipe_models.errors import OptionError
-    from urmpipe_models.toml_tables import parse_toml
+    from urmpipe_models.toml_tables import read_toml
 
-    data = parse_toml(path, OptionError)
+    data = read_toml(path, OptionError)
     faults = list(_faults(data, path, commands))
     if faults:
         raise OptionError(*faults)
@@ -145,7 +145,7 @@ def defaults_for(command: click.Command, path: Path, commands: Mapping[str, clic
 
 def _faults(data: Mapping[str, Any], path: Path, commands: Mapping[str, click.Command]) -> Iterator[Finding]:
     """Yield what is wrong with the keys of a file."""
-    from urmpipe_models.errors import Finding, not_among
+    from urmpipe_models.errors import Finding, format_unknown_name
 
     every = {name: option for one in commands.values() for name, option in _options(one).items()}
     for key, value in data.items():
@@ -154,7 +154,7 @@ def _faults(data: Mapping[str, Any], path: Path, commands: Mapping[str, click.Co
             own, place = _options(commands[key]), f"{key}."
             faults = [_fault(name, inner, own) for name, inner in value.items()]
         elif isinstance(value, Mapping) and key not in every:
-            faults = [f"{key}: {not_among(key, commands)}"]
+            faults = [f"{key}: {format_unknown_name(key, commands)}"]
         else:
             faults = [_fault(key, value, every)]
         yield from (Finding(f"key {place}{fault}", str(path)) for fault in faults if fault)
@@ -162,12 +162,13 @@ def _faults(data: Mapping[str, Any], path: Path, commands: Mapping[str, click.Co
 
 def _fault(name: str, value: Any, allowed: Mapping[str, click.Option]) -> str | None:
     """Return what is wrong with one key and its value; None if nothing is."""
-    from urmpipe_models.errors import did_you_mean, listed
+    from urmpipe_models.errors import format_names, format_suggestion
 
     if f"--{name}" in EACH_TIME:
         return f"{name}: found an option of a single call, allowed: --{name} on the command line"
     if name not in allowed:
-        return f"{name}: unknown{did_you_mean(name, allowed)}; allowed: {listed(name, sorted(allowed))}"
+        hint = format_suggestion(name, allowed)
+        return f"{name}: unknown{hint}; allowed: {format_names(name, sorted(allowed))}"
     if isinstance(value, Mapping) and name not in TABLES:
         return f"{name}: found a table, allowed: a value"
     if allowed[name].is_flag != isinstance(value, bool):

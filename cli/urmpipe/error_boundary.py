@@ -80,7 +80,7 @@ def findings_of(error: BaseException) -> Sequence[Finding]:
 
 def print_findings(findings: Sequence[Finding], as_json: bool) -> None:
     """Print errors on standard error, a line each, and as one JSON object if it is asked for."""
-    lines = [f"error: {finding.words('command line')}" for finding in findings[:SHOWN_FINDINGS]]
+    lines = [f"error: {finding.format('command line')}" for finding in findings[:SHOWN_FINDINGS]]
     if len(findings) > SHOWN_FINDINGS:
         lines.append(f"error: and {len(findings) - SHOWN_FINDINGS} more")
     with suppress(OSError):  # where standard error takes no more, the exit code tells it all the same

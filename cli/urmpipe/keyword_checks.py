@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from urmpipe.kinds import kind_of
-from urmpipe_models.display import Shown
-from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError, shown
+from urmpipe_models.display import Displayable
+from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError, format_value
 from urmpipe_pipeline.joint_log import PASSED_OVER, LogWarning
 from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.sources.options import read_options
@@ -75,7 +75,7 @@ def _wrong(function: str, given: Mapping[str, Any], defaults: Mapping[str, Any])
     for name, value in given.items():
         kind = kind_of(function, name)
         if kind is not None and value is not defaults[name] and not kind.fits(value):
-            yield Finding(parameter=name, found=shown(value), allowed=kind.allowed)
+            yield Finding(parameter=name, found=format_value(value), allowed=kind.allowed)
 
 
 def _wrong_reading(given: Mapping[str, Any]) -> Iterator[Finding]:
@@ -99,7 +99,7 @@ def _unseen(made: Any, given: Iterable[Any]) -> Iterator[str]:
 
 def _warnings_of(result: Any) -> Iterator[LogWarning]:
     """Yield the warnings of a result, and those of the logs that it compares with the log's name."""
-    if not isinstance(result, Shown):  # a table may have a column of that name
+    if not isinstance(result, Displayable):  # a table may have a column of that name
         return
     yield from getattr(result, "warnings", ())
     for deviation in getattr(result, "runs", ()):
@@ -127,7 +127,7 @@ def refuse_others(name: str, given: Sequence[object], kinds: tuple[type, ...], a
         kinds: Classes that are allowed besides paths.
         allowed: What is allowed, in words.
     """
-    found = [shown(one) for one in given if not isinstance(one, (str, Path, *kinds)) or one == ""]
+    found = [format_value(one) for one in given if not isinstance(one, (str, Path, *kinds)) or one == ""]
     if found or not given:
         raise OptionError(Finding(about=name, found=", ".join(found) or "none", allowed=allowed))
 

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from urmpipe import __version__
 from urmpipe.keyword_checks import PathLike
-from urmpipe_models.errors import Finding, OptionError, for_each, shown
+from urmpipe_models.errors import Finding, OptionError, format_value, map_collecting_errors
 from urmpipe_pipeline.outputs import DRAWING_HEADER, NOUNS, OutputKind, guarded_output, refuse_output
 from urmpipe_pipeline.placing import all_or_none
 from urmpipe_pipeline.presentation.result import Result
@@ -73,7 +73,7 @@ def guarded_outputs(named: Mapping[OutputKind, PathLike | None], inputs: Sequenc
     """
     targets = {kind: Path(path) for kind, path in named.items() if path is not None}
     _refuse_shared(targets)
-    for_each(lambda one: refuse_output(one[1], inputs, one[0]), targets.items())
+    map_collecting_errors(lambda one: refuse_output(one[1], inputs, one[0]), targets.items())
     if "recording" in targets:
         import_ahead()
     with all_or_none():
@@ -97,7 +97,7 @@ def output_kind(output: Path | None, log: OutputKind) -> OutputKind | None:
     kind = {".csv": log, ".rrd": "recording"}.get(output.suffix.lower())
     if kind is None:
         allowed = f"a name that ends in .csv (a {NOUNS.get(log, log)}) or .rrd (a recording)"
-        raise OptionError(Finding(parameter="output", found=shown(str(output)), allowed=allowed))
+        raise OptionError(Finding(parameter="output", found=format_value(str(output)), allowed=allowed))
     return kind
 
 

@@ -10,7 +10,7 @@ from typing import Any, TypedDict
 from urmpipe.arm_placing import Frame, Robot, place_robot
 from urmpipe.keyword_checks import PathLike
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.errors import for_each
+from urmpipe_models.errors import map_collecting_errors
 from urmpipe_models.math3d import RotationForm, from_offset
 from urmpipe_pipeline.sources import LogMap, ReadOptions, read_map
 from urmpipe_pipeline.sources.options import GivenInterval, read_options
@@ -129,7 +129,7 @@ def resolved(
         lambda: place_robot(arm, base, tool, base_link=base_link, tip_link=tip_link),
         lambda: read_options({**reading, "names": names}, log_map.read),
     )
-    chain, options = for_each(lambda make: make(), parts)
+    chain, options = map_collecting_errors(lambda make: make(), parts)
     return Resolved(chain, arm, options)
 
 

@@ -80,12 +80,12 @@ class Group(click.Group):
         name = args[0]
         if name.startswith("-") or ctx.resilient_parsing or self.get_command(ctx, name):
             return super().resolve_command(ctx, args)
-        from urmpipe_models.errors import not_among, shown
+        from urmpipe_models.errors import format_unknown_name, format_value
 
         names = self.list_commands(ctx)
         deeper = next(self._deeper(ctx, name), None)
-        meant = f"found {shown(name)} (did you mean {deeper}?), allowed: {', '.join(names)}"
-        raise click.UsageError(meant if deeper else not_among(name, names), ctx)
+        meant = f"found {format_value(name)} (did you mean {deeper}?), allowed: {', '.join(names)}"
+        raise click.UsageError(meant if deeper else format_unknown_name(name, names), ctx)
 
     def _deeper(self, ctx: click.Context, name: str) -> Iterator[str]:
         """Yield the commands of the groups in this group that have a name."""
@@ -97,13 +97,13 @@ class Group(click.Group):
 
 def usage_finding(error: click.UsageError) -> Finding:
     """Return what is wrong with a line, or with the urmpipe.toml that speaks for it."""
-    from urmpipe_models.errors import Finding, did_you_mean
+    from urmpipe_models.errors import Finding, format_suggestion
 
     ctx = error.ctx
     match error:
         case click.NoSuchOption():
             options = [name for param in ctx.command.params for name in param.opts] if ctx else []
-            said = f"{error.option_name}: no such option{did_you_mean(error.option_name, options)}"
+            said = f"{error.option_name}: no such option{format_suggestion(error.option_name, options)}"
         case click.BadOptionUsage(option_name=name):
             lacks = "requires" in error.message  # click tells the two apart by its words alone
             found, allowed = ("no value", _value(ctx, name)) if lacks else ("a value", "alone")

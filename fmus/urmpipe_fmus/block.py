@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from urmpipe_fmus.si_units import coherent, display_conversion, same_unit
 from urmpipe_models.elementwise import Element, FloatArray
-from urmpipe_models.errors import Finding, FmuError, UnitError, shown
+from urmpipe_models.errors import Finding, FmuError, UnitError, format_value
 
 Causality = Literal["parameter", "input", "output", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]
@@ -107,10 +107,11 @@ class Variable(ABC):
     def faults(self) -> Iterator[str]:
         """Yield what is wrong with the variable."""
         if not (self.name.isidentifier() and self.name.isascii()) or self.name.startswith("_"):
-            yield f"{shown(self.name)}: found as a name, allowed: a letter, then letters, digits and _"
+            yield f"{format_value(self.name)}: found as a name, allowed: a letter, then letters, digits and _"
         starts = self.start if isinstance(self.start, tuple) else (self.start,)
         if not all(isinstance(one, Real) for one in starts):
-            yield f"{self.name}: start value {shown(self.start)}, allowed: a number, or a tuple of numbers"
+            found = format_value(self.start)
+            yield f"{self.name}: start value {found}, allowed: a number, or a tuple of numbers"
             return
         if self.size is not None and self.size < 1:
             yield f"{self.name}: size {self.size}, allowed: 1 or more"
@@ -127,7 +128,8 @@ class Variable(ABC):
             yield f"found {self.type} with a unit, allowed: a unit of a Real"
             return
         if self.display_unit and not self.unit:
-            yield f"found display unit {shown(self.display_unit)} without a unit, allowed: both or none"
+            found = format_value(self.display_unit)
+            yield f"found display unit {found} without a unit, allowed: both or none"
         try:
             if self.unit:
                 display_conversion(self.unit, self.display_unit or self.unit)
@@ -469,18 +471,20 @@ class BlockModel:
         for one in self.variables:
             if not isinstance(one, (Parameter, Input, Output, State, Memory)):
                 allowed = "a Parameter, Input, Output, State or Memory"
-                yield f"found {shown(one)} as a variable, allowed: {allowed}"
+                yield f"found {format_value(one)} as a variable, allowed: {allowed}"
                 continue
             for key in ("name", "description", "unit", "display_unit"):
                 yield from _no_text(f"{one.name}: {key}", getattr(one, key))
             if one.type not in get_args(ValueType):
-                yield f"{one.name}: found type {shown(one.type)}, allowed: {', '.join(get_args(ValueType))}"
+                allowed = ", ".join(get_args(ValueType))
+                yield f"{one.name}: found type {format_value(one.type)}, allowed: {allowed}"
             if one.size is not None and type(one.size) is not int:
-                yield f"{one.name}: found size {shown(one.size)}, allowed: an integer; None for a scalar"
+                size = format_value(one.size)
+                yield f"{one.name}: found size {size}, allowed: an integer; None for a scalar"
         for key in ("name", "description", "source"):
             yield from _no_text(key, getattr(self, key))
         if isinstance(self.equations, str):
-            yield f"equations: found {shown(self.equations)}, allowed: a tuple of texts, a line each"
+            yield f"equations: found {format_value(self.equations)}, allowed: a tuple of texts, a line each"
 
     def _faults(self) -> Iterator[str]:
         wrong = list(self._wrong_kinds())
@@ -488,7 +492,8 @@ class BlockModel:
             yield from wrong
             return
         if not self.name.isidentifier() or not self.name.isascii():
-            yield f"found {shown(self.name)} as its name, allowed: a letter, then letters, digits and _"
+            name = format_value(self.name)
+            yield f"found {name} as its name, allowed: a letter, then letters, digits and _"
         if not self.variables:
             yield "found no variables, allowed: one or more (FMI has no FMU without them)"
         names = [one.name for one in self.variables]
@@ -521,7 +526,7 @@ def _is_internal_step(one: Variable) -> bool:
 
 def _no_text(what: str, value: Any) -> Iterator[str]:
     if not isinstance(value, str):
-        yield f"{what}: found {shown(value)}, allowed: a text"
+        yield f"{what}: found {format_value(value)}, allowed: a text"
 
 
 TABLE_FILE = "resources/table.bin"

@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 from xml.parsers import expat
 
-from urmpipe_models.errors import Finding, FmuError, shown
-from urmpipe_models.files import keep_permissions, meant_by
+from urmpipe_models.errors import Finding, FmuError, format_value
+from urmpipe_models.files import keep_permissions, suggest_path
 
 X86 = ("x86_64", "amd64", "i386", "i486", "i586", "i686", "x86")
 """What processors call themselves that FMI 2.0's linux64, win64 and their like stand for."""
@@ -231,7 +231,7 @@ def open_fmu(path: Path) -> FmuFile:
 def _description(path: Path) -> tuple[bytes, tuple[str, ...]]:
     """Return the description of an FMU, and the paths of its entries, all checked."""
     if "\0" in str(path):
-        raise FmuError(f"found {shown(str(path))}, allowed: the name of a file")
+        raise FmuError(f"found {format_value(str(path))}, allowed: the name of a file")
     try:
         kind = path.stat().st_mode
         if not stat.S_ISREG(
@@ -249,7 +249,9 @@ def _description(path: Path) -> tuple[bytes, tuple[str, ...]]:
                 raise _refused(path, f"found a zip without {DESCRIPTION}, allowed: {AN_FMU}")
             return archive.read(DESCRIPTION), names
     except FileNotFoundError as error:
-        raise _refused(path, f"found no such file{meant_by(path, ('.fmu',))}, allowed: {AN_FMU}") from error
+        raise _refused(
+            path, f"found no such file{suggest_path(path, ('.fmu',))}, allowed: {AN_FMU}"
+        ) from error
     except OSError as error:
         raise _refused(path, f"cannot be read: {error.strerror or error}") from error
     except DAMAGED as error:
@@ -312,7 +314,7 @@ def _listed(names: Sequence[str], what: str, allowed: str) -> Iterator[str]:
 
 def _written(name: str) -> str:
     """Return a path as a message shows it."""
-    return name if name.isprintable() and len(name) <= 60 else shown(name)
+    return name if name.isprintable() and len(name) <= 60 else format_value(name)
 
 
 def _leads_elsewhere(name: str) -> bool:
@@ -370,7 +372,7 @@ class _Description:
             self.kinds.append(tag)
             if not name or name == "." or "/" in name or _leads_elsewhere(name):
                 allowed = "the name of its binaries, without / \\ and :"
-                self._faults[f"modelIdentifier: found {shown(name)}, allowed: {allowed}"] = None
+                self._faults[f"modelIdentifier: found {format_value(name)}, allowed: {allowed}"] = None
 
     def _end(self, _: str) -> None:
         self._depth -= 1

@@ -22,7 +22,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from urmpipe_models.processes import command, end_group, ending, environment
+from urmpipe_models.processes import describe_exit, end_group, module_command, module_environment
 
 TIMEOUT = 60.0
 """Seconds that a call of an FMU may take; one that takes longer has hung."""
@@ -125,7 +125,7 @@ def run_job(folder: Path, job: Mapping[str, Any], timeout: float) -> Run:
     run = Run(log=(folder / "log").read_text("utf-8", "replace").splitlines())
     whole = _fill(run, folder / "found")
     if ended or not whole:
-        run.ended = f"{name} {ended or ending(0)}"
+        run.ended = f"{name} {ended or describe_exit(0)}"
     return run
 
 
@@ -159,7 +159,7 @@ def _watched(folder: Path, call: mmap.mmap, timeout: float) -> str:
             if printed.stat().st_size > LOG_BYTES:
                 os.truncate(printed, 0)
     said = printed.read_text("utf-8", "replace").strip().splitlines() if code > 0 else []
-    return ": ".join((ending(code), *said[-1:])) if code else ""
+    return ": ".join((describe_exit(code), *said[-1:])) if code else ""
 
 
 @contextmanager
@@ -167,8 +167,8 @@ def _started(folder: Path, printed: Path) -> Iterator[subprocess.Popen[bytes]]:
     """Start the process of a job; it ends with the context, and so does what the FMU started in it."""
     with printed.open("ab") as file:
         process = subprocess.Popen(
-            command("urmpipe_fmus.check_run", str(folder)),
-            env=environment(),
+            module_command("urmpipe_fmus.check_run", str(folder)),
+            env=module_environment(),
             stdin=subprocess.PIPE,  # closed when this process ends, whatever ends it
             stdout=subprocess.DEVNULL,
             stderr=file,

@@ -38,7 +38,7 @@ def delta(reference: Vector, actual: Vector) -> Delta:
     return Delta(x, y, z, np.sqrt(x * x + y * y + z * z))
 
 
-def outside(deviation: Delta, tolerance: Element) -> Element:
+def exceeds_tolerance(deviation: Delta, tolerance: Element) -> Element:
     """Return where |x|, |y| or |z| is above the tolerance in [m], or has no value (1 in a trace).
 
     Compared one by one: C's fmax passes over a value that is NaN.

@@ -6,16 +6,16 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar
 
-from urmpipe_models.errors import in_html, one_line
+from urmpipe_models.errors import escape_html, escape_line
 
-LONGEST = 120
+MAX_LINE_LENGTH = 120
 """Characters of the line: it fits into a terminal, and into a list of results."""
 
-HEAD = 8
+HEAD_ROWS = 8
 """Rows of the table in a notebook."""
 
 
-class Shown(ABC):
+class Displayable(ABC):
     """A result that people look at: it has a headline, a table, and what a person should know."""
 
     __slots__ = ()
@@ -34,30 +34,30 @@ class Shown(ABC):
     def _table(self) -> str:
         """Return the head of its table in HTML."""
         frame: Any = self.to_frame()  # type: ignore[attr-defined]
-        more = f"<p>{HEAD} of {len(frame)} rows of to_frame()</p>" if len(frame) > HEAD else ""
-        return f"{frame.head(HEAD).to_html(index=False)}{more}"
+        more = f"<p>{HEAD_ROWS} of {len(frame)} rows of to_frame()</p>" if len(frame) > HEAD_ROWS else ""
+        return f"{frame.head(HEAD_ROWS).to_html(index=False)}{more}"
 
     def __repr__(self) -> str:
         notes = len(self._notes())
-        ending = f", {number_of(notes, 'warning')}>" if notes else ">"
-        line = one_line(f"<{type(self).__name__} {self._headline()}")
-        room = LONGEST - len(ending)
+        ending = f", {format_count(notes, 'warning')}>" if notes else ">"
+        line = escape_line(f"<{type(self).__name__} {self._headline()}")
+        room = MAX_LINE_LENGTH - len(ending)
         return f"{line if len(line) <= room else line[: room - 3] + '...'}{ending}"
 
     def _repr_html_(self) -> str:
         """Return for a notebook what presents it, else its headline, warnings and the head of its table."""
-        if (page := Shown.page(self)) is not None:
+        if (page := Displayable.page(self)) is not None:
             return page
-        notes = "".join(f"<li>{in_html(note)}</li>" for note in self._notes())
-        headline = f"<p><b>{type(self).__name__}</b> {in_html(self._headline())}</p>"
+        notes = "".join(f"<li>{escape_html(note)}</li>" for note in self._notes())
+        headline = f"<p><b>{type(self).__name__}</b> {escape_html(self._headline())}</p>"
         return f"{headline}{notes and f'<ul>{notes}</ul>'}{self._table()}"
 
 
-def number_of(count: int, what: str) -> str:
+def format_count(count: int, what: str) -> str:
     """Return a number with its noun: 1 row, 2 rows."""
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
-def line_of(name: str, *facts: Any) -> str:
+def format_headline(name: str, *facts: Any) -> str:
     """Return a headline: the name, then the facts that there are."""
     return f"{name}: {', '.join(str(fact) for fact in facts if fact)}"

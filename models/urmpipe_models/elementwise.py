@@ -149,7 +149,7 @@ def cosine_sine(angle: Element) -> tuple[Element, Element]:
         cosine, sine = _of_array(np.array([angle]))
         return cosine.item(), sine.item()
     steps = round(angle * _PER_STEP)
-    cosines, sines = table()
+    cosines, sines = cosine_sine_table()
     at = steps % _STEPS
     return _turned(cosines.item(at), sines.item(at), float(angle - steps * _STEP_1) - steps * _STEP_2)
 
@@ -177,7 +177,7 @@ def cosine_sine_into(x: FloatArray, c: FloatArray, s: FloatArray, *work: FloatAr
     steps += _SHIFT
     at = np.bitwise_and(steps.view(np.int64), _STEPS - 1, r.view(np.int64))
     steps -= _SHIFT
-    cosines, sines = table()
+    cosines, sines = cosine_sine_table()
     cosines.take(at, out=c, mode="clip")
     sines.take(at, out=s, mode="clip")
     np.multiply(steps, _STEP_1, r)
@@ -220,7 +220,7 @@ def _less_turns(x: FloatArray) -> FloatArray:
 
 
 @cache
-def table() -> tuple[FloatArray, FloatArray]:
+def cosine_sine_table() -> tuple[FloatArray, FloatArray]:
     """Return cos and sin [-] of k 2 pi / 4096, shape (4096,), each the nearest double.
 
     One step after the other is added in whole numbers of 2^-128, up to an eighth of a turn; the rest is
@@ -262,7 +262,7 @@ def spread_rows(count: int, most: int) -> IntArray:
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
 
 
-def norms(vectors: FloatArray) -> FloatArray:
+def row_norms(vectors: FloatArray) -> FloatArray:
     """Return the lengths of vectors, in their unit, shape (n,), with memory for a block of rows beside them.
 
     Args:
@@ -275,7 +275,7 @@ def norms(vectors: FloatArray) -> FloatArray:
     return lengths
 
 
-def side_by_side(
+def map_blocks(
     work: Callable[[Block], Result], blocks: Sequence[Block], threads: int = THREADS
 ) -> list[Result]:
     """Return what work makes of each block, several at a time: NumPy computes without Python's lock.

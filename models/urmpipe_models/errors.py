@@ -9,9 +9,9 @@ A message keeps its sentence, written where the fault is seen. What that is abou
 would change it, are fields. Who prints chooses the voice, so that a stored message reads right for everybody:
 
     warning = Finding("no unit is given", hints=(Hint("unit", {"q1": "deg"}, "applies this"),))
-    warning.words("command line")   no unit is given; --unit q1=deg applies this
-    warning.words("python")         no unit is given; unit={"q1": "deg"} applies this
-    warning.words("system file")    no unit is given; units.q1 = "deg" in the map of the log applies this
+    warning.format("command line")   no unit is given; --unit q1=deg applies this
+    warning.format("python")         no unit is given; unit={"q1": "deg"} applies this
+    warning.format("system file")    no unit is given; units.q1 = "deg" in the map of the log applies this
 
 The error tree: everything that urmpipe raises on purpose is an `UrmpipeError`.
 
@@ -39,36 +39,36 @@ Voice = Literal["command line", "python", "system file"]
 """Who reads a message, and so how parameters are spelled."""
 
 
-class Own(str):
+class Placeholder(str):
     """What the reader fills in: it stands without quotes."""
 
     __slots__ = ()
 
 
 _OWN: Mapping[str, Any] = {
-    "audit": Own("FILE.csv"),
-    "base": [Own("X"), Own("Y"), Own("Z")],
-    "baseline": Own("RUN.rrd"),
-    "decimal": Own("SIGN"),
-    "delimiter": Own("SIGN"),
-    "duration": Own("SECONDS"),
-    "interval": (Own("LOW"), Own("HIGH")),
-    "joints": [Own("A"), Own("B"), Own("C")],
-    "log_map": Own("FILE.toml"),
-    "measured": [Own("A"), Own("B"), Own("C")],
-    "output": Own("FILE"),
-    "period": Own("SECONDS"),
-    "robot": Own("NAME|FILE"),
-    "rotation": Own("FORM"),
-    "source": Own("NAME"),
-    "step": Own("SECONDS"),
-    "sync": Own("SECONDS"),
-    "time": Own("COLUMN"),
-    "tip_link": Own("LINK"),
-    "tool": [Own("X"), Own("Y"), Own("Z")],
-    "tsp": Own("SECONDS"),
-    "write_map": Own("FILE.toml"),
-    "write_system": Own("FILE.toml"),
+    "audit": Placeholder("FILE.csv"),
+    "base": [Placeholder("X"), Placeholder("Y"), Placeholder("Z")],
+    "baseline": Placeholder("RUN.rrd"),
+    "decimal": Placeholder("SIGN"),
+    "delimiter": Placeholder("SIGN"),
+    "duration": Placeholder("SECONDS"),
+    "interval": (Placeholder("LOW"), Placeholder("HIGH")),
+    "joints": [Placeholder("A"), Placeholder("B"), Placeholder("C")],
+    "log_map": Placeholder("FILE.toml"),
+    "measured": [Placeholder("A"), Placeholder("B"), Placeholder("C")],
+    "output": Placeholder("FILE"),
+    "period": Placeholder("SECONDS"),
+    "robot": Placeholder("NAME|FILE"),
+    "rotation": Placeholder("FORM"),
+    "source": Placeholder("NAME"),
+    "step": Placeholder("SECONDS"),
+    "sync": Placeholder("SECONDS"),
+    "time": Placeholder("COLUMN"),
+    "tip_link": Placeholder("LINK"),
+    "tool": [Placeholder("X"), Placeholder("Y"), Placeholder("Z")],
+    "tsp": Placeholder("SECONDS"),
+    "write_map": Placeholder("FILE.toml"),
+    "write_system": Placeholder("FILE.toml"),
 }
 """What stands for a value that is the reader's own; another parameter shows its name in capitals."""
 
@@ -107,28 +107,28 @@ IN_NO_FILE = ("repair", "skip_bad", "derivative", "tsp")
 """Parameters of a log that no file says."""
 
 
-def subject(parameter: str, voice: Voice) -> str:
+def format_parameter(parameter: str, voice: Voice) -> str:
     """Return a parameter as somebody calls it: an option, a keyword, or a key of a file."""
     if voice == "python":
         return parameter
     if parameter in ARGUMENTS:
         return parameter.upper()
-    return IN_FILE.get(parameter, option_of(parameter)) if voice == "system file" else option_of(parameter)
+    return IN_FILE.get(parameter, to_option(parameter)) if voice == "system file" else to_option(parameter)
 
 
-def option_of(parameter: str) -> str:
+def to_option(parameter: str) -> str:
     """Return the option of the command line that a keyword is: `--skip-bad`."""
     return f"--{parameter.replace('_', '-')}"
 
 
-def spelled(parameter: str, value: Any, voice: Voice) -> str:
+def format_assignment(parameter: str, value: Any, voice: Voice) -> str:
     """Return a parameter with its value, as somebody writes it: `--unit q1=deg`, `unit={"q1": "deg"}`."""
-    own = _OWN.get(parameter, Own(parameter.upper()))
+    own = _OWN.get(parameter, Placeholder(parameter.upper()))
     if isinstance(value, Mapping):
         value = {key: own if one is None else one for key, one in value.items()}
     value = own if value is None else value
     if voice == "command line" or (voice == "system file" and parameter not in IN_FILE):
-        return " ".join(_options(option_of(parameter), value))
+        return " ".join(_options(to_option(parameter), value))
     return f"{parameter}={_in_python(value)}" if voice == "python" else _in_file(parameter, value)
 
 
@@ -146,7 +146,7 @@ def _options(option: str, value: Any) -> Iterator[str]:
 def _word(key: str, value: Any) -> str:
     """Return a value behind its key as one word of a shell; what the reader fills in stays as it is."""
     cell = _cell(value)
-    return pasted(key) * bool(key) + cell if _is_own(value) else pasted(key + cell)
+    return shell_quote(key) * bool(key) + cell if _is_own(value) else shell_quote(key + cell)
 
 
 def _cell(value: Any) -> str:
@@ -158,7 +158,7 @@ def _cell(value: Any) -> str:
 
 def _is_own(value: Any) -> bool:
     """Return whether a value is the reader's own, and needs no quotes of a shell."""
-    return isinstance(value, Own) or (isinstance(value, (list, tuple)) and all(map(_is_own, value)))
+    return isinstance(value, Placeholder) or (isinstance(value, (list, tuple)) and all(map(_is_own, value)))
 
 
 def _in_python(value: Any) -> str:
@@ -169,7 +169,7 @@ def _in_python(value: Any) -> str:
     if isinstance(value, (list, tuple)):
         inner = ", ".join(map(_in_python, value))
         return f"[{inner}]" if isinstance(value, list) else f"({inner})"
-    if isinstance(value, str) and not isinstance(value, Own):
+    if isinstance(value, str) and not isinstance(value, Placeholder):
         return _quoted(value)
     return str(value) if isinstance(value, bool) else _cell(value)
 
@@ -199,7 +199,7 @@ def _escaped(text: str) -> str:
     return "".join(one if one.isprintable() else f"\\U{ord(one):08x}" for one in text)
 
 
-def pasted(word: object, platform: str = sys.platform) -> str:
+def shell_quote(word: object, platform: str = sys.platform) -> str:
     """Return a word as it may be pasted into a shell: quoted if this would part it or read it otherwise.
 
     Args:
@@ -223,7 +223,9 @@ def python_command(code: str) -> str:
     It stands in double quotes, as cmd, too, reads it, unless a name in it has what a shell reads in these.
     """
     return (
-        f"python -c {pasted(code)}" if set(code) & set('"$`!\\\u201c\u201d\u201e') else f'python -c "{code}"'
+        f"python -c {shell_quote(code)}"
+        if set(code) & set('"$`!\\\u201c\u201d\u201e')
+        else f'python -c "{code}"'
     )
 
 
@@ -258,18 +260,20 @@ class Hint:
     def __hash__(self) -> int:
         return hash((self.parameter, self.does))  # a mapping has no hash
 
-    def spelled(self, voice: Voice) -> str:
+    def format(self, voice: Voice) -> str:
         """Return the parameter with its value: `--unit q1=deg`, `unit={"q1": "deg"}`."""
         if not self.parameter:
             return ""
         if self.robot:
             joined = " " if voice == "command line" else ", "
-            return joined.join((spelled("robot", self.robot, voice), replace(self, robot="").spelled(voice)))
+            return joined.join(
+                (format_assignment("robot", self.robot, voice), replace(self, robot="").format(voice))
+            )
         if not self.call:
-            return spelled(self.parameter, self.value, voice)
+            return format_assignment(self.parameter, self.value, voice)
         if voice == "python":
-            return f"{self.call}({spelled(self.parameter, self.value, voice)})"
-        return f"urmpipe {self.call} {spelled(self.parameter, self.value, 'command line')}"
+            return f"{self.call}({format_assignment(self.parameter, self.value, voice)})"
+        return f"urmpipe {self.call} {format_assignment(self.parameter, self.value, 'command line')}"
 
 
 class Message:
@@ -292,7 +296,7 @@ class Message:
     hints: tuple[Hint, ...]
 
     def __str__(self) -> str:
-        return self.words("python")
+        return self.format("python")
 
     def place(self) -> str:
         """Return where it was seen, as it stands before the sentence; empty where that is unknown."""
@@ -305,12 +309,12 @@ class Message:
         )
         said = (": " if self.found else ", ").join(filter(None, (self.message, ", ".join(told))))
         if self.parameter:
-            said = f"{subject(self.parameter, voice)}: {said}"
-        return one_line("; ".join([said, *hint_words(self.hints, voice)]))
+            said = f"{format_parameter(self.parameter, voice)}: {said}"
+        return escape_line("; ".join([said, *format_hints(self.hints, voice)]))
 
-    def words(self, voice: Voice) -> str:
+    def format(self, voice: Voice) -> str:
         """Return all of it in one line, as somebody reads it."""
-        place = one_line(self.place())
+        place = escape_line(self.place())
         return f"{place}: {self.sentence(voice)}" if place else self.sentence(voice)
 
     def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
@@ -358,7 +362,7 @@ class Finding(Message):
         return ": ".join(filter(None, (place, self.about) if self.file else (self.about, place)))
 
 
-def hint_words(hints: Sequence[Hint], voice: Voice) -> Iterator[str]:
+def format_hints(hints: Sequence[Hint], voice: Voice) -> Iterator[str]:
     """Yield what the reader may give, what does the same in one: "--repair or --skip-bad leaves them out".
 
     Args:
@@ -369,14 +373,14 @@ def hint_words(hints: Sequence[Hint], voice: Voice) -> Iterator[str]:
         own = [
             hint for hint in alike if hint.call or voice != "system file" or hint.parameter not in IN_NO_FILE
         ]
-        told = " or ".join(filter(None, (hint.spelled(voice) for hint in own)))
+        told = " or ".join(filter(None, (hint.format(voice) for hint in own)))
         if voice == "system file" and any(hint.parameter in IN_MAP and not hint.call for hint in own):
             told += " in the map of the log"
         if own:
             yield f"{told} {does}".strip() if does else f"use {told}"
 
 
-def one_line(text: str) -> str:
+def escape_line(text: str) -> str:
     """Return a text with all that is not printable as the escapes of Python's strings.
 
     Names come from files, and may hold what breaks a line or what a terminal acts on instead of showing it.
@@ -386,10 +390,10 @@ def one_line(text: str) -> str:
     return "".join(one if one.isprintable() else _escape(one) for one in text)
 
 
-def inert(text: str, kept: str = "") -> str:
+def escape_control_characters(text: str, kept: str = "") -> str:
     """Return a text with escapes of Python's strings for what ends a line, acts on a terminal or reorders.
 
-    Unlike `one_line` it leaves letters that are merely unusual, such as a space that does not break.
+    Unlike `escape_line` it leaves letters that are merely unusual, such as a space that does not break.
 
     Args:
         text: The text.
@@ -398,17 +402,17 @@ def inert(text: str, kept: str = "") -> str:
     return _ACTING.sub(lambda found: found[0] if found[0] in kept else _escape(found[0]), text)
 
 
-def shown_json(written: str) -> str:
+def escape_json(written: str) -> str:
     """Return JSON, or a string of TOML, with escapes for what is not seen: it reads back the same."""
     return _HIDDEN.sub(lambda found: f"\\u{ord(found[0]):04x}", written)
 
 
-def in_html(words: str) -> str:
+def escape_html(words: str) -> str:
     """Return words as text of HTML or SVG, on one line and without what is not printable."""
-    return html.escape(one_line(words))
+    return html.escape(escape_line(words))
 
 
-def in_xml(written: str) -> str:
+def escape_xml(written: str) -> str:
     """Return escaped text of XML with references for what is not seen.
 
     For what XML cannot hold, most control characters and lone surrogates, stand escapes of Python's strings.
@@ -421,14 +425,14 @@ def _escape(letter: str) -> str:
     return letter.encode("unicode_escape").decode()
 
 
-SHOWN = 60
+MAX_VALUE_LENGTH = 60
 """So many letters of a value stand in a message."""
 
 Given = TypeVar("Given")
 Made = TypeVar("Made")
 
 
-def shown(value: object) -> str:
+def format_value(value: object) -> str:
     """Return a value as a message shows it: cut where it is long, its type alone where it is an object."""
     name = type(value).__name__
     kind = f"{'an' if name[0] in 'AEIOUaeiou' else 'a'} {name}"
@@ -436,10 +440,10 @@ def shown(value: object) -> str:
         text = repr(value)
     except (ValueError, RecursionError):  # an integer of more digits than Python writes, or nested too deep
         return f"{kind} too large to be shown"
-    if len(text) <= SHOWN and text.isprintable() and not text.startswith("<"):
+    if len(text) <= MAX_VALUE_LENGTH and text.isprintable() and not text.startswith("<"):
         return text
     if isinstance(value, (str, bytes, int, float, list, tuple, dict)):
-        return one_line(f"{text[: SHOWN - 3]}...")
+        return escape_line(f"{text[: MAX_VALUE_LENGTH - 3]}...")
     return kind
 
 
@@ -501,7 +505,7 @@ class ViewerError(UrmpipeError):
     """A recording cannot be shown here: there is no display, or the viewer does not start."""
 
 
-def for_each(make: Callable[[Given], Made], items: Iterable[Given]) -> list[Made]:
+def map_collecting_errors(make: Callable[[Given], Made], items: Iterable[Given]) -> list[Made]:
     """Return what a function makes of each item.
 
     Raises:
@@ -520,48 +524,48 @@ def for_each(make: Callable[[Given], Made], items: Iterable[Given]) -> list[Made
     return made
 
 
-MOST_LISTED = 16
+MAX_LISTED = 16
 """So many names are listed; of more, those most like the one that was given."""
-LEAST_LIKE = 0.6
+MIN_SIMILARITY = 0.6
 """Share of letters that two names have in common, from where on one may have been meant by the other."""
 
-LONGEST = 200
+MAX_COMPARED_LENGTH = 200
 """Letters of a name that may have been meant otherwise."""
 
 
-def did_you_mean(name: str, allowed: Iterable[str]) -> str:
+def format_suggestion(name: str, allowed: Iterable[str]) -> str:
     """Return ` (did you mean NAME?)` with the allowed name most like another, or nothing if none is.
 
     Small and capital letters count as the same, hyphens, underscores and spaces for nothing.
     """
-    near = nearest(name, allowed)
+    near = closest_name(name, allowed)
     return f" (did you mean {near}?)" if near else ""
 
 
-def nearest(name: str, allowed: Iterable[str]) -> str | None:
+def closest_name(name: str, allowed: Iterable[str]) -> str | None:
     """Return the allowed name most like another; None if none is."""
-    near = _nearest_first(name, allowed, LEAST_LIKE)
+    near = _nearest_first(name, allowed, MIN_SIMILARITY)
     return near[0] if near else None
 
 
-def not_among(name: str, allowed: Iterable[str]) -> str:
+def format_unknown_name(name: str, allowed: Iterable[str]) -> str:
     """Return `found NAME (did you mean ONE?), allowed: ONE, ...` for a name that is not among others."""
     names = list(dict.fromkeys(allowed))
-    return f"found {shown(name)}{did_you_mean(name, names)}, allowed: {listed(name, names)}"
+    return f"found {format_value(name)}{format_suggestion(name, names)}, allowed: {format_names(name, names)}"
 
 
-def listed(name: str, allowed: Iterable[str]) -> str:
-    """Return the allowed names in their order; of more than `MOST_LISTED`, those like a given one."""
+def format_names(name: str, allowed: Iterable[str]) -> str:
+    """Return the allowed names in their order; of more than `MAX_LISTED`, those like a given one."""
     names = list(dict.fromkeys(allowed))
-    if len(names) <= MOST_LISTED:
+    if len(names) <= MAX_LISTED:
         return ", ".join(names) or "none"
-    first = ((name and _nearest_first(name, names, 0.0)) or names)[:MOST_LISTED]
+    first = ((name and _nearest_first(name, names, 0.0)) or names)[:MAX_LISTED]
     return f"{', '.join(first)} and {len(names) - len(first)} others"
 
 
 def _nearest_first(name: str, allowed: Iterable[str], least: float) -> list[str]:
     """Return the names that are at least so much like another, the nearest first; of equal ones the last."""
-    if len(name) > LONGEST:
+    if len(name) > MAX_COMPARED_LENGTH:
         return []
     wanted = _letters(name)
     like = {one: SequenceMatcher(None, _letters(one), wanted).ratio() for one in allowed}

@@ -17,16 +17,16 @@ from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
-from urmpipe_models.errors import Finding, OutputError, UrmpipeError, nearest, shown
+from urmpipe_models.errors import Finding, OutputError, UrmpipeError, closest_name, format_value
 
-MOST_SEEN = 2000
+MAX_SCANNED = 2000
 """So many files of a folder are looked at."""
 
-MOST_TOLD = 3
+MAX_SUGGESTED = 3
 """So many that may be meant are named."""
 
 
-def meant_by(path: Path, suffixes: Collection[str] = ()) -> str:
+def suggest_path(path: Path, suffixes: Collection[str] = ()) -> str:
     """Return which file may be meant by one that is not there, as ` (did you mean FILE?)`; else nothing.
 
     Where a folder is missing, that is returned, with the one above it, which is there.
@@ -39,11 +39,11 @@ def meant_by(path: Path, suffixes: Collection[str] = ()) -> str:
     if missing is not None:
         above = Path.cwd() if missing.parent == Path() else missing.parent
         folders = [one for one in map(missing.with_name, _like(missing)) if one.is_dir()]
-        return f": {above} has no folder {missing.name}{_asked(folders[:MOST_TOLD])}"
+        return f": {above} has no folder {missing.name}{_asked(folders[:MAX_SUGGESTED])}"
     there = path.exists() or path.is_symlink()  # a link to what is not there
     alike = [] if there else [path.with_name(name) for name in _like(path)]
     of_kind = [one for one in alike if one.suffix.lower() in suffixes]
-    return _asked((of_kind or alike)[:MOST_TOLD])
+    return _asked((of_kind or alike)[:MAX_SUGGESTED])
 
 
 def _asked(meant: list[Path]) -> str:
@@ -54,7 +54,7 @@ def _asked(meant: list[Path]) -> str:
 def _like(path: Path) -> list[str]:
     """Return the names beside a path that are its own in other letters, of its stem, or like its stem."""
     try:
-        names = sorted(one.name for one in islice(path.parent.iterdir(), MOST_SEEN))
+        names = sorted(one.name for one in islice(path.parent.iterdir(), MAX_SCANNED))
     except OSError:  # a folder that may not be read
         return []
     names = [name for name in names if not name.startswith(".")]
@@ -63,7 +63,7 @@ def _like(path: Path) -> list[str]:
     near = same or [name for name in names if _stem(name) == stem]
     if near:
         return near
-    others = nearest(stem, {_stem(name) for name in names})
+    others = closest_name(stem, {_stem(name) for name in names})
     return [name for name in names if _stem(name) == others]
 
 
@@ -72,7 +72,7 @@ def _stem(name: str) -> str:
     return name.casefold().split(".", 1)[0]
 
 
-LARGEST = 10e6
+MAX_BYTES = 10e6
 """Bytes of a description: the largest arms that are published take a hundredth of it."""
 
 
@@ -86,20 +86,20 @@ def read_contents(path: Path, error: type[UrmpipeError], suffixes: Collection[st
 
     Raises:
         UrmpipeError: `error`, if there is no such file, it cannot be read, it is a pipe or a device, on which
-            reading may never end, or it is larger than `LARGEST`.
+            reading may never end, or it is larger than `MAX_BYTES`.
     """
     if "\0" in str(path):
-        raise error(f"found {shown(str(path))}, allowed: the name of a file")
+        raise error(f"found {format_value(str(path))}, allowed: the name of a file")
     try:
         found = path.stat()
         if not stat.S_ISREG(found.st_mode) and not stat.S_ISDIR(found.st_mode):
             raise error(Finding("found a pipe or a device, allowed: a file", str(path)))
-        if found.st_size > LARGEST:
-            size = f"found {found.st_size / 1e6:.4g} MB, allowed: {LARGEST / 1e6:g} MB at most"
+        if found.st_size > MAX_BYTES:
+            size = f"found {found.st_size / 1e6:.4g} MB, allowed: {MAX_BYTES / 1e6:g} MB at most"
             raise error(Finding(size, str(path)))
         return path.read_bytes()
     except OSError as fault:
-        meant = meant_by(path, suffixes) if isinstance(fault, FileNotFoundError) else ""
+        meant = suggest_path(path, suffixes) if isinstance(fault, FileNotFoundError) else ""
         raise error(Finding(f"cannot be read: {fault.strerror}{meant}", str(path))) from fault
 
 
@@ -115,7 +115,7 @@ def keep_permissions(part: Path, path: Path) -> None:
             part.chmod(wanted)
 
 
-def is_there(path: Path) -> bool:
+def is_existing_file(path: Path) -> bool:
     """Tell whether a file is there; of a name that no file can have, that it is not."""
     try:
         return path.is_file()
@@ -127,7 +127,7 @@ HEADER = re.compile(r"\s*\[([^\[\]]+)\]")
 KEY = re.compile(r"\s*((?:\"[^\"]*\"|'[^']*'|[\w-]+)(?:\s*\.\s*(?:\"[^\"]*\"|'[^']*'|[\w-]+))*)\s*=")
 
 
-def placed(path: Path, name: str, faults: Iterable[Finding]) -> tuple[Finding, ...]:
+def add_line_numbers(path: Path, name: str, faults: Iterable[Finding]) -> tuple[Finding, ...]:
     """Return faults with file and line, each once.
 
     Args:
@@ -174,7 +174,7 @@ EXPORT_MARK = "urmpipe robot export"
 """Stands in a comment at the top of every robot file that urmpipe wrote."""
 
 
-def is_export(path: Path) -> bool:
+def is_robot_export(path: Path) -> bool:
     """Tell whether a file is a robot file that urmpipe wrote."""
     try:
         with path.open("rb") as file:
@@ -198,15 +198,15 @@ def write_export(path: Path, text: str, source: Path) -> None:
         raise OutputError(Finding("found a folder, allowed: the name of a file", str(path)))
     if path.exists() and source.exists() and path.samefile(source):
         raise OutputError(Finding("found the input of this command, allowed: any other name", str(path)))
-    if path.exists() and not is_export(path):
+    if path.exists() and not is_robot_export(path):
         allowed = "a new name, or such an export to replace"
         raise OutputError(
             Finding(f"found a file that is not a robot export of urmpipe, allowed: {allowed}", str(path))
         )
-    replace_text(path, text)
+    write_text_atomic(path, text)
 
 
-def replace_text(path: Path, text: str) -> None:
+def write_text_atomic(path: Path, text: str) -> None:
     """Write a text beside a file and put it in its place, so that no reader ever sees half of it.
 
     Raises:

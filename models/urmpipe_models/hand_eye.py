@@ -29,7 +29,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IndexArray
-from urmpipe_models.math3d import best_rotation, matrices, quaternions
+from urmpipe_models.math3d import fit_rotation, to_matrices, to_quaternions
 
 TURN_LENGTH = 0.01
 """What a radian counts as in [m] where positions leave something open: so little that orientations hardly
@@ -116,7 +116,7 @@ class HandEye:
     untold: tuple[Untold, ...]
 
 
-def hand_eye(
+def solve_hand_eye(
     position: FloatArray,
     rotation: FloatArray,
     measured: FloatArray,
@@ -152,7 +152,7 @@ def hand_eye(
     return HandEye(found.base, shift, found.tool, found.offset, tuple(_untold(both, found)))
 
 
-def rotation_miss(
+def rotation_residual(
     rotation: FloatArray, measured_rotation: FloatArray, base: FloatArray | None = None
 ) -> float:
     """Return how far measured orientations stay from computed ones with the best base and tool between them.
@@ -223,13 +223,13 @@ _ALL_AROUND = [
 
 def _turned(vector: FloatArray) -> FloatArray:
     """Return the matrices of rotation vectors, shape (..., 3)."""
-    turned = matrices(quaternions(vector.reshape(-1, 3), "vector"))
+    turned = to_matrices(to_quaternions(vector.reshape(-1, 3), "vector"))
     return turned.reshape(*vector.shape, 3)
 
 
 def _vector(rotation: FloatArray) -> FloatArray:
     """Return the rotation vector of a matrix."""
-    quat = quaternions(rotation.reshape(1, 9), "matrix")[0]
+    quat = to_quaternions(rotation.reshape(1, 9), "matrix")[0]
     imaginary = quat[:3] * (1.0 if quat[3] >= 0.0 else -1.0)
     size = float(np.linalg.norm(imaginary))
     angle = 2 * np.arctan2(size, abs(quat[3]))
@@ -290,19 +290,19 @@ def _by_orientations(rows: _Rows) -> Iterator[FloatArray]:
     if len(rows.turn):
         k = np.einsum("nij,nkl->ikjl", rows.measured_turn, rows.turn).reshape(9, 9)
         first = np.linalg.svd(k)[0][:, 0].reshape(3, 3)
-        yield best_rotation(first * (1.0 if np.linalg.det(first) >= 0.0 else -1.0))[0]
+        yield fit_rotation(first * (1.0 if np.linalg.det(first) >= 0.0 else -1.0))[0]
 
 
 def _rigid(rows: _Rows) -> FloatArray:
     """Return the R_Z of positions without a tool."""
-    return best_rotation(rows.measured.T @ rows.position)[0]
+    return fit_rotation(rows.measured.T @ rows.position)[0]
 
 
 def _with_tool_turn(rows: _Rows, frames: _Frames) -> _Frames:
     """Return frames with the R_X of the least squared angles."""
     turned = frames.base[..., np.newaxis, :, :] @ rows.turn
     crossed = np.einsum("...nji,njk->...ik", turned, rows.measured_turn)
-    return frames._replace(tool=best_rotation(crossed)[0]) if len(rows.turn) else frames
+    return frames._replace(tool=fit_rotation(crossed)[0]) if len(rows.turn) else frames
 
 
 def _best(rows: _Rows, length: float, bases: Iterable[FloatArray]) -> _Frames:

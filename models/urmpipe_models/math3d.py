@@ -125,7 +125,7 @@ class Transform:
         return Transform(Transform((columns[0], columns[1], columns[2])).columns, self.translation)
 
 
-def turned_vectors(vectors: Sequence[Vector], axis: Sequence[float], angle: Element) -> list[Vector]:
+def rotate_vectors(vectors: Sequence[Vector], axis: Sequence[float], angle: Element) -> list[Vector]:
     """Return vectors after a rotation about an axis, each in its own unit.
 
     About x, y or z the other two coordinates a, b become c a - s b, c b + s a: 4 products instead of 9.
@@ -177,15 +177,15 @@ class Step:
         return translation(x, y, z)
 
 
-def product(parts: Iterable[Transform | Step]) -> Transform:
+def compose(parts: Iterable[Transform | Step]) -> Transform:
     """Return the product of constants and elementary motions from the left, the identity of none."""
     frames = [part.frame if isinstance(part, Step) else part for part in parts]
     return reduce(matmul, frames) if frames else Transform()
 
 
-def made_of(*parts: Transform | Step) -> Transform:
+def compose_steps(*parts: Transform | Step) -> Transform:
     """Return the product of constants and elementary motions, which knows them."""
-    frame = product(parts)
+    frame = compose(parts)
     return Transform(frame.rotation, frame.translation, parts)
 
 
@@ -247,7 +247,7 @@ def from_xyz_rpy(xyz: Vector, rpy: Vector, source: str = "") -> Transform:
         source: What described it.
     """
     (x, y, z), (rx, ry, rz) = xyz, rpy
-    return made_of(
+    return compose_steps(
         Step("along", "x", x, source=source),
         Step("along", "y", y, source=source),
         Step("along", "z", z, source=source),
@@ -318,7 +318,7 @@ def euler_zxz(rotation: tuple[Vector, Vector, Vector]) -> tuple[Element, Element
     return z1, x, z2, singular
 
 
-def rpy_of(rotation: tuple[Vector, Vector, Vector]) -> tuple[float, float, float]:
+def matrix_to_rpy(rotation: tuple[Vector, Vector, Vector]) -> tuple[float, float, float]:
     """Return rx, ry, rz in [rad] such that `from_rpy` gives the constant R back to 1e-15.
 
     Unlike `euler_zyx` it needs no singular case: rx is taken from what rz leaves, so that the
@@ -370,12 +370,12 @@ EULER: dict[RotationForm, str] = {"zyx": "zyx", "xyz": "xyz", "zyz": "zyz", "zxz
 """The forms that are three angles about moving axes, and these axes."""
 
 
-def width(form: RotationForm) -> int:
+def column_count(form: RotationForm) -> int:
     """Return how many columns a form has."""
     return 9 if form == "matrix" else 4 if form.startswith("quat") else 3
 
 
-NAMES: dict[RotationForm, tuple[str, ...]] = {
+COLUMN_NAMES: dict[RotationForm, tuple[str, ...]] = {
     "vector": ("rx", "ry", "rz"),
     "rpy": ("roll", "pitch", "yaw"),
     **{form: tuple(f"{axis}{k + 1}" for k, axis in enumerate(axes)) for form, axes in EULER.items()},
@@ -386,12 +386,12 @@ NAMES: dict[RotationForm, tuple[str, ...]] = {
 """What the columns of a form are called: z1, y2, x3 are the first, second and third angle and their axes."""
 
 
-def angles(form: RotationForm) -> bool:
+def is_angular(form: RotationForm) -> bool:
     """Return whether the columns of a form are in [rad]; the others are in [-]."""
-    return width(form) == 3
+    return column_count(form) == 3
 
 
-def quaternions(rotation: FloatArray, form: RotationForm) -> FloatArray:
+def to_quaternions(rotation: FloatArray, form: RotationForm) -> FloatArray:
     """Return unit quaternions x, y, z, w of recorded orientations.
 
     Of a rotation vector v with the angle a = |v|: [v sin(a / 2) / a, cos(a / 2)]. Of Euler angles: the
@@ -423,7 +423,7 @@ def quaternions(rotation: FloatArray, form: RotationForm) -> FloatArray:
     return result
 
 
-def matrices(quat_xyzw: FloatArray) -> FloatArray:
+def to_matrices(quat_xyzw: FloatArray) -> FloatArray:
     """Return rotation matrices, R = I + 2 w [v]x + 2 [v]x [v]x, shape (n, 3, 3) [-].
 
     Args:
@@ -519,7 +519,7 @@ def quaternion_product(first: FloatArray, second: FloatArray) -> FloatArray:
     )
 
 
-def rotation_vectors(quat_xyzw: FloatArray) -> FloatArray:
+def to_rotation_vectors(quat_xyzw: FloatArray) -> FloatArray:
     """Return u a, 0 <= a <= pi, of orientations, in [rad], shape (n, 3); NaN of one with NaN.
 
     With v = u sin(a / 2), w = cos(a / 2) of either sign: a = 2 atan2(|v|, |w|).
@@ -533,7 +533,7 @@ def rotation_vectors(quat_xyzw: FloatArray) -> FloatArray:
     return np.asarray(imaginary * np.copysign(scale, real)[:, None])
 
 
-def best_rotation(crossed: FloatArray) -> tuple[FloatArray, FloatArray]:
+def fit_rotation(crossed: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the rotation R with the largest sum of products a . R b, which brings points b nearest to a.
 
     With U S V^T of H: R = U diag(1, 1, det(U V^T)) V^T. It is the only one if the last two of the sizes that

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from decimal import Decimal
 
-from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, format_value
 
 DEGREE = Decimal("0.01745329251994329576923690768488612713443")
 """pi / 180."""
@@ -64,7 +64,7 @@ USUAL_UNITS = {"m": "mm", "rad": "deg", "1": "%"}
 """The units in which people think of deviations, by SI unit."""
 
 
-def quantity(text: str, units: Mapping[str, Decimal]) -> float:
+def quantity_to_si(text: str, units: Mapping[str, Decimal]) -> float:
     """Return the value in SI of a number with its unit, rounded once; NaN of any other text."""
     parts = _parts(text)
     return float(parts[0] * units[parts[1]]) if parts and parts[1] in units else math.nan
@@ -82,10 +82,10 @@ def read_quantity(text: str, si: str, *, positive: bool = True, deviation: bool 
     Raises:
         OptionError: If it is no such quantity, or a deviation that needs its unit.
     """
-    value = quantity(text, WRITTEN[si])
+    value = quantity_to_si(text, WRITTEN[si])
     if not (0.0 < value < math.inf if positive else math.isfinite(value)):
         allowed = f"a positive {NAMES[si].partition(' ')[2]}" if positive else NAMES[si]
-        raise OptionError(Finding(found=shown(text), allowed=allowed))
+        raise OptionError(Finding(found=format_value(text), allowed=allowed))
     if deviation and (both := readings(text, si)):
         raise OptionError(Finding(found=text.strip(), allowed=f"a unit: {' or '.join(both)}"))
     return value
@@ -113,12 +113,12 @@ def _parts(text: str) -> tuple[Decimal, str] | None:
     return match and (Decimal(match[1]), (match[2] or "").translate(SPELLED))
 
 
-def units_of(si: str) -> dict[str, Decimal]:
+def compatible_units(si: str) -> dict[str, Decimal]:
     """Return the units of what an SI unit measures, and how many of that each is; none of an unknown one."""
     return MEASURES.get(si, {})
 
 
-def factor(unit: str, to: str) -> float:
+def conversion_factor(unit: str, to: str) -> float:
     """Return how many of one unit another is, rounded once: 1000 from m to mm.
 
     Args:
@@ -134,5 +134,5 @@ def factor(unit: str, to: str) -> float:
     known = next((units for units in MEASURES.values() if unit in units), None)
     if known is None:
         every = ", ".join(one for units in MEASURES.values() for one in units)
-        raise OptionError(f"unit: found {shown(unit)}, allowed: {every}")
-    raise OptionError(f"unit: found {shown(to)} for {shown(unit)}, allowed: {', '.join(known)}")
+        raise OptionError(f"unit: found {format_value(unit)}, allowed: {every}")
+    raise OptionError(f"unit: found {format_value(to)} for {format_value(unit)}, allowed: {', '.join(known)}")

@@ -9,21 +9,21 @@ from contextlib import suppress
 from subprocess import Popen
 from typing import Any
 
-MEMORY = 4 * 2**30
+MAX_MEMORY = 4 * 2**30
 """Bytes that such a process may ask for: far more than any file in use needs, less than a machine has."""
 
 
-def command(module: str, *arguments: str) -> list[str]:
+def module_command(module: str, *arguments: str) -> list[str]:
     """Return the command that runs a module of ours, and nothing of the working folder."""
     return [sys.executable, "-P", "-m", module, *arguments]
 
 
-def environment() -> dict[str, str]:
+def module_environment() -> dict[str, str]:
     """Return the environment in which such a module finds what this process does."""
     return {**os.environ, "PYTHONPATH": os.pathsep.join(one for one in sys.path if one)}
 
 
-def limit_memory(size: int = MEMORY) -> None:
+def limit_memory(size: int = MAX_MEMORY) -> None:
     """Let this process have no more than some bytes of memory, where the system knows such a limit."""
     with suppress(ImportError):  # Windows has none
         import resource
@@ -41,7 +41,7 @@ def end_group(process: Popen[Any]) -> None:
             os.killpg(process.pid, signal.SIGKILL)
 
 
-def ending(exit_code: int) -> str:
+def describe_exit(exit_code: int) -> str:
     """Return how a process ended, for people.
 
     Args:

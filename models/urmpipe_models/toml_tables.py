@@ -14,27 +14,28 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from urmpipe_models.errors import Finding, UrmpipeError, did_you_mean, shown, shown_json
-from urmpipe_models.files import placed, read_contents
-from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
+from urmpipe_models.errors import Finding, UrmpipeError, escape_json, format_suggestion, format_value
+from urmpipe_models.files import add_line_numbers, read_contents
+from urmpipe_models.measure_units import NAMES, WRITTEN, quantity_to_si
 
 Rows3: TypeAlias = tuple[tuple[float, ...], ...]
 
-ASKED = 100
+MAX_SUGGESTED_KEYS = 100
 """So many unknown keys of a table ask whether another may be meant."""
 
 
-class Table:
+class CheckedTable:
     """One table, read key by key.
 
     A getter returns what the key holds. Where that is missing or not allowed, the fault is noted and
-    a stand-in comes back, so that reading goes on and every fault is found. `close` then reports the
-    keys that nobody asked for.
+    a stand-in comes back, so that reading goes on and every fault is found. Then `report_unknown_keys`
+    reports the keys that no getter asked for.
 
     Attributes:
         faults: What was found to be wrong, shared with all tables within.
         place: Where the table stands, such as `joints[2].` (empty for the outermost one).
-        apart: Whether a fault has its key in `about`, from where `placed` finds its line, not in its message.
+        key_in_about: Whether a fault has its key in `about`, where `add_line_numbers` finds it, instead of in
+            its message.
     """
 
     def __init__(
@@ -44,19 +45,19 @@ class Table:
         file: str | None,
         place: str = "",
         *,
-        apart: bool = False,
+        key_in_about: bool = False,
     ) -> None:
         self.faults = faults
         self.place = place
-        self.apart = apart
+        self.key_in_about = key_in_about
         self._data = data
         self._file = file
         self._known: list[str] = []
 
-    def fault(self, key: str, message: str) -> None:
+    def add_error(self, key: str, message: str) -> None:
         """Note that something is wrong with a key."""
         where = f"{self.place}{key}"
-        if self.apart:
+        if self.key_in_about:
             self.faults.append(Finding(message, self._file, about=where))
         else:
             self.faults.append(Finding(f"key {where}: {message}", self._file))
@@ -83,7 +84,7 @@ class Table:
         value = self._get(key, default)
         if value in allowed:
             return str(value)
-        self._refuse(key, value, _one_of(allowed) + did_you_mean(str(value), allowed))
+        self._refuse(key, value, _one_of(allowed) + format_suggestion(str(value), allowed))
         return allowed[0]
 
     def number(
@@ -151,7 +152,7 @@ class Table:
         value = self._get(key, default)
         if is_number(value, infinite=True):
             return (float(value),) * count
-        if are_numbers(value, count, infinite=True):
+        if is_number_list(value, count, infinite=True):
             return tuple(float(item) for item in value)
         self._refuse(key, value, f"a number, or {count} numbers, one per joint")
         return (default,) * count
@@ -160,12 +161,12 @@ class Table:
         """Return the three rows of a 3x3 matrix; the key is required."""
         value = self._get(key)
         rows = value if isinstance(value, (list, tuple)) else ()
-        if len(rows) == 3 and all(are_numbers(row, 3) for row in rows):
+        if len(rows) == 3 and all(is_number_list(row, 3) for row in rows):
             return tuple(tuple(float(item) for item in row) for row in rows)
         self._refuse(key, value, "three rows of three finite numbers")
         return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
-    def table(self, key: str) -> Table:
+    def table(self, key: str) -> CheckedTable:
         """Return the table under a key, an empty one where it is missing."""
         value = self._get(key, {})
         if not isinstance(value, Mapping):
@@ -173,14 +174,14 @@ class Table:
             value = {}
         return self._within(value, f"{self.place}{key}.")
 
-    def named_tables(self, key: str) -> dict[str, Table]:
+    def named_tables(self, key: str) -> dict[str, CheckedTable]:
         """Return the tables in the table under a key, by their names; none where it is missing."""
         outer = self.table(key)
         named = {name: outer.table(name) for name in outer._data}
-        outer.close()
+        outer.report_unknown_keys()
         return named
 
-    def tables(self, key: str) -> list[Table]:
+    def tables(self, key: str) -> list[CheckedTable]:
         """Return the tables of a list; the key is required."""
         value = self._get(key)
         if not isinstance(value, (list, tuple)) or not all(isinstance(item, Mapping) for item in value):
@@ -189,16 +190,16 @@ class Table:
         places = (f"{self.place}{key}[{index}]." for index in range(len(value)))
         return [self._within(item, place) for item, place in zip(value, places, strict=True)]
 
-    def close(self) -> None:
+    def report_unknown_keys(self) -> None:
         """Note every key that was not asked for, with the nearest one that was."""
         allowed = list(dict.fromkeys(self._known))
         for number, key in enumerate(key for key in self._data if key not in self._known):
-            hint = did_you_mean(key, allowed) if number < ASKED else ""
-            self.fault(key, f"unknown{hint}; allowed: {', '.join(allowed)}")
+            hint = format_suggestion(key, allowed) if number < MAX_SUGGESTED_KEYS else ""
+            self.add_error(key, f"unknown{hint}; allowed: {', '.join(allowed)}")
 
-    def _within(self, data: Mapping[str, Any], place: str) -> Table:
+    def _within(self, data: Mapping[str, Any], place: str) -> CheckedTable:
         """Return a table within this one, whose faults are noted in the same way."""
-        return Table(data, self.faults, self._file, place, apart=self.apart)
+        return CheckedTable(data, self.faults, self._file, place, key_in_about=self.key_in_about)
 
     def _get(self, key: str, default: Any = None) -> Any:
         """Return what a key holds, its default, or that it is missing."""
@@ -209,13 +210,13 @@ class Table:
 
     def _refuse(self, key: str, value: Any, allowed: str) -> None:
         """Note that the value of a key is not allowed."""
-        found = "nothing" if value is _Missing else shown(value)
-        self.fault(key, f"found {found}, allowed: {allowed}")
+        found = "nothing" if value is _Missing else format_value(value)
+        self.add_error(key, f"found {found}, allowed: {allowed}")
 
 
 def _in_si(value: Any, si: str) -> Any:
     """Return a text with a unit as a number in SI, where that is a quantity; else the value as it is."""
-    number = quantity(value, WRITTEN[si]) if si and isinstance(value, str) else math.nan
+    number = quantity_to_si(value, WRITTEN[si]) if si and isinstance(value, str) else math.nan
     return value if math.isnan(number) else number
 
 
@@ -233,7 +234,7 @@ def is_number(value: Any, infinite: bool = False) -> bool:
         return False
 
 
-def are_numbers(value: Any, count: int, infinite: bool = False) -> bool:
+def is_number_list(value: Any, count: int, infinite: bool = False) -> bool:
     """Tell whether a value is a list of so many numbers."""
     given = isinstance(value, (list, tuple)) and len(value) == count
     return given and all(is_number(item, infinite) for item in value)
@@ -244,13 +245,13 @@ def _one_of(allowed: Sequence[str]) -> str:
     return f"one of {', '.join(allowed)}"
 
 
-DEEPEST = 50
+MAX_DEPTH = 50
 """So many tables and lists stand in each other at most: a description of anything needs six."""
 
-LONGEST = 1000
+MAX_KEY_LENGTH = 1000
 """Letters of a key at most."""
 
-MOST = 20_000
+MAX_KEYS = 20_000
 """Keys of a file at most."""
 
 INTEGERS = "64 bits at most"
@@ -263,7 +264,7 @@ _TOKEN = re.compile(
 """Texts and remarks, whose letters mean nothing, and what nests or ends what nests."""
 
 
-def parse_toml(path: Path, error: type[UrmpipeError]) -> dict[str, Any]:
+def read_toml(path: Path, error: type[UrmpipeError]) -> dict[str, Any]:
     """Return what a TOML file holds.
 
     Args:
@@ -281,11 +282,11 @@ def parse_toml(path: Path, error: type[UrmpipeError]) -> dict[str, Any]:
         line, said = content.count(b"\n", 0, fault.start) + 1, f"byte {fault.start} is not UTF-8"
         raise error(Finding(f"{said}; allowed: TOML in UTF-8", str(path), line=line)) from fault
     try:
-        table = toml_values(text)
+        table = parse_toml_text(text)
     except TomlError as fault:
         raise error(Finding(str(fault), str(path), line=fault.line)) from fault
     if faults := [*_oversized(table)]:
-        raise error(*placed(path, str(path), faults))
+        raise error(*add_line_numbers(path, str(path), faults))
     return table
 
 
@@ -301,14 +302,16 @@ class TomlError(ValueError):
         self.line = line
 
 
-def toml_values(text: str) -> dict[str, Any]:
+def parse_toml_text(text: str) -> dict[str, Any]:
     """Return what a text of TOML holds.
 
     Raises:
-        TomlError: If it is no TOML, or nested deeper than `DEEPEST`.
+        TomlError: If it is no TOML, or nested deeper than `MAX_DEPTH`.
     """
     if (deep := _too_deep(text)) is not None:
-        raise TomlError(f"found tables or lists nested more than {DEEPEST} deep, allowed: {DEEPEST}", deep)
+        raise TomlError(
+            f"found tables or lists nested more than {MAX_DEPTH} deep, allowed: {MAX_DEPTH}", deep
+        )
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as fault:
@@ -324,7 +327,7 @@ def toml_values(text: str) -> dict[str, Any]:
 
 
 def _too_deep(text: str) -> int | None:
-    """Return the line in which brackets and dotted keys nest more than `DEEPEST` deep; None if none does."""
+    """Return the line in which brackets and dotted keys nest deeper than `MAX_DEPTH`, or None."""
     around, dots = [0], 0
     for token in _TOKEN.finditer(text):
         match token[0]:
@@ -338,13 +341,13 @@ def _too_deep(text: str) -> int | None:
                 dots += 1
             case "," | "\n":
                 dots = 0
-        if around[-1] + dots > DEEPEST:
+        if around[-1] + dots > MAX_DEPTH:
             return text.count("\n", 0, token.start()) + 1
     return None
 
 
 def _oversized(table: Mapping[str, Any]) -> Iterator[Finding]:
-    """Yield the integers that TOML cannot hold and keys that are too long; more keys than `MOST` as well."""
+    """Yield errors of too large integers, too long keys, and more keys than `MAX_KEYS`."""
     keys, waiting = 0, [("", table)]
     while waiting:
         place, value = waiting.pop()
@@ -352,17 +355,17 @@ def _oversized(table: Mapping[str, Any]) -> Iterator[Finding]:
             keys += len(value)
             for key, one in value.items():
                 where = f"{place}.{key}" if place else key
-                if len(key) > LONGEST:
-                    said = f"found a key of {len(key)} letters, allowed: {LONGEST} at most"
-                    yield Finding(f"{shown(key)}: {said}", about=place)
+                if len(key) > MAX_KEY_LENGTH:
+                    said = f"found a key of {len(key)} letters, allowed: {MAX_KEY_LENGTH} at most"
+                    yield Finding(f"{format_value(key)}: {said}", about=place)
                 else:
                     waiting.append((where, one))
         elif isinstance(value, list):
             waiting += [(f"{place}[{k}]", one) for k, one in enumerate(value)]
         elif isinstance(value, int) and not -(2**63) <= value < 2**63:
             yield Finding(f"found an integer of {value.bit_length()} bits, allowed: {INTEGERS}", about=place)
-    if keys > MOST:
-        yield Finding(f"found {keys} keys, allowed: {MOST} at most")
+    if keys > MAX_KEYS:
+        yield Finding(f"found {keys} keys, allowed: {MAX_KEYS} at most")
 
 
 def _unquoted(written: str) -> str:
@@ -372,27 +375,27 @@ def _unquoted(written: str) -> str:
         return ""
     if bare[2] in {"True", "False"}:
         return f"; allowed: {bare[1]} = {bare[2].lower()}"
-    return f"; a text needs quotes: {bare[1]} = {toml_text(bare[2])}"
+    return f"; a text needs quotes: {bare[1]} = {quote_toml(bare[2])}"
 
 
-def toml_lines(table: Mapping[str, Any]) -> list[str]:
+def format_toml(table: Mapping[str, Any]) -> list[str]:
     """Return a line `key = value` for each key that has a value."""
     return [f"{key} = {_toml_value(value)}" for key, value in table.items() if value is not None]
 
 
-def toml_text(text: str) -> str:
+def quote_toml(text: str) -> str:
     """Return any text as a quoted key or string."""
-    return shown_json(json.dumps(text, ensure_ascii=False))
+    return escape_json(json.dumps(text, ensure_ascii=False))
 
 
 def _toml_value(value: Any) -> str:
     """Return a value as TOML writes it."""
     if isinstance(value, str):
-        return toml_text(value)
+        return quote_toml(value)
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, Mapping):
-        return f"{{ {', '.join(toml_lines(value))} }}"
+        return f"{{ {', '.join(format_toml(value))} }}"
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(_toml_value(item) for item in value)}]"
     return repr(value)

@@ -46,10 +46,10 @@ FULL_TURN = 2.0 * np.pi
 NO_LIMIT = 1e30
 """Stands for the speed of a joint without a limit: finite, so that a speed times no time is 0."""
 
-LARGEST_VALUE = 1e300
+MAX_VALUE = 1e300
 """A value at or above it is missing, as NaN is: the comparison also traces, where isnan does not."""
 
-LEAST_REST = 0.01
+MIN_WRAP_TOLERANCE = 0.01
 """Share of P by which a wrap may always miss the whole period: clocks jitter, and joints overshoot limits."""
 
 
@@ -121,7 +121,7 @@ def max_step(elapsed: Element, period: Element, max_speed: Element) -> Element:
         max_speed: Largest speed in the period's unit per second; inf without a limit.
     """
     reached = np.minimum(max_speed, NO_LIMIT) * elapsed
-    return np.minimum(np.maximum(reached, LEAST_REST * period), period / 4.0)
+    return np.minimum(np.maximum(reached, MIN_WRAP_TOLERANCE * period), period / 4.0)
 
 
 def wrap_change(step: Element, period: Element, allowed: Element) -> Element:
@@ -135,7 +135,7 @@ def wrap_change(step: Element, period: Element, allowed: Element) -> Element:
     return np.where(np.abs(np.abs(step) - period) <= allowed, -np.sign(step), 0.0)
 
 
-def notice(
+def detect_wrap(
     step: Element, elapsed: Element, residual: Element, lasted: Element, period: Element, max_speed: Element
 ) -> Flags:
     """Judge the step from one value to the next: the decision of the repolarizer, and all of it.
@@ -160,7 +160,7 @@ def notice(
     return Flags(change, unexplained, in_between)
 
 
-def turned(q: Element, turns: Element, period: Element) -> Element:
+def add_turns(q: Element, turns: Element, period: Element) -> Element:
     """Return q + P k in the unit of the period, and q itself, bit for bit, where k = 0.
 
     Args:
@@ -192,9 +192,9 @@ def step(
     """
     elapsed = state.elapsed + dt
     move = q - state.last
-    has_value = np.abs(q) < LARGEST_VALUE
+    has_value = np.abs(q) < MAX_VALUE
     known = np.logical_and(has_value, state.seen > 0.0)
-    flags = notice(move, elapsed, state.residual, state.lasted, period, max_speed)
+    flags = detect_wrap(move, elapsed, state.residual, state.lasted, period, max_speed)
     flags = Flags(
         np.where(known, flags.change, 0.0),
         np.logical_and(known, flags.unexplained),
@@ -210,7 +210,7 @@ def step(
         elapsed=np.where(has_value, 0.0, elapsed),
         seen=np.where(has_value, 1.0, state.seen),
     )
-    return following, turned(q, turns, period), flags
+    return following, add_turns(q, turns, period), flags
 
 
 def repolarize(
@@ -253,7 +253,7 @@ def _add_turns(column: FloatArray, rows: IntArray, change: IntArray, period: flo
         stop = min(block.stop, len(column))
         first, last = np.searchsorted(rows, (block.start, stop))
         bounds = np.concatenate(([block.start], rows[first:last], [stop]))
-        column[block] = turned(column[block], np.repeat(k[first : last + 1], np.diff(bounds)), period)
+        column[block] = add_turns(column[block], np.repeat(k[first : last + 1], np.diff(bounds)), period)
 
 
 class _Found(NamedTuple):
@@ -271,14 +271,14 @@ def _found_in_all(q: FloatArray, dt: FloatArray, periods: FloatArray, speeds: Fl
     joints = q.shape[1]
     complete = np.ones(joints, dtype=np.bool_)
     # Least and largest of all are quick, and mostly enough: NaN is neither, nor within the bounds.
-    if not -LARGEST_VALUE < q.min(initial=0.0) <= q.max(initial=0.0) < LARGEST_VALUE:
-        complete[:] = (np.abs(q) < LARGEST_VALUE).all(axis=0)
+    if not -MAX_VALUE < q.min(initial=0.0) <= q.max(initial=0.0) < MAX_VALUE:
+        complete[:] = (np.abs(q) < MAX_VALUE).all(axis=0)
     whole = np.flatnonzero(complete)
     part = q if complete.all() else q[:, whole]
     found = _judged(part, dt, periods[whole], speeds[whole])
     parts = [found._replace(joints=whole[found.joints])]
     for j in np.flatnonzero(~complete):
-        present = np.flatnonzero(np.abs(q[:, j]) < LARGEST_VALUE)
+        present = np.flatnonzero(np.abs(q[:, j]) < MAX_VALUE)
         one = slice(j, j + 1)
         found = _judged(q[present, one], _elapsed(present, dt), periods[one], speeds[one])
         between = np.append(present, -1)[found.between]  # -1, for none, is the last entry
@@ -307,7 +307,7 @@ def _judged(values: FloatArray, elapsed: FloatArray, periods: FloatArray, speeds
     lasted = elapsed[rows - 1]
     period, speed = periods[columns], speeds[columns]
     residual = before + period * wrap_change(before, period, max_step(lasted, period, speed))
-    flags = notice(step, elapsed[rows], residual, lasted, period, speed)
+    flags = detect_wrap(step, elapsed[rows], residual, lasted, period, speed)
     again = _after_in_between(rows, columns, flags.in_between)
     change = np.where(again, 0.0, flags.change)  # the step before is used up: alone this one is no wrap
     in_between = flags.in_between & ~again
@@ -360,7 +360,9 @@ AROUND = (-4, -3, -2, -1, 2, 3, 4, 5)
 """The steps around sample s whose speeds are the motion around it: step i leads to sample i."""
 
 
-def beside_wraps(q: FloatArray, x: FloatArray, t: FloatArray, wraps: IntArray, period: float) -> IntArray:
+def find_interpolated_samples(
+    q: FloatArray, x: FloatArray, t: FloatArray, wraps: IntArray, period: float
+) -> IntArray:
     """Return the in-between samples beside the wraps of a joint, as far as they can be told.
 
     An in-between sample lies between its neighbours in the file, which are a wrap apart; but off the line
@@ -380,7 +382,7 @@ def beside_wraps(q: FloatArray, x: FloatArray, t: FloatArray, wraps: IntArray, p
     at = np.setxor1d(wraps - 1, wraps)  # one of the two steps beside each is a wrap, not both
     at = at[(at > 0) & (at < len(q) - 1)]
     at = at[(q[at] - q[at - 1]) * (q[at + 1] - q[at]) > 0.0]
-    off = np.abs(off_line(x, t, at))
+    off = np.abs(line_residuals(x, t, at))
     motion = np.abs(x[at + 1] - x[at - 1]) / (t[at + 1] - t[at - 1])
     for offset in AROUND:
         i = at + offset
@@ -391,7 +393,7 @@ def beside_wraps(q: FloatArray, x: FloatArray, t: FloatArray, wraps: IntArray, p
     return np.asarray(at[(off > FAR * usual) & (off > PERCEPTIBLE * period)], dtype=np.int64)
 
 
-def off_line(x: FloatArray, t: FloatArray, at: IntArray) -> FloatArray:
+def line_residuals(x: FloatArray, t: FloatArray, at: IntArray) -> FloatArray:
     """Return how far samples lie from the straight line, in time, through their neighbours.
 
     Args:
@@ -407,7 +409,7 @@ def off_line(x: FloatArray, t: FloatArray, at: IntArray) -> FloatArray:
     return np.asarray(x[at] - x[at - 1] - share * (x[at + 1] - x[at - 1]), dtype=np.float64)
 
 
-def repair(x: FloatArray, t: FloatArray, in_between: IntArray) -> FloatArray:
+def reinterpolate(x: FloatArray, t: FloatArray, in_between: IntArray) -> FloatArray:
     """Return repolarized values with the in-between samples on the straight line through their neighbours.
 
     Args:
@@ -435,7 +437,7 @@ OTHER_SIGNS = np.array([1.0, -1.0, 1.0])
 """What the angles are multiplied by in the other name of a rotation."""
 
 
-def continuous_quaternions(quat_xyzw: FloatArray) -> FloatArray:
+def unwrap_quaternions(quat_xyzw: FloatArray) -> FloatArray:
     """Return quaternions with the sign that is nearest to the one before.
 
     Args:
@@ -447,7 +449,7 @@ def continuous_quaternions(quat_xyzw: FloatArray) -> FloatArray:
     return _of_present(quat_xyzw, lambda q: q * _signs(q)[:, np.newaxis])
 
 
-def continuous_vectors(vectors: FloatArray) -> FloatArray:
+def unwrap_rotation_vectors(vectors: FloatArray) -> FloatArray:
     """Return rotation vectors whose angle goes on past pi instead of flipping to the other side.
 
     The axis keeps the direction that is nearest to the one before, and the angle about it goes on by the
@@ -462,7 +464,7 @@ def continuous_vectors(vectors: FloatArray) -> FloatArray:
     return _of_present(vectors, _vectors)
 
 
-def continuous_euler(angles: FloatArray, *, proper: bool = False) -> FloatArray:
+def unwrap_euler(angles: FloatArray, *, proper: bool = False) -> FloatArray:
     """Return Euler angles of the family, and with the turns, that are nearest to those before.
 
     Args:
@@ -476,7 +478,7 @@ def continuous_euler(angles: FloatArray, *, proper: bool = False) -> FloatArray:
     return _of_present(angles, lambda present: _euler(present, np.array([np.pi, middle, np.pi])))
 
 
-def continuous_rotations(rotation: FloatArray, form: RotationForm) -> FloatArray:
+def unwrap_orientations(rotation: FloatArray, form: RotationForm) -> FloatArray:
     """Return recorded orientations in their own form, without jumps between the names of one rotation.
 
     Args:
@@ -489,10 +491,10 @@ def continuous_rotations(rotation: FloatArray, form: RotationForm) -> FloatArray
     if form == "matrix":
         return rotation
     if form in ("quat_xyzw", "quat_wxyz"):
-        return continuous_quaternions(rotation)
+        return unwrap_quaternions(rotation)
     if form == "vector":
-        return continuous_vectors(rotation)
-    return continuous_euler(rotation, proper=form in ("zyz", "zxz"))
+        return unwrap_rotation_vectors(rotation)
+    return unwrap_euler(rotation, proper=form in ("zyz", "zxz"))
 
 
 def _of_present(values: FloatArray, work: Callable[[FloatArray], FloatArray]) -> FloatArray:

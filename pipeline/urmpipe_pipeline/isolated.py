@@ -16,7 +16,7 @@ from subprocess import DEVNULL, Popen, TimeoutExpired
 from tempfile import TemporaryFile
 from typing import Any, TypeAlias
 
-from urmpipe_models.processes import command, ending, environment, limit_memory
+from urmpipe_models.processes import describe_exit, limit_memory, module_command, module_environment
 
 PATIENCE, RATE = 15.0, 5e6
 """Time in [s] that reading may take, and the bytes a second that give it more, far below any disk."""
@@ -65,8 +65,8 @@ def read_apart(path: Path, reader: str, meanwhile: Sequence[str] = ()) -> Any:
         return import_module(reader).read_through(str(path))
     limit = PATIENCE + path.stat().st_size / RATE
     with TemporaryFile() as found:
-        line = command(__name__, reader, str(path))
-        process = Popen(line, stdin=DEVNULL, stdout=found, stderr=DEVNULL, env=environment())
+        line = module_command(__name__, reader, str(path))
+        process = Popen(line, stdin=DEVNULL, stdout=found, stderr=DEVNULL, env=module_environment())
         try:
             for name in meanwhile:
                 import_module(name)
@@ -77,7 +77,7 @@ def read_apart(path: Path, reader: str, meanwhile: Sequence[str] = ()) -> Any:
             process.kill()
             process.wait()
         if code:
-            raise AbortError(ending(code))
+            raise AbortError(describe_exit(code))
         found.seek(0)
         return pickle.load(found)
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, Message, Voice
-from urmpipe_models.math3d import NAMES, RotationForm, quaternions
-from urmpipe_models.wraps import continuous_quaternions, continuous_rotations
+from urmpipe_models.math3d import COLUMN_NAMES, RotationForm, to_quaternions
+from urmpipe_models.wraps import unwrap_orientations, unwrap_quaternions
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,7 +97,7 @@ class Inference:
 
     def otherwise(self, voice: Voice = "python") -> str:
         """Return how to have it otherwise; empty where it cannot be."""
-        return ", or ".join(f"{hint.spelled(voice)} {hint.does}".strip() for hint in self.hints)
+        return ", or ".join(f"{hint.format(voice)} {hint.does}".strip() for hint in self.hints)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +180,7 @@ class LogColumn:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class JointLog(Shown):
+class JointLog(Displayable):
     """A log as its file has it: the file's own rows, in SI, neither repolarized nor resampled.
 
     A path (t, x, y, z) is a log without joints.
@@ -259,7 +259,7 @@ class JointLog(Shown):
         """
         if self.tcp_rotation is None or self.rotation_form is None:
             return None
-        return continuous_quaternions(quaternions(self.tcp_rotation, self.rotation_form))
+        return unwrap_quaternions(to_quaternions(self.tcp_rotation, self.rotation_form))
 
     @property
     def tcp_rotation_continuous(self) -> FloatArray | None:
@@ -270,7 +270,7 @@ class JointLog(Shown):
         """
         if self.tcp_rotation is None or self.rotation_form is None:
             return None
-        return continuous_rotations(self.tcp_rotation, self.rotation_form)
+        return unwrap_orientations(self.tcp_rotation, self.rotation_form)
 
     @property
     def period_assumed(self) -> bool:
@@ -289,9 +289,9 @@ class JointLog(Shown):
 
     def _headline(self) -> str:
         """Return its name, its source and how long it is."""
-        joints = number_of(len(self.joints), "joint") if self.joints else "a path"
-        rows = number_of(self.rows, "row") + (f" {self.period:g} s apart" if self.timed else "")
-        return line_of(self.name, self.source, joints, rows)
+        joints = format_count(len(self.joints), "joint") if self.joints else "a path"
+        rows = format_count(self.rows, "row") + (f" {self.period:g} s apart" if self.timed else "")
+        return format_headline(self.name, self.source, joints, rows)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a row of the file: t [s], the joints, and what else was recorded, in SI.
@@ -323,7 +323,7 @@ class JointLog(Shown):
             names, units = ([before + n for n in self.joints], [u + behind for u in self.joint_units])
             yield role, names, units, values
         yield "position", tuple("xyz"), ("m",) * 3, self.tcp_position
-        rotation = NAMES[self.rotation_form] if self.rotation_form else ()
+        rotation = COLUMN_NAMES[self.rotation_form] if self.rotation_form else ()
         yield "rotation", rotation, ("rad" if len(rotation) == 3 else "",) * len(rotation), self.tcp_rotation
 
     def to_dict(self, voice: Voice = "python") -> dict[str, Any]:

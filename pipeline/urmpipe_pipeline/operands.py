@@ -19,8 +19,8 @@ from urmpipe_models.errors import (
     OptionError,
     RecordingError,
     UrmpipeError,
-    for_each,
-    shown,
+    format_value,
+    map_collecting_errors,
 )
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.unjudged import Unjudged
@@ -110,11 +110,13 @@ def load_runs(
 
     if sides is not None:
         _refuse_sides(operands, sides)
-        both = for_each(run_of, [(operands[0], one) for one in (sides, sides[::-1])])
+        both = map_collecting_errors(run_of, [(operands[0], one) for one in (sides, sides[::-1])])
         blocks.refuse_unused()
         _refuse_unturned(read, both)
         return _on_one_arm(both)
-    found = (for_each if unjudged is None else _runs_or_errors)(run_of, [(one, None) for one in operands])
+    found = (map_collecting_errors if unjudged is None else _runs_or_errors)(
+        run_of, [(one, None) for one in operands]
+    )
     blocks.refuse_unused()
     runs = [one for one in found if isinstance(one, Run)]
     if shared and len(runs) == len(found):
@@ -172,7 +174,7 @@ def _runs_or_errors(make: Callable[[Given], Run], each: Sequence[Given]) -> Sequ
 
     found = [tried(one) for one in each]
     reference, *logs = (isinstance(one, Run) for one in found)
-    return found if reference and any(logs) else for_each(made, found)
+    return found if reference and any(logs) else map_collecting_errors(made, found)
 
 
 class _Blocks:
@@ -197,7 +199,9 @@ class _Blocks:
         """Raise an `OptionError` if blocks are named of no simulation, or of more or fewer than there are."""
         if len(self._named) in {0, 1, self._simulations} and (self._simulations or not self._named):
             return
-        found = ", ".join(map(shown, self._named)) + f" with {counted(self._simulations, 'simulation')}"
+        found = (
+            ", ".join(map(format_value, self._named)) + f" with {counted(self._simulations, 'simulation')}"
+        )
         allowed = "a block of a simulation, or one for each of several"
         raise OptionError(Finding(parameter="block", found=found, allowed=allowed))
 
@@ -224,7 +228,10 @@ def _refuse_unreached(read: ReadOptions, runs: Sequence[Run]) -> None:
     lost = [name for name in read.unit if name and not {name, key(name)} & used]
     if lost:
         allowed = "a column that a log has, and that is read"
-        said = (Finding(parameter="unit", found=f"no column {shown(name)}", allowed=allowed) for name in lost)
+        said = (
+            Finding(parameter="unit", found=f"no column {format_value(name)}", allowed=allowed)
+            for name in lost
+        )
         raise OptionError(*said)
 
 

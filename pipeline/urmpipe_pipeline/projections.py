@@ -11,7 +11,7 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.dynamics.equations import centres_of_mass_over_log
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import in_html
+from urmpipe_models.errors import escape_html
 from urmpipe_pipeline.lettering import Box, box_about, freest, width_of
 from urmpipe_pipeline.outlines import Piece, drawn_pieces, polyline
 from urmpipe_pipeline.palette import INK_COLOUR, MASS_COLOUR, REFERENCE_COLOUR
@@ -223,9 +223,9 @@ def projected(sketch: Sketch, views: Sequence[View], title: str, mark: str = "",
         (
             *([f"<!-- {mark} -->"] if mark else []),
             f'<svg xmlns="http://www.w3.org/2000/svg" {box} font-family="sans-serif" font-size="13">',
-            f"<title>{in_html(title)}</title>",
+            f"<title>{escape_html(title)}</title>",
             '<rect width="100%" height="100%" fill="white"/>',
-            f'<text x="{SCALE_PX}" y="24" font-size="17">{in_html(title)}</text>',
+            f'<text x="{SCALE_PX}" y="24" font-size="17">{escape_html(title)}</text>',
             *(line for one in frames for line in (*_scales(one), *_drawn(sketch, one))),
             *_legend(sketch, bottom),
             "</svg>\n",
@@ -263,7 +263,7 @@ def _scales(frame: _Frame) -> Iterator[str]:
     (left, top), (width, height) = frame.corner, frame.size
     bottom, right = top + height, left + width
     names = frame.view.axis_names
-    yield f'<text x="{left:.1f}" y="{top - 8:.1f}" fill="#555">{in_html(frame.view.title)}</text>'
+    yield f'<text x="{left:.1f}" y="{top - 8:.1f}" fill="#555">{escape_html(frame.view.title)}</text>'
     box = f'x="{left:.1f}" y="{top:.1f}" width="{width:.1f}" height="{height:.1f}"'
     yield f'<rect {box} fill="none" stroke="#c3cad0"/>'
     grid, number = 'stroke="#e4e8eb"', 'fill="#5b6770" font-size="11"'
@@ -300,7 +300,7 @@ def _drawn(sketch: Sketch, frame: _Frame) -> Iterator[str]:
         yield f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{5 if alone else 3}" fill="{spot.colour}"/>'
     for (x, y), words in _names(placed, [spot.words for spot in sketch.spots]):
         if words:
-            yield f'<text x="{x + 8:.1f}" y="{y - 6:.1f}" {HALO}>{in_html(words)}</text>'
+            yield f'<text x="{x + 8:.1f}" y="{y - 6:.1f}" {HALO}>{escape_html(words)}</text>'
     yield from _beside(sketch.names, frame, sketch.name_gap)
 
 
@@ -322,7 +322,8 @@ def _beside(names: Sequence[Spot], frame: _Frame, gap: float) -> Iterator[str]:
         taken.append(box)
         at = f'x="{box.middle[0]:.1f}" y="{box.middle[1] + 4.5:.1f}" text-anchor="middle"'
         fill = colours.get(words, INK_COLOUR)
-        yield f'<text class="name" {at} font-size="{NAME_PX:g}" fill="{fill}" {HALO}>{in_html(words)}</text>'
+        style = f'class="name" {at} font-size="{NAME_PX:g}" fill="{fill}" {HALO}'
+        yield f"<text {style}>{escape_html(words)}</text>"
 
 
 def _mass(place: FloatArray, radius: float) -> str:

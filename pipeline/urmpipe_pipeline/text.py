@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from urmpipe_models.elementwise import IntArray
-from urmpipe_models.errors import inert
-from urmpipe_models.measure_units import factor, units_of
+from urmpipe_models.errors import escape_control_characters
+from urmpipe_models.measure_units import compatible_units, conversion_factor
 
 NOTHING = "–"
 """Stands where there is no value."""
@@ -33,7 +33,7 @@ FINEST = 1e-3
 NAMED = 6
 """Rows or stretches of rows that are named in a sentence; the others are counted."""
 
-SHOWN = {si: (unit, factor(si, unit)) for si, unit in (("m", "mm"), ("rad", "deg"))}
+SHOWN = {si: (unit, conversion_factor(si, unit)) for si, unit in (("m", "mm"), ("rad", "deg"))}
 """The units that people read, and how many of them one of the SI unit is."""
 
 
@@ -45,7 +45,7 @@ def display_unit(unit: str, wanted: str) -> tuple[str, float]:
         wanted: The unit that people prefer; empty for none. One that is not known, or measures something else
             (an FMU may say anything), is not shown: the own one is.
     """
-    return (wanted, factor(unit, wanted)) if wanted in units_of(unit) else (unit, 1.0)
+    return (wanted, conversion_factor(unit, wanted)) if wanted in compatible_units(unit) else (unit, 1.0)
 
 
 def number(value: float | None, unit: str, against: float | None = None) -> str:
@@ -208,7 +208,11 @@ _FORMULA = ("=", "+", "-", "@")
 
 def csv_text(text: str) -> str:
     """Return a text as a cell of CSV: on one line, behind an apostrophe where a spreadsheet would run it."""
-    return f"'{inert(text)}" if text.startswith(_FORMULA) else inert(text)
+    return (
+        f"'{escape_control_characters(text)}"
+        if text.startswith(_FORMULA)
+        else escape_control_characters(text)
+    )
 
 
 def without_apostrophe(cell: str) -> str:

@@ -23,7 +23,7 @@ from urmpipe_fmus.native import native_missing
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.math3d import quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.results import read_recording
@@ -431,7 +431,7 @@ TURNED = (*PLACE, "qx", "qy", "qz", "qw")
 def turned_square(ry: float) -> FloatArray:
     """Return the square with a tool that is turned by ry in [rad], shape (n, 7)."""
     square = along(SQUARE, 0.2)
-    quat = quaternions(np.array([[0.2, ry, 0.1]]), "zyx")
+    quat = to_quaternions(np.array([[0.2, ry, 0.1]]), "zyx")
     return np.column_stack([square, np.tile(quat, (len(square), 1))])
 
 

@@ -274,7 +274,7 @@ def test_the_unit_of_a_joint_is_an_option(folder: Path) -> None:
     cause = Cause("joint_unit", "phi3", ("q3",), value=(np.pi / 180.0,))
     diagnosis = replace(there(run.diagnosis), causes=(cause,), remainder=Remainder(0.0))
     (hint,) = remedy_hints(replace(run, diagnosis=diagnosis))
-    assert hint.spelled("command line") == "--unit q3=deg"
+    assert hint.format("command line") == "--unit q3=deg"
     assert isinstance(hint.value, dict)
     right, mixed = (
         urmpipe.compare(PATH, log, "urm6", unit={"": "rad"} | unit).runs[0]

@@ -166,7 +166,7 @@ def test_a_unit_is_told_what_a_map_says_of_its_log(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("t,q1,q2\n0,1,2\n1,1.1,2.1\n", encoding="utf-8")
     *_, warning = (one for one in read_mapped_table(path).warnings if one.kind == "assumed-unit")
-    assert warning.words("command line").endswith(
+    assert warning.format("command line").endswith(
         '; --log-map FILE.toml with units."" = "deg" overrides this'
     )
     path.write_text("time,q1,q2\n0,1,2\n1000,1,2\n2000,1,2\n", encoding="utf-8")

@@ -21,7 +21,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Hint, Message
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.math3d import from_offset, quaternions
+from urmpipe_models.math3d import from_offset, to_quaternions
 from urmpipe_models.robots.catalogue import load_robot
 
 ROBOTS = (None, "ur5e")
@@ -98,7 +98,7 @@ def test_hints_that_are_followed_help(name: str, capfd: pytest.CaptureFixture[st
             told = ingested(name, given.pop("robot"), **given)
             assert of_message(message) not in map(of_message, told)
 
-            spelled = hint.spelled("command line")
+            spelled = hint.format("command line")
             if hint in typed or (spelled == MOST_USUAL and name != "pandas_default"):
                 continue
             typed.add(hint)
@@ -125,7 +125,7 @@ def test_smoothing_brings_a_noisy_log_within_its_efforts(
 
     (warning,) = told()
     (hint,) = warning["hints"]
-    words = Hint(**hint).spelled("command line")
+    words = Hint(**hint).format("command line")
     assert warning["message"].endswith(f"; {words} smooths the accelerations")
     assert told(*shlex.split(words)) == []
 
@@ -135,7 +135,7 @@ def recorded_beside(path: Path, q: FloatArray, held: Chain) -> Path:
     position, rotation = poses_over_log(held, TRUTH)
     names = ["t [s]", *(f"q{k} [rad]" for k in range(1, 7)), *(f"tcp_{axis} [m]" for axis in "xyz")]
     names += ["tcp_qx", "tcp_qy", "tcp_qz", "tcp_qw"]
-    quat = quaternions(rotation.reshape(-1, 9), "matrix")
+    quat = to_quaternions(rotation.reshape(-1, 9), "matrix")
     table = np.column_stack((0.008 * np.arange(len(q)), q, position, quat))
     np.savetxt(path, table, "%.9f", ",", header=",".join(names), comments="")
     return path
@@ -179,7 +179,7 @@ def test_what_a_comparison_with_the_recorded_poses_advises_helps(
         (message, hint), *_ = advised
         if step == 0:
             assert (message["kind"], hint["parameter"]) == (kind, parameter)
-        spelled = Hint(**hint).spelled("command line")
+        spelled = Hint(**hint).format("command line")
         assert spelled in message["message"]
         words += shlex.split(spelled)
     assert answer["verdict"] == "pass"

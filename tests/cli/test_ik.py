@@ -10,7 +10,7 @@ import pytest
 from ik_runs import answer, write_path
 from urmpipe.main import run
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import pasted
+from urmpipe_models.errors import shell_quote
 from urmpipe_models.ik.solutions import forward_targets, pose_errors
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.results import read_recording
@@ -201,7 +201,7 @@ def test_a_joint_log_is_what_ingest_reads(capsys: Captured, folder: Path) -> Non
     assert run(["robot", "export", "ur5e", "-o", "mine.toml", "-q"]) == 0
     (folder / "mine.toml").replace(folder / "my arm.toml")
     assert run(["ik", "path.csv", "--robot", "my arm.toml", "-o", "my log.csv"]) == 0
-    told = f"(read it: urmpipe ingest {pasted('my log.csv')} --robot {pasted('my arm.toml')})"
+    told = f"(read it: urmpipe ingest {shell_quote('my log.csv')} --robot {shell_quote('my arm.toml')})"
     assert capsys.readouterr().out.splitlines()[-1] == f"Joints: my log.csv  {told}"
     (folder / "my arm.toml").replace(folder / "mine.toml")
     assert run(["ik", "path.csv", "--robot", "mine.toml", "-o", "log.csv"]) == 0

@@ -17,7 +17,7 @@ from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.ik.solutions import forward_targets, pose_errors
 from urmpipe_models.kinematics.singularity import singularity_over_log
-from urmpipe_models.math3d import quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline.json_values import json_ready
 
 Q = np.array([[0.3, 0.8, -0.6, 0.5, 0.7, 0.2], [-1.0, 0.5, -0.2, 1.0, -0.8, 2.0]])
@@ -37,7 +37,7 @@ def matrices(targets: urmpipe.Targets) -> FloatArray:
 def test_a_file_matrices_and_targets_are_one_and_the_same(tmp_path: Path) -> None:
     rotation = TARGETS.rotation
     assert rotation is not None
-    table = np.column_stack([TARGETS.position, quaternions(rotation.reshape(-1, 9), "matrix")])
+    table = np.column_stack([TARGETS.position, to_quaternions(rotation.reshape(-1, 9), "matrix")])
     file = tmp_path / "targets.csv"
     np.savetxt(file, table, delimiter=",", header="x,y,z,qx,qy,qz,qw", comments="", fmt="%.17g")
     of_file, of_arrays = urmpipe.ik(file, "arm6"), urmpipe.ik(matrices(TARGETS), ARM)

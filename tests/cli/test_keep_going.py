@@ -62,7 +62,7 @@ def test_the_others_are_judged_and_all_outputs_name_the_log_that_is_not(capsys: 
     with Path("v.csv").open(encoding="utf-8", newline="") as file:
         assert {row["run"] for row in csv.DictReader(file)} == {"good"}
     made = recorded("v.rrd")
-    assert [(one.name, [error.words("command line") for error in one.errors]) for one in made.unjudged] == [
+    assert [(one.name, [error.format("command line") for error in one.errors]) for one in made.unjudged] == [
         ("broken", WRONG), ("missing", [MISSING]),
     ]  # fmt: skip
     said = (

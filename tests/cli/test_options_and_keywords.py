@@ -23,7 +23,7 @@ from urmpipe.commands.report import report
 from urmpipe.commands.robot import robot
 from urmpipe.commands.simulate import simulate
 from urmpipe.commands.view import view
-from urmpipe_models.errors import option_of
+from urmpipe_models.errors import to_option
 
 COMMANDS: dict[str, tuple[click.Command, Callable[..., Any]]] = {
     "accuracy": (accuracy, urmpipe.accuracy),
@@ -74,4 +74,4 @@ def test_each_option_is_a_keyword_and_each_keyword_an_option(name: str) -> None:
     keywords = set(signature(function).parameters) - OPERANDS[name] - OF_PYTHON
     assert set(options) - OF_COMMANDS == keywords
     for keyword in keywords:
-        assert option_of(keyword) in options[keyword].opts
+        assert to_option(keyword) in options[keyword].opts

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from urmpipe.printing.terminal import print_recording, progress_bar
-from urmpipe_models.errors import pasted
+from urmpipe_models.errors import shell_quote
 from urmpipe_models.robots.catalogue import load_robot
 
 
@@ -33,7 +33,7 @@ def test_the_command_that_opens_a_recording_works_without_an_activated_environme
     assert capsys.readouterr().out == said
 
     print_recording(Path("joint 3.rrd"))
-    quoted = pasted("joint 3.rrd")
+    quoted = shell_quote("joint 3.rrd")
     assert capsys.readouterr().out == f"Recording: joint 3.rrd  (open it: urmpipe view {quoted})\n"
 
     monkeypatch.setenv("PATH", str(tmp_path))

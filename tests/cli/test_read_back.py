@@ -19,7 +19,7 @@ from urmpipe_datasets import LOGS
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError, RecordingError
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.math3d import quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 
@@ -33,7 +33,7 @@ ROBOTS = [None, "ur5e", "iiwa14"]
 def write_log(path: Path, t: FloatArray) -> Path:
     """Write a log of urm6 with a recorded TCP, at times in [s], shape (n,)."""
     q = 0.8 * np.sin(3.0 * t)[:, np.newaxis] * np.linspace(0.3, 1.0, 6)
-    tcp = np.column_stack((0.3 + q[:, :3], quaternions(q[:, 3:], "zyx")))
+    tcp = np.column_stack((0.3 + q[:, :3], to_quaternions(q[:, 3:], "zyx")))
     names = ["t [s]", *(f"phi{k} [rad]" for k in range(1, 7)), *(f"tcp_{axis} [m]" for axis in "xyz")]
     names += ["qx", "qy", "qz", "qw"]
     rows = np.column_stack((t, q, tcp))

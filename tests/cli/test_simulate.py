@@ -16,7 +16,7 @@ from thinned_logs import lay_thinned_logs
 from urmpipe.api.recordings import read_recording
 from urmpipe.api.simulate import simulate
 from urmpipe_datasets import LOGS
-from urmpipe_models.errors import UrmpipeError, pasted
+from urmpipe_models.errors import UrmpipeError, shell_quote
 from urmpipe_pipeline.simulations.simulation import Simulation
 
 RunCommand = Callable[..., Any]
@@ -293,7 +293,7 @@ def test_a_shipped_system_is_written_to_be_changed(urmpipe: RunCommand, tmp_path
     ran = urmpipe("simulate", "one-drive", "--write-system", "mine.toml")
     assert (ran.code, ran.err) == (0, "")
     assert ran.out == "System: mine.toml  (change it, then: urmpipe simulate mine.toml)\n"
-    told = f"System: my drive.toml  (change it, then: urmpipe simulate {pasted('my drive.toml')})\n"
+    told = f"System: my drive.toml  (change it, then: urmpipe simulate {shell_quote('my drive.toml')})\n"
     assert urmpipe("simulate", "one-drive", "--write-system", "my drive.toml").out == told
     text = (tmp_path / "mine.toml").read_text(encoding="utf-8")
     changed = text.replace('unit = "dc_drive"', 'unit = "dc_drive"\nstart = { C = 0.1 }')

@@ -240,7 +240,7 @@ def test_a_log_with_both_sides_names_the_command_that_compares_them(tmp_path: Pa
     (unused,) = (
         one for one in urmpipe.ingest(log, robot="ur5e").log.inferences if one.what == "columns not used"
     )
-    assert [one.spelled("command line") for one in unused.hints] == ["urmpipe compare --sides target,actual"]
+    assert [one.format("command line") for one in unused.hints] == ["urmpipe compare --sides target,actual"]
     assert refusal(LogError, urmpipe.compare, log) == (
         "rtde.csv: no robot is given, and no single one of the catalogue fits the recorded tool centre point"
         " as it is; robot=NAME|FILE sets one; tool=[X, Y, Z] adds its tool"

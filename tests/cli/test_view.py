@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from urmpipe_datasets import LOGS
-from urmpipe_models.errors import ViewerError, pasted
+from urmpipe_models.errors import ViewerError, shell_quote
 from urmpipe_pipeline.recording.viewer import refuse_without_display
 
 RunCommand = Callable[..., Any]
@@ -45,7 +45,7 @@ def test_without_a_display_it_says_what_to_do(urmpipe: RunCommand, monkeypatch: 
 def test_the_commands_for_another_computer_can_be_pasted() -> None:
     with pytest.raises(ViewerError) as caught:
         refuse_without_display([Path("a.rrd"), Path("joint 3.rrd")], {}, "linux")
-    files = f"a.rrd {pasted('joint 3.rrd')}"
+    files = f"a.rrd {shell_quote('joint 3.rrd')}"
     assert str(caught.value) == NO_DISPLAY.replace("run.rrd", files)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from urmpipe_models.processes import environment
+from urmpipe_models.processes import module_environment
 
 WARM, MORE = 6, 12
 """Rounds until all is loaded, and the allocator has what it needs; rounds after that."""
@@ -25,7 +25,8 @@ def test_many_rounds_leave_nothing_behind(tmp_path: Path) -> None:
     """A recording left 4 threads and 2.5 MB behind: that would be 96 threads and 60 MB here."""
     done = subprocess.run(
         [sys.executable, Path(__file__).with_name("calls.py"), str(WARM + MORE)],
-        cwd=tmp_path, env=environment() | ONE_HEAP, capture_output=True, text=True, check=True, timeout=500,
+        cwd=tmp_path, env=module_environment() | ONE_HEAP,
+        capture_output=True, text=True, check=True, timeout=500,
     )  # fmt: skip
     threads, files, memory = zip(*map(json.loads, done.stdout.splitlines()), strict=True)
     assert max(threads[WARM:]) <= max(threads[:WARM])

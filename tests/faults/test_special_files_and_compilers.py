@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from urmpipe_datasets import LOGS
-from urmpipe_models.processes import environment
+from urmpipe_models.processes import module_environment
 
 HANGS = 120.0
 """Time in [s] after which a command hangs: each takes a second or two."""
@@ -45,7 +45,13 @@ def test_what_is_no_file_is_one_line(words: str, said: str, tmp_path: Path) -> N
     with socket.socket(socket.AF_UNIX) as there:
         there.bind(str(tmp_path / "socket.rrd"))
         done = subprocess.run(
-            line, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=HANGS, check=False
+            line,
+            cwd=tmp_path,
+            env=module_environment(),
+            capture_output=True,
+            text=True,
+            timeout=HANGS,
+            check=False,
         )
     assert (done.returncode, done.stderr) == (2, f"error: {said}\n")
 
@@ -58,7 +64,8 @@ def test_completion_does_not_wait_for_a_named_pipe(tmp_path: Path) -> None:
         "COMP_CWORD": "4",
     }
     done = subprocess.run(
-        COMMAND, cwd=tmp_path, env=environment() | asked, capture_output=True, text=True, timeout=HANGS,
+        COMMAND, cwd=tmp_path, env=module_environment() | asked,
+        capture_output=True, text=True, timeout=HANGS,
         check=False,
     )  # fmt: skip
     assert done.stdout == "plain,none\n"
@@ -83,7 +90,9 @@ def test_a_build_that_is_stopped_leaves_nothing_of_the_compiler(number: int, tmp
     compiler.chmod(0o755)
     told = {"CC": str(compiler), "TMPDIR": str(temporary), "STARTED": str(started)}
     line = [*COMMAND, "fmu", "build", "repolarizer", "-s", "joints=1", "--backend", "native", "-o", str(out)]
-    with subprocess.Popen(line, env=environment() | told, stderr=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        line, env=module_environment() | told, stderr=subprocess.PIPE, text=True
+    ) as process:
         end = time.monotonic() + HANGS
         while not started.exists() and process.poll() is None and time.monotonic() < end:
             time.sleep(0.01)

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from urmpipe_models.processes import environment
+from urmpipe_models.processes import module_environment
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="its workers are forks")
 
@@ -58,7 +58,12 @@ sys.exit(main())
 
 def run(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        [sys.executable, *words], cwd=ROOT, env=environment(), capture_output=True, text=True, check=False
+        [sys.executable, *words],
+        cwd=ROOT,
+        env=module_environment(),
+        capture_output=True,
+        text=True,
+        check=False,
     )
 
 

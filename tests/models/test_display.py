@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import pandas as pd
 import pytest
 
-from urmpipe_models.display import HEAD, LONGEST, Shown, line_of, number_of
+from urmpipe_models.display import HEAD_ROWS, MAX_LINE_LENGTH, Displayable, format_count, format_headline
 
 
 @dataclass
@@ -21,7 +21,7 @@ class Doubt:
 
 
 @dataclass(repr=False)
-class Shelf(Shown):
+class Shelf(Displayable):
     """A result of so many rows."""
 
     headline: str
@@ -47,7 +47,7 @@ def test_the_line_has_the_headline_and_the_number_of_warnings() -> None:
 
 @pytest.mark.parametrize(("warnings", "ending"), [((), ">"), (warned("one"), ", 1 warning>")])
 def test_what_does_not_fit_into_the_line_is_cut(warnings: tuple[Doubt, ...], ending: str) -> None:
-    room = LONGEST - len("<Shelf ") - len(ending)
+    room = MAX_LINE_LENGTH - len("<Shelf ") - len(ending)
     assert repr(Shelf("x" * room, warnings=warnings)) == f"<Shelf {'x' * room}{ending}"
     assert repr(Shelf("x" * (room + 1), warnings=warnings)) == f"<Shelf {'x' * (room - 3)}...{ending}"
 
@@ -61,13 +61,13 @@ def test_a_notebook_shows_headline_notes_and_the_head_of_the_table() -> None:
 
 
 def test_a_table_is_cut_after_its_head_and_says_so() -> None:
-    whole, cut = Shelf("books", HEAD)._repr_html_(), Shelf("books", HEAD + 1)._repr_html_()
+    whole, cut = Shelf("books", HEAD_ROWS)._repr_html_(), Shelf("books", HEAD_ROWS + 1)._repr_html_()
     assert whole.endswith("</table>")
-    assert cut == whole + f"<p>{HEAD} of {HEAD + 1} rows of to_frame()</p>"
-    cells = "".join(f"<tr><td>{1000 + row}</td></tr>" for row in range(HEAD))
+    assert cut == whole + f"<p>{HEAD_ROWS} of {HEAD_ROWS + 1} rows of to_frame()</p>"
+    cells = "".join(f"<tr><td>{1000 + row}</td></tr>" for row in range(HEAD_ROWS))
     assert f"<tbody>{cells}</tbody>" in "".join(whole.split())
 
 
 def test_numbers_and_facts_are_listed() -> None:
-    assert [number_of(count, "row") for count in (0, 1, 2)] == ["0 rows", "1 row", "2 rows"]
-    assert line_of("log", "urm6", "", None, number_of(2, "row")) == "log: urm6, 2 rows"
+    assert [format_count(count, "row") for count in (0, 1, 2)] == ["0 rows", "1 row", "2 rows"]
+    assert format_headline("log", "urm6", "", None, format_count(2, "row")) == "log: urm6, 2 rows"

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.math3d import Transform, conjugate, from_offset, matrices, quaternion_product
+from urmpipe_models.math3d import Transform, conjugate, from_offset, quaternion_product, to_matrices
 
 ROUNDING = 1e-14
 """Three products of entries of up to 4, a dozen roundings each."""
@@ -44,7 +44,7 @@ class Group:
 
 POSES = Group(from_offset, lambda a, b: a @ b, Transform.inverse, Transform(), homogeneous)
 QUATERNIONS = Group(
-    unit, quaternion_product, conjugate, np.array([[0.0, 0.0, 0.0, 1.0]]), lambda a: matrices(a)[0]
+    unit, quaternion_product, conjugate, np.array([[0.0, 0.0, 0.0, 1.0]]), lambda a: to_matrices(a)[0]
 )
 
 elements = st.lists(st.floats(-3.0, 3.0, allow_subnormal=False), min_size=6, max_size=6)

@@ -12,9 +12,9 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.hand_eye import HARDLY, TURN_LENGTH, HandEye, hand_eye, rotation_miss
+from urmpipe_models.hand_eye import HARDLY, TURN_LENGTH, HandEye, rotation_residual, solve_hand_eye
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.math3d import FORMS, RotationForm, matrices, quaternions
+from urmpipe_models.math3d import FORMS, RotationForm, to_matrices, to_quaternions
 from urmpipe_models.robots.catalogue import load_robot
 
 ROUNDING = 1e-12
@@ -57,7 +57,7 @@ def placed(position: FloatArray, rotation: FloatArray) -> Truth:
 
 
 def found_in(truth: Truth, *, turned: bool) -> HandEye:
-    return hand_eye(
+    return solve_hand_eye(
         truth.position, truth.rotation, truth.measured, truth.measured_rotation if turned else None
     )
 
@@ -104,9 +104,9 @@ def test_rows_without_a_value_count_nowhere() -> None:
     position, rotation = truth.position.copy(), truth.rotation.copy()
     measured[0, 1], turns[5:9], position[10], rotation[11, 2, 2] = np.nan, np.nan, np.nan, np.nan
     measured[14, 2] = 1e200
-    assert_found(hand_eye(position, rotation, measured, turns), truth, turned=True)
+    assert_found(solve_hand_eye(position, rotation, measured, turns), truth, turned=True)
     nowhere = np.full_like(turns, np.nan)
-    assert_found(hand_eye(position, rotation, measured, nowhere), truth, turned=False)
+    assert_found(solve_hand_eye(position, rotation, measured, nowhere), truth, turned=False)
 
 
 @pytest.mark.parametrize("turned", [True, False])
@@ -117,7 +117,7 @@ def test_no_other_frames_leave_less_of_noisy_positions(seed: int, turned: bool) 
     measured = truth.measured + rng.normal(0.0, 1e-3, truth.measured.shape)
     noise = Rotation.from_rotvec(rng.normal(0.0, 0.01, (300, 3))).as_matrix()
     turns = truth.measured_rotation @ noise
-    found = hand_eye(truth.position, truth.rotation, measured, turns if turned else None)
+    found = solve_hand_eye(truth.position, truth.rotation, measured, turns if turned else None)
 
     def miss(x: FloatArray) -> FloatArray:
         base = Rotation.from_rotvec(x[:3]).as_matrix() @ truth.base
@@ -137,8 +137,8 @@ def test_orientations_in_a_wrong_form_move_no_position() -> None:
     truth = random_truth(3, 100)
     measured = truth.measured + np.random.default_rng(3).normal(0.0, 1e-3, (100, 3))
     wrong = Rotation.random(100, np.random.default_rng(4)).as_matrix()
-    alone = hand_eye(truth.position, truth.rotation, measured)
-    found = hand_eye(truth.position, truth.rotation, measured, wrong)
+    alone = solve_hand_eye(truth.position, truth.rotation, measured)
+    found = solve_hand_eye(truth.position, truth.rotation, measured, wrong)
     assert rms(misses(found, truth, measured)) == pytest.approx(rms(misses(alone, truth, measured)), rel=1e-9)
 
 
@@ -150,7 +150,7 @@ def test_orientations_tell_what_positions_on_a_line_leave_open() -> None:
     truth = placed(line, spun)
     measured = truth.measured + rng.normal(0.0, 1e-3, line.shape)
     turns = truth.measured_rotation @ Rotation.from_rotvec(rng.normal(0.0, 0.01, (200, 3))).as_matrix()
-    found = hand_eye(truth.position, truth.rotation, measured, turns)
+    found = solve_hand_eye(truth.position, truth.rotation, measured, turns)
 
     def miss(x: FloatArray) -> FloatArray:
         base = Rotation.from_rotvec(x[:3]).as_matrix() @ truth.base
@@ -248,15 +248,15 @@ def test_the_form_of_orientations_is_the_one_that_leaves_no_angle(form: Rotation
         columns = made.as_euler(form.upper())  # type: ignore[call-overload]  # a word of Euler angles
     alike = {"zyz", "zxz"}  # these differ by quarter turns of base and tool
     for other in (one for one in FORMS if quaternions_fit(columns, one)):
-        guess = matrices(quaternions(columns, other))
-        fits = rotation_miss(truth.rotation, guess) < 1e-7
+        guess = to_matrices(to_quaternions(columns, other))
+        fits = rotation_residual(truth.rotation, guess) < 1e-7
         assert fits == (other == form or {form, other} == alike), other
         if fits:  # else no base fits, and the known one is of them
-            known = rotation_miss(truth.rotation, guess, truth.base)
+            known = rotation_residual(truth.rotation, guess, truth.base)
             assert (known < 1e-7) == (other == form), other
     if columns.shape[1] == 3:
-        in_degrees = matrices(quaternions(np.radians(columns), form))
-        assert rotation_miss(truth.rotation, in_degrees) > 0.1
+        in_degrees = to_matrices(to_quaternions(np.radians(columns), form))
+        assert rotation_residual(truth.rotation, in_degrees) > 0.1
 
 
 def quaternions_fit(columns: FloatArray, form: RotationForm) -> bool:
@@ -269,5 +269,7 @@ def test_the_angle_that_is_left_is_that_of_the_noise() -> None:
     turns = truth.measured_rotation @ noise.as_matrix()
     turns[3] = np.nan
     expected = rms(np.delete(noise.as_rotvec(), 3, axis=0))
-    assert rotation_miss(truth.rotation, turns) == pytest.approx(expected, rel=0.01)  # 6 of 1500 are fitted
-    assert np.isnan(rotation_miss(truth.rotation, np.full_like(turns, np.nan)))
+    assert rotation_residual(truth.rotation, turns) == pytest.approx(
+        expected, rel=0.01
+    )  # 6 of 1500 are fitted
+    assert np.isnan(rotation_residual(truth.rotation, np.full_like(turns, np.nan)))

@@ -10,7 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.wraps import AROUND, FAR, FULL_TURN, PERCEPTIBLE, beside_wraps, repair, repolarize
+from urmpipe_models.wraps import (
+    AROUND,
+    FAR,
+    FULL_TURN,
+    PERCEPTIBLE,
+    find_interpolated_samples,
+    reinterpolate,
+    repolarize,
+)
 
 TSP = 0.005
 MOVE = 0.01  # rad a sample, 2 rad/s
@@ -39,7 +47,9 @@ def found_in_each(
     for j, column in enumerate(q.T):
         here = np.flatnonzero(~np.isnan(column))
         wraps = np.searchsorted(here, result.rows[result.joints == j])
-        beside = here[beside_wraps(column[here], result.q[here, j], t[here], wraps, FULL_TURN)].tolist()
+        beside = here[
+            find_interpolated_samples(column[here], result.q[here, j], t[here], wraps, FULL_TURN)
+        ].tolist()
         told.append(sorted({*result.in_between[result.in_between[:, 1] == j, 0].tolist(), *beside}))
     return result.q, told, result.unexplained.tolist()
 
@@ -89,7 +99,7 @@ def test_the_repolarized_in_between_sample_stays_until_it_is_repaired() -> None:
     result = repolarize(q[:, np.newaxis], np.diff(t, prepend=0.0))
     assert result.q[s, 0] == q[s]
     assert result.in_between.tolist() == [[s, 0]]
-    repaired = repair(result.q, t, result.in_between)
+    repaired = reinterpolate(result.q, t, result.in_between)
     np.testing.assert_allclose(repaired[:, 0], x, rtol=0, atol=3e-15)  # values of 3: units in the last place
     others = np.delete(np.arange(20), s)
     assert repaired[others].tobytes() == result.q[others].tobytes()
@@ -97,7 +107,7 @@ def test_the_repolarized_in_between_sample_stays_until_it_is_repaired() -> None:
 
 def test_repair_goes_past_missing_and_other_in_between_samples() -> None:
     x = np.array([[0.0], [9.0], [np.nan], [9.0], [4.0], [5.0]])
-    repaired = repair(x, np.arange(6.0), np.array([[1, 0], [3, 0]]))
+    repaired = reinterpolate(x, np.arange(6.0), np.array([[1, 0], [3, 0]]))
     np.testing.assert_array_equal(repaired[:, 0], [0.0, 1.0, np.nan, 3.0, 4.0, 5.0])
 
 
@@ -166,7 +176,7 @@ def beside_a_wrap(deviation: float, t: FloatArray, moves: dict[int, float] | Non
         x -= x[STILL - 1] - 508.0  # the wrap stays where it is
     x[STILL] = 512.0 - deviation
     q = x - np.where(np.arange(2 * STILL) > STILL, period, 0.0)
-    return [int(at) for at in beside_wraps(q, x, t, indices(STILL + 1), period)]
+    return [int(at) for at in find_interpolated_samples(q, x, t, indices(STILL + 1), period)]
 
 
 def test_a_sample_is_off_the_line_beyond_four_times_half_the_way_of_its_neighbours() -> None:
@@ -198,7 +208,7 @@ def test_a_sample_is_told_though_a_wrap_leads_to_its_neighbour() -> None:
     x = q + 1024.0 * np.array([1, 1, 1, 0, 0, 1, 1, 1])
     # the joint goes 8 a sample there: 33 is more than four times that
     t = TSP * np.arange(8.0)
-    assert beside_wraps(q, x, t, indices(3, 5), 1024.0).tolist() == [4]
+    assert find_interpolated_samples(q, x, t, indices(3, 5), 1024.0).tolist() == [4]
 
 
 def test_a_sample_with_a_wrap_on_either_side_is_none() -> None:
@@ -207,17 +217,17 @@ def test_a_sample_with_a_wrap_on_either_side_is_none() -> None:
     for after, turns in ((16.0, 0), (2048.0, -2)):  # between its neighbours, and far off their line
         q = np.array([0.0, 0.0, after / 2.0 - 200.0 * (turns != 0), after, after])
         x = q + 1024.0 * np.array([0, 0, -1, turns, turns])
-        assert beside_wraps(q, x, t, indices(2, 3), 1024.0).tolist() == []
+        assert find_interpolated_samples(q, x, t, indices(2, 3), 1024.0).tolist() == []
     q = np.array([-508.0, -508.0, 300.0, 508.0, 508.0])
     x = q + 1024.0 * np.array([0, 0, 0, -1, -1])
-    assert beside_wraps(q, x, t, indices(3), 1024.0).tolist() == [2]
+    assert find_interpolated_samples(q, x, t, indices(3), 1024.0).tolist() == [2]
 
 
 def test_a_wrap_that_comes_late_is_clean() -> None:
     """A file of a little more than a period: it goes back by more than one, and noise brings it on again."""
     q = np.array([520.0, 520.0, 520.0, -516.0, -504.0, -504.0, -504.0])
     x = q + 1024.0 * np.array([0, 0, 0, 1, 1, 1, 1])
-    assert beside_wraps(q, x, TSP * np.arange(7.0), indices(3), 1024.0).tolist() == []
+    assert find_interpolated_samples(q, x, TSP * np.arange(7.0), indices(3), 1024.0).tolist() == []
 
 
 def test_the_second_sample_is_told_by_the_first() -> None:
@@ -225,22 +235,22 @@ def test_the_second_sample_is_told_by_the_first() -> None:
     q = np.array([508.0, 408.0, -516.0, -516.0, -516.0])
     x = q + 1024.0 * np.array([0, 0, 1, 1, 1])
     t = TSP * np.arange(5.0)
-    assert beside_wraps(q, x, t, indices(2), 1024.0).tolist() == [1]
+    assert find_interpolated_samples(q, x, t, indices(2), 1024.0).tolist() == [1]
     q = np.array([8.0, 508.0, 508.0, 408.0, -516.0, -516.0, -516.0, -516.0])
     x = q + 1024.0 * np.array([0, 0, 0, 0, 1, 1, 1, 1])
     t = TSP * np.arange(8.0)
-    assert beside_wraps(q, x, t, indices(4), 1024.0).tolist() == []
-    assert beside_wraps(q[1:], x[1:], t[1:], indices(3), 1024.0).tolist() == [2]
+    assert find_interpolated_samples(q, x, t, indices(4), 1024.0).tolist() == []
+    assert find_interpolated_samples(q[1:], x[1:], t[1:], indices(3), 1024.0).tolist() == [2]
 
 
 def test_the_first_and_the_last_sample_have_no_neighbours_at_the_other_end() -> None:
     """Between the last sample and the second stands the first; the last but one is told by the last."""
     q = np.array([300.0, -516.0, -516.0, -516.0, -516.0, -516.0, -516.0, 508.0])
     x = np.r_[300.0, np.full(7, 508.0)]
-    assert beside_wraps(q, x, TSP * np.arange(8.0), indices(1, 7), 1024.0).tolist() == []
+    assert find_interpolated_samples(q, x, TSP * np.arange(8.0), indices(1, 7), 1024.0).tolist() == []
     q = np.r_[np.full(6, 508.0), 300.0, -516.0]
     x = np.r_[np.full(6, 508.0), 300.0, 508.0]
-    assert beside_wraps(q, x, TSP * np.arange(8.0), indices(7), 1024.0).tolist() == [6]
+    assert find_interpolated_samples(q, x, TSP * np.arange(8.0), indices(7), 1024.0).tolist() == [6]
 
 
 def test_what_can_be_perceived_is_more_than_a_share_of_the_period() -> None:
@@ -248,7 +258,7 @@ def test_what_can_be_perceived_is_more_than_a_share_of_the_period() -> None:
     for off, told in ((1.0, []), (1.0 + 2.0**-40, [3])):
         q = np.array([1000.0, 1000.0, 1000.0, 1000.0 - off, -1000.0, -1000.0, -1000.0])
         x = q + period * np.array([0, 0, 0, 0, 1, 1, 1])
-        assert beside_wraps(q, x, TSP * np.arange(7.0), indices(4), period).tolist() == told
+        assert find_interpolated_samples(q, x, TSP * np.arange(7.0), indices(4), period).tolist() == told
 
 
 def test_beyond_the_ends_of_a_log_nothing_moves() -> None:
@@ -265,4 +275,9 @@ def indices(*values: int) -> IntArray:
 
 def test_the_ends_of_a_log_have_no_neighbours_to_judge_by() -> None:
     q = np.array([3.1, -3.1])
-    assert beside_wraps(q, np.array([3.1, 3.18]), np.array([0.0, TSP]), indices(1), FULL_TURN).tolist() == []
+    assert (
+        find_interpolated_samples(
+            q, np.array([3.1, 3.18]), np.array([0.0, TSP]), indices(1), FULL_TURN
+        ).tolist()
+        == []
+    )

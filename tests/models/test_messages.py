@@ -13,7 +13,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from urmpipe_models.errors import Finding, Hint, Voice, one_line
+from urmpipe_models.errors import Finding, Hint, Voice, escape_line
 from urmpipe_pipeline.joint_log import LogWarning
 
 
@@ -53,9 +53,9 @@ from urmpipe_pipeline.joint_log import LogWarning
     ],
 )  # fmt: skip
 def test_a_value_is_spelled_by_its_type(hint: Hint, option: str, keyword: str, key: str) -> None:
-    assert hint.spelled("command line") == option
-    assert hint.spelled("python") == keyword
-    assert hint.spelled("system file") == key
+    assert hint.format("command line") == option
+    assert hint.format("python") == keyword
+    assert hint.format("system file") == key
 
 
 @given(name=st.text(min_size=1, max_size=9))
@@ -63,18 +63,18 @@ def test_a_value_is_spelled_by_its_type(hint: Hint, option: str, keyword: str, k
 @example("q1\xa0\n\x7f\u2028")
 def test_any_name_in_a_hint_is_read_back_by_who_reads_the_voice(name: str) -> None:
     hint = Hint("unit", {name: "deg"})
-    assert eval(f"dict({hint.spelled('python')})") == {"unit": {name: "deg"}}  # it is Python
-    assert tomllib.loads(hint.spelled("system file")) == {"units": {name: "deg"}}
+    assert eval(f"dict({hint.format('python')})") == {"unit": {name: "deg"}}  # it is Python
+    assert tomllib.loads(hint.format("system file")) == {"units": {name: "deg"}}
     if name.isprintable():
-        assert shlex.split(hint.spelled("command line")) == ["--unit", f"{name}=deg"]
+        assert shlex.split(hint.format("command line")) == ["--unit", f"{name}=deg"]
     for voice in get_args(Voice):  # printing leaves them as they are
-        assert one_line(hint.spelled(voice)) == hint.spelled(voice)
+        assert escape_line(hint.format(voice)) == hint.format(voice)
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
 def test_a_shell_reads_a_name_that_is_not_printable() -> None:
     name = "q1\xa0$HOME'\n\u2028\\n;"
-    spelled = Hint("time", name).spelled("command line")
+    spelled = Hint("time", name).format("command line")
     shell = ["bash", "-c", f"printf %s {spelled.removeprefix('--time ')}"]
     done = subprocess.run(shell, capture_output=True, env={**os.environ, "LC_ALL": "C.UTF-8"}, check=True)
     assert done.stdout.decode() == name
@@ -104,14 +104,14 @@ HINTS = (
     ],
 )
 def test_what_hints_do_is_told_once_and_no_file_tells_what_it_cannot_say(voice: Voice, told: str) -> None:
-    assert Finding("no clock", "log.csv", 3, hints=HINTS).words(voice) == f"log.csv:3: no clock; {told}"
+    assert Finding("no clock", "log.csv", 3, hints=HINTS).format(voice) == f"log.csv:3: no clock; {told}"
 
 
 def test_the_subject_is_spelled_as_who_reads_it_writes_it() -> None:
     found = Finding(parameter="base_link", found="'a'", allowed="b")
-    assert found.words("command line") == "--base-link: found 'a', allowed: b"
+    assert found.format("command line") == "--base-link: found 'a', allowed: b"
     assert str(found) == "base_link: found 'a', allowed: b"
-    assert Finding("a", parameter="time").words("system file") == "clock.column: a"
+    assert Finding("a", parameter="time").format("system file") == "clock.column: a"
 
 
 def test_a_warning_tells_log_row_and_column_before_its_sentence() -> None:

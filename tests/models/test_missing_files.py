@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from urmpipe_models.files import meant_by
+from urmpipe_models.files import suggest_path
 
 
 @pytest.fixture
@@ -37,27 +37,27 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ],
 )
 def test_what_may_be_meant_is_asked(folder: Path, asked: str, meant: str) -> None:
-    assert meant_by(Path(asked)) == f" (did you mean {meant}?)"
+    assert suggest_path(Path(asked)) == f" (did you mean {meant}?)"
 
 
 def test_of_several_those_of_the_kind_are_meant(folder: Path) -> None:
-    assert meant_by(Path("log"), (".rrd",)) == " (did you mean log.rrd?)"
-    assert meant_by(Path("note"), (".rrd",)) == " (did you mean notes.md?)"
+    assert suggest_path(Path("log"), (".rrd",)) == " (did you mean log.rrd?)"
+    assert suggest_path(Path("note"), (".rrd",)) == " (did you mean notes.md?)"
     for k in range(5):
         (folder / f"run.{k}").touch()
-    assert meant_by(Path("run.csv")) == " (did you mean run.0 or run.1 or run.2?)"
+    assert suggest_path(Path("run.csv")) == " (did you mean run.0 or run.1 or run.2?)"
 
 
 @pytest.mark.parametrize("asked", ["targets.csv", "hidden.csv", "*.csv", "plots/path.csv", "notes.md/x"])
 def test_nothing_is_asked_where_no_name_is_like_it(folder: Path, asked: str) -> None:
-    assert "did you mean" not in meant_by(Path(asked))
+    assert "did you mean" not in suggest_path(Path(asked))
 
 
 def test_a_missing_folder_is_told_with_the_one_above_it(folder: Path) -> None:
-    assert meant_by(Path("data/raw/log.csv")) == f": {folder} has no folder data"
-    assert meant_by(Path("plot/raw/log.csv")) == f": {folder} has no folder plot (did you mean plots?)"
-    assert meant_by(Path("plots/raw/log.csv")) == ": plots has no folder raw"
-    assert meant_by(folder / "raw" / "log.csv") == f": {folder} has no folder raw"
+    assert suggest_path(Path("data/raw/log.csv")) == f": {folder} has no folder data"
+    assert suggest_path(Path("plot/raw/log.csv")) == f": {folder} has no folder plot (did you mean plots?)"
+    assert suggest_path(Path("plots/raw/log.csv")) == ": plots has no folder raw"
+    assert suggest_path(folder / "raw" / "log.csv") == f": {folder} has no folder raw"
 
 
 def test_a_link_to_nothing_is_not_meant_by_its_own_name(folder: Path) -> None:
@@ -66,4 +66,4 @@ def test_a_link_to_nothing_is_not_meant_by_its_own_name(folder: Path) -> None:
         link.symlink_to(folder / "nothing.csv")
     except OSError:
         pytest.skip("no links can be made here")
-    assert meant_by(Path("gone.csv")) == ""
+    assert suggest_path(Path("gone.csv")) == ""

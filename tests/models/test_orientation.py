@@ -14,12 +14,12 @@ from urmpipe_models.math3d import (
     FORMS,
     RotationForm,
     angle_between,
+    column_count,
     conjugate,
-    matrices,
     quaternion_product,
-    quaternions,
     slerp,
-    width,
+    to_matrices,
+    to_quaternions,
 )
 
 ROUNDING = 1e-14
@@ -46,8 +46,8 @@ def recorded(rotation: Rotation, form: RotationForm) -> FloatArray:
 def test_every_form_gives_the_rotation_that_scipy_wrote(form: RotationForm) -> None:
     rotation = Rotation.random(500, rng=np.random.default_rng(3))
     columns = recorded(rotation, form)
-    assert columns.shape == (500, width(form))
-    found = quaternions(columns, form)
+    assert columns.shape == (500, column_count(form))
+    found = to_quaternions(columns, form)
     np.testing.assert_allclose(angle_between(found, rotation.as_quat()), 0.0, atol=ROUNDING)
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=ROUNDING)
 
@@ -56,7 +56,7 @@ def test_every_form_gives_the_rotation_that_scipy_wrote(form: RotationForm) -> N
 def test_a_missing_sample_stays_missing(form: RotationForm) -> None:
     columns = recorded(Rotation.random(3, rng=np.random.default_rng(4)), form)
     columns[1, -1] = np.nan
-    found = quaternions(columns, form)
+    found = to_quaternions(columns, form)
     assert np.isnan(found[1]).any()
     assert np.isfinite(found[[0, 2]]).all()
 
@@ -64,18 +64,18 @@ def test_a_missing_sample_stays_missing(form: RotationForm) -> None:
 def test_half_turns_as_matrices() -> None:
     """1 + trace R is 0: only another component can be divided by."""
     half_turns = Rotation.from_rotvec(np.pi * np.eye(3))
-    found = quaternions(half_turns.as_matrix().reshape(-1, 9), "matrix")
+    found = to_quaternions(half_turns.as_matrix().reshape(-1, 9), "matrix")
     np.testing.assert_allclose(np.abs(found), np.eye(3, 4), atol=ROUNDING)
 
 
 def test_a_quaternion_is_brought_to_unit_length() -> None:
-    found = quaternions(np.array([[0.0, 0.0, 0.0, 2.0]]), "quat_xyzw")
+    found = to_quaternions(np.array([[0.0, 0.0, 0.0, 2.0]]), "quat_xyzw")
     assert found.tolist() == [[0.0, 0.0, 0.0, 1.0]]
 
 
 def test_quaternions_of_rotation_vectors() -> None:
     half = np.sqrt(0.5)
-    found = quaternions(
+    found = to_quaternions(
         np.array([[0, 0, 0], [0, 0, np.pi / 2], [np.pi, 0, 0], [0, -np.pi / 2, 0], [1e-9, 0, 0]]), "vector"
     )
     expected = [[0, 0, 0, 1], [0, 0, half, half], [1, 0, 0, 0], [0, -half, 0, half], [5e-10, 0, 0, 1]]
@@ -91,16 +91,16 @@ def test_the_angle_between_an_orientation_and_its_negative_is_none() -> None:
 
 def test_matrices_are_those_of_scipy() -> None:
     rotation = Rotation.random(500, rng=np.random.default_rng(6))
-    np.testing.assert_allclose(matrices(rotation.as_quat()), rotation.as_matrix(), atol=ROUNDING)
-    np.testing.assert_array_equal(matrices(np.array([[0.0, 0.0, 0.0, 1.0]])), np.eye(3)[np.newaxis])
+    np.testing.assert_allclose(to_matrices(rotation.as_quat()), rotation.as_matrix(), atol=ROUNDING)
+    np.testing.assert_array_equal(to_matrices(np.array([[0.0, 0.0, 0.0, 1.0]])), np.eye(3)[np.newaxis])
 
 
 def test_a_product_is_the_second_rotation_followed_by_the_first() -> None:
     first, second = (Rotation.random(200, rng=np.random.default_rng(seed)) for seed in (7, 8))
     found = quaternion_product(first.as_quat(), second.as_quat())
-    np.testing.assert_allclose(matrices(found), (first * second).as_matrix(), atol=ROUNDING)
+    np.testing.assert_allclose(to_matrices(found), (first * second).as_matrix(), atol=ROUNDING)
     undone = quaternion_product(conjugate(first.as_quat()), found)
-    np.testing.assert_allclose(matrices(undone), second.as_matrix(), atol=ROUNDING)
+    np.testing.assert_allclose(to_matrices(undone), second.as_matrix(), atol=ROUNDING)
 
 
 def test_angles_are_exact_from_nothing_to_half_a_turn() -> None:

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from urmpipe_models.elementwise import FloatArray, cosine_sine, table
+from urmpipe_models.elementwise import FloatArray, cosine_sine, cosine_sine_table
 
 BITS = 1200
 ONE = 1 << BITS
@@ -59,7 +59,7 @@ def largest_error(x: FloatArray) -> float:
 
 
 def test_the_table_holds_the_nearest_doubles() -> None:
-    cosines, sines = table()
+    cosines, sines = cosine_sine_table()
     assert len(cosines) == len(sines) == 4096
     for k in range(0, 513):
         c, s = exact(Fraction(2 * PI * k, 4096 * ONE))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.elementwise import Element, FloatArray, cosine_sine, side_by_side
+from urmpipe_models.elementwise import Element, FloatArray, cosine_sine, map_blocks
 from urmpipe_models.kinematics.forward import poses_over_log, tip_pose
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.tape import BLOCK, LONG, aligned, fill_over_log
@@ -80,7 +80,7 @@ def test_angles_of_many_turns_and_missing_ones_are_as_in_whole_arrays() -> None:
 def test_logs_side_by_side_do_not_disturb_each_other() -> None:
     chain = load_robot("urm6")
     logs = np.random.default_rng(2).uniform(-4.0, 4.0, (6, LONG + 100, 6))
-    together = side_by_side(lambda q: poses_over_log(chain, q), [*logs], threads=4)
+    together = map_blocks(lambda q: poses_over_log(chain, q), [*logs], threads=4)
     for q, (position, rotation) in zip(logs, together, strict=True):
         expected = entries(chain, [*np.ascontiguousarray(q.T)])
         assert_the_bits(np.vstack((position.T, rotation.reshape(-1, 9).T)), expected)

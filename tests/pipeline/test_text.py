@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from urmpipe_models.errors import pasted
+from urmpipe_models.errors import shell_quote
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Statistics
 from urmpipe_pipeline.comparison.wording import tolerance_words, used_words
@@ -93,5 +93,5 @@ def test_a_share_is_never_rounded_to_none_or_all_of_it(share: float, written: st
     ],
 )
 def test_a_word_is_quoted_where_a_shell_would_part_it(word: str, elsewhere: str, on_windows: str) -> None:
-    assert pasted(word, "linux") == pasted(word, "darwin") == elsewhere
-    assert pasted(word, "win32") == on_windows
+    assert shell_quote(word, "linux") == shell_quote(word, "darwin") == elsewhere
+    assert shell_quote(word, "win32") == on_windows

@@ -13,7 +13,7 @@ from asserting import there
 from urmpipe.main import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import forward_targets
-from urmpipe_models.math3d import quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_models.robots.catalogue import load_robot
 
 Captured = pytest.CaptureFixture[str]
@@ -29,6 +29,6 @@ def answer(capsys: Captured, code: int, *arguments: str | Path) -> dict[str, Any
 def write_path(path: Path, robot: str, q: FloatArray, period: float = 0.01) -> None:
     """Write the poses of joint values as a path of poses."""
     targets = forward_targets(load_robot(robot), q)
-    quat = quaternions(there(targets.rotation).reshape(-1, 9), "matrix")
+    quat = to_quaternions(there(targets.rotation).reshape(-1, 9), "matrix")
     table = np.column_stack([period * np.arange(len(q)), targets.position, quat])
     np.savetxt(path, table, delimiter=",", header="t,x,y,z,qx,qy,qz,qw", comments="", fmt="%.16g")

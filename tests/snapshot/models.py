@@ -14,7 +14,7 @@ from urmpipe_fmus.block import Table
 from urmpipe_fmus.blocks import block_names, make_block
 from urmpipe_fmus.run import run
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.delta import delta, outside
+from urmpipe_models.delta import delta, exceeds_tolerance
 from urmpipe_models.drives import (
     Drive,
     DrivenJoint,
@@ -55,7 +55,7 @@ from urmpipe_models.dynamics.equations import (
 )
 from urmpipe_models.dynamics.links import Wrench, kinetic_energy, mass_centres, potential_energy, wrench_power
 from urmpipe_models.elementwise import cosine_sine
-from urmpipe_models.hand_eye import hand_eye, rotation_miss
+from urmpipe_models.hand_eye import rotation_residual, solve_hand_eye
 from urmpipe_models.ik.closed import closed_form
 from urmpipe_models.ik.path import solve_path
 from urmpipe_models.ik.solutions import SearchOptions, Targets, forward_targets, pose_errors
@@ -77,23 +77,23 @@ from urmpipe_models.lagrange.formulas import c_code, equations_text, open_form
 from urmpipe_models.math3d import (
     Transform,
     angle_between,
-    best_rotation,
     conjugate,
     euler_zxz,
     euler_zyx,
+    fit_rotation,
     from_offset,
     from_rpy,
     from_zxz,
-    matrices,
+    matrix_to_rpy,
     quaternion_product,
-    quaternions,
     rotation_about,
-    rotation_vectors,
     rotation_x,
     rotation_y,
     rotation_z,
-    rpy_of,
     slerp,
+    to_matrices,
+    to_quaternions,
+    to_rotation_vectors,
     translation,
 )
 from urmpipe_models.networks.assembly import assemble, poses_at
@@ -111,11 +111,11 @@ from urmpipe_models.planning.laws import jerk_law, trapezoid_law
 from urmpipe_models.planning.path import PathRows, arc_at_corner, cube_rows
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.wraps import (
-    continuous_euler,
-    continuous_quaternions,
-    continuous_vectors,
-    repair,
+    reinterpolate,
     repolarize,
+    unwrap_euler,
+    unwrap_quaternions,
+    unwrap_rotation_vectors,
 )
 
 _rng = np.random.default_rng(7)
@@ -146,23 +146,23 @@ transforms = {
     "offset": _plain(from_offset([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])),
     "euler_zyx": np.array([euler_zyx(from_rpy(*one).rotation) for one in _angles], dtype=float),
     "euler_zxz": np.array([euler_zxz(from_zxz(*one).rotation) for one in _angles], dtype=float),
-    "rpy_of": np.array([rpy_of(from_rpy(*one).rotation) for one in _angles]),
+    "rpy_of": np.array([matrix_to_rpy(from_rpy(*one).rotation) for one in _angles]),
 }
 orientations = {
-    form: quaternions(_angles, form) for form in ("vector", "rpy", "zyx", "xyz", "zyz", "zxz")
+    form: to_quaternions(_angles, form) for form in ("vector", "rpy", "zyx", "xyz", "zyz", "zxz")
 } | {
-    "matrices": matrices(_quats),
-    "back": quaternions(matrices(_quats).reshape(-1, 9), "matrix"),
-    "wxyz": quaternions(_quats, "quat_wxyz"),
+    "matrices": to_matrices(_quats),
+    "back": to_quaternions(to_matrices(_quats).reshape(-1, 9), "matrix"),
+    "wxyz": to_quaternions(_quats, "quat_wxyz"),
     "conjugate": conjugate(_quats),
     "between": angle_between(_quats, _quats[::-1]),
     "slerp": slerp(_quats, _quats[::-1], np.linspace(0, 1, 20)),
     "product": quaternion_product(_quats, _quats[::-1]),
-    "vectors": rotation_vectors(_quats),
-    "best": best_rotation(_rng.standard_normal((3, 3)))[0],
-    "continuous": continuous_quaternions(_quats),
-    "continuous_vectors": continuous_vectors(_angles),
-    "continuous_euler": continuous_euler(_angles),
+    "vectors": to_rotation_vectors(_quats),
+    "best": fit_rotation(_rng.standard_normal((3, 3)))[0],
+    "continuous": unwrap_quaternions(_quats),
+    "continuous_vectors": unwrap_rotation_vectors(_angles),
+    "continuous_euler": unwrap_euler(_angles),
     "cosine_sine": np.array(cosine_sine(np.linspace(-700, 700, 999))),
 }
 
@@ -308,22 +308,22 @@ _wrapped = (_turning + np.pi) % (2 * np.pi) - np.pi
 _whole = repolarize(_wrapped, np.full(101, 0.01))
 _seen_q = _joints(load_robot("ur5e"), 25)
 _at, _turned = poses_over_log(load_robot("ur5e"), _seen_q)
-_turned = matrices(_turned) if _turned.shape[-1] == 4 else _turned
+_turned = to_matrices(_turned) if _turned.shape[-1] == 4 else _turned
 _measured = (_at + np.einsum("nij,j->ni", _turned, [0.02, -0.01, 0.12])) @ np.array(
     [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
 ) + [1.0, 2.0, 0.5]
-_eye = hand_eye(_at, _turned, _measured + 1e-5 * _rng.standard_normal(_measured.shape))
+_eye = solve_hand_eye(_at, _turned, _measured + 1e-5 * _rng.standard_normal(_measured.shape))
 logs = {
     "turned": _whole.q,
     "changes": [_whole.rows, _whole.joints, _whole.change],
-    "repaired": repair(_wrapped, _t, np.array([[3, 0], [50, 1]])),
+    "repaired": reinterpolate(_wrapped, _t, np.array([[3, 0], [50, 1]])),
     "delta": [
         float(one) if np.ndim(one) == 0 else np.array(one, dtype=float)
         for one in delta((0.1, 0.2, 0.3), (0.11, 0.19, 0.33))
     ],
-    "outside": float(outside(delta((0.1, 0.2, 0.3), (0.11, 0.19, 0.33)), 0.01)),
+    "outside": float(exceeds_tolerance(delta((0.1, 0.2, 0.3), (0.11, 0.19, 0.33)), 0.01)),
     "eye": [_eye.base_rotation, _eye.base_position, _eye.tool_position],
-    "miss": rotation_miss(_turned, _turned[::-1]),
+    "miss": rotation_residual(_turned, _turned[::-1]),
 }
 
 # Networks

@@ -24,7 +24,15 @@ from urmpipe_fmus.build.fmu import chosen_backend
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import DrivenJoint
 from urmpipe_models.dynamics.driven_arm import spectral_radius
-from urmpipe_models.errors import Finding, LogError, OptionError, PathError, RobotError, for_each, shown
+from urmpipe_models.errors import (
+    Finding,
+    LogError,
+    OptionError,
+    PathError,
+    RobotError,
+    format_value,
+    map_collecting_errors,
+)
 from urmpipe_models.planning.laws import Arcs
 from urmpipe_models.planning.path import PathRows
 from urmpipe_pipeline.accuracy.driven_motion import DrivenMotion
@@ -132,7 +140,7 @@ def accuracy(
         lambda: checked_timing(timing),
         lambda: _checked(velocities, limit, error, force),
     )
-    request, given, _, pushed = for_each(lambda make: make(), parts)
+    request, given, _, pushed = map_collecting_errors(lambda make: make(), parts)
     kept = [*([] if given.file is None else paths(str(path))), *map_files(reading), *paths(inputs)]
     with guarded_outputs({"recording": output}, kept) as written:
         asked = list(dict.fromkeys(map(float, velocities)))
@@ -155,7 +163,7 @@ def _request(arm: Chain | None, start: JointValues | None, timing: Timing) -> Re
         lambda: refuse_unlimited(timing, arm),
         lambda: _refuse_undriven(arm),
     )
-    begin, _, _ = for_each(lambda make: make(), parts)
+    begin, _, _ = map_collecting_errors(lambda make: make(), parts)
     return Request(arm, begin, timing)
 
 
@@ -203,14 +211,14 @@ def _faults(
     """Yield what is wrong with options."""
     bad = [one for one in velocities if not (isinstance(one, Real) and 0.0 < float(one) < math.inf)]
     if bad or not len(velocities):
-        found = ", ".join(map(shown, bad)) or "none"
+        found = ", ".join(map(format_value, bad)) or "none"
         yield Finding(parameter="velocities", found=found, allowed="finite numbers of m/s above 0")
     if limit is not None and not (isinstance(limit, Real) and 0.0 < float(limit) < math.inf):
-        yield Finding(parameter="limit", found=shown(limit), allowed="a finite number of m above 0")
+        yield Finding(parameter="limit", found=format_value(limit), allowed="a finite number of m above 0")
     if error not in DECIDES:
-        yield Finding(parameter="error", found=shown(error), allowed=", ".join(DECIDES))
+        yield Finding(parameter="error", found=format_value(error), allowed=", ".join(DECIDES))
     if force is not None and not (len(force) == 3 and np.isfinite(np.asarray(force, dtype=float)).all()):
-        yield Finding(parameter="force", found=shown(list(force)), allowed="three finite numbers of N")
+        yield Finding(parameter="force", found=format_value(list(force)), allowed="three finite numbers of N")
 
 
 def _runs(

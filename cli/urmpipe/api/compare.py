@@ -22,7 +22,7 @@ from urmpipe.keyword_checks import (
 from urmpipe.output_files import guarded_outputs
 from urmpipe.reading import Reading, map_files, resolved
 from urmpipe_models import DEFAULT_TOLERANCE
-from urmpipe_models.errors import Finding, Hint, OptionError, RecordingError, Voice, for_each
+from urmpipe_models.errors import Finding, Hint, OptionError, RecordingError, Voice, map_collecting_errors
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.clocks import CLOCKS_DIFFER
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
@@ -210,7 +210,7 @@ def operands_of(given: Mapping[str, Sequence[Any]], *further: type) -> list[Any]
     """
     kinds = (*MADE_RUNS, Simulation, Held, *further)
     named = {name: list(_with_tables(name.removesuffix("s"), operands)) for name, operands in given.items()}
-    for_each(lambda one: refuse_others(*one, kinds, OPERANDS), named.items())
+    map_collecting_errors(lambda one: refuse_others(*one, kinds, OPERANDS), named.items())
     return [one for operands in named.values() for one in operands]
 
 

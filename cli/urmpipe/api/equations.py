@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 from urmpipe.arm_placing import Frame, Robot, place_robot
 from urmpipe.keyword_checks import PathLike, public
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.files import write_export
 from urmpipe_models.lagrange.derivation import TERMS, TermName
@@ -29,7 +29,7 @@ FormName = Literal["text", "c"]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Equations(Shown):
+class Equations(Displayable):
     """The equations of motion of an arm.
 
     Attributes:
@@ -57,8 +57,8 @@ class Equations(Shown):
 
     def _headline(self) -> str:
         """Return the arm, its coordinates, and what the formulas cost."""
-        return line_of(
-            self.robot.name, number_of(len(self.robot.coordinates), "coordinate"), str(self.reduced)
+        return format_headline(
+            self.robot.name, format_count(len(self.robot.coordinates), "coordinate"), str(self.reduced)
         )
 
     def to_frame(self) -> pd.DataFrame:

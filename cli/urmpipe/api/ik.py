@@ -14,7 +14,7 @@ from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_recor
 from urmpipe.output_files import output_kind
 from urmpipe.reading import Resolved, TableReading, map_files, resolved
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.errors import Finding, OptionError, for_each
+from urmpipe_models.errors import Finding, OptionError, map_collecting_errors
 from urmpipe_models.ik.solutions import DEFAULT_SEARCH, SearchOptions
 from urmpipe_models.ik.solve import Method
 from urmpipe_models.robots.catalogue import robot_names
@@ -101,7 +101,7 @@ def ik(
         lambda: output_kind(path, "joints"),
         lambda: _given(targets, t, tsp, said.options),
     )
-    arm, kind, given = for_each(lambda make: make(), parts)
+    arm, kind, given = map_collecting_errors(lambda make: make(), parts)
     solving, writing = _parts(progress, path is not None)
     search = SearchOptions(tolerance, restarts, seed)
     request = Request(arm, given, start_of(arm, start), every, within_pi, method, search)

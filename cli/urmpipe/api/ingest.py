@@ -22,7 +22,7 @@ from urmpipe.keyword_checks import (
 from urmpipe.output_files import guarded_outputs
 from urmpipe.reading import Reading, map_files, resolved
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.errors import Finding, OptionError, for_each
+from urmpipe_models.errors import Finding, OptionError, map_collecting_errors
 from urmpipe_pipeline.operands import log_files, run_of_recording
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.runs.derivatives import Method
@@ -96,7 +96,7 @@ def ingest(
         lambda: resolved(reading, robot, base, tool, base_link, tip_link, names),
         lambda: _files_and_name(log, given={"t": t, "q": q, "recorded_tcp": recorded_tcp}),
     )
-    given, (files, folder) = for_each(lambda make: make(), parts)
+    given, (files, folder) = map_collecting_errors(lambda make: make(), parts)
     unread = {**reading, "tsp": tsp, "derivative": derivative, "names": names, "name": name}
     options = given.options
     if not files:

@@ -10,7 +10,7 @@ import numpy as np
 
 from urmpipe.keyword_checks import refuse_recording
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError
-from urmpipe_models.math3d import quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline.comparison.iso_cycles import IsoOptions
 from urmpipe_pipeline.iso9283.cycles import parse_cycles
 from urmpipe_pipeline.iso9283.poses import Poses
@@ -79,5 +79,5 @@ def _poses(targets: TargetsLike, read: ReadOptions | None) -> Poses:
     if wrong:
         raise LogError(*(Finding(said, found.name, row=row, parameter="targets") for row, said in wrong))
     rotation = found.targets.rotation
-    quat = None if rotation is None else quaternions(np.reshape(rotation, (-1, 9)), "matrix")
+    quat = None if rotation is None else to_quaternions(np.reshape(rotation, (-1, 9)), "matrix")
     return Poses(found.targets.position, quat, (False,) * len(found.targets))

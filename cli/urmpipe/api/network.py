@@ -13,7 +13,7 @@ import numpy as np
 from urmpipe.keyword_checks import PathLike, public, public_reading, refuse_warnings
 from urmpipe.output_files import guarded_outputs, output_kind, write_drawing
 from urmpipe.reading import Reading, map_files, resolved
-from urmpipe_models.errors import Finding, LogError, OptionError, for_each
+from urmpipe_models.errors import Finding, LogError, OptionError, map_collecting_errors
 from urmpipe_models.networks import file as network_file
 from urmpipe_models.networks.assembly import RESTARTS
 from urmpipe_models.networks.driving import Law
@@ -240,7 +240,7 @@ def network_drive(
         lambda: _refuse_together(log, steps, duration, law, {"derivative": derivative, **reading}),
         lambda: output_kind(written, "motion"),
     )  # fmt: skip
-    loaded, request, _, kind = for_each(lambda make: make(), parts)
+    loaded, request, _, kind = map_collecting_errors(lambda make: make(), parts)
     run = None if log is None else _read_log(log, loaded, drives or {}, tsp, derivative, reading)
     named = [Path(path) for path in (network, log) if isinstance(path, (str, Path))]
     files = [path for path in named if path.is_file()] + map_files(reading)

@@ -15,7 +15,7 @@ from urmpipe.output_files import output_kind
 from urmpipe.reading import UntimedReading, map_files, options_of, resolved
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import Finding, OptionError, for_each
+from urmpipe_models.errors import Finding, OptionError, map_collecting_errors
 from urmpipe_models.planning.laws import Arcs
 from urmpipe_models.planning.path import PathRows
 from urmpipe_pipeline.joint_log import LogWarning
@@ -109,7 +109,7 @@ def plan(
         lambda: checked_timing(timing),
         lambda: output_kind(written, "plan"),
     )
-    request, given, _, kind = for_each(lambda make: make(), parts)
+    request, given, _, kind = map_collecting_errors(lambda make: make(), parts)
     kept = [*([] if given.file is None else paths(str(path))), *map_files(reading), *paths(inputs)]
     if written is not None:
         refuse_output(written, kept, kind)
@@ -136,7 +136,7 @@ def _request(arm: Chain | None, start: JointValues | None, timing: Timing) -> Re
         lambda: _start(arm, start),
         lambda: refuse_unlimited(timing, arm),
     )
-    begin, _ = for_each(lambda make: make(), parts)
+    begin, _ = map_collecting_errors(lambda make: make(), parts)
     return Request(arm, begin, timing)
 
 

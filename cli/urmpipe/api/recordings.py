@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from urmpipe.keyword_checks import PathLike, paths, public
-from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, format_value
 from urmpipe_pipeline import results
 from urmpipe_pipeline.presentation.result import Result
 
@@ -52,5 +52,5 @@ def write_recording(
     """
     if not results.is_result(result):
         allowed = "a result, such as a Run or a Comparison"
-        raise OptionError(Finding(parameter="result", found=shown(result), allowed=allowed))
+        raise OptionError(Finding(parameter="result", found=format_value(result), allowed=allowed))
     return results.write_recording(result, Path(output), paths(inputs), progress)

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe.keyword_checks import PathLike, one_or_many, paths, public, refuse_foreign, refuse_others
-from urmpipe_models.display import Shown, line_of, number_of
-from urmpipe_models.errors import for_each
+from urmpipe_models.display import Displayable, format_count, format_headline
+from urmpipe_models.errors import map_collecting_errors
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Cell, Value
 from urmpipe_pipeline.results import present, read_recording, whole
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Report(Shown):
+class Report(Displayable):
     """A report that was written.
 
     Attributes:
@@ -37,8 +37,8 @@ class Report(Shown):
 
     def _headline(self) -> str:
         """Return the file, and what it shows."""
-        figures = number_of(len(self.figures), "figure file") if self.figures else ""
-        return line_of(str(self.path), number_of(len(self.results), "result"), figures)
+        figures = format_count(len(self.figures), "figure file") if self.figures else ""
+        return format_headline(str(self.path), format_count(len(self.results), "result"), figures)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a compared log and quantity, as `Comparison.to_frame`, for all comparisons in it."""
@@ -128,7 +128,7 @@ def report(
         reading(number / len(given))
         return whole(found)
 
-    found = for_each(read, enumerate(given, start=1))
+    found = map_collecting_errors(read, enumerate(given, start=1))
     shown = [present(one) for one in found]
     written = write_report(shown, Path(output), [*files, *paths(inputs)], of_figures, writing)
     return Report(written.path, tuple(found), written.figures)

@@ -129,7 +129,7 @@ def _print(result: SolvedTargets, robot: str | None, replaces: bool) -> None:
     """Print what was found, and what was written: how to read it names the robot as the caller does."""
     from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
-    from urmpipe_models.errors import pasted
+    from urmpipe_models.errors import shell_quote
     from urmpipe_pipeline.results import present
 
     print_presentation(present(result))
@@ -138,5 +138,5 @@ def _print(result: SolvedTargets, robot: str | None, replaces: bool) -> None:
         print_recording(written, replaced=replaces)
     elif written is not None:
         earlier = "; it replaced an earlier one" if replaces else ""
-        how = f"urmpipe ingest {pasted(written)} --robot {pasted(robot)}"
+        how = f"urmpipe ingest {shell_quote(written)} --robot {shell_quote(robot)}"
         say(f"Joints: {written}  (read it: {how}{earlier})")

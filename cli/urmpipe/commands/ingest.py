@@ -90,7 +90,7 @@ def _print(run: Run, explain: bool, replaces: bool, options: Mapping[str, Any]) 
     """Print what was found in a log, and what was written."""
     from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
-    from urmpipe_models.errors import pasted
+    from urmpipe_models.errors import shell_quote
     from urmpipe_pipeline.results import present
     from urmpipe_pipeline.text import counted
 
@@ -100,7 +100,7 @@ def _print(run: Run, explain: bool, replaces: bool, options: Mapping[str, Any]) 
     if audit := options["audit"]:
         say(f"Audit: {audit}  ({counted(len(run.audit), 'line')})")
     if written := options["write_map"]:
-        say(f"Map: {written}  (use it: urmpipe ingest LOG --map {pasted(written)})")
+        say(f"Map: {written}  (use it: urmpipe ingest LOG --map {shell_quote(written)})")
 
 
 def default_name(logs: tuple[Path, ...]) -> str:

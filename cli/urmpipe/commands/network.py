@@ -274,7 +274,7 @@ def _print(result: NetworkResult | NetworkMotion, replaces: bool) -> None:
     """Print what was found, and what was written."""
     from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
-    from urmpipe_models.errors import pasted
+    from urmpipe_models.errors import shell_quote
     from urmpipe_pipeline.networks.network_motion import NetworkMotion
     from urmpipe_pipeline.results import present
 
@@ -283,4 +283,4 @@ def _print(result: NetworkResult | NetworkMotion, replaces: bool) -> None:
         print_recording(result.recording, replaced=replaces)
     elif isinstance(result, NetworkMotion) and result.log is not None:
         earlier = "; it replaced an earlier one" if replaces else ""
-        say(f"Log: {result.log}  (read it: urmpipe ingest {pasted(result.log)}{earlier})")
+        say(f"Log: {result.log}  (read it: urmpipe ingest {shell_quote(result.log)}{earlier})")

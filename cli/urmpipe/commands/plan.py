@@ -87,11 +87,11 @@ def _print(result: PlannedPath, options: Mapping[str, Any], replaces: bool) -> N
 
 def _reading(log: Path, options: Mapping[str, Any]) -> str:
     """Return the command that reads a plan: an arm of the catalogue is found by its joints and its path."""
-    from urmpipe_models.errors import option_of, pasted
+    from urmpipe_models.errors import shell_quote, to_option
     from urmpipe_models.robots.catalogue import kinematically_distinct_names
 
-    placed = [option_of(name) for name in PLACED if options[name] is not None]
-    command = f"urmpipe ingest {pasted(log)}"
+    placed = [to_option(name) for name in PLACED if options[name] is not None]
+    command = f"urmpipe ingest {shell_quote(log)}"
     if options["robot"] is not None and (placed or options["robot"] not in kinematically_distinct_names()):
-        command += f" --robot {pasted(options['robot'])}"
+        command += f" --robot {shell_quote(options['robot'])}"
     return f"{command} with the same {', '.join(placed)}" if placed else command

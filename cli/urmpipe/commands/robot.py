@@ -116,7 +116,7 @@ def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -
       urmpipe robot export urm8 -o urm8.toml
     """
     from urmpipe.printing.terminal import say
-    from urmpipe_models.errors import Finding, OptionError, shown
+    from urmpipe_models.errors import Finding, OptionError, format_value
     from urmpipe_models.files import write_export
     from urmpipe_models.robots.toml import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
@@ -126,7 +126,7 @@ def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -
     writers = {".urdf": urdf_text, ".toml": robot_toml}
     if target.suffix.lower() not in writers:
         allowed = "a name that ends in .urdf or .toml"
-        raise OptionError(Finding(parameter="output", found=shown(str(target)), allowed=allowed))
+        raise OptionError(Finding(parameter="output", found=format_value(str(target)), allowed=allowed))
     chain = _placed(name, placing)
     write_export(target, writers[target.suffix.lower()](chain), Path(name))
     terminal.warn(lost_in_urdf(chain) if target.suffix.lower() == ".urdf" else [])

@@ -172,14 +172,14 @@ def _write(system: str, path: Path, terminal: Terminal) -> int:
     from urmpipe.api.simulate import own_logs
     from urmpipe.printing.terminal import say
     from urmpipe_fmus.cosim import system_text
-    from urmpipe_models.errors import pasted
+    from urmpipe_models.errors import shell_quote
     from urmpipe_pipeline.outputs import guarded_output
 
     text = system_text(system)
     with guarded_output(path, [], "system") as part:
         part.write_text(text, encoding="utf-8")
     logs = "".join(f" --set {name}=FILE.csv" for name in own_logs(system))
-    said = f"System: {path}  (change it, then: urmpipe simulate {pasted(path)}{logs})"
+    said = f"System: {path}  (change it, then: urmpipe simulate {shell_quote(path)}{logs})"
     terminal.answer(lambda: {"schema": 1, "system": str(path)}, lambda: say(said))
     return 0
 

@@ -12,7 +12,7 @@ from urmpipe.options.completion import tolerances, words
 from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.types import OneOf, ParsedType, parsed
 from urmpipe_models import DEFAULT_TOLERANCE
-from urmpipe_models.measure_units import WRITTEN, quantity
+from urmpipe_models.measure_units import WRITTEN, quantity_to_si
 
 SYNC_WORDS = ("stamps", "start", "auto")
 
@@ -23,12 +23,12 @@ def _sync(text: str) -> str | float:
     Raises:
         OptionError: If it is none of them.
     """
-    from urmpipe_models.errors import OptionError, shown
+    from urmpipe_models.errors import OptionError, format_value
 
-    offset = quantity(text, WRITTEN["s"])
+    offset = quantity_to_si(text, WRITTEN["s"])
     if text not in SYNC_WORDS and not math.isfinite(offset):
         allowed = f"{', '.join(SYNC_WORDS)}, or a time in s, such as -0.2 or 200ms"
-        raise OptionError(f"found {shown(text)}, allowed: {allowed}")
+        raise OptionError(f"found {format_value(text)}, allowed: {allowed}")
     return text if text in SYNC_WORDS else offset
 
 
@@ -47,11 +47,11 @@ def _sides(text: str) -> tuple[str, ...]:
     Raises:
         OptionError: If there are not two.
     """
-    from urmpipe_models.errors import OptionError, shown
+    from urmpipe_models.errors import OptionError, format_value
 
     words = tuple(word.strip() for word in text.split(","))
     if len(words) != 2 or not all(words):
-        raise OptionError(f"found {shown(text)}, allowed: two words, such as target,actual")
+        raise OptionError(f"found {format_value(text)}, allowed: two words, such as target,actual")
     return words
 
 

@@ -10,8 +10,8 @@ from click.shell_completion import CompletionItem
 
 from urmpipe.options.completion import items, operands
 from urmpipe.options.types import networks, robots
-from urmpipe_models.errors import shown
-from urmpipe_models.toml_tables import TomlError, toml_values
+from urmpipe_models.errors import format_value
+from urmpipe_models.toml_tables import TomlError, parse_toml_text
 
 
 class NamedType(click.ParamType[str]):
@@ -69,7 +69,7 @@ def control_names(ctx: click.Context) -> Iterable[str]:
 def option_value(text: str) -> Any:
     """Return the value of NAME=VALUE: as TOML has it, else words separated by commas, or a word."""
     try:
-        return toml_values(f"value = {text}\n")["value"]
+        return parse_toml_text(f"value = {text}\n")["value"]
     except (TomlError, KeyError):
         words = [part.strip() for part in text.split(",")]
         return words if len(words) > 1 else text.strip()
@@ -85,6 +85,6 @@ def named_values(ctx: click.Context, param: click.Parameter, values: tuple[str, 
     for value in values:
         name, sign, text = value.partition("=")
         if not sign or not name.strip() or name.strip() in found:
-            raise click.BadParameter(f"found {shown(value)}, allowed: NAME=VALUE, each name once")
+            raise click.BadParameter(f"found {format_value(value)}, allowed: NAME=VALUE, each name once")
         found[name.strip()] = text
     return found

@@ -10,7 +10,7 @@ from urmpipe.headings import Heading, option
 from urmpipe.options.completion import columns, units, words
 from urmpipe.options.grouped import Command, with_options
 from urmpipe.options.types import DURATION, ROBOT, FileType, NamesType, OffsetType, OneOf
-from urmpipe_models.errors import pasted, shown
+from urmpipe_models.errors import format_value, shell_quote
 
 FORMS = ["vector", "rpy", "zyx", "xyz", "zyz", "zxz", "quat_xyzw", "quat_wxyz", "matrix"]
 """Forms of a recorded orientation (a test compares them with those of the models)."""
@@ -32,7 +32,7 @@ def _units(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
         column, _, unit = value.rpartition("=")
         several = value.split(",")
         if len(several) > 1 and all("=" in one for one in several):
-            apart = " ".join(f"--unit {pasted(one.strip())}" for one in several)
+            apart = " ".join(f"--unit {shell_quote(one.strip())}" for one in several)
             raise click.BadParameter(f"found {value!r}, allowed: one COLUMN=UNIT per option: {apart}")
         if units.setdefault(column, unit) != unit:
             found = f"found {units[column]} and {unit} {f'for {column}' if column else 'without a column'}"
@@ -54,7 +54,7 @@ def _intervals(
         found = tuple(map(_end, ends.split(":")))
         if not is_interval(found):
             allowed = "LOW:HIGH or JOINT=LOW:HIGH, in the file's unit or with units, such as -180deg:180deg"
-            raise click.BadParameter(f"found {shown(value)}, allowed: {allowed}")
+            raise click.BadParameter(f"found {format_value(value)}, allowed: {allowed}")
         intervals[joint] = found
     return intervals
 

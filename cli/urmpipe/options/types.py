@@ -13,8 +13,8 @@ import click
 from click.shell_completion import CompletionItem
 
 from urmpipe.options.completion import files
-from urmpipe_models.errors import Finding, OptionError, for_each, shown
-from urmpipe_models.measure_units import WRITTEN, quantity, read_quantity
+from urmpipe_models.errors import Finding, OptionError, format_value, map_collecting_errors
+from urmpipe_models.measure_units import WRITTEN, quantity_to_si, read_quantity
 
 
 class CatalogueType(click.ParamType[str]):
@@ -107,9 +107,9 @@ class OneOf(click.Choice[str]):
 
     def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
         """Return what was found, what may have been meant, and what is allowed."""
-        from urmpipe_models.errors import not_among
+        from urmpipe_models.errors import format_unknown_name
 
-        return not_among(str(value), self.choices)
+        return format_unknown_name(str(value), self.choices)
 
 
 def parsed(
@@ -164,11 +164,11 @@ class OffsetType(click.ParamType[Any]):
         if not isinstance(value, str):
             return value
         parts = value.split(",")
-        values = [quantity(part, WRITTEN["m"]) for part in parts[:3]]
-        values += [quantity(part, WRITTEN["rad"]) for part in parts[3:]]
+        values = [quantity_to_si(part, WRITTEN["m"]) for part in parts[:3]]
+        values += [quantity_to_si(part, WRITTEN["rad"]) for part in parts[3:]]
         if len(values) not in (3, 6) or not all(map(math.isfinite, values)):
             allowed = "X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0,150mm,0,0,90deg"
-            self.fail(f"found {shown(value)}, allowed: {allowed}", param, ctx)
+            self.fail(f"found {format_value(value)}, allowed: {allowed}", param, ctx)
         return from_offset(values)
 
 
@@ -180,7 +180,7 @@ class WholeType(click.ParamType[int]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
         """Return the number."""
         if not isinstance(value, int) and not re.fullmatch("[0-9]+", value):
-            self.fail(f"found {shown(value)}, allowed: a whole number, 0 or more", param, ctx)
+            self.fail(f"found {format_value(value)}, allowed: a whole number, 0 or more", param, ctx)
         return int(value)
 
 
@@ -205,7 +205,7 @@ def quantity_type(si: str, name: str = "", *, positive: bool = True, deviation: 
     """
     read = partial(read_quantity, si=si, positive=positive, deviation=deviation)
     if name:
-        return ParsedType(name, lambda text: tuple(for_each(read, text.split(","))))
+        return ParsedType(name, lambda text: tuple(map_collecting_errors(read, text.split(","))))
     return ParsedType(f"NUMBER[{'|'.join(filter(None, WRITTEN[si]))}]", read)
 
 
@@ -216,9 +216,9 @@ def _joint_values(text: str) -> tuple[str, ...]:
         OptionError: If one is neither.
     """
     parts = tuple(text.split(","))
-    if any(all(math.isnan(quantity(part, WRITTEN[si])) for si in ("rad", "m")) for part in parts):
+    if any(all(math.isnan(quantity_to_si(part, WRITTEN[si])) for si in ("rad", "m")) for part in parts):
         allowed = "joint values in rad and m, or with units, such as 0,180deg,500mm"
-        raise OptionError(Finding(found=shown(text), allowed=allowed))
+        raise OptionError(Finding(found=format_value(text), allowed=allowed))
     return parts
 
 

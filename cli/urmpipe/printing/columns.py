@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from urmpipe.printing.terminal import lines_of
-from urmpipe_models.errors import one_line
+from urmpipe_models.errors import escape_line
 from urmpipe_pipeline.text import NOTHING
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Column:
         from rich.cells import cell_len
 
         lines = [*self.head, *(str(cell or NOTHING) for cell in self.cells)]
-        width = max(cell_len(one_line(line)) for line in lines)
+        width = max(cell_len(escape_line(line)) for line in lines)
         return min(width, KEY_WIDTH) if self.key or self.words else width
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from urmpipe_models.display import HEAD
-from urmpipe_models.errors import in_html
+from urmpipe_models.display import HEAD_ROWS
+from urmpipe_models.errors import escape_html
 from urmpipe_pipeline.presentation.brief import brief_columns, brief_facts, brief_tables, head, rows_within
 from urmpipe_pipeline.presentation.digits import units_differ, written
 from urmpipe_pipeline.presentation.section import Fact, Section, Table
@@ -20,7 +20,7 @@ def notebook_page(result: Any) -> str | None:
         return None
     shown = present(result)
     word = (shown.verdict or shown.word).upper()
-    headline = f"<p><b>{type(result).__name__}</b> {in_html(word)} {in_html(shown.headline)}</p>"
+    headline = f"<p><b>{type(result).__name__}</b> {escape_html(word)} {escape_html(shown.headline)}</p>"
     return headline + _facts(shown.facts) + "".join(_section(shown.body))
 
 
@@ -28,25 +28,25 @@ def _section(section: Section) -> Iterator[str]:
     yield from map(_table, brief_tables(section))
     yield _facts(section.facts)
     if section.warnings:
-        yield f"<ul>{''.join(f'<li>{in_html(str(one))}</li>' for one in section.warnings)}</ul>"
+        yield f"<ul>{''.join(f'<li>{escape_html(str(one))}</li>' for one in section.warnings)}</ul>"
     for below in section.sections:
         if below.facts or below.tables or below.warnings:
-            yield f"<p><b>{in_html(below.title)}</b></p>"
+            yield f"<p><b>{escape_html(below.title)}</b></p>"
             yield from _section(below)
 
 
 def _facts(facts: tuple[Fact, ...]) -> str:
     told = [(one.name, written(one.value, unit=True, voice="python")) for one in brief_facts(facts)]
-    rows = (f"<tr><th>{in_html(name)}</th><td>{in_html(value)}</td></tr>" for name, value in told)
+    rows = (f"<tr><th>{escape_html(name)}</th><td>{escape_html(value)}</td></tr>" for name, value in told)
     return f"<table>{''.join(rows)}</table>" if told else ""
 
 
 def _table(table: Table) -> str:
-    columns, shown = list(brief_columns(table)), rows_within(table, HEAD)
+    columns, shown = list(brief_columns(table)), rows_within(table, HEAD_ROWS)
     count = len(columns[0].cells)
-    heads = "".join(f"<th>{in_html(head(one))}</th>" for one in columns)
+    heads = "".join(f"<th>{escape_html(head(one))}</th>" for one in columns)
     cells = ([written(cell, unit=units_differ(one.cells)) for cell in one.cells[shown]] for one in columns)
     rows = zip(*cells, strict=True)
-    lines = (f"<tr>{''.join(f'<td>{in_html(cell)}</td>' for cell in row)}</tr>" for row in rows)
-    more = f"<p>{HEAD} of {count} rows</p>" if count > HEAD else ""
-    return f"<p>{in_html(table.title)}</p><table><tr>{heads}</tr>{''.join(lines)}</table>{more}"
+    lines = (f"<tr>{''.join(f'<td>{escape_html(cell)}</td>' for cell in row)}</tr>" for row in rows)
+    more = f"<p>{HEAD_ROWS} of {count} rows</p>" if count > HEAD_ROWS else ""
+    return f"<p>{escape_html(table.title)}</p><table><tr>{heads}</tr>{''.join(lines)}</table>{more}"

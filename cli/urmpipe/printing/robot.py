@@ -15,7 +15,7 @@ from urmpipe_models.arm.chain import GRAVITY, Chain, Joint, Parameter, frame_to_
 from urmpipe_models.drives import PassiveJoint
 from urmpipe_models.ik.closed import closed_form, format_method
 from urmpipe_models.kinematics.forward import forward, points_over_log
-from urmpipe_models.math3d import Transform, euler_zyx, rpy_of
+from urmpipe_models.math3d import Transform, euler_zyx, matrix_to_rpy
 from urmpipe_models.robots.toml import chain_to_dict, drive_to_dict
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ def _parameters(chain: Chain) -> Table:
                 table.add_row(one.name, _value(one), f"{one.kind} {one.axis}", name, one.source)
         for part in frame_to_steps(frame):
             if isinstance(part, Transform) and part != Transform():
-                turn = _figures(math.degrees(angle) for angle in rpy_of(part.rotation))
+                turn = _figures(math.degrees(angle) for angle in matrix_to_rpy(part.rotation))
                 table.add_row("", f"{turn} deg", "about x, y, z", name, "constant")
     return table
 

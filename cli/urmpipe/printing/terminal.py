@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from urmpipe_models.errors import one_line, shown_json
+from urmpipe_models.errors import escape_json, escape_line
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -40,7 +40,7 @@ def echo_json(value: Any, indent: int | None = None) -> None:
 
     What is no visible letter stands there as an escape of JSON, which reads back as it is.
     """
-    written = shown_json(json.dumps(value, ensure_ascii=False, indent=indent))
+    written = escape_json(json.dumps(value, ensure_ascii=False, indent=indent))
     try:
         written.encode(sys.stdout.encoding or "utf-8")
     except UnicodeEncodeError:  # such as the bytes of a file name that are no text
@@ -50,28 +50,28 @@ def echo_json(value: Any, indent: int | None = None) -> None:
 
 def say(line: str, *, err: bool = False) -> None:
     """Print one line, on standard output or standard error; what is not printable in names as escapes."""
-    click.echo(one_line(line), err=err)
+    click.echo(escape_line(line), err=err)
 
 
 def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
     """Print where a recording is, and how to open it with the urmpipe that is running."""
-    from urmpipe_models.errors import pasted
+    from urmpipe_models.errors import shell_quote
 
     command = "urmpipe"
     if shutil.which(command) is None:  # not on the path, as in an environment that was not activated
         installed, here = Path(sys.executable).parent / command, Path.cwd()
         command = str(installed.relative_to(here) if installed.is_relative_to(here) else installed)
     earlier = "; it replaced an earlier one" if replaced else ""
-    called = pasted(command)
+    called = shell_quote(command)
     called = f"& {called}" if sys.platform == "win32" and called != command else called  # PowerShell's call
-    say(f"Recording: {recording}  (open it: {called} view {pasted(recording)}{earlier})")
+    say(f"Recording: {recording}  (open it: {called} view {shell_quote(recording)}{earlier})")
 
 
 def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:
     """Print warnings on standard error, one unwrapped line each, behind the name of their log if given."""
     named = f"{log}: " if log else ""
     for warning in warnings[:LISTED]:
-        say(f"warning: {named}{warning.words('command line')}", err=True)
+        say(f"warning: {named}{warning.format('command line')}", err=True)
     if len(warnings) > LISTED:
         say(f"warning: {named}and {len(warnings) - LISTED} more", err=True)
 
@@ -88,7 +88,7 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float
     name = TextColumn("{task.description}", markup=False)  # a title holds names of files
     columns = (name, BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(one_line(title), total=1.0)
+        task = bar.add_task(escape_line(title), total=1.0)
         yield lambda share: bar.update(task, completed=share)
 
 
@@ -104,7 +104,7 @@ def clock(title: str, *, quiet: bool = False) -> Iterator[None]:
     name = TextColumn("{task.description}", markup=False)  # a title holds names of files
     columns = (SpinnerColumn(), name, TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
-        shown.add_task(one_line(title), total=None)
+        shown.add_task(escape_line(title), total=None)
         yield
 
 
@@ -127,7 +127,7 @@ def judged(verdict: str | None) -> Text:
 
 def judged_line(verdict: str | None, said: str) -> Text:
     """Return a verdict and what is said to it, in one line."""
-    return judged(verdict).append(f"  {one_line(said)}", style="not bold default")
+    return judged(verdict).append(f"  {escape_line(said)}", style="not bold default")
 
 
 def new_console() -> Console:
@@ -143,7 +143,7 @@ def new_console() -> Console:
 
         def render_str(self, text: str, **options: Any) -> Text:
             """Return a string or the text of a cell on one line, without what is not printable."""
-            return super().render_str(one_line(text), **options)
+            return super().render_str(escape_line(text), **options)
 
     width = None if sys.stdout.isatty() else PIPE_WIDTH
     return PlainConsole(width=width, markup=False, emoji=False, highlight=False)
@@ -153,7 +153,7 @@ def lines_of(lines: Iterable[str]) -> Text:
     """Return lines that a cell or a head has, each without what is not printable."""
     from rich.text import Text
 
-    return Text("\n".join(map(one_line, lines)))
+    return Text("\n".join(map(escape_line, lines)))
 
 
 def new_table(*columns: str, title: str) -> Table:

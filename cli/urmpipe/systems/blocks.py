@@ -19,7 +19,7 @@ from urmpipe_fmus.block import Table
 from urmpipe_fmus.build.fmu import cached_fmu, chosen_backend
 from urmpipe_fmus.cosim.plan import LogColumn
 from urmpipe_fmus.cosim.system import STEP
-from urmpipe_models.errors import Finding, OptionError, UrmpipeError, shown
+from urmpipe_models.errors import Finding, OptionError, UrmpipeError, format_value
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import row_clock
 from urmpipe_pipeline.simulations.simulation import SLOW
@@ -204,5 +204,5 @@ class Blocks:
 def _text(name: str, value: Any) -> str | None:
     """Return an option that names a robot or a file."""
     if value is not None and not isinstance(value, str):
-        raise OptionError(f"{name}: found {shown(value)}, allowed: a name or a file")
+        raise OptionError(f"{name}: found {format_value(value)}, allowed: a name or a file")
     return value

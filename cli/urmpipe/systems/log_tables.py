@@ -68,7 +68,7 @@ def read_mapped_table(
 def _in_map(hints: Sequence[Hint]) -> tuple[Hint, ...]:
     """Return hints with those of reading options as what a map says; what it cannot say is left out."""
     said = (
-        Hint("log_map", None, f"with {hint.spelled('system file')} {hint.does}".strip())
+        Hint("log_map", None, f"with {hint.format('system file')} {hint.does}".strip())
         if hint.parameter in IN_MAP and not hint.call
         else hint
         for hint in hints

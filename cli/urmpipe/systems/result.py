@@ -18,7 +18,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.measure_units import readings
-from urmpipe_models.toml_tables import toml_text
+from urmpipe_models.toml_tables import quote_toml
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict, delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.provenance import provenance
@@ -43,7 +43,7 @@ def check_meters(plan: Plan, blocks: Blocks) -> None:
     for block in plan.system.blocks:
         given = str(block.start.get(TOLERANCE, ""))
         if block.name in meters and (both := readings(given, "m")):
-            allowed = f"a unit: {' or '.join(map(toml_text, both))}"
+            allowed = f"a unit: {' or '.join(map(quote_toml, both))}"
             faults.append(f"block {block.name}: tolerance: found {given}, allowed: {allowed}")
     if faults:
         raise OptionError(*faults)

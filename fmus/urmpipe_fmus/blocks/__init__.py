@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import Any, cast
 
 from urmpipe_fmus.block import BlockModel
-from urmpipe_models.errors import UnitError, did_you_mean, not_among
+from urmpipe_models.errors import UnitError, format_suggestion, format_unknown_name
 
 # Of each unit its module, and what it does.
 _UNITS: dict[str, tuple[str, str]] = {
@@ -84,8 +84,8 @@ def make_block(name: str, /, **options: Any) -> BlockModel:
     needed = [one.name for one in signature(make).parameters.values() if one.default is Parameter.empty]
     allowed = ", ".join(known) or "none, it has no options"
     faults = [
-        f"option {one}: found{did_you_mean(one, known)}, allowed: {allowed}; a parameter is set where the"
-        f" unit runs, in a system by start = {{ {one} = ... }}, in another tool as the FMU's start value"
+        f"option {one}: found{format_suggestion(one, known)}, allowed: {allowed}; a parameter is set where"
+        f" the unit runs, in a system by start = {{ {one} = ... }}, in another tool as the FMU's start value"
         for one in options
         if one not in known
     ]
@@ -102,5 +102,5 @@ def _module(name: str) -> ModuleType:
 def _known(name: str) -> str:
     """Return the name of a unit; `UnitError` if there is none."""
     if (found := normalise_block_name(name)) not in _UNITS:
-        raise UnitError(f"unit: {not_among(name, _UNITS)}, or a .py file with a unit in it")
+        raise UnitError(f"unit: {format_unknown_name(name, _UNITS)}, or a .py file with a unit in it")
     return found

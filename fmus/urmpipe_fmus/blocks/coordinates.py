@@ -12,7 +12,7 @@ from typing import Any
 from urmpipe_fmus.block import Output, Recipe, State, Values
 from urmpipe_models.arm.chain import Chain, JointKind
 from urmpipe_models.elementwise import Element
-from urmpipe_models.errors import UnitError, shown
+from urmpipe_models.errors import UnitError, format_value
 from urmpipe_models.robots.toml import robot_toml
 
 MOST = 1000
@@ -26,7 +26,7 @@ def an_arm(unit: str, value: Any) -> None:
         UnitError: If it is none.
     """
     if not isinstance(value, Chain):
-        raise UnitError(f"unit {unit}: option robot: found {shown(value)}, allowed: a robot (Chain)")
+        raise UnitError(f"unit {unit}: option robot: found {format_value(value)}, allowed: a robot (Chain)")
 
 
 def whole_number(unit: str, option: str, value: Any) -> int:
@@ -38,7 +38,7 @@ def whole_number(unit: str, option: str, value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST:
         too_many = isinstance(value, int) and value > MOST
         allowed = f"{MOST} at most" if too_many else "an integer, 1 or more"
-        raise UnitError(f"unit {unit}: option {option}: found {shown(value)}, allowed: {allowed}")
+        raise UnitError(f"unit {unit}: option {option}: found {format_value(value)}, allowed: {allowed}")
     return value
 
 
@@ -49,7 +49,7 @@ def yes_or_no(unit: str, option: str, value: Any) -> bool:
         UnitError: If it is neither.
     """
     if not isinstance(value, bool):
-        raise UnitError(f"unit {unit}: option {option}: found {shown(value)}, allowed: true or false")
+        raise UnitError(f"unit {unit}: option {option}: found {format_value(value)}, allowed: true or false")
     return value
 
 
@@ -62,14 +62,13 @@ def some_of(unit: str, option: str, value: Any, allowed: tuple[str, ...]) -> tup
     if isinstance(value, str):
         value = [value]
     if not isinstance(value, (list, tuple)):
-        raise UnitError(
-            f"unit {unit}: option {option}: found {shown(value)}, allowed: a list of {', '.join(allowed)}"
-        )
+        found = f"found {format_value(value)}, allowed: a list of {', '.join(allowed)}"
+        raise UnitError(f"unit {unit}: option {option}: {found}")
     wrong = [one for one in value if one not in allowed]
     if wrong:
         raise UnitError(
             *(
-                f"unit {unit}: option {option}: found {shown(one)}, allowed: {', '.join(allowed)}"
+                f"unit {unit}: option {option}: found {format_value(one)}, allowed: {', '.join(allowed)}"
                 for one in wrong
             )
         )

@@ -25,7 +25,7 @@ from urmpipe_models.arm.chain import Parameter as ArmParameter
 from urmpipe_models.arm.geometric_models import SEGMENT_SOURCE, TILT_SOURCE
 from urmpipe_models.errors import UnitError
 from urmpipe_models.kinematics.forward import Motion, forward, iter_point_motions
-from urmpipe_models.math3d import Transform, euler_zyx, from_rpy, rpy_of
+from urmpipe_models.math3d import Transform, euler_zyx, from_rpy, matrix_to_rpy
 from urmpipe_models.robots.toml import chain_from_dict
 
 
@@ -132,7 +132,7 @@ def _frame_parameters(name: str, where: str, frame: Transform) -> tuple[Paramete
             description=f"Turn of {where}: roll, pitch, yaw (about the fixed x, y, z)",
             unit="rad",
             display_unit="deg",
-            start=rpy_of(frame.rotation),
+            start=matrix_to_rpy(frame.rotation),
             size=3,
         ),
     )

@@ -26,9 +26,9 @@ from urmpipe_fmus.block import (
 )
 from urmpipe_fmus.blocks.coordinates import whole_number, yes_or_no
 from urmpipe_models import DEFAULT_TOLERANCE
-from urmpipe_models.delta import delta, outside
+from urmpipe_models.delta import delta, exceeds_tolerance
 from urmpipe_models.elementwise import Element
-from urmpipe_models.errors import UnitError, shown
+from urmpipe_models.errors import UnitError, format_value
 from urmpipe_models.wraps import State, step
 
 LOG_SOURCE_OPTIONS: Mapping[str, str] = {
@@ -119,7 +119,7 @@ def _column(given: Column | Sequence[Any]) -> Column:
     texts = (*parts[:2], *parts[3:])
     if not 1 <= len(parts) <= len(Column._fields) or not all(isinstance(one, str) for one in texts):
         allowed = "name, unit, size and description"
-        raise UnitError(f"unit log_source: option columns: found {shown(given)}, allowed: {allowed}")
+        raise UnitError(f"unit log_source: option columns: found {format_value(given)}, allowed: {allowed}")
     column = Column(*parts)
     if column.size is not None:
         whole_number("log_source", f"columns: {column.name}: size", column.size)
@@ -287,5 +287,5 @@ def _outputs_delta_meter(v: Values) -> Mapping[str, Element]:
     return {
         "delta": (found.x, found.y, found.z),
         "norm": found.norm,
-        "out_of_tolerance": outside(found, v.tolerance),
+        "out_of_tolerance": exceeds_tolerance(found, v.tolerance),
     }

@@ -15,8 +15,8 @@ import numpy as np
 from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Recipe, Values, Variable
 from urmpipe_fmus.blocks.coordinates import whole_number
 from urmpipe_models.elementwise import Element, Vector
-from urmpipe_models.errors import UnitError, not_among, shown
-from urmpipe_models.measure_units import WRITTEN, quantity
+from urmpipe_models.errors import UnitError, format_unknown_name, format_value
+from urmpipe_models.measure_units import WRITTEN, quantity_to_si
 from urmpipe_models.networks.assembly import CLOSED, assemble, assembled_at, start_with
 from urmpipe_models.networks.driving import move_to
 from urmpipe_models.networks.file import Network, load_network
@@ -24,7 +24,7 @@ from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.mobility import network_tables, with_start
 from urmpipe_models.networks.parts import POSE_UNITS
 from urmpipe_models.networks.rates import changes, close_network, largest_residual, predict_variables
-from urmpipe_models.toml_tables import are_numbers, is_number
+from urmpipe_models.toml_tables import is_number, is_number_list
 
 NETWORK_MOTION_OPTIONS: Mapping[str, str] = {
     "network": "a kinematic network: a name of the catalogue, or a .toml file",
@@ -75,10 +75,10 @@ def network_motion(
     loaded = network if isinstance(network, Network) else load_network(_network_source(network))
     for option, value in (("controls", controls), ("start", start)):
         if value is not None and not isinstance(value, Mapping):
-            raise _option_error(option, f"found {shown(value)}, allowed: a table of names and values")
+            raise _option_error(option, f"found {format_value(value)}, allowed: a table of names and values")
     for name, number in (controls or {}).items():
         if not (isinstance(number, str) or is_number(number)):
-            message = f"found {name} = {shown(number)}, allowed: a number, or a text with a unit"
+            message = f"found {name} = {format_value(number)}, allowed: a number, or a text with a unit"
             raise _option_error("controls", message)
     mechanism = build_mechanism(_at_joint_values(loaded, start or {}))
     values = {name: loaded.control_value(name, value) for name, value in (controls or {}).items()}
@@ -291,27 +291,29 @@ def _network_source(network: Any) -> str | Path | Mapping[str, Any]:
     """Return a name, a file or tables of a network."""
     if isinstance(network, (str, Path, Mapping)):
         return network
-    raise _option_error("network", f"found {shown(network)}, allowed: a name, a file, or tables")
+    raise _option_error("network", f"found {format_value(network)}, allowed: a name, a file, or tables")
 
 
 def _at_joint_values(network: Network, start: Mapping[str, Any]) -> Network:
     """Return a network whose joints start at other values, in [rad] and [m]."""
     joints = {joint.name: joint for joint in network.joints if joint.units}
-    faults = [f"start: joint {not_among(name, joints)}" for name in start if name not in joints]
+    faults = [f"start: joint {format_unknown_name(name, joints)}" for name in start if name not in joints]
     for name, value in start.items():
         if name not in joints:
             continue
         units = joints[name].units
         values = list(value) if isinstance(value, (list, tuple)) else [value]
         read = [
-            quantity(entry, WRITTEN[unit]) if isinstance(entry, str) else entry
+            quantity_to_si(entry, WRITTEN[unit]) if isinstance(entry, str) else entry
             for entry, unit in zip(values, units, strict=False)
         ]
-        if len(values) == len(units) and are_numbers(read, len(units)):
+        if len(values) == len(units) and is_number_list(read, len(units)):
             joints[name] = replace(joints[name], start=tuple(float(entry) for entry in read))
         else:
             count = "a number" if len(units) == 1 else f"a list of {len(units)} numbers"
-            faults.append(f"start: found {name} = {shown(value)}, allowed: {count} in {', '.join(units)}")
+            faults.append(
+                f"start: found {name} = {format_value(value)}, allowed: {count} in {', '.join(units)}"
+            )
     if faults:
         raise UnitError(*(f"unit network_motion: option {fault}" for fault in faults))
     return replace(network, joints=tuple(joints.get(joint.name, joint) for joint in network.joints))
@@ -333,9 +335,9 @@ def _read_points(network: Network, points: Any) -> tuple[tuple[str, str, Vector]
     faults, read = [], []
     for name, (body, place) in rows.items():
         if body not in network.body_names:
-            faults.append(f"{name}: body {not_among(str(body), network.body_names)}")
-        elif not are_numbers(place, 3):
-            faults.append(f"{name}: found {shown(place)}, allowed: x, y, z in m")
+            faults.append(f"{name}: body {format_unknown_name(str(body), network.body_names)}")
+        elif not is_number_list(place, 3):
+            faults.append(f"{name}: found {format_value(place)}, allowed: x, y, z in m")
         else:
             read.append((name, body, (float(place[0]), float(place[1]), float(place[2]))))
     if faults:

@@ -33,7 +33,7 @@ from urmpipe_fmus.block import BlockModel, Recipe
 from urmpipe_fmus.build.description import Backend, documentation, model_description
 from urmpipe_fmus.fmu_file import DAMAGED, content_guid, this_platform, write_fmu
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.display import Shown, line_of
+from urmpipe_models.display import Displayable, format_headline
 from urmpipe_models.errors import Finding, FmuError, Hint, UrmpipeError
 from urmpipe_models.robots.toml import chain_from_dict
 
@@ -66,7 +66,7 @@ DOCUMENTATION = "documentation/index.html"
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class BuiltFmu(Shown):
+class BuiltFmu(Displayable):
     """An FMU that was built.
 
     Attributes:
@@ -87,7 +87,7 @@ class BuiltFmu(Shown):
 
     def _headline(self) -> str:
         """Return the file, and what is in it."""
-        return line_of(str(self.path), self.unit.name, self.backend, *self.platforms)
+        return format_headline(str(self.path), self.unit.name, self.backend, *self.platforms)
 
     def _notes(self) -> list[str]:
         """Return why it is not native."""

@@ -16,8 +16,8 @@ from typing import Any
 from urmpipe_fmus.cosim.system import Block, Connection, Port, System
 from urmpipe_fmus.fmu_file import binaries_here, open_fmu
 from urmpipe_fmus.si_units import BASE_NAMES, BaseUnit, base_unit, same_unit
-from urmpipe_models.errors import CosimulationError, Finding, UnitError, not_among
-from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
+from urmpipe_models.errors import CosimulationError, Finding, UnitError, format_unknown_name
+from urmpipe_models.measure_units import NAMES, WRITTEN, quantity_to_si
 
 ELEMENT = re.compile(r"(.+)\[(\d+(?:,\s*\d+)*)\]")
 """The name of an array's element: `phi[1]`, `M[1,2]`."""
@@ -360,7 +360,7 @@ class Wiring:
         shown = self.interfaces[port.block]
         found = shown.elements(port.variable)
         if not found:
-            allowed = not_among(port.variable, shown.names(causality))
+            allowed = format_unknown_name(port.variable, shown.names(causality))
             self._fault(where, f"{causality} of {port.block}: {allowed}")
         for one in found:
             if one.causality != causality:
@@ -434,7 +434,7 @@ class Wiring:
             found = shown.elements(name)
             if not found:
                 names = [n for kind in ("parameter", "input", "output", "local") for n in shown.names(kind)]
-                self._fault(where, not_among(name, names))
+                self._fault(where, format_unknown_name(name, names))
                 continue
             values = value if isinstance(value, list) else [value] * len(found)
             if len(values) != len(found):
@@ -474,7 +474,7 @@ def _unit(one: Variable) -> str:
 
 def _in_si(one: Variable, value: Any) -> Any:
     """Return a start value; a text with its unit as a number, where the variable is in SI."""
-    number = quantity(value, WRITTEN.get(one.unit or "", {})) if isinstance(value, str) else math.nan
+    number = quantity_to_si(value, WRITTEN.get(one.unit or "", {})) if isinstance(value, str) else math.nan
     return number if one.type == "Real" and math.isfinite(number) else value
 
 

@@ -19,7 +19,7 @@ from urmpipe_fmus.cosim.job import TYPES, BlockJob, ExchangeJob, Job, LoopJob, T
 from urmpipe_fmus.cosim.order import Exchange, Loop, Order
 from urmpipe_fmus.cosim.system import STEP, SYSTEMS, Block, LogInput, Port, System
 from urmpipe_models.errors import CosimulationError, Finding, Hint, UrmpipeError
-from urmpipe_models.files import placed
+from urmpipe_models.files import add_line_numbers
 
 Make = Callable[[Block], BlockModel | Path]
 
@@ -155,7 +155,7 @@ def _refuse(system: System, faults: list[Finding]) -> None:
     """Raise a `CosimulationError` if there are faults, by line if the system has a file."""
     if faults and system.path.is_file():
         shipped = system.path.parent == SYSTEMS
-        found = placed(system.path, system.path.name if shipped else str(system.path), faults)
+        found = add_line_numbers(system.path, system.path.name if shipped else str(system.path), faults)
         raise CosimulationError(*sorted(found, key=lambda one: one.line or 0))
     if faults:
         raise CosimulationError(*dict.fromkeys(faults))
@@ -188,7 +188,7 @@ def _interfaces(
 
 def _quoted(where: str, error: UrmpipeError) -> list[Finding]:
     """Return what is wrong with what a table or key of the system's file asks for."""
-    return [Finding(one.words("system file"), about=where) for one in error.findings]
+    return [Finding(one.format("system file"), about=where) for one in error.findings]
 
 
 def _fmu_of(unit: BlockModel) -> Path:

@@ -43,8 +43,8 @@ from urmpipe_fmus.cosim.system import Port
 from urmpipe_fmus.fmu_file import open_fmu
 from urmpipe_fmus.process import TIMEOUT
 from urmpipe_fmus.python_fmu.place import why_not_in
-from urmpipe_models.errors import CosimulationError, one_line
-from urmpipe_models.processes import command, end_group, ending, environment
+from urmpipe_models.errors import CosimulationError, escape_line
+from urmpipe_models.processes import describe_exit, end_group, module_command, module_environment
 
 POLL = 0.02
 """How often it is looked at, in [s]."""
@@ -72,11 +72,11 @@ class Worker:
         self.folder = Path(self._folder.name)
         with (self.folder / SAID).open("ab") as said:
             self._process = subprocess.Popen(
-                command("urmpipe_fmus.cosim.worker", str(self.folder)),
+                module_command("urmpipe_fmus.cosim.worker", str(self.folder)),
                 stdin=subprocess.PIPE,
                 stdout=said,
                 stderr=subprocess.STDOUT,
-                env=environment(),
+                env=module_environment(),
                 start_new_session=True,
                 bufsize=0,  # so that closing its input writes nothing to a process that has ended
             )
@@ -103,7 +103,7 @@ class Worker:
         while True:
             with suppress(subprocess.TimeoutExpired):
                 code = self._process.wait(POLL)
-                return ending(code) if code else ""
+                return describe_exit(code) if code else ""
             if (self.folder / SAID).stat().st_size > SAID_BYTES:
                 os.truncate(self.folder / SAID, 0)  # what is appended from then on begins there
             why = watch()
@@ -307,7 +307,7 @@ def _recorded(
     result = _result(folder)
     failed = _failure(job, folder, state, result) if result else None
     if failed is None and (ended or not state.done):
-        failed = _crash(job, folder, state, ended or ending(0))
+        failed = _crash(job, folder, state, ended or describe_exit(0))
     times = np.arange(state.rows) * job.record_every * job.step
     if state.ended:
         times[-1] = state.ended
@@ -345,14 +345,14 @@ def _failure(job: Job, folder: Path, state: Progress, result: dict[str, Any]) ->
     if result["failed"] is None:
         return None
     if result["code"] == ELSEWHERE:
-        return one_line(f"{result['failed']}, at t = {state.k * job.step:.9g} s")
+        return escape_line(f"{result['failed']}, at t = {state.k * job.step:.9g} s")
     return _told(job, folder, state, result["code"], result["failed"])
 
 
 def _crash(job: Job, folder: Path, state: Progress, ended: str) -> str:
     """Return how a run failed whose process ended in some way before all was done."""
     if state.code == ELSEWHERE:
-        return one_line(f"the process of the co-simulation {ended}" + _quoted(_said(folder)[-LAST_LINES:]))
+        return escape_line(f"the process of the co-simulation {ended}" + _quoted(_said(folder)[-LAST_LINES:]))
     return _told(job, folder, state, state.code, ended)
 
 
@@ -362,7 +362,7 @@ def _told(job: Job, folder: Path, state: Progress, code: int, what: str) -> str:
     name = job.blocks[number].name
     lines = [f"{status}: {text}" for block, status, text in _log(folder) if block == name]
     words = _quoted([*lines[-LAST_LINES:], *_said(folder)[-LAST_LINES:]])
-    return one_line(f"block {name}: {function} at t = {state.k * job.step:.9g} s: {what}{words}")
+    return escape_line(f"block {name}: {function} at t = {state.k * job.step:.9g} s: {what}{words}")
 
 
 def _quoted(lines: list[str]) -> str:
@@ -395,4 +395,4 @@ def _warnings(job: Job, folder: Path) -> Iterator[str]:
         last = f", the last: {lines[-1]}" if lines else ""
         times = f"{counts[code]:.0f} times, first" if counts[code] > 1 else "once,"
         when = f"at t = {first[code] * job.step:.9g} s"
-        yield one_line(f"block {name}: {function} returned fmi2Warning {times} {when}{last}")
+        yield escape_line(f"block {name}: {function} returned fmi2Warning {times} {when}{last}")

@@ -16,10 +16,17 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from urmpipe_fmus.blocks import normalise_block_name
-from urmpipe_models.errors import CosimulationError, Finding, Hint, did_you_mean, not_among, shown
-from urmpipe_models.files import is_there, meant_by, placed
-from urmpipe_models.measure_units import WRITTEN, quantity
-from urmpipe_models.toml_tables import parse_toml
+from urmpipe_models.errors import (
+    CosimulationError,
+    Finding,
+    Hint,
+    format_suggestion,
+    format_unknown_name,
+    format_value,
+)
+from urmpipe_models.files import add_line_numbers, is_existing_file, suggest_path
+from urmpipe_models.measure_units import WRITTEN, quantity_to_si
+from urmpipe_models.toml_tables import read_toml
 
 SYSTEMS = Path(__file__).parents[1] / "systems"
 """Where the shipped systems are."""
@@ -148,7 +155,7 @@ def beside(folder: Path, value: Any) -> Any:
     """Return a value in which each text that names a file of a folder is that file's path."""
     if isinstance(value, str) and value and not value.startswith("$"):
         path = folder / value
-        return str(path) if is_there(path) else value
+        return str(path) if is_existing_file(path) else value
     if isinstance(value, Mapping):
         return {key: one if key in NAMES else beside(folder, one) for key, one in value.items()}
     return _mapped(lambda one: beside(folder, one), value)
@@ -165,7 +172,8 @@ def unknown(value: Any, arguments: Mapping[str, Any], where: str = "") -> Iterat
     """Yield what is wrong with the `$name`s of a value: no such argument."""
     if isinstance(value, str) and value[:1] == "$" and value[1:] not in arguments:
         yield Finding(
-            f"{not_among(value, (f'${name}' for name in arguments))} ([arguments] names them)", about=where
+            f"{format_unknown_name(value, (f'${name}' for name in arguments))} ([arguments] names them)",
+            about=where,
         )
     elif isinstance(value, Mapping):
         for key, one in value.items():
@@ -189,7 +197,7 @@ def given(
     values = dict(defaults)
     for name, text in arguments.items():
         if name not in defaults:
-            said = f"{not_among(name, defaults)}; all else is changed in the system's file"
+            said = f"{format_unknown_name(name, defaults)}; all else is changed in the system's file"
             hints = (Hint("write_system", None, "makes a copy of it"),) if shipped else ()
             faults.append(Finding(said, about=f"argument {name}", hints=hints))
             continue
@@ -199,7 +207,7 @@ def given(
             allowed = "true, false" if isinstance(defaults[name], bool) else "a number"
             faults.append(
                 Finding(
-                    f"found {shown(text)}, allowed: {allowed}, like {shown(defaults[name])}",
+                    f"found {format_value(text)}, allowed: {allowed}, like {format_value(defaults[name])}",
                     about=f"argument {name}",
                 )
             )
@@ -212,7 +220,7 @@ def _like(default: Any, text: str) -> Any:
         if text not in ("true", "false"):
             raise ValueError(text)
         return text == "true"
-    if isinstance(default, str) or any(math.isfinite(quantity(text, units)) for units in _WITH_UNIT):
+    if isinstance(default, str) or any(math.isfinite(quantity_to_si(text, units)) for units in _WITH_UNIT):
         return text
     return int(text) if isinstance(default, int) and text.lstrip("+-").isdigit() else float(text)
 
@@ -262,7 +270,7 @@ def system_text(name: str) -> str:
         CosimulationError: If there is no such system.
     """
     if system_name(name) not in system_names():
-        found = f"found {shown(name)}{did_you_mean(name, system_names())}"
+        found = f"found {format_value(name)}{format_suggestion(name, system_names())}"
         raise CosimulationError(f"system: {found}, allowed: one of {', '.join(system_names())}")
     return _path_of(name).read_text(encoding="utf-8")
 
@@ -304,7 +312,7 @@ def read_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = 
     faults += unknown(rest, values)
     system = _System(path, replaced(rest, values), values, faults).read()
     unread = {name for name in system.by_name if any(_is_of(f"blocks.{name}", fault) for fault in faults)}
-    found = placed(path, str(name_or_path), faults) if faults else ()
+    found = add_line_numbers(path, str(name_or_path), faults) if faults else ()
     return replace(system, faults=found, unread=frozenset(unread))
 
 
@@ -320,9 +328,9 @@ def _path_of(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
     if path.is_file():
         return path
-    meant = did_you_mean(str(name_or_path), system_names()) or meant_by(path, (".toml",))
+    meant = format_suggestion(str(name_or_path), system_names()) or suggest_path(path, (".toml",))
     allowed = f"a TOML file, or one of {', '.join(system_names())}"
-    raise CosimulationError(f"system: found {shown(str(name_or_path))}{meant}, allowed: {allowed}")
+    raise CosimulationError(f"system: found {format_value(str(name_or_path))}{meant}, allowed: {allowed}")
 
 
 def _parsed(path: Path) -> dict[str, Any]:
@@ -330,7 +338,7 @@ def _parsed(path: Path) -> dict[str, Any]:
     if path.suffix.lower() == ".fmu":
         said = f"found an FMU, allowed: a TOML file in which it is a block, [blocks.NAME] fmu = {path.name!r}"
         raise CosimulationError(Finding(said, file=str(path)))
-    return parse_toml(path, CosimulationError)
+    return read_toml(path, CosimulationError)
 
 
 def _table(table: Mapping[str, Any], key: str, faults: list[Finding]) -> dict[str, Any]:
@@ -338,7 +346,7 @@ def _table(table: Mapping[str, Any], key: str, faults: list[Finding]) -> dict[st
     value = table.get(key, {})
     if isinstance(value, dict):
         return value
-    faults.append(Finding(f"found {shown(value)}, allowed: a table", about=key))
+    faults.append(Finding(f"found {format_value(value)}, allowed: a table", about=key))
     return {}
 
 
@@ -356,7 +364,9 @@ class _System:
 
     def read(self) -> System:
         """Return the system; what is wrong is in `faults`."""
-        self.faults += [Finding(not_among(key, TABLES), about=key) for key in self.table if key not in TABLES]
+        self.faults += [
+            Finding(format_unknown_name(key, TABLES), about=key) for key in self.table if key not in TABLES
+        ]
         head, loops = self._keys("system"), self._keys("loops")
         blocks = tuple(self._block(name, value) for name, value in self._rows("blocks"))
         if not blocks:
@@ -386,7 +396,9 @@ class _System:
         """Return a table whose keys are known."""
         table, allowed = self._dict(name), TABLES[name] or ()
         self.faults += [
-            Finding(not_among(key, allowed), about=f"{name}.{key}") for key in table if key not in allowed
+            Finding(format_unknown_name(key, allowed), about=f"{name}.{key}")
+            for key in table
+            if key not in allowed
         ]
         return table
 
@@ -396,14 +408,14 @@ class _System:
             if isinstance(value, dict):
                 yield key, value
             else:
-                self._fault(f"{name}.{key}", f"found {shown(value)}, allowed: a table [{name}.{key}]")
+                self._fault(f"{name}.{key}", f"found {format_value(value)}, allowed: a table [{name}.{key}]")
 
     def _block(self, name: str, table: dict[str, Any]) -> Block:
         """Return a block."""
         where = f"blocks.{name}"
         if not BLOCK_NAME.fullmatch(name):
             self._fault(
-                where, f"found {shown(name)} as a name, allowed: a letter, then letters, digits, _, -"
+                where, f"found {format_value(name)} as a name, allowed: a letter, then letters, digits, _, -"
             )
         kinds = [key for key in ("unit", "file", "fmu") if key in table]
         if len(kinds) != 1:
@@ -412,11 +424,13 @@ class _System:
         options = {k: v for k, v in table.items() if k not in ("unit", "file", "fmu", "start")}
         if "fmu" in kinds:
             self.faults += [
-                Finding(not_among(key, ("fmu", "start")), about=f"{where}.{key}") for key in options
+                Finding(format_unknown_name(key, ("fmu", "start")), about=f"{where}.{key}") for key in options
             ]
         start = table.get("start", {})
         if not isinstance(start, dict):
-            self._fault(f"{where}.start", f"found {shown(start)}, allowed: a table of names and values")
+            self._fault(
+                f"{where}.start", f"found {format_value(start)}, allowed: a table of names and values"
+            )
             start = {}
         return Block(
             name=name,
@@ -432,18 +446,20 @@ class _System:
         where = f"connections.{destination}"
         if isinstance(source, str):
             return Connection(self._port(where, destination), self._port(where, source))
-        self._fault(where, f"found {shown(source)}, allowed: its source as 'block.variable'")
+        self._fault(where, f"found {format_value(source)}, allowed: its source as 'block.variable'")
         return Connection(self._port(where, destination), NOWHERE)
 
     def _input(self, destination: str, table: Any) -> LogInput:
         """Return an input from a log."""
         where = f"inputs.{destination}"
         if not isinstance(table, dict):
-            self._fault(where, f"found {shown(table)}, allowed: {{ log = FILE, column = NAME }}")
+            self._fault(where, f"found {format_value(table)}, allowed: {{ log = FILE, column = NAME }}")
             return LogInput(destination=self._port(where, destination), log="", column="")
         allowed = ("log", "column", "interpolate")
         self.faults += [
-            Finding(not_among(key, allowed), about=f"{where}.{key}") for key in table if key not in allowed
+            Finding(format_unknown_name(key, allowed), about=f"{where}.{key}")
+            for key in table
+            if key not in allowed
         ]
         port = self._port(where, destination)
         for key in ("log", "column"):
@@ -458,10 +474,10 @@ class _System:
         """Return the port that a text `block.variable` names, `NOWHERE` if there is no such block."""
         block, dot, variable = text.partition(".")
         if not (block and dot and variable):
-            self._fault(where, f"found {shown(text)}, allowed: block.variable")
+            self._fault(where, f"found {format_value(text)}, allowed: block.variable")
             return NOWHERE
         if block not in self.names:
-            self._fault(where, f"block {not_among(block, self.names)}")
+            self._fault(where, f"block {format_unknown_name(block, self.names)}")
             return NOWHERE
         return Port(block, variable)
 
@@ -469,7 +485,7 @@ class _System:
         value = table.get(key, default)
         if isinstance(value, str):
             return value
-        self._fault(f"{where}.{key}", f"found {shown(value)}, allowed: a text")
+        self._fault(f"{where}.{key}", f"found {format_value(value)}, allowed: a text")
         return default
 
     def _file(self, table: Mapping[str, Any], where: str, key: str) -> Path | None:
@@ -477,20 +493,20 @@ class _System:
         text = self._text(table, where, key, "")
         if not text:
             return None
-        if not is_there(Path(text)):
-            self._fault(f"{where}.{key}", f"found {shown(text)}, allowed: a file that is there")
+        if not is_existing_file(Path(text)):
+            self._fault(f"{where}.{key}", f"found {format_value(text)}, allowed: a file that is there")
         return Path(text)
 
     def _flag(self, table: Mapping[str, Any], where: str, key: str) -> bool:
         value = table.get(key, False)
         if not isinstance(value, bool):
-            self._fault(f"{where}.{key}", f"found {shown(value)}, allowed: true, false")
+            self._fault(f"{where}.{key}", f"found {format_value(value)}, allowed: true, false")
         return value is True
 
     def _positive(self, table: Mapping[str, Any], where: str, key: str, default: float) -> float:
         value = table.get(key, default)
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
-            self._fault(f"{where}.{key}", f"found {shown(value)}, allowed: a number above 0")
+            self._fault(f"{where}.{key}", f"found {format_value(value)}, allowed: a number above 0")
             return default
         return float(value)
 
@@ -499,17 +515,17 @@ class _System:
         found = head.get(key)
         if found is None:
             return None
-        value = quantity(found, WRITTEN["s"]) if isinstance(found, str) else found
+        value = quantity_to_si(found, WRITTEN["s"]) if isinstance(found, str) else found
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
             allowed = 'a time above 0 in s, or with its unit as in "1ms"'
-            self._fault(f"system.{key}", f"found {shown(found)}, allowed: {allowed}")
+            self._fault(f"system.{key}", f"found {format_value(found)}, allowed: {allowed}")
             return None
         return float(value)
 
     def _count(self, table: Mapping[str, Any], key: str) -> int:
         value = table.get(key, 1)
         if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-            self._fault(f"system.{key}", f"found {shown(value)}, allowed: an integer from 1")
+            self._fault(f"system.{key}", f"found {format_value(value)}, allowed: an integer from 1")
             return 1
         return value
 

@@ -21,11 +21,11 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.drives import JointDrive
 from urmpipe_models.elementwise import ZERO, Element, Vector
-from urmpipe_models.errors import RobotError, in_html, not_among
-from urmpipe_models.math3d import Step, Transform, made_of, product
+from urmpipe_models.errors import RobotError, escape_html, format_unknown_name
+from urmpipe_models.math3d import Step, Transform, compose, compose_steps
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ def parameters_of(frames: Sequence[Transform], places: Sequence[str]) -> Iterato
             while name in names:
                 name += "'"
             names.add(name)
-            before, after = product(parts[:k]), product(parts[k + 1 :])
+            before, after = compose(parts[:k]), compose(parts[k + 1 :])
             yield Parameter(name, step.kind, step.axis, step.value, step.source, place, index, before, after)
 
 
@@ -104,7 +104,9 @@ def with_values(frame: Transform, values: Sequence[Element]) -> Transform:
     """Return a frame with other values of its parameters, in [m] and [rad], multiplied again."""
     given = iter(values)
     parts = frame_to_steps(frame)
-    return made_of(*(replace(one, value=next(given)) if isinstance(one, Step) else one for one in parts))
+    return compose_steps(
+        *(replace(one, value=next(given)) if isinstance(one, Step) else one for one in parts)
+    )
 
 
 GRAVITY: tuple[float, float, float] = (0.0, 0.0, -9.81)
@@ -377,7 +379,7 @@ class Joint:
 
 
 @dataclass(frozen=True, repr=False)
-class Chain(Shown):
+class Chain(Displayable):
     """A serial chain from its base to its tip.
 
     The points p1..pn are the ends of its segments: p_k is the origin of the frame that follows
@@ -513,7 +515,9 @@ class Chain(Shown):
             RobotError: With every name that no parameter has.
         """
         index = {one.name: one.frame_index for one in self.parameters}
-        unknown = [f"robot {self.name}: parameter: {not_among(n, index)}" for n in values if n not in index]
+        unknown = [
+            f"robot {self.name}: parameter: {format_unknown_name(n, index)}" for n in values if n not in index
+        ]
         if unknown:
             raise RobotError(*unknown)
         frames = list(self.frames)
@@ -530,13 +534,13 @@ class Chain(Shown):
 
     def _headline(self) -> str:
         """Return its name, what it is, and its coordinates."""
-        moving = number_of(len(self.coordinates), "coordinate")
-        return line_of(self.name, self.description, f"{moving} ({', '.join(self.coordinates)})")
+        moving = format_count(len(self.coordinates), "coordinate")
+        return format_headline(self.name, self.description, f"{moving} ({', '.join(self.coordinates)})")
 
     def _table(self) -> str:
         """Return a row a joint: its name, kind and limits; a model knows no pandas."""
         rows = "".join(
-            f"<tr><td>{in_html(one.name)}</td><td>{one.kind}</td><td>{one.lower:.6g}</td><td>{one.upper:.6g}</td></tr>"
+            f"<tr><td>{escape_html(one.name)}</td><td>{one.kind}</td><td>{one.lower:.6g}</td><td>{one.upper:.6g}</td></tr>"
             for one in self.joints
         )
         return f"<table><tr><th>joint</th><th>kind</th><th>lower</th><th>upper</th></tr>{rows}</table>"

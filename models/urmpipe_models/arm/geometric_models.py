@@ -17,7 +17,7 @@ from typing import Literal
 from urmpipe_models.arm.chain import Chain, Joint, JointKind
 from urmpipe_models.elementwise import ZERO, Element, Vector
 from urmpipe_models.errors import RobotError
-from urmpipe_models.math3d import Step, Transform, made_of
+from urmpipe_models.math3d import Step, Transform, compose_steps
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +82,8 @@ def dh_chain(
 
     Source: [DenavitHartenberg1955]_.
     """
-    links = (made_of(*_screw_z(row, k), *_screw_x(row, k)) for k, row in enumerate(rows, start=1))
-    *origins, tip = made_of(), *links
+    links = (compose_steps(*_screw_z(row, k), *_screw_x(row, k)) for k, row in enumerate(rows, start=1))
+    *origins, tip = compose_steps(), *links
     return Chain(
         name,
         _joints(rows, origins),
@@ -125,11 +125,11 @@ def modified_dh_chain(
 
     Source: [Craig2005]_ section 3.4.
     """
-    origins = [made_of(*_screw_x(row, k), *_screw_z(row, k)) for k, row in enumerate(rows, start=1)]
+    origins = [compose_steps(*_screw_x(row, k), *_screw_z(row, k)) for k, row in enumerate(rows, start=1)]
     return Chain(
         name,
         _joints(rows, origins),
-        tip=made_of(),
+        tip=compose_steps(),
         base=base or Transform(),
         tool=tool or Transform(),
         start=tuple(float(value) for value in start),
@@ -250,7 +250,7 @@ def geometric_chain(
 def _shift(r: Vector, k: int) -> Transform:
     """Return the frame at r_k, parallel to the one before."""
     x, y, z = r
-    return made_of(
+    return compose_steps(
         Step("along", "x", x, f"r{k}.x", f"geometric row {k}"),
         Step("along", "y", y, f"r{k}.y", f"geometric row {k}"),
         Step("along", "z", z, f"r{k}.z", f"geometric row {k}"),
@@ -308,8 +308,8 @@ def articulated_6r(
     rows = articulated_6r_rows(l0, l1, l2, l3)
     chain = geometric_chain(name, rows, start=start, description=description, source=source)
     lengths = enumerate((l0, l1, l2, l3, l4))
-    *links, tip = (made_of(Step("along", "z", length, f"l{k}", "6R length")) for k, length in lengths)
-    origins = (*links, made_of(), made_of())  # the wrist's axes meet
+    *links, tip = (compose_steps(Step("along", "z", length, f"l{k}", "6R length")) for k, length in lengths)
+    origins = (*links, compose_steps(), compose_steps())  # the wrist's axes meet
     joints = (replace(joint, origin=at) for joint, at in zip(chain.joints, origins, strict=True))
     return replace(chain, joints=tuple(joints), tip=tip)
 
@@ -358,7 +358,7 @@ def urm_chain(
         raise RobotError(f"robot {name}: directions {list(turns)}; allowed: {modules} values, each 1 or -1")
     *segments, end = (Step("along", "z", r, f"r{k}", SEGMENT_SOURCE) for k, r in enumerate(lengths, start=1))
     turned = (Step("about", "y", tilt, f"theta{k}", TILT_SOURCE) for k, tilt in enumerate(tilts, start=2))
-    origins = [made_of(), *map(made_of, segments, turned)]
+    origins = [compose_steps(), *map(compose_steps, segments, turned)]
     joints = [
         Joint(f"phi{k}", "revolute", origin, (0.0, 0.0, float(turn)))
         for k, (origin, turn) in enumerate(zip(origins, turns, strict=False), start=1)
@@ -367,7 +367,7 @@ def urm_chain(
     return Chain(
         name,
         (*joints, effector),
-        tip=made_of(end),
+        tip=compose_steps(end),
         start=tuple(float(value) for value in start),
         description=description,
         source=source,

@@ -46,11 +46,11 @@ from urmpipe_models.elementwise import (
     add,
     cross,
     dot,
+    map_blocks,
     minus,
     plus,
     row_blocks,
     scale,
-    side_by_side,
     subtract,
     times,
 )
@@ -685,5 +685,5 @@ def _over(
         for k, element in enumerate(work(*columns)):
             found[k, block] = element
 
-    side_by_side(fill, row_blocks(len(rows[0])), threads)
+    map_blocks(fill, row_blocks(len(rows[0])), threads)
     return found

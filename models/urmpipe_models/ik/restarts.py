@@ -29,8 +29,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain, Joint
-from urmpipe_models.elementwise import THREADS, BoolArray, FloatArray, IndexArray, row_blocks, side_by_side
-from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.elementwise import THREADS, BoolArray, FloatArray, IndexArray, map_blocks, row_blocks
+from urmpipe_models.errors import Finding, OptionError, format_value
 from urmpipe_models.ik.numeric import (
     METHODS,
     STATIONARY,
@@ -143,7 +143,7 @@ def _starts(chain: Chain, targets: Targets, q: FloatArray, method: str) -> Float
     shape = (len(targets), len(chain.coordinates))
     faults = []
     if method not in METHODS:
-        faults.append(Finding(parameter="method", found=shown(method), allowed=", ".join(METHODS)))
+        faults.append(Finding(parameter="method", found=format_value(method), allowed=", ".join(METHODS)))
     if np.shape(q) not in {shape, shape[1:]}:
         found, allowed = f"an array of shape {np.shape(q)}", f"{shape[1:]} or {shape}"
         faults.append(Finding(parameter="starts", found=found, allowed=allowed))
@@ -171,7 +171,7 @@ def _run(
 
     for done in range(0, iterations, ROUND):
         steps = min(ROUND, iterations - done)
-        side_by_side(work, [pending[rows] for rows in row_blocks(len(pending), BATCH_SIZE)], threads)
+        map_blocks(work, [pending[rows] for rows in row_blocks(len(pending), BATCH_SIZE)], threads)
         pending = pending[~progress.ended[pending]]
         if not len(pending):
             return
@@ -204,7 +204,7 @@ def _settled(
         q, to = take_rows(progress.q, index), np.ascontiguousarray(home[index].T)
         progress.q[:, index], slack[index] = minimise_motion(task, q, to, settings)
 
-    side_by_side(work, [arrived[rows] for rows in row_blocks(len(arrived), BATCH_SIZE)], threads)
+    map_blocks(work, [arrived[rows] for rows in row_blocks(len(arrived), BATCH_SIZE)], threads)
     return slack
 
 

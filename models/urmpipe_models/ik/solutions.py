@@ -24,9 +24,9 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import BoolArray, FloatArray, TextArray
-from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, format_value
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.math3d import quaternions, rotation_vectors
+from urmpipe_models.math3d import to_quaternions, to_rotation_vectors
 
 DIGITS = 4
 """Significant digits, where they are enough."""
@@ -86,7 +86,7 @@ def pose_errors(chain: Chain, q: FloatArray, targets: Targets) -> tuple[FloatArr
     if targets.rotation is None:
         return targets.position - position, np.zeros_like(position)
     between = targets.rotation @ rotation.transpose(0, 2, 1)
-    return targets.position - position, rotation_vectors(quaternions(between.reshape(-1, 9), "matrix"))
+    return targets.position - position, to_rotation_vectors(to_quaternions(between.reshape(-1, 9), "matrix"))
 
 
 SingularFamily = Literal[
@@ -311,15 +311,15 @@ class SearchOptions:
         """Yield which of the values make no sense."""
         if self.tolerance is not None and not isinstance(self.tolerance, Real):
             allowed = "a number of m, more than 0"
-            yield Finding(parameter="tolerance", found=shown(self.tolerance), allowed=allowed)
+            yield Finding(parameter="tolerance", found=format_value(self.tolerance), allowed=allowed)
         elif self.tolerance is not None and not 0.0 < self.tolerance < math.inf:
             found = f"{self.tolerance:g} m"
             yield Finding(parameter="tolerance", found=found, allowed="more than 0, finite")
         for name, value in (("restarts", self.restarts), ("seed", self.seed)):
             if not isinstance(value, Integral) or value < 0:
-                yield Finding(parameter=name, found=shown(value), allowed="a whole number, 0 or more")
+                yield Finding(parameter=name, found=format_value(value), allowed="a whole number, 0 or more")
             elif name == "restarts" and value > MAX_RESTARTS:
-                yield Finding(parameter=name, found=shown(value), allowed=f"{MAX_RESTARTS} at most")
+                yield Finding(parameter=name, found=format_value(value), allowed=f"{MAX_RESTARTS} at most")
 
 
 DEFAULT_SEARCH = SearchOptions()

@@ -13,8 +13,8 @@ from typing import Literal
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.elementwise import BoolArray, FloatArray, norms
-from urmpipe_models.errors import Finding, Hint, OptionError, shown
+from urmpipe_models.elementwise import BoolArray, FloatArray, row_norms
+from urmpipe_models.errors import Finding, Hint, OptionError, format_value
 from urmpipe_models.ik.closed import ClosedForm, closed_form, exact_closed_form
 from urmpipe_models.ik.restarts import choose_free_joints
 from urmpipe_models.ik.solutions import (
@@ -72,7 +72,7 @@ def solve(
     form = None if position_only or method == "iterative" else closed_form(chain)
     faults = [*_start_faults(chain, len(targets), start), *search.faults()]
     if method not in METHODS:
-        faults.append(Finding(parameter="method", found=shown(method), allowed=", ".join(METHODS)))
+        faults.append(Finding(parameter="method", found=format_value(method), allowed=", ".join(METHODS)))
     if method == "closed" and form is None:
         faults.append(_no_closed_form(chain, position_only))
     if faults:
@@ -216,7 +216,7 @@ def find_out_of_reach(chain: Chain, targets: Targets, tolerance: float | None) -
     """
     most = max_reach(chain)
     first = (chain.base @ chain.joints[0].origin).translation
-    away = norms(targets.position - np.array(first))
+    away = row_norms(targets.position - np.array(first))
     reasons = [""] * len(targets)
     for row in np.flatnonzero(away > most + SURE + math.sqrt(3.0) * (tolerance or 0.0)).tolist():
         reasons[row] = f"the target is {away[row]:.3f} m from the first joint, allowed: {most:.3f} m at most"

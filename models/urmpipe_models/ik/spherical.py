@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.elementwise import BoolArray, FloatArray, TextArray, row_blocks, side_by_side
+from urmpipe_models.elementwise import BoolArray, FloatArray, TextArray, map_blocks, row_blocks
 from urmpipe_models.ik.position_arm import PositionArm, Postures, position_arm
 from urmpipe_models.ik.solutions import (
     SingularFamily,
@@ -211,7 +211,7 @@ class SphericalWrist:
             """Return the solutions of the targets of a block."""
             return self._block(positions[rows], rotations[rows], None if wish is None else wish[rows])
 
-        return concatenate_solutions(side_by_side(work, row_blocks(count, BATCH_SIZE)))
+        return concatenate_solutions(map_blocks(work, row_blocks(count, BATCH_SIZE)))
 
     def _block(self, positions: FloatArray, rotations: FloatArray, near: FloatArray | None) -> Solutions:
         """Return the solutions of some targets, near of shape (n, joints)."""

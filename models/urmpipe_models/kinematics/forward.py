@@ -28,14 +28,14 @@ from urmpipe_models.elementwise import (
     Vector,
     add,
     cross,
+    map_blocks,
     plus,
     row_blocks,
     scale,
-    side_by_side,
     subtract,
     times,
 )
-from urmpipe_models.math3d import Transform, euler_zyx, turned_vectors
+from urmpipe_models.math3d import Transform, euler_zyx, rotate_vectors
 from urmpipe_models.tape import aligned, fill_over_log
 
 
@@ -97,7 +97,7 @@ def tip_to_world(chain: Chain, q: Sequence[Element], point: Vector, *directions:
     vectors = [point, *directions]
     for joint, value in zip(reversed(chain.joints), reversed(joint_values(chain, q)), strict=True):
         if joint.kind == "revolute":
-            vectors = turned_vectors(vectors, joint.axis, value)
+            vectors = rotate_vectors(vectors, joint.axis, value)
         elif joint.kind == "prismatic":
             vectors[0] = add(vectors[0], scale(value, joint.axis))
         vectors = [joint.origin.point(vectors[0]), *map(joint.origin.rotate, vectors[1:])]
@@ -373,7 +373,7 @@ def point_over_log(
         _fill(acceleration[:, block], motion.acceleration)
         _fill(euler[:, block], (rz, ry, rx))
 
-    side_by_side(work, row_blocks(count))
+    map_blocks(work, row_blocks(count))
     return PointLog(position.T, velocity.T, acceleration.T, euler.T, singular)
 
 
@@ -392,7 +392,7 @@ def points_over_log(chain: Chain, q: FloatArray) -> FloatArray:
         for k, pose in enumerate(forward(chain, _columns(q[block])), start=1):
             _fill(skeleton[k, :, block], pose.translation)
 
-    side_by_side(work, row_blocks(len(q)))
+    map_blocks(work, row_blocks(len(q)))
     return skeleton.transpose(2, 0, 1)
 
 
@@ -417,7 +417,7 @@ def frames_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray
             for row in range(3):
                 _fill(rotation[k, row, :, block], frame.rotation[row])
 
-    side_by_side(work, row_blocks(len(q)))
+    map_blocks(work, row_blocks(len(q)))
     return position.transpose(2, 0, 1), rotation.transpose(3, 0, 1, 2)
 
 
@@ -440,7 +440,7 @@ def jacobian_over_log(chain: Chain, q: FloatArray, point: int = -1) -> FloatArra
         for i, column in enumerate(jacobian(chain, _columns(q[block]), point)):
             _fill(result[i, :, block], column)
 
-    side_by_side(work, row_blocks(len(q)))
+    map_blocks(work, row_blocks(len(q)))
     return result.transpose(2, 1, 0)
 
 
@@ -464,7 +464,7 @@ def bias_over_log(chain: Chain, q: FloatArray, qd: FloatArray) -> FloatArray:
         _fill(result[:3, block], tip.acceleration)
         _fill(result[3:, block], tip.alpha)
 
-    side_by_side(work, row_blocks(len(q)))
+    map_blocks(work, row_blocks(len(q)))
     return result.T
 
 

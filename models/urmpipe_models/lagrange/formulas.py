@@ -20,9 +20,9 @@ from textwrap import fill
 from typing import Any, NamedTuple, TypeAlias
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.display import number_of
+from urmpipe_models.display import format_count
 from urmpipe_models.dynamics.links import check_masses
-from urmpipe_models.errors import Finding, RobotError, one_line
+from urmpipe_models.errors import Finding, RobotError, escape_line
 from urmpipe_models.files import EXPORT_MARK
 from urmpipe_models.lagrange.derivation import (
     TERMS,
@@ -97,7 +97,7 @@ def format_angle(angle: Angle, coordinates: Sequence[str]) -> str:
 def legend(coordinates: Sequence[str], names: Sequence[str]) -> list[str]:
     """Return a line for each coordinate whose name in the formulas is another one."""
     pairs = zip(names, coordinates, strict=True)
-    return [f"{name}: {one_line(own)}" for name, own in pairs if name != own]
+    return [f"{name}: {escape_line(own)}" for name, own in pairs if name != own]
 
 
 def _pose_names(variables: Variables, coordinates: Sequence[str]) -> list[str]:
@@ -117,7 +117,8 @@ class Operations(NamedTuple):
     multiplications: int
 
     def __str__(self) -> str:
-        return f"{number_of(self.additions, 'addition')}, {number_of(self.multiplications, 'multiplication')}"
+        additions = format_count(self.additions, "addition")
+        return f"{additions}, {format_count(self.multiplications, 'multiplication')}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,7 +317,7 @@ def equations_text(form: OpenForm) -> str:
 
 def _head(form: OpenForm, coordinates: Sequence[str]) -> Iterator[str]:
     """Yield what the names mean, and what the terms cost."""
-    yield f"{EXPORT_MARK}: equations of motion of {one_line(form.chain.name)}"
+    yield f"{EXPORT_MARK}: equations of motion of {escape_line(form.chain.name)}"
     yield "tau: what the drives must give, in N.m, of a joint that slides in N"
     yield "q, q', q'': a coordinate in rad, rad/s, rad/s2, or in m, m/s, m/s2"
     yield from legend(form.chain.coordinates, coordinates)
@@ -524,4 +525,4 @@ def _printer() -> Any:
 
 def _remark(text: str) -> str:
     """Return a name as it may stand in a comment."""
-    return one_line(text).replace("*/", "* /").replace("/*", "/ *")
+    return escape_line(text).replace("*/", "* /").replace("/*", "/ *")

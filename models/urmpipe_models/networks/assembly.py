@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import Finding, NetworkError, not_among
+from urmpipe_models.errors import Finding, NetworkError, format_unknown_name
 from urmpipe_models.networks.closure import (
     Reached,
     closure_of,
@@ -167,7 +167,7 @@ def start_with(mechanism: Mechanism, controls: Mapping[str, float]) -> FloatArra
     faults = []
     for name, value in controls.items():
         if name not in own:
-            faults.append(Finding(f"control {not_among(name, own)}", parameter="controls"))
+            faults.append(Finding(f"control {format_unknown_name(name, own)}", parameter="controls"))
         elif not (math.isfinite(value) and own[name].lower <= value <= own[name].upper):
             allowed = f"{own[name].lower:g} to {own[name].upper:g}"
             faults.append(Finding(found=f"{name} = {value:g}", allowed=allowed, parameter="controls"))

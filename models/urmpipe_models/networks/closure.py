@@ -27,7 +27,7 @@ from urmpipe_models.elementwise import (
 )
 from urmpipe_models.ik.numeric import FIRST_GAIN, GAINS, MIN_GAIN_RATIO, STATIONARY, damped_step
 from urmpipe_models.ik.task import column_squares, dot_product, product, transposed_product
-from urmpipe_models.math3d import Transform, quaternions, rotation_vectors
+from urmpipe_models.math3d import Transform, to_quaternions, to_rotation_vectors
 from urmpipe_models.networks.joint_motion import (
     MEASURED_QUANTITIES,
     SMALL_ANGLE_SQUARED,
@@ -223,7 +223,7 @@ SLIDING_SCREWS: Twists = [
 def gap_of(error: Transform, n: int) -> FloatArray:
     """Return the translation in [m] and the rotation vector in [rad] of n frames, shape (6, n)."""
     rows = _stacked(tuple(entry for row in error.rotation for entry in row), n)
-    vector = rotation_vectors(quaternions(rows.T, "matrix"))
+    vector = to_rotation_vectors(to_quaternions(rows.T, "matrix"))
     return np.concatenate((_stacked(error.translation, n), vector.T))
 
 
@@ -570,6 +570,6 @@ def _twist(turned: Transform, axis: Vector, n: int) -> FloatArray:
     rows = np.empty((9, n))
     for k, entry in enumerate(entry for row in turned.rotation for entry in row):
         rows[k] = entry
-    quat = quaternions(rows.T, "matrix")
+    quat = to_quaternions(rows.T, "matrix")
     along = sum(quat[:, k] * axis[k] for k in range(3))
     return np.asarray(2.0 * np.arctan2(along, quat[:, 3]))

@@ -19,7 +19,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IndexArray
-from urmpipe_models.errors import Finding, NetworkError, not_among
+from urmpipe_models.errors import Finding, NetworkError, format_unknown_name
 from urmpipe_models.networks.closure import idle_spins, spinning_parts, unspun
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.mobility import mobility_nearby
@@ -100,7 +100,9 @@ def find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
             free = [name for name, joint in joints.items() if None in joint.drives]
             allowed = [*(name for name, control in controls.items() if control.value is None), *free]
             fault = (
-                f"drive {not_among(name, allowed)}" if allowed else f"found {name}, but nothing can be driven"
+                f"drive {format_unknown_name(name, allowed)}"
+                if allowed
+                else f"found {name}, but nothing can be driven"
             )
         else:
             fault = _joint_fault(name, owner, index, joints[owner].units, joints[owner].drives)

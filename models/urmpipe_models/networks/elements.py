@@ -35,7 +35,7 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.arm.chain import Joint as ChainJoint
 from urmpipe_models.elementwise import ZERO, Element, FloatArray, Vector, cross
-from urmpipe_models.errors import Finding, OptionError, RobotError, not_among, shown
+from urmpipe_models.errors import Finding, OptionError, RobotError, format_unknown_name, format_value
 from urmpipe_models.math3d import Transform, rotation_x, rotation_y, translation
 from urmpipe_models.networks.file_values import (
     IDENTITY_MOTION,
@@ -60,7 +60,7 @@ from urmpipe_models.networks.parts import (
 )
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.toml import Units
-from urmpipe_models.toml_tables import Table, are_numbers, is_number
+from urmpipe_models.toml_tables import CheckedTable, is_number, is_number_list
 
 DH_KINDS: dict[str, JointKind] = {
     "R": "revolute",
@@ -146,7 +146,7 @@ def element_to_joint(element: DHElement, ends: tuple[str, str]) -> Joint:
 
 
 def read_dh(
-    table: Table, units: Units, ground: str, places: dict[str, str]
+    table: CheckedTable, units: Units, ground: str, places: dict[str, str]
 ) -> Iterator[tuple[Joint, Body | None]]:
     """Yield the joint of each element and the body that it carries; None of one that closes the chain.
 
@@ -158,7 +158,7 @@ def read_dh(
     """
     closed = table.flag("closed")
     rows = table.named_tables("elements")
-    table.close()
+    table.report_unknown_keys()
     before = ground
     for name, row in rows.items():
         place = f"dh.elements.{name}"
@@ -173,7 +173,7 @@ def read_dh(
         before = after
 
 
-def _read_joint(name: str, row: Table, units: Units, ends: tuple[str, str]) -> Joint:
+def _read_joint(name: str, row: CheckedTable, units: Units, ends: tuple[str, str]) -> Joint:
     """Return the joint of an element; one that cannot move where its kind is none."""
     many = len(row.faults)
     kind = row.choice("kind", tuple(DH_KINDS))
@@ -188,7 +188,7 @@ def _read_joint(name: str, row: Table, units: Units, ends: tuple[str, str]) -> J
         pitch=units.length(row.number("pitch")) if kind == "H" else 0.0,
         values=read_drives(row, JOINT_UNITS[DH_KINDS[kind]], units),
     )
-    row.close()
+    row.report_unknown_keys()
     return element_to_joint(element, ends)
 
 
@@ -296,7 +296,7 @@ def _fixed(ends: tuple[str, str], frame: Transform) -> Joint:
 
 
 def read_chain(
-    name: str, table: Table, units: Units, folder: Path, ground: str, places: dict[str, str]
+    name: str, table: CheckedTable, units: Units, folder: Path, ground: str, places: dict[str, str]
 ) -> ChainParts | None:
     """Return the parts of a robot; None where that cannot be read.
 
@@ -313,7 +313,7 @@ def read_chain(
     if chain is None:  # then its start and what drives it cannot be checked
         return None
     start, values = _start(table, chain, units), _values(table, chain, units)
-    table.close()
+    table.report_unknown_keys()
     parts = chain_to_parts(name, chain, carrier, start, values)
     places |= {f"joints.{one.name}": place for one in parts.joints}
     places |= {f"bodies.{one.name}": place for one in parts.bodies}
@@ -325,12 +325,12 @@ def read_chain(
     return parts
 
 
-def _load(table: Table, folder: Path) -> Chain | None:
+def _load(table: CheckedTable, folder: Path) -> Chain | None:
     """Return a robot of the catalogue or of a file; what is wrong with it is noted."""
     many = len(table.faults)
     robot = table.text("robot")
     if "\0" in robot:  # which no path has
-        table.fault("robot", f"found {shown(robot)}, allowed: a robot or a file")
+        table.add_error("robot", f"found {format_value(robot)}, allowed: a robot or a file")
     if len(table.faults) > many:
         return None
     base, tip = (table.text(key, "") or None for key in ("base_link", "tip_link"))
@@ -339,25 +339,25 @@ def _load(table: Table, folder: Path) -> Chain | None:
         return load_robot(path, base_link=base, tip_link=tip)
     except (OptionError, RobotError) as error:
         for one in error.findings:
-            table.fault("robot", str(one))
+            table.add_error("robot", str(one))
     return None
 
 
-def _start(table: Table, chain: Chain, units: Units) -> tuple[float, ...]:
+def _start(table: CheckedTable, chain: Chain, units: Units) -> tuple[float, ...]:
     """Return where the coordinates start in [rad] and [m], as the robot says where the network does not."""
     value = table.value("start")
     if value is None:
         return chain.start
-    if not are_numbers(value, len(chain.moving)):
+    if not is_number_list(value, len(chain.moving)):
         allowed = f"{len(chain.moving)} finite numbers: {', '.join(chain.coordinates)}"
-        table.fault("start", f"found {shown(value)}, allowed: {allowed}")
+        table.add_error("start", f"found {format_value(value)}, allowed: {allowed}")
         return chain.start
     return tuple(
         units.of_joint(joint.kind, float(one)) for joint, one in zip(chain.moving, value, strict=True)
     )
 
 
-def _values(table: Table, chain: Chain, units: Units) -> dict[str, Expression]:
+def _values(table: CheckedTable, chain: Chain, units: Units) -> dict[str, Expression]:
     """Return what drives coordinates, in [rad] and [m]."""
     given, inner = table.value("value"), table.table("value")
     kinds = {one.name: one.kind for one in chain.moving}
@@ -367,7 +367,7 @@ def _values(table: Table, chain: Chain, units: Units) -> dict[str, Expression]:
             unit = "m" if kinds[key] == "prismatic" else "rad"
             found[key] = parse_expression(inner, key, value, unit, units)
         else:
-            inner.fault(key, f"coordinate {not_among(key, kinds)}")
+            inner.add_error(key, f"coordinate {format_unknown_name(key, kinds)}")
     return found
 
 
@@ -441,7 +441,7 @@ def _segments(profile: Profile) -> FloatArray:
 
 
 def read_pair(
-    name: str, kind: ElementKind, table: Table, joints: Mapping[str, Joint], units: Units, folder: Path
+    name: str, kind: ElementKind, table: CheckedTable, joints: Mapping[str, Joint], units: Units, folder: Path
 ) -> ConstraintElement:
     """Return a gear, rack or cam from its table; errors are noted there.
 
@@ -467,11 +467,11 @@ def read_pair(
         radius=units.length(table.number("radius")) if kind == "rack" else 0.0,
         profile=_read_profile(table, unit, units, folder) if kind == "cam" else (),
     )
-    table.close()
+    table.report_unknown_keys()
     return pair
 
 
-def _read_profile(table: Table, unit: str, units: Units, folder: Path) -> Profile:
+def _read_profile(table: CheckedTable, unit: str, units: Units, folder: Path) -> Profile:
     """Return the points of `profile`, a list or a CSV file, in [rad] and the unit of the follower."""
     value = table.value("profile")
     rows: Sequence[Any]
@@ -479,26 +479,28 @@ def _read_profile(table: Table, unit: str, units: Units, folder: Path) -> Profil
         rows = _read_csv(table, value, folder)
     else:
         rows = value if isinstance(value, (list, tuple)) else []
-        unreadable = [k for k, row in enumerate(rows) if not are_numbers(row, 2)]
+        unreadable = [k for k, row in enumerate(rows) if not is_number_list(row, 2)]
         for k in unreadable:
-            table.fault(
-                f"profile[{k}]", f"found {shown(rows[k])}, allowed: [angle, lift], two finite numbers"
+            table.add_error(
+                f"profile[{k}]", f"found {format_value(rows[k])}, allowed: [angle, lift], two finite numbers"
             )
         if rows is not value:
-            text = "nothing" if value is None else shown(value)
-            table.fault("profile", f"found {text}, allowed: a list of [angle, lift], or a .csv file")
+            text = "nothing" if value is None else format_value(value)
+            table.add_error("profile", f"found {text}, allowed: a list of [angle, lift], or a .csv file")
         rows = [] if unreadable else rows
     return tuple((to_si(float(a), "rad", units), to_si(float(b), unit, units)) for a, b in rows)
 
 
-def _read_csv(table: Table, file: str, folder: Path) -> list[tuple[float, float]]:
+def _read_csv(table: CheckedTable, file: str, folder: Path) -> list[tuple[float, float]]:
     """Return the rows of a file of two columns; its first line may name these."""
     try:
         with (folder / file).open(encoding="utf-8-sig") as lines:
             cells = [line.strip().split(",") for line in islice(lines, MAX_POINTS + 2)]
     except (OSError, ValueError) as error:  # a ValueError: no text, or no path
         reason = error.strerror if isinstance(error, OSError) else "it is no text"
-        table.fault("profile", f"{shown(file)} cannot be read: {reason}; allowed: a .csv file of two columns")
+        table.add_error(
+            "profile", f"{format_value(file)} cannot be read: {reason}; allowed: a .csv file of two columns"
+        )
         return []
     points, faults = [], []
     for number, row in enumerate(cells, 1):
@@ -506,11 +508,11 @@ def _read_csv(table: Table, file: str, folder: Path) -> list[tuple[float, float]
         if len(pair) == 2 and all(map(is_number, pair)):
             points.append((pair[0], pair[1]))
         elif row != [""] and not (number == 1 and all(map(math.isnan, pair))):
-            faults.append(f"{file}, line {number}: found {shown(','.join(row))}")
+            faults.append(f"{file}, line {number}: found {format_value(','.join(row))}")
     for message in faults[:MAX_LISTED]:
-        table.fault("profile", f"{message}, allowed: angle,lift, two finite numbers")
+        table.add_error("profile", f"{message}, allowed: angle,lift, two finite numbers")
     if len(faults) > MAX_LISTED:
-        table.fault("profile", f"{file}: {len(faults) - MAX_LISTED} more such lines")
+        table.add_error("profile", f"{file}: {len(faults) - MAX_LISTED} more such lines")
     return [] if faults else points
 
 
@@ -553,7 +555,7 @@ def _joints_faults(where: str, element: ConstraintElement, parts: Parts) -> Iter
     kinds = PAIR_JOINTS[element.kind]
     for name, allowed, order in zip(element.joints, kinds, ("first", "second"), strict=True):
         if name not in joints:
-            yield Finding(f"joint {not_among(name, joints)}", about=place, kind="coupled")
+            yield Finding(f"joint {format_unknown_name(name, joints)}", about=place, kind="coupled")
         elif joints[name].kind not in allowed:
             message = f"found {name}, a {joints[name].kind} joint, allowed as the {order} of a {element.kind}"
             yield Finding(f"{message}: {', '.join(allowed)}", about=place, kind="coupled")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, get_args
 import numpy as np
 
 from urmpipe_models.elementwise import Element, FloatArray, Vector, cross, dot, subtract
-from urmpipe_models.errors import Finding, nearest, not_among, shown
+from urmpipe_models.errors import Finding, closest_name, format_unknown_name, format_value
 from urmpipe_models.networks.elements import pair_faults
 from urmpipe_models.networks.mechanism import build_graph, build_mechanism
 from urmpipe_models.networks.parts import (
@@ -87,7 +87,7 @@ def _name_faults(parts: Parts) -> Iterator[Finding]:
     for table, name in named:
         where = f"{table}.{name}"
         if table != "controls" and not name.strip():
-            yield Finding(f"found {shown(name)} as a name, allowed: one that can be seen", about=where)
+            yield Finding(f"found {format_value(name)} as a name, allowed: one that can be seen", about=where)
         if name in first:
             yield Finding(f"{first[name]} has this name, too; allowed: each name once", about=where)
         first.setdefault(name, where)
@@ -96,7 +96,7 @@ def _name_faults(parts: Parts) -> Iterator[Finding]:
 def _body_faults(parts: Parts) -> Iterator[Finding]:
     """Yield bodies that nothing ties, and starts that are not allowed."""
     tied = {name for _, tie in parts.constraints for name in tie.bodies}
-    tied |= {nearest(name, parts.body_names) or "" for name in tied - set(parts.body_names)}
+    tied |= {closest_name(name, parts.body_names) or "" for name in tied - set(parts.body_names)}
     for body in parts.bodies:
         where = f"bodies.{body.name}"
         if body.name not in tied:
@@ -129,7 +129,7 @@ def _tie_faults(where: str, tie: Joint | ConstraintElement, names: tuple[str, ..
     """Yield what is wrong with the bodies of a joint or an element."""
     for name in tie.bodies:
         if name not in names:
-            yield Finding(f"body {not_among(name, names)}", about=f"{where}.bodies")
+            yield Finding(f"body {format_unknown_name(name, names)}", about=f"{where}.bodies")
     if tie.bodies[0] == tie.bodies[1]:
         yield Finding(f"found {tie.bodies[0]} twice, allowed: two bodies", about=f"{where}.bodies")
 
@@ -137,7 +137,7 @@ def _tie_faults(where: str, tie: Joint | ConstraintElement, names: tuple[str, ..
 def _joint_faults(where: str, joint: Joint) -> Iterator[Finding]:
     """Yield what is wrong with a joint by itself."""
     if joint.kind not in JOINT_UNITS:
-        yield Finding(not_among(joint.kind, JOINT_UNITS), about=f"{where}.kind")
+        yield Finding(format_unknown_name(joint.kind, JOINT_UNITS), about=f"{where}.kind")
         return
     if joint.kind == "user":
         yield from _user_faults(where, joint)
@@ -201,7 +201,7 @@ def _element_faults(where: str, element: ConstraintElement) -> Iterator[Finding]
     """Yield what is wrong with an element by itself."""
     kinds = get_args(ElementKind)
     if element.kind not in kinds:
-        yield Finding(not_among(element.kind, kinds), about=f"{where}.kind")
+        yield Finding(format_unknown_name(element.kind, kinds), about=f"{where}.kind")
         return
     normals: tuple[Vector, ...] = {"gg": (), "crc": element.normals}.get(element.kind, element.normals[:1])
     for n in dict.fromkeys(normals):

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any, cast, get_args
 
 from urmpipe_datasets import NETWORKS
-from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.elementwise import ZERO
-from urmpipe_models.errors import Finding, NetworkError, did_you_mean, in_html, shown
-from urmpipe_models.files import placed
+from urmpipe_models.errors import Finding, NetworkError, escape_html, format_suggestion, format_value
+from urmpipe_models.files import add_line_numbers
 from urmpipe_models.networks.elements import read_chain, read_dh, read_pair
 from urmpipe_models.networks.faults import validate_parts
 from urmpipe_models.networks.file_values import (
@@ -49,11 +49,11 @@ from urmpipe_models.networks.parts import (
     exceeded_limits,
 )
 from urmpipe_models.robots.toml import Units
-from urmpipe_models.toml_tables import Table, parse_toml
+from urmpipe_models.toml_tables import CheckedTable, read_toml
 
 
 @dataclass(frozen=True, repr=False)
-class Network(Parts, Shown):
+class Network(Parts, Displayable):
     """Bodies, and what ties them: joints, constraint elements, controls.
 
     `urmpipe.load_network` reads one from a file, or makes one of such tables.
@@ -81,17 +81,17 @@ class Network(Parts, Shown):
         """Return its name, what it is, and how much there is of it."""
         parts = {"body": len(self.bodies) + 1, "joint": len(self.joints), "element": len(self.elements)}
         counts = (
-            f"{count} bodies" if what == "body" else number_of(count, what)
+            f"{count} bodies" if what == "body" else format_count(count, what)
             for what, count in parts.items()
             if count
         )
-        return line_of(self.name, self.description, ", ".join(counts))
+        return format_headline(self.name, self.description, ", ".join(counts))
 
     def _table(self) -> str:
         """Return a row a joint or element: its name, kind and bodies."""
         rows = "".join(
-            f"<tr><td>{in_html(one.name)}</td><td>{one.kind}</td><td>{in_html(one.bodies[0])}</td>"
-            f"<td>{in_html(one.bodies[1])}</td></tr>"
+            f"<tr><td>{escape_html(one.name)}</td><td>{one.kind}</td><td>{escape_html(one.bodies[0])}</td>"
+            f"<td>{escape_html(one.bodies[1])}</td></tr>"
             for _, one in self.constraints
         )
         return f"<table><tr><th>name</th><th>kind</th><th>body</th><th>body</th></tr>{rows}</table>"
@@ -126,11 +126,11 @@ def load_network(network: str | Path | Mapping[str, Any]) -> Network:
     if isinstance(network, Mapping):
         return _network(network, "network", Path())
     path = _path_of(network)
-    data = parse_toml(path, NetworkError)
+    data = read_toml(path, NetworkError)
     try:
         return _network(data, path.stem, path.parent)
     except NetworkError as error:
-        faults = placed(path, str(network), error.findings)
+        faults = add_line_numbers(path, str(network), error.findings)
         raise NetworkError(*sorted(faults, key=lambda one: one.line or 0)) from error
 
 
@@ -174,7 +174,7 @@ def _path_of(name_or_path: str | Path) -> Path:
     name = str(name_or_path).casefold().replace("_", "-")
     if name in names:
         return NETWORKS / f"{name}.toml"
-    found = f"{shown(str(name_or_path))}{did_you_mean(str(name_or_path), names)}"
+    found = f"{format_value(str(name_or_path))}{format_suggestion(str(name_or_path), names)}"
     raise NetworkError(f"unknown network {found}; allowed: {', '.join(names)}, or a .toml file")
 
 
@@ -189,7 +189,7 @@ class _Reader:
     def __init__(self, tables: Mapping[str, Any], folder: Path) -> None:
         self.faults: list[Finding] = []
         self.places: dict[str, str] = {}
-        self.table = Table(tables, self.faults, None, apart=True)
+        self.table = CheckedTable(tables, self.faults, None, key_in_about=True)
         self.folder = folder
         self.units = Units(
             self.table.choice("length_unit", ("m", "mm"), "m") == "mm",
@@ -211,7 +211,7 @@ class _Reader:
         for name, table in rows.items():
             chain = read_chain(name, table, self.units, self.folder, self.ground, self.places)
             if _stands_on_itself(name, rows):
-                table.fault("body", f"found a body that {name} carries itself; allowed: another")
+                table.add_error("body", f"found a body that {name} carries itself; allowed: another")
             if chain is None or _stands_on_itself(name, rows):
                 unread.append(f"{name}.")
             else:
@@ -219,7 +219,7 @@ class _Reader:
                 controls += chain.controls
         named = {one.name: one for one in joints}
         elements = [self._element(*row, named) for row in element_rows]
-        self.table.close()
+        self.table.report_unknown_keys()
         bodies += _standing_in(unread, (*joints, *elements))
         return Parts("", tuple(bodies), tuple(joints), tuple(elements), tuple(controls), self.ground)
 
@@ -238,7 +238,7 @@ class _Reader:
             name = name.rpartition(".")[0]
         return self.places.get(name, about)
 
-    def _rows(self, key: str) -> Iterator[tuple[str, Table]]:
+    def _rows(self, key: str) -> Iterator[tuple[str, CheckedTable]]:
         """Yield the tables in a table by their names; what is no table is noted and left out."""
         given = self.table.value(key)
         for name, table in self.table.named_tables(key).items():
@@ -250,14 +250,14 @@ class _Reader:
         for name, table in self._rows("bodies"):
             if name == self.ground:
                 if table.has("start"):
-                    table.fault("start", "found a start of the body that stands still, allowed: none")
+                    table.add_error("start", "found a start of the body that stands still, allowed: none")
             else:
                 numbers = table.numbers("start", len(POSE_UNITS)) if table.has("start") else ()
                 pairs = zip(numbers, POSE_UNITS, strict=False)
                 yield Body(name, tuple(to_si(one, unit, self.units) for one, unit in pairs))
-            table.close()
+            table.report_unknown_keys()
 
-    def _control(self, name: str, table: Table) -> Control:
+    def _control(self, name: str, table: CheckedTable) -> Control:
         """Read a control: its start and limits, or its function of others."""
         many = len(self.faults)
         if table.has("value"):
@@ -270,10 +270,10 @@ class _Reader:
             control = Control(name, table.number("start", 0.0), lower, upper)
         if len(self.faults) > many:  # nothing is found of values that no number stands for
             control = Control(name, math.nan)
-        table.close()
+        table.report_unknown_keys()
         return control
 
-    def _joint(self, name: str, table: Table) -> Joint:
+    def _joint(self, name: str, table: CheckedTable) -> Joint:
         """Read a joint; one whose kind is none holds its bodies together."""
         ends = _ends(table)
         kind = cast("JointKind", self._kind(table, tuple(JOINT_UNITS)))
@@ -290,10 +290,10 @@ class _Reader:
             self._check_start(table, joint)
             if table.has("driven"):
                 self.places[f"joints.{name}.value"] = f"joints.{name}.driven"
-        table.close()
+        table.report_unknown_keys()
         return joint
 
-    def _check_start(self, table: Table, joint: Joint) -> None:
+    def _check_start(self, table: CheckedTable, joint: Joint) -> None:
         """Note a start of a free variable beyond its limits."""
         starts = zip(joint.start or (0.0,) * len(joint.units), joint.drives, strict=False)
         free = [start if drive is None else math.nan for start, drive in starts]  # NaN is beyond no limit
@@ -302,15 +302,15 @@ class _Reader:
         for unit, value, end, limit in exceeded_limits(joint, free, is_coupled=False):
             size = to_si(1.0, unit, self.units)
             allowed = "at least lower" if end == "lower" else "at most upper"
-            table.fault("start", f"found {value / size:.6g}, allowed: {allowed}, {limit / size:.6g}")
+            table.add_error("start", f"found {value / size:.6g}, allowed: {allowed}, {limit / size:.6g}")
 
-    def _kind(self, table: Table, kinds: tuple[str, ...]) -> str:
+    def _kind(self, table: CheckedTable, kinds: tuple[str, ...]) -> str:
         """Return the kind of a joint or an element; "" where it has none, and so no known keys."""
         many = len(self.faults)
         kind = table.choice("kind", kinds)
         return kind if len(self.faults) == many else ""
 
-    def _element(self, name: str, table: Table, joints: Mapping[str, Joint]) -> ConstraintElement:
+    def _element(self, name: str, table: CheckedTable, joints: Mapping[str, Joint]) -> ConstraintElement:
         """Read an element."""
         if table.value("kind") in [*PAIR_JOINTS]:
             return read_pair(name, table.value("kind"), table, joints, self.units, self.folder)
@@ -324,7 +324,7 @@ class _Reader:
             normals = (first, second if kind == "crc" else DEFAULT_N)
         points = read_points(table, self.units, POINTS[kind])
         length = read_expression(table, "h" if kind == "eg" else "d", "m", self.units)
-        table.close()
+        table.report_unknown_keys()
         return ConstraintElement(
             name, kind, ends, length, (ZERO, points[1]) if kind == "eg" else points, normals
         )
@@ -334,18 +334,18 @@ POINTS: dict[ElementKind, VectorCount] = {"gg": "one or two", "eg": "one", "crc"
 """Of which bodies an element has points."""
 
 
-def _ends(table: Table) -> tuple[str, str]:
+def _ends(table: CheckedTable) -> tuple[str, str]:
     """Return the two bodies of a joint or an element."""
     many = len(table.faults)
     names = table.texts("bodies")
     if len(names) == 2:
         return names[0], names[1]
     if len(table.faults) == many:
-        table.fault("bodies", f"found {len(names)}, allowed: the names of two bodies")
+        table.add_error("bodies", f"found {len(names)}, allowed: the names of two bodies")
     return "", ""
 
 
-def _stands_on_itself(name: str, chains: Mapping[str, Table]) -> bool:
+def _stands_on_itself(name: str, chains: Mapping[str, CheckedTable]) -> bool:
     """Return whether a chain is carried by its own bodies, be it through other chains."""
     on, passed = name, 0
     while passed < len(chains):

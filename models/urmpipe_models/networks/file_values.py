@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any, Literal, TypeAlias
 
 from urmpipe_models.elementwise import ZERO, Vector, dot, scale, subtract
-from urmpipe_models.errors import shown
+from urmpipe_models.errors import format_value
 from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.parts import (
     AXES_TOLERANCE,
@@ -16,7 +16,7 @@ from urmpipe_models.networks.parts import (
     is_control_name,
 )
 from urmpipe_models.robots.toml import Units
-from urmpipe_models.toml_tables import Table, are_numbers, is_number
+from urmpipe_models.toml_tables import CheckedTable, is_number, is_number_list
 
 VectorCount: TypeAlias = Literal["one", "two", "one or two"]
 """Whether a key holds a vector, one for each body, or either."""
@@ -39,7 +39,7 @@ IDENTITY_MOTION = tuple(map(Expression, ("1.0", "0.0", "0.0", "0.0", "1.0", "0.0
 
 
 def read_vectors(
-    table: Table, key: str, form: VectorCount = "one or two", default: Vector | None = None
+    table: CheckedTable, key: str, form: VectorCount = "one or two", default: Vector | None = None
 ) -> tuple[Vector, Vector]:
     """Return the vectors of both bodies in the file's unit, twice the same where the key holds one.
 
@@ -52,22 +52,24 @@ def read_vectors(
     value = table.value(key)
     if value is None and default is not None:
         return default, default
-    if form != "two" and are_numbers(value, 3):
+    if form != "two" and is_number_list(value, 3):
         return _vector(value), _vector(value)
-    pair = isinstance(value, (list, tuple)) and len(value) == 2 and all(are_numbers(one, 3) for one in value)
+    pair = (
+        isinstance(value, (list, tuple)) and len(value) == 2 and all(is_number_list(one, 3) for one in value)
+    )
     if form != "one" and pair:
         return _vector(value[0]), _vector(value[1])
     _refuse(table, key, value, FORMS[form])
     return default or ZERO, default or ZERO
 
 
-def read_points(table: Table, units: Units, form: VectorCount = "one or two") -> tuple[Vector, Vector]:
+def read_points(table: CheckedTable, units: Units, form: VectorCount = "one or two") -> tuple[Vector, Vector]:
     """Return the points `a` of both bodies in [m], their origins where the key is missing."""
     first, second = read_vectors(table, "a", form, ZERO)
     return _metres(first, units), _metres(second, units)
 
 
-def read_frames(table: Table, units: Units) -> tuple[Transform, Transform]:
+def read_frames(table: CheckedTable, units: Units) -> tuple[Transform, Transform]:
     """Return A_1 and A_2 of a joint; not turned where its m or n are no vectors."""
     many = len(table.faults)
     m, n = read_vectors(table, "m", default=DEFAULT_M), read_vectors(table, "n", default=DEFAULT_N)
@@ -92,7 +94,7 @@ def perpendicular(n: Vector) -> Vector:
     return scale(1.0 / max(math.sqrt(dot(across, across)), 1e-300), across)
 
 
-def read_start(table: Table, of: Sequence[str], units: Units) -> tuple[float, ...]:
+def read_start(table: CheckedTable, of: Sequence[str], units: Units) -> tuple[float, ...]:
     """Return the `start` of a joint in [rad] and [m]: a number of a joint with one variable, else a list.
 
     Args:
@@ -104,13 +106,13 @@ def read_start(table: Table, of: Sequence[str], units: Units) -> tuple[float, ..
     if value is None:
         return ()
     values = [value] if len(of) == 1 and is_number(value) else value
-    if not are_numbers(values, len(of)):
+    if not is_number_list(values, len(of)):
         _refuse(table, "start", value, "a finite number" if len(of) == 1 else f"{len(of)} finite numbers")
         return ()
     return tuple(to_si(float(one), unit, units) for one, unit in zip(values, of, strict=True))
 
 
-def read_limits(table: Table, of: Sequence[str], units: Units) -> tuple[tuple[float, float], ...]:
+def read_limits(table: CheckedTable, of: Sequence[str], units: Units) -> tuple[tuple[float, float], ...]:
     """Return `lower` and `upper` of each variable of a joint in [rad] and [m]; empty where it has neither.
 
     Args:
@@ -122,16 +124,16 @@ def read_limits(table: Table, of: Sequence[str], units: Units) -> tuple[tuple[fl
     for key, default in (("lower", -math.inf), ("upper", math.inf)):
         value = table.value(key)
         values = [value] if len(of) == 1 and is_number(value, infinite=True) else value
-        if value is not None and not are_numbers(values, len(of), infinite=True):
+        if value is not None and not is_number_list(values, len(of), infinite=True):
             _refuse(table, key, value, "a number" if len(of) == 1 else f"{len(of)} numbers")
-        is_right = are_numbers(values, len(of), infinite=True)
+        is_right = is_number_list(values, len(of), infinite=True)
         numbers = values if is_right else [default] * len(of)
         ends.append([to_si(float(one), unit, units) for one, unit in zip(numbers, of, strict=True)])
     limits = tuple(zip(*ends, strict=True))
     return limits if any(map(math.isfinite, (*ends[0], *ends[1]))) else ()
 
 
-def read_drives(table: Table, of: Sequence[str], units: Units) -> tuple[Expression | None, ...]:
+def read_drives(table: CheckedTable, of: Sequence[str], units: Units) -> tuple[Expression | None, ...]:
     """Return what drives each variable of a joint, by `driven` or `value`; none where it has neither.
 
     Args:
@@ -142,7 +144,7 @@ def read_drives(table: Table, of: Sequence[str], units: Units) -> tuple[Expressi
     controls, functions = table.value("driven"), table.value("value")
     key, value = ("value", functions) if controls is None else ("driven", controls)
     if controls is not None and functions is not None:
-        table.fault("value", "found beside driven; allowed: one of the two")
+        table.add_error("value", "found beside driven; allowed: one of the two")
     if value is None:
         return ()
     values = [value] if len(of) == 1 and not isinstance(value, (list, tuple)) else value
@@ -153,7 +155,7 @@ def read_drives(table: Table, of: Sequence[str], units: Units) -> tuple[Expressi
     return tuple(_drive(table, key, one, unit, units) for one, unit in zip(values, of, strict=True))
 
 
-def _drive(table: Table, key: str, value: Any, unit: str, units: Units) -> Expression | None:
+def _drive(table: CheckedTable, key: str, value: Any, unit: str, units: Units) -> Expression | None:
     """Return what drives a variable; None where that is "", or no name of a control under `driven`."""
     if value == "":
         return None
@@ -163,7 +165,7 @@ def _drive(table: Table, key: str, value: Any, unit: str, units: Units) -> Expre
     return None
 
 
-def read_motion(table: Table, units: Units) -> tuple[Expression, ...]:
+def read_motion(table: CheckedTable, units: Units) -> tuple[Expression, ...]:
     """Return m, n [-] and a in [m] of a user joint, each three numbers or functions of controls."""
     many = len(table.faults)
     turned = [*_three(table, "m", "", units), *_three(table, "n", "", units)]
@@ -172,7 +174,7 @@ def read_motion(table: Table, units: Units) -> tuple[Expression, ...]:
     return (*turned, *_three(table, "a", "m", units))
 
 
-def _three(table: Table, key: str, unit: str, units: Units) -> list[Expression]:
+def _three(table: CheckedTable, key: str, unit: str, units: Units) -> list[Expression]:
     """Return three numbers or functions of controls in SI."""
     value = table.value(key)
     if isinstance(value, (list, tuple)) and len(value) == 3:
@@ -181,7 +183,7 @@ def _three(table: Table, key: str, unit: str, units: Units) -> list[Expression]:
     return [*IDENTITY_MOTION[6:]]
 
 
-def read_expression(table: Table, key: str, unit: str, units: Units) -> Expression:
+def read_expression(table: CheckedTable, key: str, unit: str, units: Units) -> Expression:
     """Return the number or function of controls under a key in SI; the key is required.
 
     Args:
@@ -193,7 +195,7 @@ def read_expression(table: Table, key: str, unit: str, units: Units) -> Expressi
     return parse_expression(table, key, table.value(key), unit, units)
 
 
-def parse_expression(table: Table, key: str, value: Any, unit: str, units: Units) -> Expression:
+def parse_expression(table: CheckedTable, key: str, value: Any, unit: str, units: Units) -> Expression:
     """Return a number or text of a file as a function of controls in SI; 1 where it is no arithmetic."""
     if is_number(value):
         return Expression(repr(to_si(float(value), unit, units)))
@@ -205,7 +207,7 @@ def parse_expression(table: Table, key: str, value: Any, unit: str, units: Units
         factor = _factor(unit, units)
         return Expression(f"({value}) * {factor}" if factor else value)
     except ValueError as error:
-        table.fault(key, str(error))
+        table.add_error(key, str(error))
         return Expression("1.0")
 
 
@@ -229,7 +231,7 @@ def _vector(value: Sequence[float]) -> Vector:
     return float(value[0]), float(value[1]), float(value[2])
 
 
-def _refuse(table: Table, key: str, value: Any, allowed: str) -> None:
+def _refuse(table: CheckedTable, key: str, value: Any, allowed: str) -> None:
     """Note that the value of a key is not allowed."""
-    found = "nothing" if value is None else shown(value)
-    table.fault(key, f"found {found}, allowed: {allowed}")
+    found = "nothing" if value is None else format_value(value)
+    table.add_error(key, f"found {found}, allowed: {allowed}")

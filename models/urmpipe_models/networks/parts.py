@@ -19,9 +19,9 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from urmpipe_models.elementwise import ZERO, Element, Vector, cross, minus, plus, times
-from urmpipe_models.errors import Finding, OptionError, nearest, not_among, shown
+from urmpipe_models.errors import Finding, OptionError, closest_name, format_unknown_name, format_value
 from urmpipe_models.math3d import Transform
-from urmpipe_models.measure_units import DEGREE, NAMES, WRITTEN, quantity
+from urmpipe_models.measure_units import DEGREE, NAMES, WRITTEN, quantity_to_si
 
 MAX_LETTERS = 1000
 """Letters of an expression: more are no formula that a person wrote."""
@@ -80,15 +80,17 @@ class Expression:
 def _parsed(text: str) -> ast.expr:
     """Return the tree of an expression whose parts are all arithmetic; raise a `ValueError` of any other."""
     if len(text) > MAX_LETTERS:
-        raise ValueError(f"found {shown(text)} of {len(text)} letters, allowed: {MAX_LETTERS} at most")
+        raise ValueError(f"found {format_value(text)} of {len(text)} letters, allowed: {MAX_LETTERS} at most")
     if (nested := _nested(text)) > MAX_DEPTH:
-        raise ValueError(f"found {shown(text)}, nested {nested} deep; allowed: {MAX_DEPTH}")
+        raise ValueError(f"found {format_value(text)}, nested {nested} deep; allowed: {MAX_DEPTH}")
     try:
         if "#" in text:  # the rest would be a remark
             raise SyntaxError("a remark")
         tree = ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise ValueError(f"found {shown(text)}, no arithmetic; allowed: {ALLOWED_ARITHMETIC}") from error
+        raise ValueError(
+            f"found {format_value(text)}, no arithmetic; allowed: {ALLOWED_ARITHMETIC}"
+        ) from error
     _refuse(tree, text, 0)
     return tree
 
@@ -102,7 +104,7 @@ def _nested(text: str) -> int:
 def _refuse(node: ast.expr, text: str, depth: int) -> None:
     """Raise a `ValueError` if a tree holds anything but arithmetic, or is nested too deep."""
     if depth > MAX_DEPTH:
-        raise ValueError(f"found {shown(text)}, nested {depth} deep; allowed: {MAX_DEPTH}")
+        raise ValueError(f"found {format_value(text)}, nested {depth} deep; allowed: {MAX_DEPTH}")
     match node:
         case ast.Constant(value=int() | float() as value) if not isinstance(value, bool) and _finite(value):
             parts: list[ast.expr] = []
@@ -114,7 +116,7 @@ def _refuse(node: ast.expr, text: str, depth: int) -> None:
             parts = [operand]
         case ast.Call(ast.Name(id=name), args, []):
             if name not in _FUNCTIONS:
-                raise ValueError(f"function {not_among(name, _FUNCTIONS)}")
+                raise ValueError(f"function {format_unknown_name(name, _FUNCTIONS)}")
             if len(args) != _arguments(name):
                 allowed = f"{_arguments(name)}"
                 raise ValueError(f"found {len(args)} arguments of {name}, allowed: {allowed}")
@@ -124,7 +126,9 @@ def _refuse(node: ast.expr, text: str, depth: int) -> None:
             hint = (
                 "; a power is **" if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor) else ""
             )
-            raise ValueError(f"found {shown(found)}, no arithmetic; allowed: {ALLOWED_ARITHMETIC}{hint}")
+            raise ValueError(
+                f"found {format_value(found)}, no arithmetic; allowed: {ALLOWED_ARITHMETIC}{hint}"
+            )
     for part in parts:
         _refuse(part, text, depth + 1)
 
@@ -510,7 +514,7 @@ class Parts:
             return value
         si, factor = self.control_unit(control) or ("", Decimal(1))
         units = {unit: in_si / factor for unit, in_si in WRITTEN.get(si, {}).items()} | {"": Decimal(1)}
-        number = quantity(value, units)
+        number = quantity_to_si(value, units)
         if not math.isfinite(number):
             allowed = f"a number, or {NAMES[si].partition(' in ')[0]} with its unit" if si else "a number"
             raise OptionError(Finding(parameter="controls", found=f"{control} = {value}", allowed=allowed))
@@ -602,7 +606,7 @@ def control_faults(parts: Parts) -> Iterator[Finding]:
     for where, function in (*parts.control_functions, *driving):
         for name in sorted(function.names.difference(names)):
             unknown.add(name)
-            yield Finding(f"control {not_among(name, names)}", about=where)
+            yield Finding(f"control {format_unknown_name(name, names)}", about=where)
     for cycle in _cycles(parts.controls):
         way = " -> ".join((*cycle, cycle[0]))
         message = f"is a function of itself: {way}; allowed: functions of other controls"
@@ -614,7 +618,7 @@ def _own_faults(where: str, control: Control) -> Iterator[Finding]:
     """Yield what is wrong with the name, the limits and the start of a control."""
     if not is_control_name(control.name):
         allowed = "a letter, then letters, digits, _; not pi, a function or a word of Python"
-        yield Finding(f"found {shown(control.name)} as a name, allowed: {allowed}", about=where)
+        yield Finding(f"found {format_value(control.name)} as a name, allowed: {allowed}", about=where)
     if control.value is not None:
         return
     lower, start, upper = control.lower, control.start, control.upper
@@ -658,7 +662,7 @@ def _idle(
     """Yield controls that drive nothing, but for those that a name which is none may have meant."""
     names = [one.name for one in controls]
     found = {name for _, function in driving for name in function.names}
-    found |= {nearest(name, names) or "" for name in unknown}
+    found |= {closest_name(name, names) or "" for name in unknown}
     functions = {one.name: one.value.names for one in controls if one.value is not None}
     used: set[str] = set()
     while found:

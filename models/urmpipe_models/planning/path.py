@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urmpipe_models.elementwise import FloatArray, IndexArray, IntArray
-from urmpipe_models.errors import Finding, OptionError, not_among
-from urmpipe_models.math3d import conjugate, matrices, quaternions, rotation_vectors
+from urmpipe_models.errors import Finding, OptionError, format_unknown_name
+from urmpipe_models.math3d import conjugate, to_matrices, to_quaternions, to_rotation_vectors
 from urmpipe_models.math3d import quaternion_product as product
-from urmpipe_models.wraps import continuous_quaternions
+from urmpipe_models.wraps import unwrap_quaternions
 
 PROPER = 2
 """The variant of an arc that turns towards the next row; 1 turns away from it, and round."""
@@ -130,11 +130,11 @@ class OrientationPath:
         """Return the orientation at arc lengths in [m], shape (n,), as x, y, z, w [-], shape (n, 4)."""
         k = segment_index(self.at, s)
         turned = self.rate[k] * (s - self.at[k])[:, None]
-        return product(quaternions(turned, "vector"), self.quat_xyzw[k])
+        return product(to_quaternions(turned, "vector"), self.quat_xyzw[k])
 
     def matrices(self, s: FloatArray) -> FloatArray:
         """Return the orientation at arc lengths in [m], shape (n,), as matrices [-], shape (n, 3, 3)."""
-        return matrices(self.quaternions(s))
+        return to_matrices(self.quaternions(s))
 
     @property
     def uneven_rows(self) -> IndexArray:
@@ -166,8 +166,8 @@ def interpolate_orientations(rotation: FloatArray, at: FloatArray) -> Orientatio
         rotation: Matrices at the rows [-], shape (n, 3, 3).
         at: Where the rows are along the path in [m], rising, shape (n,).
     """
-    quats = continuous_quaternions(quaternions(rotation.reshape(-1, 9), "matrix"))
-    turn = rotation_vectors(product(quats[1:], conjugate(quats[:-1])))
+    quats = unwrap_quaternions(to_quaternions(rotation.reshape(-1, 9), "matrix"))
+    turn = to_rotation_vectors(product(quats[1:], conjugate(quats[:-1])))
     return OrientationPath(at, quats, turn / np.diff(at)[:, None])
 
 
@@ -490,9 +490,9 @@ def validate_cube(kind: str, plane: str | None, side: float, radius: float) -> I
         radius: Of its arcs in [m]; NaN where it is not known.
     """
     if kind not in PLANES:
-        yield Finding(not_among(kind, PLANES))
+        yield Finding(format_unknown_name(kind, PLANES))
     elif plane is not None and plane not in PLANES[kind]:
-        yield Finding(f"plane of a {kind} section: {not_among(plane, PLANES[kind])}")
+        yield Finding(f"plane of a {kind} section: {format_unknown_name(plane, PLANES[kind])}")
     if side <= 0.0:
         yield Finding(found=f"a = {side:g} m", allowed="more than 0")
     if radius < 0.0:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from urmpipe_datasets import ROBOTS
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.errors import OptionError, RobotError, did_you_mean, shown
+from urmpipe_models.errors import OptionError, RobotError, format_suggestion, format_value
 from urmpipe_models.math3d import Transform, from_offset
 from urmpipe_models.robots.toml import read_robot_file
 from urmpipe_models.robots.urdf import read_urdf
@@ -58,9 +58,9 @@ def load_robot(
     names = robot_names()
     if (name := str(name_or_path).lower()) in names:
         return _of_catalogue(name)
-    hint = did_you_mean(str(name_or_path), names)
+    hint = format_suggestion(str(name_or_path), names)
     raise RobotError(
-        f"unknown robot {shown(str(name_or_path))}{hint};"
+        f"unknown robot {format_value(str(name_or_path))}{hint};"
         f" allowed: {', '.join(names)}, or a .toml or .urdf file"
     )
 
@@ -83,7 +83,7 @@ def parse_offset(text: str) -> Transform:
         values = []
     if len(values) not in {3, 6} or not all(map(math.isfinite, values)):
         raise OptionError(
-            f"found {shown(text)}, allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15"
+            f"found {format_value(text)}, allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15"
         )
     return from_offset(values)
 

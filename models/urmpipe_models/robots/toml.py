@@ -53,10 +53,10 @@ from urmpipe_models.drives import (
 from urmpipe_models.elementwise import ZERO, cross, dot
 from urmpipe_models.errors import Finding, RobotError
 from urmpipe_models.files import EXPORT_MARK
-from urmpipe_models.math3d import Step, Transform, from_xyz_rpy, made_of
+from urmpipe_models.math3d import Step, Transform, compose_steps, from_xyz_rpy
 from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_models.robots.urdf_tree import MAX_LINKS
-from urmpipe_models.toml_tables import Table, parse_toml, toml_lines, toml_text
+from urmpipe_models.toml_tables import CheckedTable, format_toml, quote_toml, read_toml
 
 ORTHONORMAL = 1e-9
 """R R^T may differ from the identity by this: rounding, not a matrix that is no rotation."""
@@ -82,24 +82,24 @@ class Units:
         return self.length(value) if kind == "prismatic" else self.angle(value)
 
 
-def read_frame(table: Table, units: Units) -> Transform:
+def read_frame(table: CheckedTable, units: Units) -> Transform:
     """Return the frame that a table tells by `translation` and `rpy` or `rotation`, or by `steps`.
 
     What is wrong is noted as a fault.
     """
     frame = _rigid(table, units)
     if table.has("steps"):
-        made = made_of(*(_part(row, units) for row in table.tables("steps")))
+        made = compose_steps(*(_part(row, units) for row in table.tables("steps")))
         others = [key for key in ("translation", "rpy", "rotation") if table.has(key)]
         if others and not _same(frame, made):
             found = f"found beside {' and '.join(others)} of another frame"
-            table.fault("steps", f"{found}; allowed: steps alone")
+            table.add_error("steps", f"{found}; allowed: steps alone")
         frame = made
-    table.close()
+    table.report_unknown_keys()
     return frame
 
 
-def _rigid(table: Table, units: Units) -> Transform:
+def _rigid(table: CheckedTable, units: Units) -> Transform:
     """Return the frame of `translation` and `rpy` or `rotation`."""
     x, y, z = (units.length(value) for value in table.numbers("translation", 3, (0.0, 0.0, 0.0)))
     rx, ry, rz = (units.angle(value) for value in table.numbers("rpy", 3, (0.0, 0.0, 0.0)))
@@ -107,13 +107,13 @@ def _rigid(table: Table, units: Units) -> Transform:
         return from_xyz_rpy((x, y, z), (rx, ry, rz), "robot file")
     frame = Transform(cast("Any", table.rows("rotation")), (x, y, z))
     if table.has("rpy"):
-        table.fault("rotation", "found beside rpy; allowed: one of the two")
+        table.add_error("rotation", "found beside rpy; allowed: one of the two")
     elif not _is_rotation(frame):
-        table.fault("rotation", "is not a rotation matrix; allowed: orthonormal rows, right-handed")
+        table.add_error("rotation", "is not a rotation matrix; allowed: orthonormal rows, right-handed")
     return frame
 
 
-def _part(table: Table, units: Units) -> Transform | Step:
+def _part(table: CheckedTable, units: Units) -> Transform | Step:
     """Read an elementary motion, or a constant frame between two."""
     part: Transform | Step
     if table.has("along") or table.has("about"):
@@ -123,7 +123,7 @@ def _part(table: Table, units: Units) -> Transform | Step:
         part = Step(kind, axis, value, table.text("name", ""), table.text("source", ""))
     else:
         part = replace(_rigid(table, units), made_of=None)
-    table.close()
+    table.report_unknown_keys()
     return part
 
 
@@ -161,13 +161,13 @@ HELD_KEYS = DRIVE_KEYS[:2]
 """The keys of a joint that is only held; any other key makes it a driven one, which needs them all."""
 
 
-def read_drive(joint: str, table: Table) -> JointDrive:
+def read_drive(joint: str, table: CheckedTable) -> JointDrive:
     """Return the drive of a table, in SI whatever the units of the file; faults are noted in the table."""
     further = (*DRIVE_KEYS[2:], "period", *GAIN_KEYS, "u_max")
     driven = [key for key in (*further, *SPRING_KEYS) if table.has(key)]
     sprung = SPRING_KEYS if any(map(table.has, SPRING_KEYS)) else ()
     values = {key: table.number(key) for key in (*HELD_KEYS, *(further if driven else ()), *sprung)}
-    table.close()
+    table.report_unknown_keys()
     if not driven:
         return PassiveJoint(joint, *values.values())
     drive, gains = Drive(*map(values.get, DRIVE_KEYS)), Gains(*map(values.get, GAIN_KEYS))
@@ -189,7 +189,7 @@ def drive_to_dict(drive: JointDrive) -> dict[str, float]:
     return {key: float(value) for key, value in given.items()}
 
 
-def read_inertial(table: Table, units: Units) -> Inertial:
+def read_inertial(table: CheckedTable, units: Units) -> Inertial:
     """Return the inertial of a table, in [kg], [m] and [kg.m2]; faults are noted in the table.
 
     Masses and inertias are SI whatever the units of the file; `centre` is in its unit of length.
@@ -202,7 +202,7 @@ def read_inertial(table: Table, units: Units) -> Inertial:
         cast("Any", table.numbers("inertia", 6, (0.0,) * 6)),
         table.text("source", ""),
     )
-    table.close()
+    table.report_unknown_keys()
     return inertial
 
 
@@ -222,7 +222,7 @@ SHAPES = ("box", "cylinder", "capsule", "sphere", "mesh")
 """The keys of which a visual has one."""
 
 
-def read_visual(table: Table, units: Units) -> Visual:
+def read_visual(table: CheckedTable, units: Units) -> Visual:
     """Return the visual of a table; faults are noted in the table."""
     visual = Visual(
         table.text("joint", "") if table.has("joint") else None,
@@ -230,7 +230,7 @@ def read_visual(table: Table, units: Units) -> Visual:
         replace(read_frame(table.table("origin"), units), made_of=None),
         cast("Colour", table.numbers("colour", 4)) if table.has("colour") else None,
     )
-    table.close()
+    table.report_unknown_keys()
     return visual
 
 
@@ -245,11 +245,13 @@ def visual_to_dict(visual: Visual) -> dict[str, Any]:
     return {key: value for key, value in given.items() if value is not None}
 
 
-def _shape(table: Table, units: Units) -> Shape:
+def _shape(table: CheckedTable, units: Units) -> Shape:
     """Return the one shape of the table, in [m]."""
     keys = [key for key in SHAPES if table.has(key)]
     if len(keys) != 1:
-        table.fault("box", f"found {' and '.join(keys) or 'no shape'}, allowed: one of {', '.join(SHAPES)}")
+        table.add_error(
+            "box", f"found {' and '.join(keys) or 'no shape'}, allowed: one of {', '.join(SHAPES)}"
+        )
         return Sphere(0.0)
     (key,) = keys
     if key == "mesh":
@@ -278,7 +280,7 @@ PARTS = ("visuals", "inertials", "drives")
 """Fields of a chain whose items know their own faults."""
 
 
-def read_carried(table: Table, units: Units) -> dict[str, Any]:
+def read_carried(table: CheckedTable, units: Units) -> dict[str, Any]:
     """Return fields of a chain: what it shows, weighs and is driven by, in SI; faults are noted in the table.
 
     What the file leaves out is left to a URDF. Masses that it gives take the place of a URDF's, whatever is
@@ -369,7 +371,7 @@ def read_robot_file(path: str | Path) -> Chain:
         RobotError: With everything that is wrong: the key, what was found and what is allowed.
     """
     path = Path(path)
-    data = parse_toml(path, RobotError)
+    data = read_toml(path, RobotError)
     chain = _read(data, tuple(_READERS), file=str(path), stem=path.stem, folder=path.parent)
     if faults := [*_unsaid_units(data, chain)]:
         raise RobotError(*(Finding(fault, str(path)) for fault in faults))
@@ -413,14 +415,14 @@ def robot_toml(chain: Chain) -> str:
         joint["origin"] = _shortest(joint["origin"])
     lists = {key: data.pop(key, []) for key in ("joints", "visuals", "inertials")}
     drives = data.pop("drives", {})
-    lines = [f"# {EXPORT_MARK}: lengths in m, angles in rad", *toml_lines(data)]
+    lines = [f"# {EXPORT_MARK}: lengths in m, angles in rad", *format_toml(data)]
     for key, frame in frames.items():
-        lines += ["", f"[{key}]", *toml_lines(frame)]
+        lines += ["", f"[{key}]", *format_toml(frame)]
     for key, items in lists.items():
         for item in items:
-            lines += ["", f"[[{key}]]", *toml_lines(item)]
+            lines += ["", f"[[{key}]]", *format_toml(item)]
     for joint, drive in drives.items():
-        lines += ["", f"[drives.{toml_text(joint)}]", *toml_lines(drive)]
+        lines += ["", f"[drives.{quote_toml(joint)}]", *format_toml(drive)]
     return "\n".join(lines) + "\n"
 
 
@@ -439,7 +441,7 @@ def _read(
 ) -> Chain:
     """Read every key, raise what is wrong, and only then build."""
     faults: list[Finding] = []
-    table = Table(data, faults, file)
+    table = CheckedTable(data, faults, file)
     kind = table.choice("kind", kinds)
     if faults:  # without a kind every other key would be called unknown
         raise RobotError(*faults)
@@ -454,7 +456,7 @@ def _read(
     base, tool = (read_frame(table.table(key), units) if table.has(key) else None for key in ("base", "tool"))
     build = _READERS[kind](table, units, folder)
     carried = read_carried(table, units)
-    table.close()
+    table.report_unknown_keys()
     if faults:
         raise RobotError(*faults)
     try:
@@ -496,7 +498,7 @@ def _unsaid_units(data: Mapping[str, Any], chain: Chain) -> Iterator[str]:
         yield f'key angle_unit: found none, and {angle:.4g} rad, allowed: "deg", or "rad" if intended'
 
 
-def _read_urm(table: Table, units: Units, folder: Path) -> Build:
+def _read_urm(table: CheckedTable, units: Units, folder: Path) -> Build:
     """Read the keys of an arm of modules."""
     lengths = tuple(units.length(value) for value in table.numbers("lengths", None))
     tilts = tuple(units.angle(value) for value in table.numbers("tilts", None))
@@ -513,7 +515,7 @@ def _read_urm(table: Table, units: Units, folder: Path) -> Build:
     return build
 
 
-def _read_dh(table: Table, units: Units, folder: Path, *, modified: bool = False) -> Build:
+def _read_dh(table: CheckedTable, units: Units, folder: Path, *, modified: bool = False) -> Build:
     """Read the keys of an arm by Denavit-Hartenberg parameters."""
     rows = [_dh_row(row, units) for row in table.tables("joints")]
     moving = [row.kind for row in rows if row.kind != "fixed"]
@@ -522,7 +524,7 @@ def _read_dh(table: Table, units: Units, folder: Path, *, modified: bool = False
     return partial(modified_dh_chain if modified else dh_chain, rows=limited)
 
 
-def _read_articulated6r(table: Table, units: Units, folder: Path) -> Build:
+def _read_articulated6r(table: CheckedTable, units: Units, folder: Path) -> Build:
     """Read the keys of an articulated 6R arm."""
     lengths = tuple(units.length(value) for value in table.numbers("lengths", 5))
     limits = _limits(table.table("limits"), ["revolute"] * 6, units)
@@ -538,20 +540,20 @@ def _read_articulated6r(table: Table, units: Units, folder: Path) -> Build:
     return build
 
 
-def _read_joints(table: Table, units: Units, folder: Path) -> Build:
+def _read_joints(table: CheckedTable, units: Units, folder: Path) -> Build:
     """Read the keys of an arm joint by joint."""
     joints = tuple(_joint(row, units) for row in table.tables("joints"))
     return partial(Chain, joints=joints, tip=read_frame(table.table("tip"), units))
 
 
-def _read_urdf(table: Table, units: Units, folder: Path) -> Build:
+def _read_urdf(table: CheckedTable, units: Units, folder: Path) -> Build:
     """Read the keys of an arm that a URDF describes."""
     file = table.text("file")
     base_link, tip_link = (table.text(key, "") or None for key in ("base_link", "tip_link"))
     return lambda name: read_urdf(folder / file, base_link=base_link, tip_link=tip_link)
 
 
-_READERS: dict[str, Callable[[Table, Units, Path], Build]] = {
+_READERS: dict[str, Callable[[CheckedTable, Units, Path], Build]] = {
     "urm": _read_urm,
     "dh": _read_dh,
     "modified_dh": partial(_read_dh, modified=True),
@@ -561,7 +563,7 @@ _READERS: dict[str, Callable[[Table, Units, Path], Build]] = {
 }
 
 
-def _dh_row(table: Table, units: Units) -> DHRow:
+def _dh_row(table: CheckedTable, units: Units) -> DHRow:
     """Read a row of parameters."""
     row = DHRow(
         theta=units.angle(table.number("theta", 0.0)),
@@ -571,11 +573,11 @@ def _dh_row(table: Table, units: Units) -> DHRow:
         name=table.text("name", ""),
         kind=cast("JointKind", table.choice("kind", ("revolute", "prismatic", "fixed"), "revolute")),
     )
-    table.close()
+    table.report_unknown_keys()
     return row
 
 
-def _joint(table: Table, units: Units) -> Joint:
+def _joint(table: CheckedTable, units: Units) -> Joint:
     """Read a joint with its frame, axis, limits and mimic."""
     kind = table.choice("kind", ("revolute", "prismatic", "fixed"), "revolute")
     joint = Joint(
@@ -589,25 +591,25 @@ def _joint(table: Table, units: Units) -> Joint:
         },
         mimic=_mimic(table.table("mimic"), kind, units) if table.has("mimic") else None,
     )
-    table.close()
+    table.report_unknown_keys()
     return joint
 
 
-def _mimic(table: Table, kind: str, units: Units) -> Mimic:
+def _mimic(table: CheckedTable, kind: str, units: Units) -> Mimic:
     """Read which joint another follows."""
     mimic = Mimic(
         table.text("joint"),
         table.number("multiplier", 1.0),
         units.of_joint(kind, table.number("offset", 0.0)),
     )
-    table.close()
+    table.report_unknown_keys()
     return mimic
 
 
-def _limits(table: Table, kinds: Sequence[JointKind], units: Units) -> list[_Limits]:
+def _limits(table: CheckedTable, kinds: Sequence[JointKind], units: Units) -> list[_Limits]:
     """Return the limits of every joint, in SI."""
     given = {key: table.spread(key, len(kinds), default) for key, default in _Limits._field_defaults.items()}
-    table.close()
+    table.report_unknown_keys()
     return [
         _Limits(**{key: _limit(key, kind, values[k], units) for key, values in given.items()})
         for k, kind in enumerate(kinds)

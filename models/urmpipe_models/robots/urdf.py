@@ -27,7 +27,7 @@ from urmpipe_models.arm.chain import (
     Visual,
 )
 from urmpipe_models.dynamics.links import Symmetric, rotate_inertia
-from urmpipe_models.errors import Finding, Hint, RobotError, did_you_mean, listed, shown
+from urmpipe_models.errors import Finding, Hint, RobotError, format_names, format_suggestion, format_value
 from urmpipe_models.math3d import Transform
 from urmpipe_models.robots.urdf_tree import (
     BASE_JOINT,
@@ -295,9 +295,9 @@ def _is_link(tree: UrdfTree, role: str, link: str) -> bool:
     """Tell whether a chosen link is in the file, and note a fault if not."""
     if link in tree.links:
         return True
-    hint = did_you_mean(link, tree.links)
-    allowed = listed(link, tree.links)
-    tree.fault(f"{role} link {shown(link)} is not in the file{hint}; allowed: {allowed}")
+    hint = format_suggestion(link, tree.links)
+    allowed = format_names(link, tree.links)
+    tree.fault(f"{role} link {format_value(link)} is not in the file{hint}; allowed: {allowed}")
     return False
 
 
@@ -436,4 +436,4 @@ def _visuals(tree: UrdfTree, carrier: CarrierLink) -> Iterator[Visual]:
 
 def _listed(names: Iterable[str]) -> str:
     """Return names as a list in a sentence."""
-    return listed("", names)
+    return format_names("", names)

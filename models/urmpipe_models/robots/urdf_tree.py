@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 from xml.parsers import expat
 
 from urmpipe_models.arm.chain import Joint, JointKind, Mimic
-from urmpipe_models.errors import Finding, Hint, RobotError, did_you_mean, shown
+from urmpipe_models.errors import Finding, Hint, RobotError, format_suggestion, format_value
 from urmpipe_models.files import read_contents
 from urmpipe_models.math3d import Transform, from_xyz_rpy
 
@@ -250,7 +250,7 @@ def _add_joint(tree: UrdfTree, node: Node) -> None:
         tree.fault(f"joint {name}: name stands already in line {tree.edges[name].line}", node.line)
         return
     if type_ not in KINDS and type_ not in UNSUPPORTED_TYPES:
-        tree.fault(f"joint {name}: found type {shown(type_)}; allowed: {', '.join(KINDS)}", node.line)
+        tree.fault(f"joint {name}: found type {format_value(type_)}; allowed: {', '.join(KINDS)}", node.line)
     parent, child = (_link_of(tree, node, name, end) for end in ("parent", "child"))
     kind = KINDS.get(type_, "fixed")
     lower, upper, velocity, acceleration, effort = _limits(tree, node, name, type_)
@@ -278,8 +278,8 @@ def _link_of(tree: UrdfTree, node: Node, joint: str, end: Literal["parent", "chi
         tree.sound = False
         return ""
     if link not in tree.links:
-        hint = did_you_mean(link, tree.links) if len(tree.faults) < ASKED else ""
-        tree.fault(f"joint {joint}: {end} {shown(link)}; allowed: a link of the file{hint}", node.line)
+        hint = format_suggestion(link, tree.links) if len(tree.faults) < ASKED else ""
+        tree.fault(f"joint {joint}: {end} {format_value(link)}; allowed: a link of the file{hint}", node.line)
         tree.sound = False
     return link
 
@@ -372,7 +372,9 @@ def read_numbers(
         values = ()
     finite = node.tag == "limit" or all(math.isfinite(value) for value in values)
     if len(values) != len(default) or any(math.isnan(value) for value in values) or not finite:
-        tree.fault(f"{place} {attribute}: found {shown(text)}, expected {COUNTS[len(default)]}", node.line)
+        tree.fault(
+            f"{place} {attribute}: found {format_value(text)}, expected {COUNTS[len(default)]}", node.line
+        )
         return tuple(default)
     return values
 
@@ -411,6 +413,6 @@ def _check_mimics(tree: UrdfTree) -> None:
         mimic = edge.joint.mimic
         if mimic is not None and mimic.joint not in tree.edges:
             tree.fault(
-                f"joint {edge.joint.name}: mimics {shown(mimic.joint)}; allowed: a joint of the file",
+                f"joint {edge.joint.name}: mimics {format_value(mimic.joint)}; allowed: a joint of the file",
                 edge.line,
             )

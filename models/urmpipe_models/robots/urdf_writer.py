@@ -21,9 +21,9 @@ from urmpipe_models.arm.chain import (
     Visual,
 )
 from urmpipe_models.arm.solids import build_placeholder_solids
-from urmpipe_models.errors import RobotError, in_xml
-from urmpipe_models.files import EXPORT_MARK, replace_text
-from urmpipe_models.math3d import rpy_of, translation
+from urmpipe_models.errors import RobotError, escape_xml
+from urmpipe_models.files import EXPORT_MARK, write_text_atomic
+from urmpipe_models.math3d import matrix_to_rpy, translation
 from urmpipe_models.robots.urdf import MOMENTS
 from urmpipe_models.robots.urdf_tree import (
     BASE_JOINT,
@@ -42,7 +42,7 @@ def write_urdf(chain: Chain, path: str | Path) -> None:
         OutputError: If the file cannot be written.
         RobotError: If a joint has a name that stands for base, tip, tool or a mass.
     """
-    replace_text(Path(path), urdf_text(chain))
+    write_text_atomic(Path(path), urdf_text(chain))
 
 
 def urdf_text(chain: Chain) -> str:
@@ -146,7 +146,7 @@ def _without_capsules(chain: Chain) -> Iterator[Visual]:
 
 def _visual_lines(visual: Visual, material: str | None) -> list[str]:
     """Return a shape that the arm shows, of a material of this name, else of its own colour."""
-    xyz, rpy = _numbers(visual.origin.translation), _numbers(rpy_of(visual.origin.rotation))
+    xyz, rpy = _numbers(visual.origin.translation), _numbers(matrix_to_rpy(visual.origin.rotation))
     lines = [
         "    <visual>",
         f'      <origin xyz="{xyz}" rpy="{rpy}"/>',
@@ -174,7 +174,7 @@ def _shape(shape: Shape) -> str:
 
 def _joint_lines(joint: Joint, parent: str, child: str) -> list[str]:
     """Return a joint as lines of URDF."""
-    xyz, rpy = _numbers(joint.origin.translation), _numbers(rpy_of(joint.origin.rotation))
+    xyz, rpy = _numbers(joint.origin.translation), _numbers(matrix_to_rpy(joint.origin.rotation))
     lines = [
         f'  <joint name={_quoted(joint.name)} type="{_type(joint)}">',
         f'    <parent link="{parent}"/>',
@@ -208,7 +208,7 @@ def _finite(value: float) -> float:
 
 def _quoted(text: str) -> str:
     """Return a text as the value of an attribute: what can be held but not be seen stands as a number."""
-    return in_xml(quoteattr(text))
+    return escape_xml(quoteattr(text))
 
 
 def _numbers(values: Sequence[float]) -> str:

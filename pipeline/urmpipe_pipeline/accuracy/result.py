@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.display import line_of
+from urmpipe_models.display import format_headline
 from urmpipe_models.errors import Voice
 from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.path import LineArcPath, PathRows
@@ -131,7 +131,7 @@ class Accuracy(Result):
         said = "" if self.limit is None else "no velocity within the limit"
         if found is not None:
             said = f"{found:.4g} m/s within {self.limit:g} m"
-        return line_of(self.name, self.verdict, self.robot.name, said)
+        return format_headline(self.name, self.verdict, self.robot.name, said)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a velocity that was asked for or tried, by velocity.

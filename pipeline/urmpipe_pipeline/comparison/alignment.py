@@ -10,16 +10,16 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, Vector
 from urmpipe_models.errors import LogError
-from urmpipe_models.hand_eye import hand_eye
+from urmpipe_models.hand_eye import solve_hand_eye
 from urmpipe_models.math3d import (
     Transform,
     angle_between,
-    best_rotation,
     conjugate,
-    matrices,
+    fit_rotation,
+    matrix_to_rpy,
     quaternion_product,
-    quaternions,
-    rpy_of,
+    to_matrices,
+    to_quaternions,
 )
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, lacking
@@ -86,7 +86,7 @@ def placed(robot: Chain, alignment: Alignment) -> Chain:
 def as_option(frame: Transform) -> tuple[float, ...]:
     """Return a frame as `base` and `tool` take it: X, Y, Z in [m]; RX, RY, RZ in [rad] if it is turned."""
     x, y, z = (float(value) for value in frame.translation)
-    turned = rpy_of(frame.rotation)
+    turned = matrix_to_rpy(frame.rotation)
     return (x, y, z, *turned) if any(turned) else (x, y, z)
 
 
@@ -100,7 +100,7 @@ def _start(matched: Matched) -> Alignment:
             turn = quaternion_product(
                 matched.reference_quat[[first]], conjugate(matched.actual_quat[[first]])
             )
-    rotation = matrices(turn)[0]
+    rotation = to_matrices(turn)[0]
     return _alignment("start", rotation, matched.reference[first] - rotation @ matched.actual[first])
 
 
@@ -110,7 +110,7 @@ def _rigid(matched: Matched, run: Run) -> Alignment:
     Source: Umeyama 1991, eq. 38-42, without scale.
     """
     wanted, done = (side - side.mean(axis=0) for side in (matched.reference, matched.actual))
-    rotation, common = best_rotation(wanted.T @ done / len(done))
+    rotation, common = fit_rotation(wanted.T @ done / len(done))
     size, breadth = zip(*map(_extent, (wanted, done)), strict=True)
     if min(breadth) < RESOLVED or common[1] + common[2] <= IN_COMMON * breadth[0] * breadth[1]:
         raise LogError(lacking(run, _open_rotation(min(size), min(breadth)), parameter="align"))
@@ -153,7 +153,7 @@ def _moved(matched: Matched, alignment: Alignment) -> Matched:
     done = matched.actual @ rotation.T + np.array(alignment.translation)
     quat = matched.actual_quat
     if quat is not None:
-        quat = quaternion_product(quaternions(rotation.reshape(1, 9), "matrix"), quat)
+        quat = quaternion_product(to_quaternions(rotation.reshape(1, 9), "matrix"), quat)
     return replace(matched, actual=done, actual_quat=quat, alignment=alignment)
 
 
@@ -165,7 +165,7 @@ def _with_tool(matched: Matched, run: Run) -> Matched:
         found = f"tool: found a tool that turns by {np.degrees(turned):.4f} deg in all"
         said = "which an offset of the base explains as well, allowed: a log that turns it; start, none"
         raise LogError(lacking(run, f"{found}, {said}", parameter="align"))
-    rotation = matrices(quat)
+    rotation = to_matrices(quat)
     x, y, z = np.einsum("nji,nj->ni", rotation, posed.reference - posed.actual).mean(axis=0).tolist()
     moved = posed.actual + rotation @ np.array((x, y, z))
     return replace(posed, actual=moved, alignment=Alignment("tool", tool=(x, y, z)))
@@ -178,8 +178,10 @@ def _with_base_and_tool(matched: Matched, run: Run) -> Matched:
         few = text.counted(len(quat), "compared pose")
         said = f"base+tool: found {few}, which some base and tool fit, allowed: {LEAST_POSES} or more"
         raise LogError(lacking(run, said, parameter="align"))
-    rotation, wanted = matrices(quat), posed.reference_quat
-    found = hand_eye(posed.actual, rotation, posed.reference, None if wanted is None else matrices(wanted))
+    rotation, wanted = to_matrices(quat), posed.reference_quat
+    found = solve_hand_eye(
+        posed.actual, rotation, posed.reference, None if wanted is None else to_matrices(wanted)
+    )
     moved = _alignment("base+tool", found.base_rotation, found.base_position)
     x, y, z = found.tool_position.tolist()
     alignment = replace(moved, tool=(x, y, z), tool_rotation=_rows(found.tool_rotation), untold=found.untold)
@@ -187,7 +189,7 @@ def _with_base_and_tool(matched: Matched, run: Run) -> Matched:
     with_tool = replace(
         posed,
         actual=posed.actual + rotation @ found.tool_position,
-        actual_quat=quaternion_product(quat, quaternions(tool, "matrix")),
+        actual_quat=quaternion_product(quat, to_quaternions(tool, "matrix")),
     )
     return _moved(with_tool, alignment)
 

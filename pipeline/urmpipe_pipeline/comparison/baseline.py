@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, OptionError
-from urmpipe_models.math3d import Transform, rpy_of
+from urmpipe_models.math3d import Transform, matrix_to_rpy
 from urmpipe_pipeline.comparison.change import (
     Absent,
     BaselineComparison,
@@ -260,7 +260,9 @@ def _made(result: Comparison) -> dict[str, Any]:
 
 def _frame(frame: Transform) -> list[float]:
     """Return a frame as `base` and `tool` take it: x, y, z in [m], rx, ry, rz in [rad]."""
-    return [float(value) + 0.0 for value in (*frame.translation, *rpy_of(frame.rotation))]  # + 0.0: no -0.0
+    return [
+        float(value) + 0.0 for value in (*frame.translation, *matrix_to_rpy(frame.rotation))
+    ]  # + 0.0: no -0.0
 
 
 def _facts(run: Deviation) -> dict[str, Any]:

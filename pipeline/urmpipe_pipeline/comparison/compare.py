@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 from urmpipe_models import DEFAULT_TOLERANCE
-from urmpipe_models.errors import Finding, Hint, LogError, OptionError, for_each
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, map_collecting_errors
 from urmpipe_pipeline import text
 from urmpipe_pipeline.choices import check_choice
 from urmpipe_pipeline.comparison.alignment import align
@@ -173,7 +173,7 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     same = [warning for done in sides for warning in same_data(asked, done)]
     if chosen.iso is not None:
         return _test(asked, sides, chosen, same)
-    deviations = for_each(lambda done: _deviation(asked, done, chosen), sides)
+    deviations = map_collecting_errors(lambda done: _deviation(asked, done, chosen), sides)
     told = [*(one.of(reference.name) for one in reference.warnings), *exchanged(reference, runs), *same]
     for done, one in zip(sides, deviations, strict=True):
         told += clocks_differ(wanted, done.trajectory, one) if late(one) else ()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.display import line_of, number_of
+from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.errors import Finding, Voice
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Share, Statistics, Verdict
@@ -142,15 +142,19 @@ class Comparison(Result):
             worst = (
                 f"{one.name} {one.value:.4g} {one.unit}" for one in self.iso.overall if one.value is not None
             )
-            return line_of(f"{self.name}: {self.verdict or 'not judged'}", self.iso.cycle_count, *worst)
+            return format_headline(
+                f"{self.name}: {self.verdict or 'not judged'}", self.iso.cycle_count, *worst
+            )
         logs = (f"{one.name} {one.verdict} ({_decided(one)})" for one in reversed(self.ranking))
         failed = sum(one.verdict == "fail" for one in self.runs)
         share = f" ({failed} of {len(self.runs)} logs)" if failed and len(self.runs) > 1 else ""
         worse = ", worse than the baseline" if self.baseline and self.baseline.verdict == "fail" else ""
         count = len(self.assumptions)
-        assumed = f", on {number_of(count, 'assumption')}" if count else ""
+        assumed = f", on {format_count(count, 'assumption')}" if count else ""
         lost = (f"{one.name} not judged" for one in self.unjudged)
-        return line_of(f"{self.name}: {self.verdict or 'incomplete'}{share}{worse}{assumed}", *lost, *logs)
+        return format_headline(
+            f"{self.name}: {self.verdict or 'incomplete'}{share}{worse}{assumed}", *lost, *logs
+        )
 
     def _notes(self) -> list[str]:
         """Return what is to be known of it, and of its logs."""

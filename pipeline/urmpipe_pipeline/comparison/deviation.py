@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Voice
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
@@ -153,7 +153,7 @@ class Share:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Deviation(Shown):
+class Deviation(Displayable):
     """The deviation of one log from the reference.
 
     Attributes:
@@ -319,10 +319,10 @@ class Deviation(Shown):
 
     def _headline(self) -> str:
         """Return its verdict, and by what it is decided."""
-        one, samples = self.furthest, number_of(len(self.sample), "sample")
+        one, samples = self.furthest, format_count(len(self.sample), "sample")
         largest = f"{one.quantity} up to {one.max:.4g} {one.unit}"
         shares = (f"{share.quantity} {share.value:.1%}" for share in self.partly)
-        return line_of(self.name, self.verdict, largest, f"{samples} compared", *shares)
+        return format_headline(self.name, self.verdict, largest, f"{samples} compared", *shares)
 
     def _notes(self) -> list[str]:
         """Return what is to be known of the log."""

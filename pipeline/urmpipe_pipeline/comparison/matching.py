@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
 from urmpipe_models.kinematics.forward import point_over_log
-from urmpipe_models.math3d import quaternions, slerp
-from urmpipe_models.wraps import continuous_quaternions
+from urmpipe_models.math3d import slerp, to_quaternions
+from urmpipe_models.wraps import unwrap_quaternions
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
 from urmpipe_pipeline.diagnosis.sides import Side
 from urmpipe_pipeline.joint_log import NETWORK
@@ -94,7 +94,7 @@ def by_kinematics(run: Run) -> Trajectory:
     if run.rows is not None:  # by the arithmetic of the grid, so that no grid changes a bit of a verdict
         still = np.zeros_like(run.rows.q)
         tcp = point_over_log(run.robot, run.rows.q, still, still)
-    return _by_joints(run, tcp.position, continuous_quaternions(quaternions(tcp.euler_zyx, "zyx")))
+    return _by_joints(run, tcp.position, unwrap_quaternions(to_quaternions(tcp.euler_zyx, "zyx")))
 
 
 def traces_point(run: Run) -> bool:

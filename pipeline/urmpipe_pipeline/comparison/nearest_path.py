@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.elementwise import THREADS, FloatArray, IndexArray, row_blocks, side_by_side
+from urmpipe_models.elementwise import THREADS, FloatArray, IndexArray, map_blocks, row_blocks
 
 ACCURACY = (1e-9, 1e-6)
 """What a distance may be too large by: in [m], and as a share of itself. A nanometre beside the path; a log
@@ -95,7 +95,7 @@ def _distances(points: FloatArray, path: FloatArray, joined: NDArray[np.bool_]) 
     pieces, balls = _of_path(path, joined), _of_points(points)
     best = _guess(balls, pieces)
     blocks = row_blocks(balls.widest, max(1, BLOCK * balls.widest // len(balls.row)))
-    looked = side_by_side(lambda some: _search(balls, pieces, np.arange(some.start, some.stop), best), blocks)
+    looked = map_blocks(lambda some: _search(balls, pieces, np.arange(some.start, some.stop), best), blocks)
     found[balls.row] = best[balls.single :]
     return found, sum(looked)
 
@@ -209,7 +209,7 @@ def _grouped(middle: FloatArray, shape: _Shape) -> _Groups:
                 return
             level, first = _apart(middle, level, BRANCHES), widest + BRANCHES * first
 
-    side_by_side(grow, row_blocks(widest, max(1, GROWN // size)))
+    map_blocks(grow, row_blocks(widest, max(1, GROWN // size)))
     return groups
 
 

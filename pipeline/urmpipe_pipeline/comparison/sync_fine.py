@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.math3d import best_rotation
+from urmpipe_models.math3d import fit_rotation
 from urmpipe_pipeline.comparison.sync_coarse import Peak, Rates, rates, similarity
 from urmpipe_pipeline.comparison.sync_views import View
 from urmpipe_pipeline.runs.grid import interpolate
@@ -113,7 +113,7 @@ def line_at(view: View, found: Rates, offset_ns: int) -> Line:
     energy = float((parts[2][both] ** 2).sum())
     reference, log, rate, *nuisance = (part[both] - part[both].mean(axis=0) for part in parts)
     if view.turned:
-        turn = best_rotation(reference.T @ log)[0].T
+        turn = fit_rotation(reference.T @ log)[0].T
         log = log @ turn
         nuisance = [*(np.cross(axis, log) for axis in np.eye(3)), *(part @ turn for part in nuisance)]
     residual, rate = (_without(part, nuisance) for part in (reference - log, rate))

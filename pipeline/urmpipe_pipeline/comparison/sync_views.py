@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.math3d import matrices
+from urmpipe_models.math3d import to_matrices
 from urmpipe_pipeline.comparison.matching import joint_order
 from urmpipe_pipeline.comparison.trajectory import AlignMode, Trajectory
 
@@ -46,7 +46,7 @@ def views(reference: Trajectory, log: Trajectory, align: AlignMode) -> Iterator[
     order = joint_order(reference.joints, log.joints)
     if order is not None and reference.q is not None and log.q is not None:
         yield View("joints", False, reference.t_ns, reference.q[:, order], log.t_ns, log.q)
-    axes = None if "tool" not in align or log.quat_xyzw is None else matrices(log.quat_xyzw)
+    axes = None if "tool" not in align or log.quat_xyzw is None else to_matrices(log.quat_xyzw)
     if align in ("none", "tool"):
         yield View("position", False, reference.t_ns, reference.position, log.t_ns, log.position, axes)
     both = axes if align == "base+tool" else None

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from numbers import Real
 
 from urmpipe_models import DEFAULT_TOLERANCE
-from urmpipe_models.errors import Finding, Hint, OptionError, shown
-from urmpipe_models.measure_units import WRITTEN, quantity, readings
+from urmpipe_models.errors import Finding, Hint, OptionError, format_value
+from urmpipe_models.measure_units import WRITTEN, quantity_to_si, readings
 from urmpipe_pipeline.iso9283.criteria import UNITS as CRITERIA
 
 DEVIATIONS = ("axis", "x", "y", "z", "norm", "path", "angle", "joint")
@@ -72,13 +72,13 @@ def parse_tolerance(
     if DECIMAL_COMMA.fullmatch(text):
         point = text.strip().replace(",", ".")
         allowed = f"a point before the decimals, {point}"
-        raise OptionError(Finding(parameter=parameter, found=shown(text), allowed=allowed))
+        raise OptionError(Finding(parameter=parameter, found=format_value(text), allowed=allowed))
     found: dict[str, float] = {}
     named: set[str] = set()
     faults = []
     for part, kinds, value in _parts(text, bare):
         unit = UNITS.get(kinds[0], "")
-        number = quantity(value, WRITTEN.get(unit, {}))
+        number = quantity_to_si(value, WRITTEN.get(unit, {}))
         fits = _fits(kinds[0], number, zero)
         both = readings(value, unit) if math.isfinite(number) else ()
         if both:
@@ -87,10 +87,12 @@ def parse_tolerance(
             faults.append(Finding(parameter=parameter, found=part.strip(), allowed=allowed))
         twice = " twice" if fits and not named.isdisjoint(kinds) else ""
         if (not fits and not both) or twice:
-            angle = "=" not in part and _fits("angle", quantity(value, WRITTEN["rad"]), zero) and not twice
+            angle = (
+                "=" not in part and _fits("angle", quantity_to_si(value, WRITTEN["rad"]), zero) and not twice
+            )
             of_what = ("angle", "joint") if angle else ()
             hints = tuple(Hint(parameter, f"{one}={part.strip()}", "specifies the kind") for one in of_what)
-            said = f"{shown(part.strip())}{twice}"
+            said = f"{format_value(part.strip())}{twice}"
             allowed = (ALLOWED_CRITERIA if iso else ALLOWED) + ("" if zero else ALLOWED_SHARES)
             faults.append(Finding(parameter=parameter, found=said, allowed=allowed, hints=hints))
             continue

@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.hand_eye import Untold
-from urmpipe_models.math3d import angle_between, quaternions
+from urmpipe_models.math3d import angle_between, to_quaternions
 from urmpipe_pipeline.joint_log import SourceFile, seconds
 
 SyncMode = Literal["start", "stamps", "given", "auto"]
@@ -154,7 +154,7 @@ class Alignment:
 
 
 def _angle(rotation: tuple[tuple[float, ...], ...]) -> float:
-    quat = quaternions(np.reshape(rotation, (1, 9)), "matrix")
+    quat = to_quaternions(np.reshape(rotation, (1, 9)), "matrix")
     return float(angle_between(quat, np.array([[0.0, 0.0, 0.0, 1.0]]))[0])
 
 

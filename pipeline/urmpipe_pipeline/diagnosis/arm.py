@@ -10,7 +10,7 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import BoolArray, Element, FloatArray, IntArray, Vector, scale, spread_rows
-from urmpipe_models.hand_eye import hand_eye
+from urmpipe_models.hand_eye import solve_hand_eye
 from urmpipe_models.kinematics.forward import jacobian, poses_over_log, tip_pose
 from urmpipe_models.kinematics.identification import Twist, apply_twists, sensitivities
 from urmpipe_models.math3d import Transform
@@ -104,7 +104,7 @@ class ArmModel(Positions):
         measured = None
         if self.rotation is not None:
             measured = mirror.T @ self.rotation[:, :, rows].transpose(2, 0, 1) @ mirror
-        found = hand_eye(position, rotation, self.position[:, rows].T @ mirror, measured)
+        found = solve_hand_eye(position, rotation, self.position[:, rows].T @ mirror, measured)
         base = _frame(found.base_rotation, found.base_position)
         return chain.placed(base @ chain.base, chain.tool @ _frame(found.tool_rotation, found.tool_position))
 

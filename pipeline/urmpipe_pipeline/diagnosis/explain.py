@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from urmpipe_models.elementwise import FloatArray, IntArray, row_blocks, side_by_side
+from urmpipe_models.elementwise import FloatArray, IntArray, map_blocks, row_blocks
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.cause_texts import short_name
 from urmpipe_pipeline.diagnosis.deciding import deciding_joint
@@ -422,7 +422,7 @@ class ExplanationBuilder:
             flat = jacobian.reshape(len(columns), -1)
             return np.einsum("pcn,cn->np", jacobian, left), flat @ flat.T
 
-        parts = side_by_side(scores_of, row_blocks(len(rows.at), BLOCK))
+        parts = map_blocks(scores_of, row_blocks(len(rows.at), BLOCK))
         scores, gram = np.concatenate([part[0] for part in parts]), sum(part[1] for part in parts)
         size = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
         inverse = np.linalg.pinv(gram / size / size[:, np.newaxis], rcond=1e-12, hermitian=True)

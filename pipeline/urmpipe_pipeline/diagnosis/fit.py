@@ -8,7 +8,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_blocks, side_by_side
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, map_blocks, row_blocks
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.diagnosis.hypotheses import Group, State
 from urmpipe_pipeline.diagnosis.selection import Normal
@@ -181,21 +181,21 @@ def normal_equations(model: Model, state: State, rows: Rows, groups: Sequence[Gr
         return Normal(flat @ flat.T, flat @ flat_y, float(flat_y @ flat_y), flat_y.size)
 
     whole = Normal(np.zeros((len(columns), len(columns))), np.zeros(len(columns)), 0.0, 0)
-    for part in side_by_side(of_block, row_blocks(len(rows.at), BLOCK)):
+    for part in map_blocks(of_block, row_blocks(len(rows.at), BLOCK)):
         whole = whole + part
     return whole
 
 
 def residual(model: Model, state: State, rows: IntArray) -> FloatArray:
     """Return what an explanation leaves of rows in [m] and [rad], shape (c, n), worked on by blocks."""
-    parts = side_by_side(lambda block: model.residual(state, rows[block]), row_blocks(len(rows)))
+    parts = map_blocks(lambda block: model.residual(state, rows[block]), row_blocks(len(rows)))
     return np.concatenate(parts, axis=1)
 
 
 def deviation(model: Model, state: State) -> FloatArray:
     """Return what an explanation leaves of what is judged, of all rows, in [m] or [rad], shape (k, n)."""
     rows = np.arange(model.rows)
-    parts = side_by_side(lambda block: model.deviation(state, rows[block]), row_blocks(len(rows)))
+    parts = map_blocks(lambda block: model.deviation(state, rows[block]), row_blocks(len(rows)))
     return np.concatenate(parts, axis=1)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, spread_rows
 from urmpipe_models.kinematics.forward import jacobian, positions_over_log
-from urmpipe_models.math3d import Transform, matrices
+from urmpipe_models.math3d import Transform, to_matrices
 from urmpipe_pipeline import text
 from urmpipe_pipeline.diagnosis.arm import ArmModel
 from urmpipe_pipeline.diagnosis.arm_groups import (
@@ -325,7 +325,7 @@ def _turned(quat: FloatArray | None) -> FloatArray | None:
 
 
 def _matrices(quat: FloatArray) -> FloatArray:
-    return matrices(quat).transpose(1, 2, 0).copy()
+    return to_matrices(quat).transpose(1, 2, 0).copy()
 
 
 def _rounding(values: FloatArray, run: Run) -> FloatArray:

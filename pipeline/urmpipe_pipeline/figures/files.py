@@ -12,7 +12,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from urmpipe_models.errors import Finding, OptionError, OutputError, for_each, shown
+from urmpipe_models.errors import Finding, OptionError, OutputError, format_value, map_collecting_errors
 from urmpipe_pipeline.figures.listing import Listed, Plot, chosen, listed
 from urmpipe_pipeline.figures.size import COARSEST, FINEST, Size, size_of
 from urmpipe_pipeline.outputs import DRAWING_HEADER, guarded_output, refuse_output
@@ -62,7 +62,9 @@ class FigureOptions:
     dpi: int = 300
 
     def __post_init__(self) -> None:
-        for_each(lambda check: check(), (self._check_formats, lambda: self.size, self._check_dpi))
+        map_collecting_errors(
+            lambda check: check(), (self._check_formats, lambda: self.size, self._check_dpi)
+        )
 
     @property
     def size(self) -> Size:
@@ -78,7 +80,7 @@ class FigureOptions:
     def _check_dpi(self) -> None:
         if not FINEST <= self.dpi <= COARSEST:
             allowed = f"{FINEST} to {COARSEST}"
-            raise OptionError(Finding(parameter="figure_dpi", found=shown(self.dpi), allowed=allowed))
+            raise OptionError(Finding(parameter="figure_dpi", found=format_value(self.dpi), allowed=allowed))
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +131,7 @@ def write_figures(
     ]
     files = [file for _, some in wanted for file in some]
     with _made_folder(options.folder), all_or_none():
-        for_each(lambda file: refuse_output(file.path, inputs, "figure"), files)
+        map_collecting_errors(lambda file: refuse_output(file.path, inputs, "figure"), files)
         done = 0
         for one, some in wanted:
             save = _saver(one, options)

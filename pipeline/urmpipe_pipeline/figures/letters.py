@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, fontManager, get_font
 from matplotlib.text import Text
 
-from urmpipe_models.errors import inert
+from urmpipe_models.errors import escape_control_characters
 from urmpipe_pipeline.text import encodable
 
 FONT = "DejaVu Sans"
@@ -19,7 +19,7 @@ FONT = "DejaVu Sans"
 
 def drawable(words: str) -> str:
     """Return a text from a file as it is drawn: with escapes for what acts, without what is no letter."""
-    return encodable(inert(words))
+    return encodable(escape_control_characters(words))
 
 
 def complete(made: Figure) -> None:

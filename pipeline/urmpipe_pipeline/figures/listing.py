@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 
-from urmpipe_models.errors import Finding, OptionError, not_among
+from urmpipe_models.errors import Finding, OptionError, format_unknown_name
 from urmpipe_pipeline.presentation.curves import Span, axis_of, by_axis, panels_of, span_of
 from urmpipe_pipeline.presentation.figure import Drawing, Figure, Panel, SpaceFigure
 from urmpipe_pipeline.presentation.section import Presentation, Section
@@ -70,7 +70,9 @@ def chosen(figures: Sequence[Listed], names: Sequence[str], parameter: str) -> l
     unknown = [name for name in names if not any(_stands_for(name, one) for one in figures)]
     if unknown:
         titles = [one.title for one in figures]
-        raise OptionError(*(Finding(not_among(name, titles), parameter=parameter) for name in unknown))
+        raise OptionError(
+            *(Finding(format_unknown_name(name, titles), parameter=parameter) for name in unknown)
+        )
     return [one for one in figures if not names or any(_stands_for(name, one) for name in names)]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, format_value
 from urmpipe_pipeline.figures.files import drawn
 from urmpipe_pipeline.figures.listing import Listed, Plot, chosen, listed
 from urmpipe_pipeline.figures.size import size_of
@@ -31,7 +31,9 @@ def plot(presentation: Presentation, title: str | None, width: str | float, font
     """
     size = size_of(width, font)
     if not (title is None or isinstance(title, str)):
-        raise OptionError(Finding(parameter="title", found=shown(title), allowed="the title of a figure"))
+        raise OptionError(
+            Finding(parameter="title", found=format_value(title), allowed="the title of a figure")
+        )
     figures = (one for one in listed([presentation]) if not isinstance(one.content, Drawing))
     wanted = _main(figures) if title is None else chosen(list(figures), (title,), "title")[0]
     if wanted is None:

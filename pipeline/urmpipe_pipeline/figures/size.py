@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from decimal import Decimal
 from numbers import Real
 
-from urmpipe_models.errors import Finding, OptionError, shown
-from urmpipe_models.measure_units import WRITTEN, quantity
+from urmpipe_models.errors import Finding, OptionError, format_value
+from urmpipe_models.measure_units import WRITTEN, quantity_to_si
 
 WIDTHS = {"column": 0.088, "page": 0.180}
 """Widths by name in [m], as most journals have them."""
@@ -50,14 +50,16 @@ def size_of(width: str | float, font: float, prefix: str = "") -> Size:
     Raises:
         OptionError: With all that is out of range.
     """
-    length = WIDTHS.get(width) or quantity(width, PAPER_UNITS) if isinstance(width, str) else _number(width)
+    length = (
+        WIDTHS.get(width) or quantity_to_si(width, PAPER_UNITS) if isinstance(width, str) else _number(width)
+    )
     wrong = []
     if not NARROWEST <= length <= WIDEST:
         allowed = "column, page, or 40 mm to 1 m, such as 85mm or 3.5in"
-        wrong.append(Finding(parameter=f"{prefix}width", found=shown(width), allowed=allowed))
+        wrong.append(Finding(parameter=f"{prefix}width", found=format_value(width), allowed=allowed))
     if not SMALLEST <= _number(font) <= LARGEST:
         allowed = f"{SMALLEST:g} to {LARGEST:g}, in pt"
-        wrong.append(Finding(parameter=f"{prefix}font", found=shown(font), allowed=allowed))
+        wrong.append(Finding(parameter=f"{prefix}font", found=format_value(font), allowed=allowed))
     if wrong:
         raise OptionError(*wrong)
     return Size(length, float(font))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import in_html
+from urmpipe_models.errors import escape_html
 from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.iso9283.corners import CornerPath
 from urmpipe_pipeline.iso9283.result import AttainedPoses, CutPath, IsoTest
@@ -296,7 +296,7 @@ SMALL_END = 'fill="#5b6770" font-size="10" text-anchor="end"'
 
 
 def _title(words: str, left: float, top: float) -> str:
-    return f'<text x="{left + GAP_PX:.1f}" y="{top + 20:.1f}">{in_html(words)}</text>'
+    return f'<text x="{left + GAP_PX:.1f}" y="{top + 20:.1f}">{escape_html(words)}</text>'
 
 
 def _cloud(points: FloatArray) -> str:
@@ -328,12 +328,12 @@ def _svg(
     legend, x = [], float(GAP_PX) + 10.0
     for sign, words in entries:
         legend.append(f'<g transform="translate({x:.0f} {height + 10:.0f})">{sign}')
-        legend.append(f'<text x="14" y="4">{in_html(words)}</text></g>')
+        legend.append(f'<text x="14" y="4">{escape_html(words)}</text></g>')
         x += 40.0 + 6.6 * len(words)
     return "\n".join(
         (
             f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="sans-serif" font-size="12">',
-            f"<title>{in_html(title)}</title>",
+            f"<title>{escape_html(title)}</title>",
             '<rect width="100%" height="100%" fill="white"/>',
             *parts,
             *legend,

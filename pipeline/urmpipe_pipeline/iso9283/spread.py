@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.math3d import euler_zyx, matrices
+from urmpipe_models.math3d import euler_zyx, to_matrices
 
 
 def accuracy(attained: FloatArray, command: FloatArray) -> FloatArray:
@@ -60,7 +60,7 @@ def threefold(values: FloatArray) -> FloatArray | None:
 
 def angles(quat_xyzw: FloatArray) -> FloatArray:
     """Return rz, ry, rx of orientations [-], shape (n, 4), with R = Rz Ry Rx, in [rad], shape (n, 3)."""
-    r = matrices(quat_xyzw)
+    r = to_matrices(quat_xyzw)
     rows = tuple(tuple(r[:, i, j] for j in range(3)) for i in range(3))
     rz, ry, rx, _ = euler_zyx(rows)  # type: ignore[arg-type]
     return np.column_stack((rz, ry, rx))

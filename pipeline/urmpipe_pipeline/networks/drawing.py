@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from urmpipe_models.errors import in_html
+from urmpipe_models.errors import escape_html
 from urmpipe_pipeline.networks.gallery import gallery_svg
 from urmpipe_pipeline.networks.graph_drawing import graph_svg
 from urmpipe_pipeline.networks.result import NetworkResult
@@ -53,7 +53,7 @@ def stacked(pictures: Sequence[str], title: str) -> str:
     return "\n".join(
         (
             f'<svg xmlns="http://www.w3.org/2000/svg" {size}>',
-            f"<title>{in_html(title)}</title>",
+            f"<title>{escape_html(title)}</title>",
             '<rect width="100%" height="100%" fill="white"/>',
             *(
                 one.replace("<svg ", f'<svg y="{top:.0f}" ', 1)

@@ -18,7 +18,14 @@ from typing import Any
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, Vector
-from urmpipe_models.errors import Finding, NetworkError, OptionError, for_each, not_among, shown
+from urmpipe_models.errors import (
+    Finding,
+    NetworkError,
+    OptionError,
+    format_unknown_name,
+    format_value,
+    map_collecting_errors,
+)
 from urmpipe_models.networks.assembly import MOST_STARTS, RESTARTS, assemble
 from urmpipe_models.networks.driving import (
     LAWS,
@@ -112,18 +119,22 @@ class DriveRequest:
             if count is not None and (
                 isinstance(count, bool) or not isinstance(count, Integral) or count < least
             ):
-                yield Finding(parameter=key, found=shown(count), allowed=f"a whole number, {least} or more")
+                yield Finding(
+                    parameter=key, found=format_value(count), allowed=f"a whole number, {least} or more"
+                )
         for key, value in (("duration", self.duration), ("tsp", self.tsp)):
             if value is not None and not (isinstance(value, Real) and 1e-9 <= float(value) < 1e9):
-                yield Finding(parameter=key, found=shown(value), allowed="a time in s, 1e-9 to 1e9")
+                yield Finding(parameter=key, found=format_value(value), allowed="a time in s, 1e-9 to 1e9")
         if self.steps is not None and self.duration is not None:
             yield Finding("found together with steps, allowed: one of the two", parameter="duration")
         if self.law not in LAWS:
-            yield Finding(not_among(str(self.law), LAWS), parameter="law")
+            yield Finding(format_unknown_name(str(self.law), LAWS), parameter="law")
         elif self.law != "uniform" and self.duration is None:
             yield Finding("found without a duration, allowed: with one", parameter="law")
         if isinstance(self.restarts, Integral) and self.restarts > MOST_STARTS:
-            yield Finding(parameter="restarts", found=shown(self.restarts), allowed=f"{MOST_STARTS} at most")
+            yield Finding(
+                parameter="restarts", found=format_value(self.restarts), allowed=f"{MOST_STARTS} at most"
+            )
         if self.branch is not None and self.start:
             yield Finding("found together with start, allowed: one of the two", parameter="branch")
 
@@ -177,7 +188,7 @@ def drive_network(
         lambda: [parse_wrench(network, wrench) for wrench in request.wrenches],
         lambda: parse_torques(network, request.torques),
     )
-    _, driven, ranges, start, point, wrenches, torques = for_each(lambda make: make(), parts)
+    _, driven, ranges, start, point, wrenches, torques = map_collecting_errors(lambda make: make(), parts)
     t_ns = request.times_ns() if log is None else log.t_ns
     factors = np.array([drive_factor(network, name) for name in driven.names])
     values, d_values, dd_values = _drive_values(driven, ranges, factors, columns, log, request, t_ns)
@@ -267,7 +278,9 @@ def _log_columns(network: Network, request: DriveRequest, log: Run) -> dict[str,
     joints = log.log.joints
     by_name = {name: str(column) for name, column in request.drives.items() if is_word(column)}
     if invalid := [column for column in by_name.values() if column not in joints]:
-        faults = [Finding(f"column {not_among(name, joints)}", parameter="drives") for name in invalid]
+        faults = [
+            Finding(f"column {format_unknown_name(name, joints)}", parameter="drives") for name in invalid
+        ]
         raise OptionError(*faults)
     if by_name:
         return by_name

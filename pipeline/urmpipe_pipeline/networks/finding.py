@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_models.display import number_of
-from urmpipe_models.errors import Finding, Hint, OptionError, for_each, shown
+from urmpipe_models.display import format_count
+from urmpipe_models.errors import Finding, Hint, OptionError, format_value, map_collecting_errors
 from urmpipe_models.networks.assembly import (
     MOST_STARTS,
     RESTARTS,
@@ -67,13 +67,13 @@ class Search:
                 continue
             if isinstance(value, bool) or not isinstance(value, Real) or not abs(float(value)) < float("inf"):
                 yield Finding(
-                    parameter="controls", found=f"{name} = {shown(value)}", allowed="a finite number"
+                    parameter="controls", found=f"{name} = {format_value(value)}", allowed="a finite number"
                 )
         for key, count in (("restarts", self.restarts), ("seed", self.seed)):
             if not isinstance(count, Integral) or count < 0:
-                yield Finding(parameter=key, found=shown(count), allowed="a whole number, 0 or more")
+                yield Finding(parameter=key, found=format_value(count), allowed="a whole number, 0 or more")
             elif key == "restarts" and count > MOST_STARTS:
-                yield Finding(parameter=key, found=shown(count), allowed=f"{MOST_STARTS} at most")
+                yield Finding(parameter=key, found=format_value(count), allowed=f"{MOST_STARTS} at most")
 
 
 def find_network(
@@ -97,10 +97,10 @@ def find_network(
     """
     mechanism = build_mechanism(network)
     parts: tuple[Callable[[], Any], ...] = (
-        lambda: for_each(lambda pair: network.control_value(*pair), search.controls.items()),
+        lambda: map_collecting_errors(lambda pair: network.control_value(*pair), search.controls.items()),
         lambda: parse_start(network, search.start),
     )
-    values, start = for_each(lambda make: make(), parts)
+    values, start = map_collecting_errors(lambda make: make(), parts)
     controls = dict(zip(search.controls, values, strict=True))
     found, unreached = _assemble(mechanism, controls, start, search, progress)
     mobility = mobility_of(mechanism, found.x_nearest) if found.assemblies else None
@@ -146,7 +146,7 @@ def _warnings(
     if every and found.continuum:
         said = (
             f"with its controls held the network still moves, with mobility {found.continuum}: its assemblies"
-            f" cannot be listed; {number_of(found.continuum, 'more control')} would hold it"
+            f" cannot be listed; {format_count(found.continuum, 'more control')} would hold it"
         )
         yield LogWarning("continuum", said)
     if mobility is None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import in_html
+from urmpipe_models.errors import escape_html
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mobility import Assembly
 from urmpipe_pipeline.networks.parts_in_space import body_points, find_plane, parts, placed
@@ -46,9 +46,9 @@ def gallery_svg(result: NetworkResult) -> str:
     return "\n".join(
         (
             f'<svg xmlns="http://www.w3.org/2000/svg" {size} font-family="sans-serif" font-size="12">',
-            f"<title>{in_html(heading)}</title>",
+            f"<title>{escape_html(heading)}</title>",
             '<rect width="100%" height="100%" fill="white"/>',
-            f'<text x="14" y="26" font-size="17">{in_html(heading)}</text>',
+            f'<text x="14" y="26" font-size="17">{escape_html(heading)}</text>',
             *(
                 line
                 for k, pieces in enumerate(drawn)

@@ -15,8 +15,14 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from urmpipe_models.elementwise import Vector
-from urmpipe_models.errors import Finding, OptionError, for_each, not_among, shown
-from urmpipe_models.measure_units import MEASURES, NAMES, QUANTITY, WRITTEN, quantity
+from urmpipe_models.errors import (
+    Finding,
+    OptionError,
+    format_unknown_name,
+    format_value,
+    map_collecting_errors,
+)
+from urmpipe_models.measure_units import MEASURES, NAMES, QUANTITY, WRITTEN, quantity_to_si
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.forces import Wrench
 from urmpipe_models.networks.mechanism import build_mechanism
@@ -48,13 +54,15 @@ def parse_quantity(
     if not isinstance(value, str):
         if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(float(value)):
             raise OptionError(
-                Finding(parameter=parameter, found=f"{name} = {shown(value)}", allowed="a finite number")
+                Finding(
+                    parameter=parameter, found=f"{name} = {format_value(value)}", allowed="a finite number"
+                )
             )
         return float(value)
     in_file = {"m": network.length_unit, "rad": network.angle_unit}.get(unit, "")
     units = {key: si / factor for key, si in WRITTEN.get(unit, {}).items()}
     units[""] = MEASURES[unit][in_file] / factor if unit else Decimal(1)
-    number = quantity(value, units)
+    number = quantity_to_si(value, units)
     if not math.isfinite(number):
         allowed = f"a number, or {NAMES[unit].partition(' in ')[0]} with its unit" if unit else "a number"
         raise OptionError(Finding(parameter=parameter, found=f"{name} = {value}", allowed=allowed))
@@ -92,12 +100,12 @@ def parse_ranges(network: Network, drives: Mapping[str, Range]) -> list[tuple[fl
         unit, factor = _find_unit(network, name)
         ends = value.split(":") if isinstance(value, str) else _as_list(value)
         if len(ends) not in (1, 2):
-            found, allowed = f"{name} = {shown(value)}", "FROM:TO, or one value"
+            found, allowed = f"{name} = {format_value(value)}", "FROM:TO, or one value"
             raise OptionError(Finding(parameter="drives", found=found, allowed=allowed))
         read = [parse_quantity(network, "drives", name, end, unit, factor) for end in ends]
         return read[0], read[-1]
 
-    return for_each(parse, drives.items())
+    return map_collecting_errors(parse, drives.items())
 
 
 def parse_start(network: Network, start: Mapping[str, Any]) -> dict[str, tuple[float, ...]]:
@@ -115,23 +123,25 @@ def parse_start(network: Network, start: Mapping[str, Any]) -> dict[str, tuple[f
         if name in controls and name not in units:
             return None
         if name not in units:
-            raise OptionError(Finding(f"joint {not_among(name, units)}", parameter="start"))
+            raise OptionError(Finding(f"joint {format_unknown_name(name, units)}", parameter="start"))
         values = _as_list(value)
         if len(values) != len(units[name]):
             allowed = f"{len(units[name])} in {', '.join(units[name])}"
-            raise OptionError(Finding(parameter="start", found=f"{name} = {shown(value)}", allowed=allowed))
+            raise OptionError(
+                Finding(parameter="start", found=f"{name} = {format_value(value)}", allowed=allowed)
+            )
         pairs = zip(values, units[name], strict=True)
         return name, tuple(
             parse_quantity(network, "start", name, part, unit, Decimal(1)) for part, unit in pairs
         )
 
-    return dict(pair for pair in for_each(parse, start.items()) if pair is not None)
+    return dict(pair for pair in map_collecting_errors(parse, start.items()) if pair is not None)
 
 
 def _parse_vector(parameter: str, value: Any, counts: tuple[int, ...], si: str, allowed: str) -> list[float]:
     """Return the numbers of a text such as 1,2,3 or of a list."""
     numbers = [
-        quantity(part, WRITTEN[si])
+        quantity_to_si(part, WRITTEN[si])
         if isinstance(part, str)
         else float(part)
         if isinstance(part, Real)
@@ -139,13 +149,15 @@ def _parse_vector(parameter: str, value: Any, counts: tuple[int, ...], si: str, 
         for part in _as_list(value)
     ]
     if len(numbers) not in counts or not all(map(math.isfinite, numbers)):
-        raise OptionError(Finding(parameter=parameter, found=shown(value), allowed=allowed))
+        raise OptionError(Finding(parameter=parameter, found=format_value(value), allowed=allowed))
     return numbers
 
 
 def _check_body(network: Network, parameter: str, body: Any) -> str:
     if body not in network.body_names:
-        raise OptionError(Finding(f"body {not_among(str(body), network.body_names)}", parameter=parameter))
+        raise OptionError(
+            Finding(f"body {format_unknown_name(str(body), network.body_names)}", parameter=parameter)
+        )
     return str(body)
 
 
@@ -158,7 +170,7 @@ def parse_point(network: Network, point: Any) -> tuple[str, Vector] | None:
     if isinstance(point, str) and ":" not in point:
         parts = [point, "0,0,0"]
     if len(parts) != 2:
-        raise OptionError(Finding(parameter="point", found=shown(point), allowed=allowed))
+        raise OptionError(Finding(parameter="point", found=format_value(point), allowed=allowed))
     x, y, z = _parse_vector("point", parts[1], (3,), "m", allowed)
     return _check_body(network, "point", parts[0]), (x, y, z)
 
@@ -170,7 +182,7 @@ def parse_wrench(network: Network, wrench: Any) -> Wrench:
     if isinstance(wrench, Wrench):
         parts = [wrench.body, wrench.point, [*wrench.force, *wrench.moment]]
     if len(parts) != 3:
-        raise OptionError(Finding(parameter="wrenches", found=shown(wrench), allowed=allowed))
+        raise OptionError(Finding(parameter="wrenches", found=format_value(wrench), allowed=allowed))
     x, y, z = _parse_vector("wrenches", parts[1], (3,), "m", allowed)
     load = _parse_vector("wrenches", parts[2], (3, 6), "1", allowed) + [0.0] * 3
     body = _check_body(network, "wrenches", parts[0])
@@ -193,13 +205,13 @@ def parse_torques(network: Network, torques: Mapping[str, Any]) -> dict[str, flo
     def parse(pair: tuple[str, Any]) -> tuple[str, float]:
         name, value = pair
         if name not in joints:
-            raise OptionError(Finding(f"joint {not_among(name, joints)}", parameter="torques"))
+            raise OptionError(Finding(f"joint {format_unknown_name(name, joints)}", parameter="torques"))
         units = ("N.m", "Nm") if joints[name].units[0] == "rad" else ("N",)
         known = dict.fromkeys(("", *units), Decimal(1))
-        number = quantity(value, known) if isinstance(value, str) else value
+        number = quantity_to_si(value, known) if isinstance(value, str) else value
         if isinstance(number, bool) or not isinstance(number, Real) or not math.isfinite(float(number)):
-            found = f"{name} = {shown(value)}"
+            found = f"{name} = {format_value(value)}"
             raise OptionError(Finding(parameter="torques", found=found, allowed=f"a number in {units[0]}"))
         return name, float(number)
 
-    return dict(for_each(parse, torques.items()))
+    return dict(map_collecting_errors(parse, torques.items()))

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import in_html
+from urmpipe_models.errors import escape_html
 from urmpipe_models.networks.parts import ConstraintElement, Control
 from urmpipe_pipeline.lettering import Box, width_of
 from urmpipe_pipeline.networks.drives import Tie, caption, controlled, is_driven, ties
@@ -56,7 +56,7 @@ def graph_svg(result: NetworkResult) -> str:
             f'<svg xmlns="http://www.w3.org/2000/svg" {size} {LETTERS}>',
             _title(title),
             '<rect width="100%" height="100%" fill="white"/>',
-            f'<text x="{MARGIN_PX:.0f}" y="26" font-size="17">{in_html(title)}</text>',
+            f'<text x="{MARGIN_PX:.0f}" y="26" font-size="17">{escape_html(title)}</text>',
             f'<g transform="{shift}">',
             *_clusters(result, layout),
             *_loops(result, layout),
@@ -130,7 +130,7 @@ def _body(result: NetworkResult, name: str, box: Box) -> str:
     x, y = box.middle
     place = _edges(box)
     at = f'x="{x:.1f}" y="{y + 4.5:.1f}" text-anchor="middle"'
-    words = f'<text class="body" {at} fill="{INK_COLOUR}">{in_html(name)}</text>'
+    words = f'<text class="body" {at} fill="{INK_COLOUR}">{escape_html(name)}</text>'
     if name != result.network.ground:
         edge = f'rx="9" fill="white" stroke="{colour}" stroke-width="2.6"'
         return f"<rect {place} {edge}/>{words}"
@@ -147,7 +147,7 @@ def _words(words: str, box: Box, one: Tie) -> str:
     """Return the words at a line: its name in bold, what it is, and what drives it."""
     x, y = box.middle
     colour = CONTROL_COLOUR if is_driven(one) else INK_COLOUR
-    name, rest = in_html(one.name), in_html(words[len(one.name) :])
+    name, rest = escape_html(one.name), escape_html(words[len(one.name) :])
     place = f'class="tie" x="{x:.1f}" y="{y + 4.5:.1f}" text-anchor="middle" fill="{colour}"'
     behind = f'<rect {_edges(box)} rx="5" fill="white" fill-opacity="0.75"/>'
     return f'{behind}<text {place} {HALO}><tspan font-weight="bold">{name}</tspan>{rest}</text>'
@@ -185,12 +185,12 @@ def _key_line(words: str, colour: str, y: float) -> str:
     """Return a line of the key, with a swatch if it has a colour."""
     swatch = f'<rect x="{MARGIN_PX:.0f}" y="{y - 10:.1f}" width="12" height="12" rx="2" fill="{colour}"/>'
     place = f'x="{MARGIN_PX + (20.0 if colour else 0.0):.0f}" y="{y:.1f}" fill="{QUIET}"'
-    return f"{swatch if colour else ''}<text {place}>{in_html(words)}</text>"
+    return f"{swatch if colour else ''}<text {place}>{escape_html(words)}</text>"
 
 
 def _title(words: str) -> str:
     """Return what is shown where the pointer rests."""
-    return f"<title>{in_html(words)}</title>"
+    return f"<title>{escape_html(words)}</title>"
 
 
 def _edges(box: Box) -> str:

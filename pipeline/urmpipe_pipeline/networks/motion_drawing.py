@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.math3d import quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.parts import ConstraintElement, Joint
 from urmpipe_pipeline.networks.drives import Tie, ties
@@ -224,7 +224,7 @@ def _in_frame(solid: Solid, motion: Motion, pose: FloatArray) -> Solid:
 
 def _quaternions(poses: FloatArray) -> FloatArray:
     """Return the orientations of poses, shape (n, 4, 4), as quaternions x, y, z, w [-], shape (n, 4)."""
-    return quaternions(poses[:, :3, :3].reshape(-1, 9), "matrix")
+    return to_quaternions(poses[:, :3, :3].reshape(-1, 9), "matrix")
 
 
 def _further_rows(poses: FloatArray) -> list[int]:

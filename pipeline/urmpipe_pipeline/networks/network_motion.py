@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from urmpipe_models.display import line_of
+from urmpipe_models.display import format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Voice
-from urmpipe_models.math3d import quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.motion import Passage, iter_chunks
@@ -294,7 +294,7 @@ class NetworkMotion(Result):
         rows = np.empty((9, len(self)))
         for k, entry in enumerate(entry for row in frame.rotation for entry in row):
             rows[k] = entry
-        return quaternions(rows.T, "matrix")
+        return to_quaternions(rows.T, "matrix")
 
     def as_run(self) -> Run:
         """Return the motion as a run: its joints, and the traced point as the recorded tool centre point."""
@@ -303,7 +303,7 @@ class NetworkMotion(Result):
     def _headline(self) -> str:
         """Return its verdict, its drives and its duration."""
         rows = f"{len(self)} of {self.requested} rows" if not self.complete else f"{len(self)} rows"
-        return line_of(self.name, self.verdict, ", ".join(drive.name for drive in self.drives), rows)
+        return format_headline(self.name, self.verdict, ", ".join(drive.name for drive in self.drives), rows)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row per sample.

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from urmpipe_models.display import line_of, number_of
+from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Voice
-from urmpipe_models.math3d import quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Structure, build_mechanism
 from urmpipe_models.networks.mobility import Assembly, Gap, Mobility
@@ -93,9 +93,9 @@ class NetworkResult(Result):
 
     def _headline(self) -> str:
         """Return its verdict, what it is and how much of it moves, and how many assemblies there are."""
-        found = number_of(len(self.assemblies), "assembly").replace("assemblys", "assemblies")
+        found = format_count(len(self.assemblies), "assembly").replace("assemblys", "assemblies")
         moves = self.mobility and f"{self.mobility.kind} of mobility {self.mobility.mobility}"
-        return line_of(self.name, self.verdict, self.structure, moves, found)
+        return format_headline(self.name, self.verdict, self.structure, moves, found)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row an assembly: its variables in [m] and [rad], residual and mobility.
@@ -180,7 +180,7 @@ class NetworkResult(Result):
 
 def _poses(matrices: FloatArray) -> list[dict[str, list[float]]]:
     """Return positions in [m] and quaternions x, y, z, w with w >= 0 of poses, shape (bodies, 4, 4)."""
-    quats = quaternions(matrices[:, :3, :3].reshape(-1, 9), "matrix")
+    quats = to_quaternions(matrices[:, :3, :3].reshape(-1, 9), "matrix")
     quats = np.where(quats[:, 3:] < 0.0, -quats, quats) + 0.0  # no -0
     positions = matrices[:, :3, 3] + 0.0
     return [

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import Finding, OptionError, not_among
-from urmpipe_models.math3d import matrices, quaternions
-from urmpipe_models.measure_units import WRITTEN, quantity
+from urmpipe_models.errors import Finding, OptionError, format_unknown_name
+from urmpipe_models.math3d import to_matrices, to_quaternions
+from urmpipe_models.measure_units import WRITTEN, quantity_to_si
 from urmpipe_models.planning.path import PLANES, PathRows, cube_rows, validate_cube
 from urmpipe_pipeline.planned_paths.row_checks import FARTHEST
 
@@ -56,7 +56,7 @@ def _pairs(parts: list[str], faults: list[Finding]) -> Iterator[tuple[str, str]]
         if not sign:
             faults.append(Finding(found=repr(part), allowed="KEY=VALUE with a decimal point, such as a=0.6"))
         elif key not in KEYS:
-            faults.append(Finding(f"key: {not_among(key, KEYS)}"))
+            faults.append(Finding(f"key: {format_unknown_name(key, KEYS)}"))
         elif key in seen:
             faults.append(Finding(found=f"{key} twice", allowed="each key once"))
         else:
@@ -69,7 +69,7 @@ def _values(given: Mapping[str, str], faults: list[Finding]) -> Iterator[tuple[s
     for key, text in given.items():
         if key == PLANE:
             continue
-        value = quantity(text, WRITTEN["rad" if key in ANGLE_KEYS else "m"])
+        value = quantity_to_si(text, WRITTEN["rad" if key in ANGLE_KEYS else "m"])
         if key in LENGTH_KEYS and FARTHEST < abs(value) < math.inf:
             faults.append(Finding(found=f"{key}={text}", allowed=f"up to {FARTHEST:g} m"))
         elif math.isfinite(value):
@@ -98,4 +98,4 @@ def _rotation(values: Mapping[str, float]) -> FloatArray | None:
     if ANGLE_KEYS[0] not in values:
         return None
     turns = np.array([[values[key] for key in ANGLE_KEYS]])
-    return np.asarray(matrices(quaternions(turns, "zyx"))[0])
+    return np.asarray(to_matrices(to_quaternions(turns, "zyx"))[0])

@@ -8,7 +8,7 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.math3d import NAMES
+from urmpipe_models.math3d import COLUMN_NAMES
 from urmpipe_pipeline.joint_log import SOLVED, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.planned_paths.planned_joints import PlannedJoints
 from urmpipe_pipeline.provenance import Provenance
@@ -65,6 +65,6 @@ def _columns(chain: Chain | None, *, turned: bool) -> Iterator[LogColumn]:
     for j, axis in enumerate("xyz"):
         number += 1
         yield LogColumn(axis, f"{axis} [m]", "position", j, "m", number=number)
-    for j, component in enumerate(NAMES["quat_xyzw"] if turned else ()):
+    for j, component in enumerate(COLUMN_NAMES["quat_xyzw"] if turned else ()):
         number += 1
         yield LogColumn(component, component, "rotation", j, "", number=number)

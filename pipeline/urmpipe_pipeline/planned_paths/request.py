@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, format_value
 from urmpipe_models.planning.laws import ARCS, Arcs
 
 Law = Literal["trapezoid", "jerk", "limits"]
@@ -84,17 +84,21 @@ def _bad_values(timing: Timing) -> Iterator[Finding]:
     """Yield which values are not among those allowed, or no finite numbers above 0."""
     for name, words in (("law", LAWS), ("arcs", ARCS)):
         if getattr(timing, name) not in words:
-            yield Finding(parameter=name, found=shown(getattr(timing, name)), allowed=", ".join(words))
+            yield Finding(parameter=name, found=format_value(getattr(timing, name)), allowed=", ".join(words))
     units = {"velocity": "m/s", "acceleration": "m/s2", "jerk": "m/s3", "tsp": "s"}
     for name, unit in units.items():
         value = getattr(timing, name)
         if value is not None and not (isinstance(value, Real) and 0.0 < float(value) < math.inf):
-            yield Finding(parameter=name, found=shown(value), allowed=f"a finite number of {unit} above 0")
+            yield Finding(
+                parameter=name, found=format_value(value), allowed=f"a finite number of {unit} above 0"
+            )
         elif name == "tsp" and timing.tsp < NANOSECOND:
-            yield Finding(parameter=name, found=shown(value), allowed="1e-09 s or more: times are in ns")
+            yield Finding(
+                parameter=name, found=format_value(value), allowed="1e-09 s or more: times are in ns"
+            )
         elif value is not None and not LEAST <= float(value) <= LARGEST:
             allowed = f"{LEAST:g} to {LARGEST:g} {unit}"
-            yield Finding(parameter=name, found=shown(value), allowed=allowed)
+            yield Finding(parameter=name, found=format_value(value), allowed=allowed)
 
 
 def _bad_pairs(timing: Timing) -> Iterator[Finding]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.display import line_of
+from urmpipe_models.display import format_headline
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Voice
 from urmpipe_models.planning.from_rows import rows_to_path
@@ -158,7 +158,9 @@ class PlannedPath(Result):
     def _headline(self) -> str:
         """Return its verdict, the arm, its length and duration."""
         arm = self.robot.name if self.robot else "no robot"
-        return line_of(self.name, self.verdict, arm, f"{self.path.total:.6g} m in {self.duration:.6g} s")
+        return format_headline(
+            self.name, self.verdict, arm, f"{self.path.total:.6g} m in {self.duration:.6g} s"
+        )
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a sample.

@@ -8,7 +8,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IndexArray
 from urmpipe_models.kinematics.forward import points_over_log, poses_over_log
-from urmpipe_models.math3d import quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import DEVIATION_COLOUR, INK_COLOUR, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.planned_paths.planes import outlines
@@ -141,4 +141,4 @@ def _quaternions(plan: PlannedPath, at: IndexArray) -> FloatArray | None:
     if plan.joints is None or not plan.reached[at].all():
         return None
     rotation = poses_over_log(plan.joints.chain, plan.joints.q[at])[1]
-    return quaternions(rotation.reshape(-1, 9), "matrix")
+    return to_quaternions(rotation.reshape(-1, 9), "matrix")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from urmpipe_models.errors import Voice, hint_words
+from urmpipe_models.errors import Voice, format_hints
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Value
 
@@ -27,7 +27,7 @@ def written(cell: Cell, *, unit: bool = False, voice: Voice = "command line") ->
         case Place():
             return f"({text.point(cell.position)})" + (" m" if unit else "")
         case Advice():
-            said = "; ".join(filter(None, (cell.words, *hint_words(cell.hints, voice))))
+            said = "; ".join(filter(None, (cell.words, *format_hints(cell.hints, voice))))
         case Judged():
             said = (cell.verdict or "").upper()
         case Ref():

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from urmpipe_models.display import Shown
+from urmpipe_models.display import Displayable
 from urmpipe_models.errors import Voice
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Result(Shown):
+class Result(Displayable):
     """A result: a frozen dataclass, whose fields are all that a recording keeps of it.
 
     Attributes:

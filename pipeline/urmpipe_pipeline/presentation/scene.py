@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import Element, FloatArray, IntArray, Vector
-from urmpipe_models.math3d import matrices
+from urmpipe_models.math3d import to_matrices
 
 BoolArray: TypeAlias = NDArray[bool_]
 
@@ -204,7 +204,7 @@ class Motion:
 
     def points(self, points: FloatArray) -> FloatArray:
         """Return points of the frame in [m], shape (k, 3), over time in [m], shape (n, k, 3)."""
-        turned = np.einsum("nij,kj->nki", matrices(self.quat_xyzw), points)
+        turned = np.einsum("nij,kj->nki", to_matrices(self.quat_xyzw), points)
         return np.asarray(turned + self.position[:, np.newaxis])
 
 

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.errors import shown
+from urmpipe_models.errors import format_value
 from urmpipe_pipeline.text import unique
 
 ARRAY, DTYPE, SHAPE, TEXT, CODES = "$array", "dtype", "shape", "$text", "codes"
@@ -57,7 +57,7 @@ class Place:
 
     def wrong(self, found: Any, allowed: str) -> CodecError:
         """Return an error that says where, what was found and what is allowed."""
-        return CodecError(f"{self.path or '/'}: found {shown(found)}, allowed: {allowed}")
+        return CodecError(f"{self.path or '/'}: found {format_value(found)}, allowed: {allowed}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.errors import pasted, shown
+from urmpipe_models.errors import format_value, shell_quote
 from urmpipe_pipeline.recording.array_form import ArrayOf, CodecError, In
 from urmpipe_pipeline.recording.codec import decode
 from urmpipe_pipeline.recording.forms import form_of
@@ -46,7 +46,9 @@ def _reads(store: Store, lazy: bool, document: Mapping[str, Any]) -> ArrayOf:
     clocks = form_of(dict[str, str]).read(document.get("clocks"), In("/clocks", _no_array))
     checksums = form_of(dict[str, int]).read(document.get("checksums"), In("/checksums", _no_array))
     if not clocks.keys().isdisjoint(clocks.values()):
-        raise CodecError(f"/clocks: found {shown(clocks)}, allowed: the paths of times by those of arrays")
+        raise CodecError(
+            f"/clocks: found {format_value(clocks)}, allowed: the paths of times by those of arrays"
+        )
     known: dict[tuple[str, tuple[int, ...], str], Any] = {}
 
     def array(at: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
@@ -95,7 +97,7 @@ def _again(document: dict[str, Any]) -> str:
     """Return how to make a recording again: by which command, as far as its metadata tell."""
     try:
         made = document["result"]["provenance"]
-        inputs = " ".join(pasted(one["name"]) for one in made["inputs"])
+        inputs = " ".join(shell_quote(one["name"]) for one in made["inputs"])
         return f": urmpipe {made['command']} {inputs} and its options"
     except (KeyError, TypeError):
         return " from what it was made of"

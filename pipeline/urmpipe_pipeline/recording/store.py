@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.elementwise import IntArray
-from urmpipe_models.errors import Finding, RecordingError, pasted
-from urmpipe_models.files import meant_by
+from urmpipe_models.errors import Finding, RecordingError, shell_quote
+from urmpipe_models.files import suggest_path
 from urmpipe_pipeline.recording.identity import APPLICATION_ID, is_recording, open_reader, our_entries
 from urmpipe_pipeline.recording.trial import recording_abort
 
@@ -135,7 +135,7 @@ class Store:
         """Return the store of the recording that urmpipe wrote."""
         if not self.path.is_file():
             special = self.path.exists() and not self.path.is_dir()
-            found = "a pipe or a device" if special else f"no such file{meant_by(self.path, ('.rrd',))}"
+            found = "a pipe or a device" if special else f"no such file{suggest_path(self.path, ('.rrd',))}"
             raise self.error(f"found {found}, allowed: a recording (.rrd) that urmpipe wrote")
         if not is_recording(self.path):
             raise self.error("found no Rerun recording, allowed: a recording (.rrd) that urmpipe wrote")
@@ -154,7 +154,7 @@ class Store:
             raise self.error(
                 "found a recording that was cut off (no footer), allowed: a whole one;"
                 " what is left of it can be looked at after:"
-                f" rerun rrd optimize {pasted(self.path)} -o mended.rrd"
+                f" rerun rrd optimize {shell_quote(self.path)} -o mended.rrd"
             ) from error
 
     def _metadata(self) -> str:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urmpipe_models.errors import ViewerError, for_each, pasted
+from urmpipe_models.errors import ViewerError, map_collecting_errors, shell_quote
 from urmpipe_pipeline.recording.store import TIME, Opening, Store
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def openings(paths: Sequence[Path]) -> dict[Path, Opening]:
     Raises:
         RecordingError: With every file that is no recording of urmpipe's.
     """
-    return dict(zip(paths, for_each(lambda path: Store(path).opening, paths), strict=True))
+    return dict(zip(paths, map_collecting_errors(lambda path: Store(path).opening, paths), strict=True))
 
 
 def refuse_without_display(
@@ -83,7 +83,7 @@ def refuse_without_display(
     """
     if not platform.startswith("linux") or any(environment.get(name) for name in DISPLAYS):
         return
-    files = " ".join(map(pasted, paths))
+    files = " ".join(map(shell_quote, paths))
     raise ViewerError(
         f"found no display (neither {' nor '.join(DISPLAYS)} is set), allowed: a copy on a computer with one,"
         f" there: urmpipe view {files}; or a browser there, here: rerun --serve-web --bind {LOOPBACK}"
@@ -169,7 +169,7 @@ def _shown(process: subprocess.Popen[bytes], url: str, path: Path, opening: Open
     how = f"did not answer within {PATIENCE:.0f} s" if code is None else f"ended with exit code {code}"
     raise ViewerError(
         f"the viewer {how}, allowed: a display and a graphics driver that it can use; to see its messages:"
-        f" {pasted(_program())} {pasted(path)}"
+        f" {shell_quote(_program())} {shell_quote(path)}"
     )
 
 

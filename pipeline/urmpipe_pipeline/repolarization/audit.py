@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Hint
-from urmpipe_models.wraps import FULL_TURN, Repolarized, beside_wraps, off_line, repair, repolarize
+from urmpipe_models.wraps import (
+    FULL_TURN,
+    Repolarized,
+    find_interpolated_samples,
+    line_residuals,
+    reinterpolate,
+    repolarize,
+)
 from urmpipe_pipeline import text
 from urmpipe_pipeline.gaps import MISSED_SAMPLE
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogWarning, seconds
@@ -113,7 +120,7 @@ def audit_log(
     unresolved = np.concatenate((odd.steps, unsure.steps))
     mended = np.column_stack((between.rows, between.joints))
     return Audited(
-        q=repair(fixed.q, log.t, mended) if repaired and len(mended) else fixed.q,
+        q=reinterpolate(fixed.q, log.t, mended) if repaired and len(mended) else fixed.q,
         entries=tuple(_entries(log, fixed, periods, kinds)),
         warnings=tuple(warnings),
         inferences=tuple(inferences),
@@ -179,9 +186,9 @@ def _in_between(log: JointLog, fixed: Repolarized, periods: FloatArray) -> _Plac
             q, x, t = q[present], x[present], t[present]
         wraps = np.searchsorted(present, fixed.rows[fixed.joints == j])
         hidden = np.searchsorted(present, fixed.in_between[fixed.in_between[:, 1] == j, 0])
-        at = np.union1d(hidden, beside_wraps(q, x, t, wraps, float(periods[j])))
+        at = np.union1d(hidden, find_interpolated_samples(q, x, t, wraps, float(periods[j])))
         found.append(np.column_stack((present[at], np.full(len(at), j))))
-        off.append(off_line(x, t, at))
+        off.append(line_residuals(x, t, at))
     rows, joints = np.concatenate(found).T
     order = np.lexsort((joints, rows))
     places = _steps_to(log, rows[order], joints[order])

@@ -13,7 +13,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError, OptionError
-from urmpipe_models.measure_units import quantity, units_of
+from urmpipe_models.measure_units import compatible_units, quantity_to_si
 from urmpipe_models.wraps import FULL_TURN, Repolarized
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.repolarization.joint_motion import over_rows
@@ -45,7 +45,10 @@ def _refuse_empty(name: str, low: float, high: float) -> None:
 
 def _in_own_unit(interval: GivenInterval, factor: float) -> Interval:
     """Return an interval in the file's own unit, one of which is `factor` rad."""
-    low, high = (quantity(end, units_of("rad")) / factor if isinstance(end, str) else end for end in interval)
+    low, high = (
+        quantity_to_si(end, compatible_units("rad")) / factor if isinstance(end, str) else end
+        for end in interval
+    )
     return low, high
 
 

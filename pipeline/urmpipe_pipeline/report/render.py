@@ -16,7 +16,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from urmpipe_models.errors import inert
+from urmpipe_models.errors import escape_control_characters
 from urmpipe_pipeline.figures.files import FigureFile, FigureOptions, figure_stem, write_figures
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.presentation.section import Presentation
@@ -132,12 +132,12 @@ def _inert(value: Any) -> Any:
     """
     if isinstance(value, Markup) or not isinstance(value, str):
         return value
-    return inert(value).replace(" -> ", " → ")
+    return escape_control_characters(value).replace(" -> ", " → ")
 
 
 def text_lines(text: str) -> Markup:
     """Return a text of several lines that stand as they are, else as any text of the page."""
-    return escape(inert(text, kept="\n\t"))
+    return escape(escape_control_characters(text, kept="\n\t"))
 
 
 def data_address(svg: str) -> str:

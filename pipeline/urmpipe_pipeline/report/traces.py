@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.errors import inert
+from urmpipe_models.errors import escape_control_characters
 from urmpipe_pipeline import text
 from urmpipe_pipeline.decimate import POINTS, decimate
 from urmpipe_pipeline.presentation.curves import stretches
@@ -35,7 +35,7 @@ EXPONENT = ".3e"
 
 def label(said: str) -> str:
     """Return a text from a file so that plotly.js, which reads HTML, draws it letter by letter."""
-    return html.escape(inert(said), quote=False)
+    return html.escape(escape_control_characters(said), quote=False)
 
 
 def line(

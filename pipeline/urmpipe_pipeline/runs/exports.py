@@ -13,7 +13,7 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, RecordingError
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.wraps import continuous_quaternions
+from urmpipe_models.wraps import unwrap_quaternions
 from urmpipe_pipeline.joint_log import ROW_NS
 from urmpipe_pipeline.presentation.exports import (
     ExportColumn,
@@ -163,7 +163,7 @@ def poses_by_kinematics(name: str, robot: Chain, clock_ns: IntArray, q: FloatArr
 
     position, rotation = poses_over_log(robot, q[there])
     quat = np.asarray(Rotation.from_matrix(rotation).as_quat(), dtype=np.float64)
-    return Poses(name, clock_ns[there], position, continuous_quaternions(quat), len(q) - len(there))
+    return Poses(name, clock_ns[there], position, unwrap_quaternions(quat), len(q) - len(there))
 
 
 def run_poses(run: Run, rows: str) -> list[Poses]:

@@ -8,9 +8,9 @@ from functools import partial
 
 import numpy as np
 
-from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, norms
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_norms
 from urmpipe_models.kinematics.forward import PointLog
-from urmpipe_models.wraps import continuous_euler
+from urmpipe_models.wraps import unwrap_euler
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.figure import Computed, Figure, Line, Mark, Panel, Shape, View
@@ -180,7 +180,7 @@ def _point(run: Run, tcp: PointLog) -> Iterator[View]:
 
 
 def _lengths(vectors: FloatArray) -> Computed:
-    return Computed(len(vectors), lambda: norms(vectors))
+    return Computed(len(vectors), lambda: row_norms(vectors))
 
 
 def _angles(tcp: PointLog, singular: BoolArray | None, *, follows: bool) -> FloatArray:
@@ -188,7 +188,7 @@ def _angles(tcp: PointLog, singular: BoolArray | None, *, follows: bool) -> Floa
     known = np.asarray(tcp.euler_zyx)
     if singular is not None:
         known = np.where(singular[:, np.newaxis], np.nan, known)
-    return continuous_euler(known) if follows else known
+    return unwrap_euler(known) if follows else known
 
 
 def _recorded(run: Run) -> Iterator[View]:
@@ -216,7 +216,7 @@ def _extent_words(motion: str, tcp: PointLog) -> str:
         return f"{motion} over time by forward kinematics. It has no value."
     said = f"{motion} over time by forward kinematics. It stays {within_words(tcp.position)}"
     for values, word, unit in ((tcp.velocity, "speed", "m/s"), (tcp.acceleration, "acceleration", "m/s²")):
-        norm = norms(values)
+        norm = row_norms(values)
         if np.isfinite(norm).any():
             said += f"; its {word} reaches {np.nanmax(norm):.4f} {unit}"
     return f"{said}."

@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray, Vector
 from urmpipe_models.kinematics.forward import poses_over_log, positions_over_log
-from urmpipe_models.math3d import Transform, best_rotation, matrices, quaternions, rpy_of
+from urmpipe_models.math3d import Transform, fit_rotation, matrix_to_rpy, to_matrices, to_quaternions
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.runs.recorded_start import outlying_start
@@ -86,7 +86,7 @@ class RecordedPoses:
         known = has_both(q, position)
         quat = None
         if log.tcp_rotation is not None and log.rotation_form is not None:
-            quat = quaternions(log.tcp_rotation[rows], log.rotation_form)[known]
+            quat = to_quaternions(log.tcp_rotation[rows], log.rotation_form)[known]
         told = quat is not None and bool(np.isfinite(quat).all(axis=1).any())
         return cls(q[known], position[known], quat if told else None) if known.any() else None
 
@@ -123,15 +123,15 @@ class RecordedPoses:
         """Return rx, ry, rz in [rad] of the tool that fits the orientations best; zeros without them."""
         if self.quat is None:
             return 0.0, 0.0, 0.0
-        (turn,) = matrices(mean_turn(*self._orientations(robot, self.q))[np.newaxis])
-        return rpy_of(_rows_of(turn))
+        (turn,) = to_matrices(mean_turn(*self._orientations(robot, self.q))[np.newaxis])
+        return matrix_to_rpy(_rows_of(turn))
 
     def base(self, robot: Chain) -> tuple[float, ...]:
         """Return x, y, z in [m] and rx, ry, rz in [rad] of the base with which the points agree best."""
         computed = positions_over_log(replace(robot, base=Transform()), self.q)
         middle, target = computed.mean(axis=0), self.position.mean(axis=0)
-        turn, _ = best_rotation((self.position - target).T @ (computed - middle))
-        return (*(target - turn @ middle).tolist(), *rpy_of(_rows_of(turn)))
+        turn, _ = fit_rotation((self.position - target).T @ (computed - middle))
+        return (*(target - turn @ middle).tolist(), *matrix_to_rpy(_rows_of(turn)))
 
     def _angle(self, robot: Chain, q: FloatArray, *, tool: bool) -> float:
         return 0.0 if self.quat is None else turned_apart(*self._orientations(robot, q), tool=tool)
@@ -141,7 +141,7 @@ class RecordedPoses:
         assert self.quat is not None  # asked before
         known = np.isfinite(self.quat).all(axis=1)
         _, rotation = poses_over_log(robot, q[known])
-        return quaternions(rotation.reshape(-1, 9), "matrix"), self.quat[known]
+        return to_quaternions(rotation.reshape(-1, 9), "matrix"), self.quat[known]
 
 
 def _rows_of(matrix: FloatArray) -> tuple[Vector, Vector, Vector]:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.display import line_of, number_of
+from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, Voice
 from urmpipe_models.kinematics.forward import PointLog
-from urmpipe_models.math3d import NAMES, angles
+from urmpipe_models.math3d import COLUMN_NAMES, is_angular
 from urmpipe_pipeline.joint_log import OWN, JointLog, LogWarning, seconds
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
@@ -144,13 +144,13 @@ class Run(Result):
             return None
         if not np.array_equal(self.t_ns, self.log.t_ns):
             values = interpolate(self.t_ns, self.log.t_ns, values)
-        return values if angles(form) else values / np.linalg.norm(values, axis=1, keepdims=True)
+        return values if is_angular(form) else values / np.linalg.norm(values, axis=1, keepdims=True)
 
     @property
     def rotation_names(self) -> tuple[str, ...]:
         """What the columns of `rotation_recorded` are called; none without one."""
         form = self.log.rotation_form
-        return () if form is None else NAMES["quat_xyzw" if form == "matrix" else form]
+        return () if form is None else COLUMN_NAMES["quat_xyzw" if form == "matrix" else form]
 
     @property
     def joint_units(self) -> list[str]:
@@ -176,11 +176,11 @@ class Run(Result):
     def _headline(self) -> str:
         """Return its name, its arm and how long it is."""
         arm = self.robot.name if self.robot else "no robot"
-        rows = number_of(self.log.rows, "row")
+        rows = format_count(self.log.rows, "row")
         if not self.timed:
-            return line_of(self.name, arm, rows)
-        grid = f"grid of {number_of(len(self.t_ns), 'sample')}"
-        return line_of(self.name, arm, f"{rows} in {self.duration:g} s", grid)
+            return format_headline(self.name, arm, rows)
+        grid = f"grid of {format_count(len(self.t_ns), 'sample')}"
+        return format_headline(self.name, arm, f"{rows} in {self.duration:g} s", grid)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a grid sample: t [s], the joints, their rates and torques, and the TCP, where known.

@@ -15,7 +15,7 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import Finding, Hint, LogError, OptionError, shown
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, Role
 from urmpipe_pipeline.runs.ingest import run_of
 from urmpipe_pipeline.runs.results import Run
@@ -82,7 +82,7 @@ def _chosen(simulation: Simulation, block: str | None) -> str:
         raise LogError(Finding(said, _place(simulation)))
     if block is not None:
         allowed = f"{', '.join(moving)}, which have a motion in {_place(simulation)}"
-        raise OptionError(Finding(parameter="block", found=shown(block), allowed=allowed))
+        raise OptionError(Finding(parameter="block", found=format_value(block), allowed=allowed))
     if len(moving) > 1:
         said = f"found {len(moving)} blocks with a motion, allowed: one"
         hints = tuple(Hint("block", one) for one in moving)

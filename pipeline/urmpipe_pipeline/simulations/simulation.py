@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.display import line_of, number_of
+from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import CosimulationError, Voice
 from urmpipe_pipeline.assumptions import assumed
@@ -268,8 +268,8 @@ class Simulation(Result):
     def _headline(self) -> str:
         """Return its verdict, why it failed, and how much it recorded."""
         end = f"failed ({self.failed})" if self.failed is not None else self.verdict
-        samples = f"{number_of(len(self.t_ns), 'sample')} in {self.duration:g} s"
-        return line_of(self.name, end, number_of(len(self.signals), "signal"), samples)
+        samples = f"{format_count(len(self.t_ns), 'sample')} in {self.duration:g} s"
+        return format_headline(self.name, end, format_count(len(self.signals), "signal"), samples)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a sample: t [s], then a column a scalar signal, such as `chain.phi[1]`."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, format_value
 from urmpipe_models.ik.solutions import ROTATION_TOLERANCE, Targets
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.solved_targets.target_file import read_targets
@@ -73,7 +73,7 @@ def given_targets(
         OptionError: If an array has another shape, or times do not fit.
     """
     if tsp is not None and not (isinstance(tsp, Real) and 0.0 < tsp < math.inf):
-        raise OptionError(Finding(parameter="tsp", found=shown(tsp), allowed="a positive time in s"))
+        raise OptionError(Finding(parameter="tsp", found=format_value(tsp), allowed="a positive time in s"))
     if isinstance(given, (str, Path)):
         if t is not None:
             allowed = "with arrays; a file has its own"

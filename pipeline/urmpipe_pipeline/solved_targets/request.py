@@ -12,11 +12,11 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import Finding, Hint, OptionError, for_each, shown
+from urmpipe_models.errors import Finding, Hint, OptionError, format_value, map_collecting_errors
 from urmpipe_models.ik.closed import ClosedForm, closed_form, exact_closed_form
 from urmpipe_models.ik.solutions import SearchOptions
 from urmpipe_models.ik.solve import METHODS, Method
-from urmpipe_models.measure_units import NAMES, WRITTEN, quantity
+from urmpipe_models.measure_units import NAMES, WRITTEN, quantity_to_si
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets
 
 TYPED = 1e-3
@@ -78,7 +78,7 @@ def refuse_unsolvable(request: Request, *, recorded: bool) -> None:
 def _bad_values(request: Request) -> Iterator[Finding]:
     """Yield which values make no sense."""
     if request.method not in METHODS:
-        yield Finding(parameter="method", found=shown(request.method), allowed=", ".join(METHODS))
+        yield Finding(parameter="method", found=format_value(request.method), allowed=", ".join(METHODS))
     yield from request.search.faults()
 
 
@@ -134,12 +134,14 @@ def joint_values(arm: Chain, given: JointValues, parameter: str) -> FloatArray:
     """
     allowed = f"{len(arm.coordinates)}, one for each of {', '.join(arm.coordinates)}"
     if isinstance(given, (list, tuple)) and len(given) == len(arm.coordinates):
-        given = for_each(partial(_joint_value, parameter), list(zip(arm.moving, given, strict=True)))
+        given = map_collecting_errors(
+            partial(_joint_value, parameter), list(zip(arm.moving, given, strict=True))
+        )
     try:
         values = np.asarray(given, dtype=float)
     except (TypeError, ValueError):
         allowed = f"{allowed}, in rad and m"
-        raise OptionError(Finding(parameter=parameter, found=shown(given), allowed=allowed)) from None
+        raise OptionError(Finding(parameter=parameter, found=format_value(given), allowed=allowed)) from None
     if values.shape != (len(arm.coordinates),):
         raise OptionError(Finding(parameter=parameter, found=f"{values.size} values", allowed=allowed))
     if not np.isfinite(values).all():
@@ -154,7 +156,7 @@ def _joint_value(parameter: str, given: tuple[Joint, float | str]) -> float:
     if not isinstance(value, str):
         return value
     si = "m" if joint.kind == "prismatic" else "rad"
-    number = quantity(value, WRITTEN[si])
+    number = quantity_to_si(value, WRITTEN[si])
     if not math.isfinite(number):
         found = f"{joint.name} = {value}"
         raise OptionError(Finding(parameter=parameter, found=found, allowed=NAMES[si]))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.display import line_of, number_of
+from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray, IntArray, TextArray
 from urmpipe_models.errors import Finding, LogError, Voice
 from urmpipe_models.ik.path import JointPath
@@ -181,8 +181,8 @@ class SolvedTargets(Result):
 
     def _headline(self) -> str:
         """Return its verdict, the arm, and how many targets it reaches."""
-        reached = f"{int(self.reached.sum())} of {number_of(len(self), 'target')} reached"
-        return line_of(self.name, self.verdict, self.robot.name, reached, self.method)
+        reached = f"{int(self.reached.sum())} of {format_count(len(self), 'target')} reached"
+        return format_headline(self.name, self.verdict, self.robot.name, reached, self.method)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a solution, and one a target that has none.

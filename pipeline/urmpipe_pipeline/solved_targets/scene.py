@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.math3d import quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline.palette import ghost_colour, run_colour
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene, Targets
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
@@ -77,7 +77,7 @@ def _paths(one: SolvedTargets) -> tuple[Path, ...]:
 def _targets(one: SolvedTargets) -> Targets:
     """Return the targets, those that are not reached with the first reason why."""
     rotation = one.targets.rotation
-    quat = None if rotation is None else quaternions(np.asarray(rotation).reshape(-1, 9), "matrix")
+    quat = None if rotation is None else to_quaternions(np.asarray(rotation).reshape(-1, 9), "matrix")
     reasons = tuple(
         "" if reason is None else f"row {row}: {reason.split('; ')[0]}"
         for row, reason in zip(one.row, one.reasons, strict=True)

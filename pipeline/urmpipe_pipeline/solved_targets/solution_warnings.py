@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, norms
+from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray, row_norms
 from urmpipe_models.errors import Hint
 from urmpipe_models.ik.path import JointPath
 from urmpipe_models.ik.solutions import Solutions, Targets
@@ -138,7 +138,7 @@ def far_warnings(
         of_file: Whether a file holds them, of which one may say the unit.
     """
     reach = longest(chain)
-    away = norms(targets.position - np.asarray(chain.base.translation, dtype=float))
+    away = row_norms(targets.position - np.asarray(chain.base.translation, dtype=float))
     with np.errstate(invalid="ignore"):
         far = ~reached & (away > FAR * reach) & (MILLI * away <= reach)
     if far.any():

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.errors import Finding, Hint, LogError, for_each
+from urmpipe_models.errors import Finding, Hint, LogError, map_collecting_errors
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.checks import (
     MOST_SKIPPED,
@@ -79,7 +79,7 @@ def read_content(plan: Plan, *, skip_bad: bool = False) -> Content:
             of one log differ in their times.
     """
     columns = {t: tuple(c for c in plan.roles.columns if c.table == t) for t in plan.used}
-    read = for_each(lambda table: _numbers(plan, table, columns[table], skip_bad), plan.used)
+    read = map_collecting_errors(lambda table: _numbers(plan, table, columns[table], skip_bad), plan.used)
     numbers = dict(zip(plan.used, read, strict=True))
     roles, said = _joined(plan, numbers)
     if plan.time_file is not None:

@@ -11,9 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
-from urmpipe_models.errors import Finding, OptionError, one_line, shown
+from urmpipe_models.errors import Finding, OptionError, escape_line, format_value
 from urmpipe_models.math3d import FORMS
-from urmpipe_models.toml_tables import Table, parse_toml, toml_lines, toml_text
+from urmpipe_models.toml_tables import CheckedTable, format_toml, quote_toml, read_toml
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, Role
 from urmpipe_pipeline.outputs import MAP_HEADER
 from urmpipe_pipeline.sources.clocks.time_file import TIME_FILE, named_file
@@ -57,7 +57,7 @@ def read_map(path: Path) -> LogMap:
         OptionError: With everything that is wrong with it.
     """
     faults: list[Finding] = []
-    table = Table(parse_toml(path, OptionError), faults, str(path))
+    table = CheckedTable(read_toml(path, OptionError), faults, str(path))
     clock, tcp = table.table("clock"), table.table("tcp")
     joints = table.tables("joints") if table.has("joints") else []
     units = table.mapping("units")
@@ -96,7 +96,7 @@ def read_map(path: Path) -> LogMap:
         tool=_frame(table, "tool"),
     )
     for part in (table, clock, tcp, *joints):
-        part.close()
+        part.report_unknown_keys()
     if faults:
         raise OptionError(*faults)
     return result
@@ -133,7 +133,7 @@ def map_of(
         "tool": list(tool) or None,
     }
     clock = _clock(log, found, asked.get("time"))
-    lines = [MAP_HEADER, "", *toml_lines(top), "", "[clock]", *toml_lines(clock)]
+    lines = [MAP_HEADER, "", *format_toml(top), "", "[clock]", *format_toml(clock)]
     lines += ["", *CORRECTIONS] if log.joints else []
     for column, name in zip(_of(log, "joint"), log.joints, strict=True):
         said: dict[str, Any] = {"column": _called(log, column), "name": name}
@@ -142,64 +142,68 @@ def map_of(
         said |= corrected if corrected != {"sign": 1, "offset": 0.0} else {}
         interval = intervals.get(name, intervals.get(""))
         said |= {"interval": list(interval)} if interval and column.unit in TURNING else {}
-        lines += ["", "[[joints]]", *toml_lines(said)]
+        lines += ["", "[[joints]]", *format_toml(said)]
         lines += [_assumed("unit", column.unit, column.doubt)] if column.doubt else []
     position, orientation = _of(log, "position"), _of(log, "rotation")
     if position:
         said = {"position": [_called(log, column) for column in position]}
         turned = {"orientation": [_called(log, column) for column in orientation], "form": log.rotation_form}
         said |= turned if orientation else {}
-        lines += ["", "[tcp]", *toml_lines(said | ({"measured": True} if log.measured else {}))]
+        lines += ["", "[tcp]", *format_toml(said | ({"measured": True} if log.measured else {}))]
     measured = [column for column in (*position, *orientation) if column.unit != PURE.name]
     units = {_called(log, column): column.unit for column in measured if not column.doubt}
     timed = {name for c in _of(log, "time") for name in (c.name, c.header, str(c.number)) if name}
     units |= {name: unit for name, unit in asked.get("unit", {}).items() if name in timed}
-    told = [f"{toml_text(one)} = {toml_text(unit)}" for one, unit in units.items()]
-    told += [_assumed(toml_text(_called(log, c)), c.unit, c.doubt) for c in measured if c.doubt]
+    told = [f"{quote_toml(one)} = {quote_toml(unit)}" for one, unit in units.items()]
+    told += [_assumed(quote_toml(_called(log, c)), c.unit, c.doubt) for c in measured if c.doubt]
     lines += ["", "[units]", *told] if told else []
     return "\n".join(lines) + "\n"
 
 
-def _joint(table: Table, units: dict[str, str]) -> tuple[str, str, int, float]:
+def _joint(table: CheckedTable, units: dict[str, str]) -> tuple[str, str, int, float]:
     """Return column, name, sign and offset of a joint, and note its unit."""
     column = table.text("column")
     sign = table.number("sign", 1.0)
     if sign not in (1.0, -1.0):
-        table.fault("sign", f"found {sign:g}, allowed: 1 or -1")
+        table.add_error("sign", f"found {sign:g}, allowed: 1 or -1")
     _note_unit(table, column, units)
     return column, table.text("name", column), int(sign), table.number("offset", 0.0)
 
 
-def _interval(table: Table) -> GivenInterval | None:
+def _interval(table: CheckedTable) -> GivenInterval | None:
     """Return the interval of a joint, if the table has one."""
     if not table.has("interval"):
         return None
     given = table.value("interval")
     if is_interval(given):
         return given[0], given[1]
-    table.fault("interval", f"found {shown(given)}, allowed: 2 finite numbers, or two angles with units")
+    table.add_error(
+        "interval", f"found {format_value(given)}, allowed: 2 finite numbers, or two angles with units"
+    )
     return None
 
 
-def _note_unit(table: Table, column: str | None, units: dict[str, str]) -> None:
+def _note_unit(table: CheckedTable, column: str | None, units: dict[str, str]) -> None:
     """Note the unit of a column, if the table has both."""
     unit = _given(table, "unit", table.text)
     if column is not None and unit is not None:
         units[column] = unit
 
 
-def _given(table: Table, key: str, get: Callable[[str], T]) -> T | None:
+def _given(table: CheckedTable, key: str, get: Callable[[str], T]) -> T | None:
     """Return what is got of a table under a key, if it is there."""
     return get(key) if table.has(key) else None
 
 
-def _frame(table: Table, key: str) -> tuple[float, ...]:
+def _frame(table: CheckedTable, key: str) -> tuple[float, ...]:
     """Return three or six numbers, or nothing."""
     if not table.has(key):
         return ()
     values = table.numbers(key, None, si=("m", "m", "m", "rad", "rad", "rad"))
     if len(values) not in (3, 6):
-        table.fault(key, f"found {len(values)} numbers, allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad")
+        table.add_error(
+            key, f"found {len(values)} numbers, allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad"
+        )
     return values
 
 
@@ -226,7 +230,7 @@ def _called(log: JointLog, column: LogColumn) -> str:
 
 def _assumed(key: str, unit: str, doubt: str) -> str:
     """Return the comment that stands for a unit that is only assumed: read by a map it would be given."""
-    return f"# {key} = {toml_text(unit)}  # {one_line(doubt)}"
+    return f"# {key} = {quote_toml(unit)}  # {escape_line(doubt)}"
 
 
 def _clock(log: JointLog, found: Mapping[str, str], given: str | None = None) -> dict[str, Any]:

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, fields, replace
 from numbers import Real
 from typing import Any, TypeAlias
 
-from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, format_value
 from urmpipe_models.math3d import FORMS, RotationForm
-from urmpipe_models.measure_units import quantity, units_of
+from urmpipe_models.measure_units import compatible_units, quantity_to_si
 
 COLUMNS = "columns by name or number, such as ['q1', 'q2'] or [2, 3]"
 UNITS = "a unit of every angle, such as 'deg', or a mapping, such as {'q1': 'deg'}"
@@ -91,7 +91,7 @@ class ReadOptions:
         for name in ("unit", "interval"):
             object.__setattr__(self, name, _for_all(getattr(self, name)))
         wrong = [
-            Finding(parameter=one.name, found=shown(value), allowed=allowed)
+            Finding(parameter=one.name, found=format_value(value), allowed=allowed)
             for one in fields(self)
             for value, (fits, allowed) in [(getattr(self, one.name), _KINDS[one.name])]
             if not ((value is None and one.default is None) or fits(value))
@@ -134,8 +134,8 @@ def _are_named(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
 
 def is_interval(value: Any) -> bool:
     """Return whether a value is two ends: numbers in the file's own unit, or angles with units."""
-    angle = units_of("rad")
-    kinds = (_is_number, lambda end: isinstance(end, str) and math.isfinite(quantity(end, angle)))
+    angle = compatible_units("rad")
+    kinds = (_is_number, lambda end: isinstance(end, str) and math.isfinite(quantity_to_si(end, angle)))
     return any(_are(fits)(value) for fits in kinds) and len(value) == 2
 
 

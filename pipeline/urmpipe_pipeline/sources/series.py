@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.errors import Finding, LogError, for_each
+from urmpipe_models.errors import Finding, LogError, map_collecting_errors
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.clock import even_clock, find_clocks
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of, find_column, given_units
@@ -67,7 +67,7 @@ def _read(file: Path, names: Sequence[str], options: ReadOptions) -> Series:
     """Return some columns of a table as `read_series` does."""
     tables = open_tables([file], options)
     columns = columns_of(tables.layouts, tables.titles)
-    chosen = for_each(lambda name: find_column(columns, name, file=str(file)), names)
+    chosen = map_collecting_errors(lambda name: find_column(columns, name, file=str(file)), names)
     units = given_units(columns, options)
     plan = Plan(tables, find_clocks(tables, columns, options, units), Roles(joints=tuple(chosen)), units)
     content = read_content(plan, skip_bad=options.skip_bad)

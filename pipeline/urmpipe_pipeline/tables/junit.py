@@ -106,7 +106,7 @@ def _suite(section: Section, timestamp: str, warnings: Sequence[LogWarning], voi
             _reason(case, "failure", check.kind, check.words)
     _add_errors(suite, section.errors, voice, section.title)
     if warnings:
-        told = (f"{one.kind}: {one.words(voice)}" for one in warnings)
+        told = (f"{one.kind}: {one.format(voice)}" for one in warnings)
         ET.SubElement(suite, "system-out").text = "\n".join(map(_plain, told))
     _count(suite)
     if timestamp:
@@ -118,7 +118,7 @@ def _add_errors(suite: ET.Element, findings: Sequence[Finding], voice: Voice, ab
     """Add a test case for each error, of a class for all or of its file's name."""
     for number, finding in enumerate(findings, start=1):
         case = _case(suite, about or finding.file or "urmpipe compare", f"can be compared ({number})")
-        _reason(case, "error", BAD_INPUT, finding.words(voice))
+        _reason(case, "error", BAD_INPUT, finding.format(voice))
 
 
 def _count(suite: ET.Element) -> None:

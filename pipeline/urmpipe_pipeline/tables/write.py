@@ -10,8 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.display import Shown, line_of, number_of
-from urmpipe_models.errors import Finding, OutputError, Voice, for_each
+from urmpipe_models.display import Displayable, format_count, format_headline
+from urmpipe_models.errors import Finding, OutputError, Voice, map_collecting_errors
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.json_values import json_ready
 from urmpipe_pipeline.outputs import EXPORT_HEADER, guarded_output, know_own, refuse_output
@@ -63,7 +63,7 @@ class ExportedFile:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Exported(Shown):
+class Exported(Displayable):
     """What left.
 
     Attributes:
@@ -89,9 +89,9 @@ class Exported(Shown):
 
     def _headline(self) -> str:
         """Return the file, and what it holds."""
-        more = f"and {number_of(len(self.files) - 1, 'other file')}" if len(self.files) > 1 else ""
-        rows = number_of(sum(one.rows for one in self.files), "row")
-        return line_of(str(self.path), more, self.to, rows, number_of(len(self.columns), "column"))
+        more = f"and {format_count(len(self.files) - 1, 'other file')}" if len(self.files) > 1 else ""
+        rows = format_count(sum(one.rows for one in self.files), "row")
+        return format_headline(str(self.path), more, self.to, rows, format_count(len(self.columns), "column"))
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a file: its path and its rows."""
@@ -200,7 +200,7 @@ def write_all(
     if to == "csv" and targets[0].is_file():
         found = "found a file, allowed: a new name; an existing CSV file is never replaced"
         raise OutputError(Finding(found, str(targets[0])))
-    for_each(lambda path: refuse_output(path, inputs, "export"), targets)
+    map_collecting_errors(lambda path: refuse_output(path, inputs, "export"), targets)
     with all_or_none():
         for path, write in zip(targets, writers, strict=True):
             with guarded_output(path, inputs, "export") as part:

@@ -16,7 +16,7 @@ from diagnoses import diagnosis_of
 from flat_arm import lay_flat_arm
 from urmpipe_datasets import LOGS
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
-from urmpipe_models.display import Shown
+from urmpipe_models.display import Displayable
 from urmpipe_pipeline.comparison.change import Absent, BaselineComparison
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
@@ -66,7 +66,7 @@ def test_each_public_class_is_a_result_or_named_as_another(results: dict[str, An
     public = {name for name in urmpipe.__all__ if isinstance(getattr(urmpipe, name), type)}
     errors = {name for name in public if issubclass(getattr(urmpipe, name), Exception)}
     assert public - errors - OTHERS == set(results)
-    assert all(isinstance(one, Shown) for one in results.values())
+    assert all(isinstance(one, Displayable) for one in results.values())
 
 
 @pytest.mark.slow

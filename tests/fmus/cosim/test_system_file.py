@@ -191,7 +191,7 @@ def test_an_argument_that_a_shipped_system_lacks_is_told_with_how_to_change_its_
     (found,) = caught.value.findings
     assert (found.file, found.about) == ("one-drive", "argument u")
     assert found.hints == (Hint("write_system", None, "makes a copy of it"),)
-    assert found.words("command line").endswith(f"{ELSE}; --write-system FILE.toml makes a copy of it")
+    assert found.format("command line").endswith(f"{ELSE}; --write-system FILE.toml makes a copy of it")
 
 
 def test_words_of_a_system_and_of_its_units_are_joined_by_either_sign(tmp_path: Path) -> None:

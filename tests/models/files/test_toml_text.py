@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from asserting import refusal
 from urmpipe_models.errors import OptionError
-from urmpipe_models.toml_tables import parse_toml, toml_lines, toml_text
+from urmpipe_models.toml_tables import format_toml, quote_toml, read_toml
 
 texts = st.text(st.characters(exclude_categories=["Cs"]), max_size=20)
 leaves = st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False) | texts
@@ -25,15 +25,15 @@ values = st.recursive(
 @pytest.mark.slow
 @given(st.dictionaries(keys, values, max_size=4))
 def test_what_is_written_reads_back(table: dict[str, object]) -> None:
-    assert tomllib.loads("\n".join(toml_lines(table))) == table
+    assert tomllib.loads("\n".join(format_toml(table))) == table
 
 
 def test_each_kind_of_value_is_written_as_toml_has_it() -> None:
     table = {"a": True, "b": False, "c": 1, "d": 0.5, "e": "x", "f": (1, "y"), "g": {"h": [True]}, "i": None}
-    assert toml_lines(table) == [
+    assert format_toml(table) == [
         "a = true", "b = false", "c = 1", "d = 0.5", 'e = "x"', 'f = [1, "y"]', "g = { h = [true] }",
     ]  # fmt: skip
-    assert toml_text('Größe "\x7f\n') == '"Größe \\"\\u007f\\n"'
+    assert quote_toml('Größe "\x7f\n') == '"Größe \\"\\u007f\\n"'
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_what_is_no_toml_is_told_with_its_line(
     monkeypatch.chdir(tmp_path)
     Path("a.toml").write_bytes(written.encode())
     with pytest.raises(OptionError) as caught:
-        parse_toml(Path("a.toml"), OptionError)
+        read_toml(Path("a.toml"), OptionError)
     if place is None:
         line = 1 + written.rstrip("\n").count("\n")
         assert str(caught.value) == f"a.toml:{line}: not valid TOML: Invalid value (at end of document)"
@@ -75,9 +75,9 @@ def test_what_cannot_be_read_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyP
         ("a\0b.toml", "found 'a\\x00b.toml', allowed: the name of a file"),
         ("b.toml", "b.toml: cannot be read: No such file or directory"),
     ):
-        assert refusal(OptionError, parse_toml, Path(name), OptionError) == said
+        assert refusal(OptionError, read_toml, Path(name), OptionError) == said
     Path("a.toml").write_bytes(b"\xef\xbb\xbfa = 1")  # with a byte order mark, as Windows writes it
-    assert parse_toml(Path("a.toml"), OptionError) == {"a": 1}
+    assert read_toml(Path("a.toml"), OptionError) == {"a": 1}
 
 
 DEEP = "found tables or lists nested more than 50 deep, allowed: 50"
@@ -118,7 +118,7 @@ def test_what_people_do_not_write_is_told_with_its_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("a.toml").write_text(written, encoding="utf-8")
-    assert refusal(OptionError, parse_toml, Path("a.toml"), OptionError) == said
+    assert refusal(OptionError, read_toml, Path("a.toml"), OptionError) == said
 
 
 def test_what_only_looks_deep_is_read(tmp_path: Path) -> None:
@@ -134,4 +134,4 @@ def test_what_only_looks_deep_is_read(tmp_path: Path) -> None:
     )  # fmt: skip
     path = tmp_path / "a.toml"
     path.write_text(written, encoding="utf-8")
-    assert parse_toml(path, OptionError) == tomllib.loads(written)
+    assert read_toml(path, OptionError) == tomllib.loads(written)

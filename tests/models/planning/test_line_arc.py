@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from random_paths import by_first_points, corner_rows
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import PathError
-from urmpipe_models.math3d import angle_between, from_offset, matrices, quaternions
+from urmpipe_models.math3d import angle_between, from_offset, to_matrices, to_quaternions
 from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.path import LineArcPath, PathRows
 
@@ -216,7 +216,7 @@ def test_arcs_touch_in_a_plane_of_any_place(corner: bool) -> None:
 @given(corner_rows(), st.lists(st.floats(-2.0, 2.0), min_size=60, max_size=60))
 def test_the_tool_turns_evenly_from_row_to_row(rows: PathRows, angles: list[float]) -> None:
     turned = np.array(angles).reshape(20, 3)[: len(rows)]
-    rotation = matrices(quaternions(turned, "zyx"))
+    rotation = to_matrices(to_quaternions(turned, "zyx"))
     path = rows_to_path(PathRows(rows.position, rows.radius, corner=True, rotation=rotation))
     assert path.orientation is not None
     at = path.orientation.matrices(path.at)
@@ -224,7 +224,7 @@ def test_the_tool_turns_evenly_from_row_to_row(rows: PathRows, angles: list[floa
     np.testing.assert_allclose(at[-1], rotation[-1], atol=1e-9)  # after a whole turn by the last rate
     middle = 0.5 * (path.at[1:] + path.at[:-1])
     quats = path.orientation.quaternions(middle)
-    ends = quaternions(rotation.reshape(-1, 9), "matrix")
+    ends = to_quaternions(rotation.reshape(-1, 9), "matrix")
     along_it = np.insert(path.orientation.quaternions(path.at), np.arange(1, len(rows)), quats, axis=0)
     turned_by = np.einsum("ij,ij->i", along_it[1:], along_it[:-1])
     assert turned_by.min() >= math.sqrt(0.5) - ROUNDING  # one sign: half of at most half a turn a step
@@ -244,7 +244,7 @@ def faults(points: Sequence[Sequence[float]], radius: Sequence[float], corner: b
 def test_an_even_turn_may_be_rounded_to_six_digits(digits: int, uneven: bool) -> None:
     points = np.array([[2, 0, 3], [4, 0, 3], [4, 4, 3], [0, 4, 3], [0, 0, 3], [2, 0, 3.0]]) / 10.0
     angle = 2.0 * rows_to_path(PathRows(points, 0.05, corner=True)).at
-    turned = matrices(quaternions(np.round(angle, digits)[:, None] * [0.0, 0.0, 1.0], "vector"))
+    turned = to_matrices(to_quaternions(np.round(angle, digits)[:, None] * [0.0, 0.0, 1.0], "vector"))
     path = rows_to_path(PathRows(points, 0.05, corner=True, rotation=turned))
     assert path.orientation is not None
     assert bool(len(path.orientation.uneven_rows)) == uneven

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from urmpipe_models.errors import OutputError
-from urmpipe_models.files import EXPORT_MARK, is_export, replace_text, write_export
+from urmpipe_models.files import EXPORT_MARK, is_robot_export, write_export, write_text_atomic
 
 NO_EXPORT = (
     "found a file that is not a robot export of urmpipe, allowed: a new name, or such an export to replace"
@@ -24,13 +24,13 @@ def assert_refused(path: Path, source: Path, finding: str) -> None:
 
 def test_a_file_is_an_export_by_the_mark_at_its_start(tmp_path: Path) -> None:
     file = tmp_path / "arm.toml"
-    assert not is_export(file)
-    assert not is_export(tmp_path)
+    assert not is_robot_export(file)
+    assert not is_robot_export(tmp_path)
     room = 200 - len(EXPORT_MARK)
     file.write_text(" " * room + EXPORT_MARK, encoding="utf-8")
-    assert is_export(file)
+    assert is_robot_export(file)
     file.write_text(" " * (room + 1) + EXPORT_MARK, encoding="utf-8")
-    assert not is_export(file)
+    assert not is_robot_export(file)
 
 
 def test_a_new_file_and_an_export_are_written(tmp_path: Path) -> None:
@@ -57,11 +57,11 @@ def test_what_is_no_export_and_the_input_itself_stay(tmp_path: Path) -> None:
 
 def test_where_nothing_can_be_written_nothing_is_left(tmp_path: Path) -> None:
     with pytest.raises(OutputError) as caught:
-        replace_text(tmp_path / "missing" / "arm.toml", "text")
+        write_text_atomic(tmp_path / "missing" / "arm.toml", "text")
     missing = tmp_path / "missing" / "arm.toml"
     assert str(caught.value) == f"{missing}: cannot be written: No such file or directory"
     (tmp_path / "folder").mkdir()
     with pytest.raises(OutputError) as caught:
-        replace_text(tmp_path / "folder", "text")
+        write_text_atomic(tmp_path / "folder", "text")
     assert str(caught.value).startswith(f"{tmp_path / 'folder'}: cannot be written: ")
     assert [one.name for one in tmp_path.iterdir()] == ["folder"]

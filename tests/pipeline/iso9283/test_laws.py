@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from repeated import PLACE, along, logs, overall, still, told, value, values_of, written
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.math3d import matrices, quaternions
+from urmpipe_models.math3d import to_matrices, to_quaternions
 from urmpipe_pipeline.iso9283.criteria import UNITS
 from urmpipe_pipeline.iso9283.result import IsoTest
 from urmpipe_pipeline.iso9283.spread import repeatability
@@ -45,7 +45,7 @@ def turned(rows: int) -> FloatArray:
     """Rotations that change slowly, shape (n, 3, 3)."""
     share = np.linspace(0.0, 1.0, rows)
     half = np.column_stack((0.05 * share, 0.1 * share**2, 0.2 * np.sin(share), np.ones(rows)))
-    return matrices(half / np.linalg.norm(half, axis=1)[:, np.newaxis]).reshape(-1, 3, 3)
+    return to_matrices(half / np.linalg.norm(half, axis=1)[:, np.newaxis]).reshape(-1, 3, 3)
 
 
 def about(axis: Sequence[float], angle: float) -> FloatArray:
@@ -82,7 +82,7 @@ def moved(folder: Path, rotation: FloatArray, shift: Sequence[float]) -> IsoTest
     folder.mkdir(exist_ok=True)
 
     def rows(place: FloatArray, turns: FloatArray) -> FloatArray:
-        quat = quaternions((rotation @ turns).reshape(-1, 9), "matrix")
+        quat = to_quaternions((rotation @ turns).reshape(-1, 9), "matrix")
         return np.column_stack((place @ rotation.T + np.asarray(shift), quat))
 
     wanted = command()
@@ -141,7 +141,7 @@ def test_shifts_and_turns_about_the_base_change_no_angle(
 @pytest.mark.slow
 def test_identical_cycles_have_no_spread(tmp_path: Path) -> None:
     place, turns = next(cycles())
-    rows = np.column_stack((place, quaternions(turns.reshape(-1, 9), "matrix")))
+    rows = np.column_stack((place, to_quaternions(turns.reshape(-1, 9), "matrix")))
     reference = written(tmp_path / "command.csv", rows, None, QUAT)
     values = overall(told(reference, logs(tmp_path, [rows] * 5, QUAT), planes=20))
     for name in ("RP", "RT", "RD", "RV", *(name for name in ANGLES if name.startswith("R"))):

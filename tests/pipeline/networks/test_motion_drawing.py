@@ -18,7 +18,7 @@ from presented import scene_of
 from recorded import entities, rows_of, static, times_of, views
 from toys import eye_of, recorded, shown
 from urmpipe_models.elementwise import ZERO, FloatArray, Vector
-from urmpipe_models.math3d import matrices
+from urmpipe_models.math3d import to_matrices
 from urmpipe_models.networks.file import Network, load_network
 from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_from_axes
 from urmpipe_pipeline.networks.finding import Search, find_network
@@ -198,7 +198,7 @@ def test_the_viewer_moves_bodies_by_their_poses(name: str, body: str, tmp_path: 
         for part in ("translation", "quaternion")
     ]
     np.testing.assert_allclose(moves[0], poses[:, :3, 3], atol=SINGLE)
-    np.testing.assert_allclose(matrices(moves[1]), poses[:, :3, :3], atol=SINGLE)
+    np.testing.assert_allclose(to_matrices(moves[1]), poses[:, :3, :3], atol=SINGLE)
     first = np.array(static(file, f"{entity}/surface", "Mesh3D:vertex_positions"))
     at_rest = {one.name: one for one in scene_of(present(found(name))).solids}
     placed = first @ poses[0, :3, :3].T + poses[0, :3, 3]

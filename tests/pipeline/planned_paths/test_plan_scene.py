@@ -12,7 +12,7 @@ from made_plans import CONTOUR, DOWN, FAILED, over_its_axis, planned
 from presented import scene_of
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import points_over_log
-from urmpipe_models.math3d import matrices
+from urmpipe_models.math3d import to_matrices
 from urmpipe_models.planning.path import PathRows, cube_rows
 from urmpipe_pipeline.planned_paths.obstacles import ObstacleKind
 from urmpipe_pipeline.planned_paths.planes import outlines
@@ -171,7 +171,7 @@ def test_the_scene_of_a_plan(contour: PlannedPath) -> None:
     # an orientation that is left open is the arm's own, at the sample nearest to the row: level, and
     # turned by theta1 about z
     turns = there(contour.joints).q[samples_of_rows(contour), 0]
-    axes = matrices(there(targets.quat_xyzw))[:, :, 0]
+    axes = to_matrices(there(targets.quat_xyzw))[:, :, 0]
     np.testing.assert_allclose(axes, np.stack([np.cos(turns), np.sin(turns), 0 * turns], axis=1), atol=1e-14)
 
 
@@ -185,7 +185,7 @@ def test_samples_of_rows_are_the_nearest_ones(ring: PlannedPath, contour: Planne
 
 def test_frames_at_rows_are_turned_as_the_rows_say(slowed: PlannedPath) -> None:
     quat = there(there(scene_of(present(slowed)).targets).quat_xyzw)
-    np.testing.assert_allclose(matrices(quat), np.broadcast_to(DOWN, (6, 3, 3)), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(to_matrices(quat), np.broadcast_to(DOWN, (6, 3, 3)), rtol=0, atol=1e-15)
 
 
 def test_the_scene_without_a_robot_is_the_path(alone: PlannedPath) -> None:

@@ -23,7 +23,7 @@ from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError, PathError
 from urmpipe_models.ik.solutions import Targets, pose_errors
-from urmpipe_models.math3d import matrices, quaternions
+from urmpipe_models.math3d import to_matrices, to_quaternions
 from urmpipe_models.planning.from_rows import rows_to_path
 from urmpipe_models.planning.path import PathRows, cube_rows
 from urmpipe_models.robots.catalogue import load_robot
@@ -284,7 +284,7 @@ def test_the_tool_is_turned_as_the_rows_say() -> None:
     assert str(warning) == (
         "the tool's angular rate steps in row 2 while it moves, and so do the joints' rates"
     )
-    wanted = Targets(plan.position, matrices(there(plan.quat_xyzw)))
+    wanted = Targets(plan.position, to_matrices(there(plan.quat_xyzw)))
     miss = np.hstack(pose_errors(load_robot("ur5e"), joints_of(plan).q, wanted))
     assert np.abs(miss).max() < 1e-9
 
@@ -305,7 +305,9 @@ def test_an_even_turn_that_was_rounded_is_no_step(digits: int) -> None:
     points = np.array([[0.4, -0.2, 0.3], [0.5, -0.1, 0.3], [0.5, 0.0, 0.3], [0.4, 0.2, 0.3]])
     radius = np.array([0.0, 0.02, 0.02, 0.0])
     at = rows_to_path(PathRows(points, radius, corner=True)).at
-    turned = matrices(quaternions(np.round(2.0 * at, digits)[:, None] * [0.0, 0.0, 1.0], "vector")) @ DOWN
+    turned = (
+        to_matrices(to_quaternions(np.round(2.0 * at, digits)[:, None] * [0.0, 0.0, 1.0], "vector")) @ DOWN
+    )
     rows = PathRows(points, radius, corner=True, rotation=turned)
     plan = planned(limited("ur5e", acceleration=8.0), rows, law="limits")
     assert planned(limited("ur5e", acceleration=8.0), rows).warnings == plan.warnings == ()

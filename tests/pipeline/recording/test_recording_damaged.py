@@ -13,7 +13,7 @@ import pytest
 
 from same_results import assert_same
 from urmpipe_models.errors import RecordingError
-from urmpipe_models.processes import command, environment
+from urmpipe_models.processes import module_command, module_environment
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
 
@@ -46,8 +46,8 @@ def test_a_byte_that_aborts_the_reader_is_one_line(make_run: MakeRun, tmp_path: 
         if said.startswith("found a damaged recording (reading"):
             break
     assert said == ABORTED
-    line = command("urmpipe_pipeline.isolated", "urmpipe_pipeline.recording.trial", str(one))
-    ended = subprocess.run(line, env=environment(), capture_output=True, timeout=100, check=False)
+    line = module_command("urmpipe_pipeline.isolated", "urmpipe_pipeline.recording.trial", str(one))
+    ended = subprocess.run(line, env=module_environment(), capture_output=True, timeout=100, check=False)
     assert ended.returncode == -signal.SIGABRT  # else nothing would need a process of its own
 
 

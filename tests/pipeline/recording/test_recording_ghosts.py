@@ -21,7 +21,7 @@ from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import Targets
 from urmpipe_models.kinematics.forward import points_over_log
-from urmpipe_models.math3d import matrices
+from urmpipe_models.math3d import to_matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_pipeline.palette import GHOST_COLOURS, rgb, run_colour
@@ -89,7 +89,7 @@ def test_branches_may_be_called_anything(make_solved: MakeSolved, tmp_path: Path
 @example(np.zeros(3))
 def test_a_capsule_lies_along_its_bone(bone: FloatArray) -> None:
     length, quat = capsules(bone)
-    along = matrices(quat.astype(np.float64)[None])[0] @ (0.0, 0.0, float(length))
+    along = to_matrices(quat.astype(np.float64)[None])[0] @ (0.0, 0.0, float(length))
     np.testing.assert_allclose(along, bone, rtol=0, atol=3e-6)  # single precision over 5 m
 
 
@@ -152,7 +152,7 @@ def test_each_ghost_is_drawn_where_its_joints_put_it_and_gone_elsewhere(
             assert [row for row, values in rows.items() if not values] == [5, 20]
         for row in there:
             begin, quat, length = (np.array(part[row], dtype=np.float64) for part in sent[:3])
-            along = matrices(quat) @ (0.0, 0.0, 1.0) * length[:, None]
+            along = to_matrices(quat) @ (0.0, 0.0, 1.0) * length[:, None]
             np.testing.assert_allclose(begin, start[row], rtol=0, atol=1e-6)  # single precision over 1 m
             np.testing.assert_allclose(begin + along, end[row], rtol=0, atol=1e-6)
 

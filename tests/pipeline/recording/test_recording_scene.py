@@ -18,7 +18,7 @@ from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.dynamics.equations import centres_of_mass_over_log
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
-from urmpipe_models.math3d import from_offset, quaternions
+from urmpipe_models.math3d import from_offset, to_quaternions
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf import read_urdf
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -220,7 +220,7 @@ def test_each_link_moves_with_its_frame(make_run: MakeRun, shapes: Path, tmp_pat
         moved = column(path, entity, "Transform3D:translation")[:, 0]
         turned = column(path, entity, "Transform3D:quaternion")[:, 0]
         np.testing.assert_allclose(moved, position[:, k], atol=1e-6)
-        expected = quaternions(rotation[:, k].reshape(-1, 9), "matrix")
+        expected = to_quaternions(rotation[:, k].reshape(-1, 9), "matrix")
         np.testing.assert_allclose(turned, expected, atol=1e-6)
     assert below(path, "robot") == {
         "base",

@@ -128,7 +128,7 @@ def test_steps_of_one_kind_are_one_warning_and_all_in_the_audit() -> None:
     assert len(found.entries) == 384
     (warning,) = found.warnings
     assert (warning.kind, warning.row) == ("large-step", 2)
-    assert warning.words("command line") == (
+    assert warning.format("command line") == (
         "row 2: 384 steps of q1 and q3 by more than 90 deg are not wraps and are kept; the largest, of q1 by"
         " 126.1 deg, is to row 122; urmpipe ingest --audit FILE.csv lists all"
     )
@@ -146,7 +146,7 @@ def test_samples_on_wraps_are_one_warning() -> None:
     worst = max(off, key=lambda entry: abs(entry.step))
     (warning,) = found.warnings
     assert (warning.kind, warning.row) == ("in-between", wraps[0] + 1)
-    assert warning.words("command line") == (
+    assert warning.format("command line") == (
         f"row {wraps[0] + 1}: {len(wraps)} samples of q1 lie between the ends of wraps, where a linear"
         f" resampling left them, off the line of their neighbours, at most that of q1 in row {worst.row} by"
         f" {abs(worst.step):.4g} rad; --repair puts them there; urmpipe ingest --audit FILE.csv lists all"

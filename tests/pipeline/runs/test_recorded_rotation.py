@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from asserting import there
 from exported import export_result
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.math3d import NAMES, RotationForm, width
+from urmpipe_models.math3d import COLUMN_NAMES, RotationForm, column_count
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
@@ -59,7 +59,7 @@ def test_a_matrix_becomes_a_quaternion_without_jumps(tmp_path: Path) -> None:
     names = [f"r{i}{j}" for i in "123" for j in "123"]
     run = ingest(tmp_path / "log.csv", names, rotation.as_matrix().reshape(-1, 9), None, 0.0125)
     quaternions = there(run.rotation_recorded)
-    assert run.rotation_names == NAMES["quat_xyzw"]
+    assert run.rotation_names == COLUMN_NAMES["quat_xyzw"]
     np.testing.assert_allclose(np.linalg.norm(quaternions, axis=1), 1.0, atol=1e-14)
     assert np.abs(np.diff(quaternions, axis=0)).max() < 0.05  # a jump would be 2 times its size
     # linear between samples 0.025 rad apart: off by a part of its square
@@ -86,4 +86,6 @@ def test_a_log_without_an_orientation_has_none(tmp_path: Path) -> None:
 
 
 def test_each_form_has_a_name_for_each_column() -> None:
-    assert {form: len(names) for form, names in NAMES.items()} == {form: width(form) for form in NAMES}
+    assert {form: len(names) for form, names in COLUMN_NAMES.items()} == {
+        form: column_count(form) for form in COLUMN_NAMES
+    }

@@ -13,7 +13,7 @@ from solved import solved
 from urmpipe_models.arm.chain import Chain, Joint
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.ik.solutions import DEFAULT_SEARCH, forward_targets, pose_errors
-from urmpipe_models.math3d import matrices
+from urmpipe_models.math3d import to_matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.presentation.figure import Figure
 from urmpipe_pipeline.presentation.section import Presentation, Table, Value
@@ -81,7 +81,7 @@ def test_every_ghost_brings_the_tool_to_the_targets_as_the_chosen_solution_does(
     assert np.array_equal(shown.targets.reached, reached)
     assert np.flatnonzero(~reached).tolist() == [17, 18, 19]
     assert path.targets.rotation is not None
-    back = matrices(shown.targets.quat_xyzw)
+    back = to_matrices(shown.targets.quat_xyzw)
     assert np.abs(back - path.targets.rotation).max() < 1e-15  # a rotation as a quaternion and back
     for arm in (chosen, *others):
         assert arm.t_ns is not None

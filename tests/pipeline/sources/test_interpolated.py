@@ -15,8 +15,8 @@ from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.math3d import (
     RotationForm,
     angle_between,
-    quaternions,
-    rotation_vectors,
+    to_quaternions,
+    to_rotation_vectors,
 )
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
@@ -38,7 +38,7 @@ def joints(t: FloatArray) -> FloatArray:
 def oriented(quat: FloatArray, form: str) -> FloatArray:
     """Return orientations, shape (n, 4) [-], as a controller spells them: its jumps are where it has them."""
     if form == "vector":
-        return rotation_vectors(quat)
+        return to_rotation_vectors(quat)
     if form == "quat_xyzw":
         return np.asarray(quat * np.where(quat[:, 3:] < 0.0, -1.0, 1.0))
     x, y, z, w = quat.T
@@ -50,7 +50,7 @@ def oriented(quat: FloatArray, form: str) -> FloatArray:
 
 def true(robot: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     position, rotation = poses_over_log(robot, q)
-    return position, quaternions(rotation.reshape(-1, 9), "matrix")
+    return position, to_quaternions(rotation.reshape(-1, 9), "matrix")
 
 
 def resampled(t: FloatArray, values: FloatArray, ratio: float) -> tuple[FloatArray, FloatArray]:
@@ -83,7 +83,7 @@ def test_rows_between_the_ends_of_a_jump_are_not_used(form: RotationForm, ratio:
     content, q = text(form, ratio)
     log = read(content, robot, rotation=form)
     assert log.tcp_rotation is not None
-    apart = angle_between(quaternions(log.tcp_rotation, form), true(robot, q)[1])
+    apart = angle_between(to_quaternions(log.tcp_rotation, form), true(robot, q)[1])
     missing = np.isnan(apart)
     (said,) = [warning for warning in log.warnings if warning.kind == "interpolated-orientation"]
     assert said.row == int(np.argmax(missing)) + 1
@@ -112,7 +112,7 @@ def test_many_rows_between_contradict_the_kinematics(form: RotationForm, read: R
     log = read(content, robot, rotation=form)
     assert log.tcp_rotation is not None
     assert "interpolated-orientation" in kinds(log)
-    apart = angle_between(quaternions(log.tcp_rotation, form), true(robot, q)[1])
+    apart = angle_between(to_quaternions(log.tcp_rotation, form), true(robot, q)[1])
     assert np.nanmax(apart) <= 0.35  # a row of 20 is 18 deg off, 0.31 rad; the chord adds less than 0.04
     assert np.isnan(apart).mean() < 0.02
 
@@ -146,7 +146,7 @@ def test_each_row_between_is_found_in_any_unit(
     spelled[:, 0] = np.mod(angles[:, 0] + np.pi, 2 * np.pi) - np.pi
     grid, values = resampled(t, spelled * factor, ratio)
     _, smooth = resampled(t, angles, ratio)
-    off = angle_between(quaternions(values / factor, "rpy"), quaternions(smooth, "rpy"))
+    off = angle_between(to_quaternions(values / factor, "rpy"), to_quaternions(smooth, "rpy"))
     np.testing.assert_array_equal(interpolated_rows(values), off > 0.1)
     assert not interpolated_rows(spelled * factor).any()
     assert len(grid) == len(values)

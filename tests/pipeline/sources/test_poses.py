@@ -15,7 +15,7 @@ from asserting import INCREASE
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import OptionError
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.math3d import RotationForm, quaternions
+from urmpipe_models.math3d import RotationForm, to_quaternions
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import ROW_NS, JointLog
 from urmpipe_pipeline.sources import ReadOptions, map_of, read_log, read_map
@@ -252,7 +252,7 @@ def test_units_and_form_of_a_measured_tool_are_told_by_the_joints(
     np.testing.assert_allclose(log.tcp_position, pose[:, :3] * unit, rtol=1e-12)
     assert log.rotation_form == form
     np.testing.assert_allclose(log.tcp_rotation, pose[:, 3:] * turn, rtol=1e-12)
-    assert quaternions(log.tcp_rotation, form).shape == (40, 4)
+    assert to_quaternions(log.tcp_rotation, form).shape == (40, 4)
 
 
 @pytest.mark.parametrize(

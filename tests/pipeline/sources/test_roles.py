@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.math3d import quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources.cells.cell import grouped_number
 
@@ -282,7 +282,7 @@ def test_tcp_pose_of_ur_is_a_position_and_a_rotation_vector(read: Read) -> None:
     assert log.tcp_quat_xyzw is not None
     assert log.tcp_position[0].tolist() == [7.0, 8.0, 9.0]
     np.testing.assert_array_equal(
-        log.tcp_quat_xyzw[0], quaternions(np.array([[10.0, 11.0, 12.0]]), "vector")[0]
+        log.tcp_quat_xyzw[0], to_quaternions(np.array([[10.0, 11.0, 12.0]]), "vector")[0]
     )
 
 

@@ -47,5 +47,7 @@ def events_view(
 
 
 def _words(one: Event) -> str:
-    said = one.words if isinstance(one.words, str) else f"{one.words.kind}: {one.words.words('command line')}"
+    said = (
+        one.words if isinstance(one.words, str) else f"{one.words.kind}: {one.words.format('command line')}"
+    )
     return text.encodable(said)

@@ -13,7 +13,7 @@ from urmpipe_models.arm.chain import Box, Chain, Mesh
 from urmpipe_models.dynamics.equations import centres_of_mass_over_log
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
-from urmpipe_models.math3d import matrices
+from urmpipe_models.math3d import to_matrices
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, rgb
 from urmpipe_pipeline.presentation.scene import (
     Arm,
@@ -276,7 +276,7 @@ def drawn_targets(targets: Targets) -> DrawnTargets:
     missed = np.flatnonzero(there & ~targets.reached)[:MOST]
     return DrawnTargets(
         origin=position if framed else none,
-        axes=matrices(turned),
+        axes=to_matrices(turned),
         points=none if framed or (timed and not few) else reached[:MOST],
         strips=dashed(lines_of(targets.position)) if timed else (),
         reached=reached,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.math3d import product
+from urmpipe_models.math3d import compose
 from urmpipe_pipeline.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
@@ -229,7 +229,7 @@ def _draw_mark(
 def _draw_tool(stream: RecordingStream, chain: Chain, size: float) -> None:
     """Draw the axes of the tool centre point, which the last moving joint carries."""
     last = max(k for k, joint in enumerate(chain.joints) if joint.kind != "fixed")
-    tool = product([*(joint.origin for joint in chain.joints[last + 1 :]), chain.tip, chain.tool])
+    tool = compose([*(joint.origin for joint in chain.joints[last + 1 :]), chain.tip, chain.tool])
     axes = _frames(np.array([tool.translation], float), np.array([tool.rotation], float), size)
     stream.log(f"{shown_path(*carrier_path(chain.joints[last].name))}/tool", axes, static=True)
 

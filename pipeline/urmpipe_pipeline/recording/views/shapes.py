@@ -13,7 +13,7 @@ from urmpipe_models.arm.chain import Box, Capsule, Chain, Colour, Cylinder, Mesh
 from urmpipe_models.arm.solids import build_placeholder_solids
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import frames_over_log
-from urmpipe_models.math3d import quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_pipeline.meshes import MEDIA_TYPES, drawable
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, rgb
 from urmpipe_pipeline.recording.sending import keys, shown_path
@@ -75,7 +75,7 @@ def bodies_over_log(
     carriers = [None, *(joint.name for joint in robot.joints)]
     on = {carrier: tuple(one for one in (*shown, *solids) if one.joint == carrier) for carrier in carriers}
     return tuple(
-        Body(carrier, position[:, k], quaternions(rotation[:, k].reshape(-1, 9), "matrix"), visuals)
+        Body(carrier, position[:, k], to_quaternions(rotation[:, k].reshape(-1, 9), "matrix"), visuals)
         for k, (carrier, visuals) in enumerate(on.items())
         if visuals
     )
@@ -142,7 +142,7 @@ def _placed(visual: Visual) -> AsComponents:
     rotation: FloatArray = np.array(visual.origin.rotation, dtype=float).reshape(1, 9)
     return rr.Transform3D(
         translation=visual.origin.translation,
-        quaternion=quaternions(rotation, "matrix")[0],
+        quaternion=to_quaternions(rotation, "matrix")[0],
         scale=visual.shape.scale if isinstance(visual.shape, Mesh) else None,
     )
 

@@ -10,7 +10,7 @@ from decimal import Decimal
 import numpy as np
 
 from urmpipe_models.elementwise import IntArray
-from urmpipe_models.errors import Finding, Hint, OptionError, shown
+from urmpipe_models.errors import Finding, Hint, OptionError, format_value
 from urmpipe_pipeline.joint_log import ASSUMED_PERIOD, Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import LONGEST_NS
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
@@ -193,12 +193,14 @@ def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> Clo
     cells, given = layout.cells(column.index), units.get(column.number)
     forms = known_forms(cells)
     if not forms:
-        raise layout.error(f"found {shown(cells[0])}, allowed: {FORMS_TOLD}", column.header, *OTHER_TIME)
+        raise layout.error(
+            f"found {format_value(cells[0])}, allowed: {FORMS_TOLD}", column.header, *OTHER_TIME
+        )
     wanted = given or column.unit
     asked = tuple(form for form in forms if wanted is not None and wanted.name in form.keys)
     if given is not None and not asked:
         keys = ", ".join(dict.fromkeys(key for form in forms for key in form.keys)) or "none"
-        found = f"{given.name} for the time {shown(column.name)}"
+        found = f"{given.name} for the time {format_value(column.name)}"
         raise OptionError(Finding(parameter="unit", found=found, allowed=keys, hints=OTHER_TIME))
     return ClockColumn(column.index, forms=asked or forms)
 

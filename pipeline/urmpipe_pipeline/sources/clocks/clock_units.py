@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from urmpipe_models.errors import Finding, Hint, LogError, OptionError, shown
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.chosen import EVEN, EXPONENTS, OTHER_TIME
 from urmpipe_pipeline.sources.clocks.halves import EPOCH
@@ -65,7 +65,7 @@ def unit_of(
     given = units.get(time.number)
     if given is not None:
         if given.name not in EXPONENTS:
-            found = f"{given.name} for the time {shown(time.name)}"
+            found = f"{given.name} for the time {format_value(time.name)}"
             raise OptionError(Finding(parameter="unit", found=found, allowed=_UNITS, hints=OTHER_TIME))
         return given.name, "given as an option", ()
     named = time.unit or vocabulary().unit(time.key)  # "seconds" has no other name
@@ -73,7 +73,7 @@ def unit_of(
         return named.name, "its name", ()
     long = time.unit_text or time.key.rpartition("_")[2]
     if long.lower() in vocabulary().long_times:
-        message = f"found the unit {shown(long)}, allowed: {_UNITS}; convert the times"
+        message = f"found the unit {format_value(long)}, allowed: {_UNITS}; convert the times"
         raise layout.error(message, time.header, *EVEN)
     if source is not None and "time" in source.units:
         return source.units["time"].name, f"{source.name} writes {source.units['time'].name}", ()
@@ -134,7 +134,7 @@ def _short(time: Column, layout: Layout, step: float) -> Found:
 
 
 def _assumed(time: Column, step: float) -> LogWarning:
-    said = f"the time {shown(time.name)} steps by {step:.6g}: taken as s"
+    said = f"the time {format_value(time.name)} steps by {step:.6g}: taken as s"
     hints, taken = (*unit_hints([time], "s", "confirms it"), *OTHER_TIME), "the times are in s"
     return LogWarning("assumed-unit", said, hints=hints, assumption=taken, role="time")
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import Finding, Hint, LogError, shown
-from urmpipe_models.math3d import width
+from urmpipe_models.errors import Finding, Hint, LogError, format_value
+from urmpipe_models.math3d import column_count
 from urmpipe_pipeline.sources.clocks.chosen import EXPONENTS, Chosen
 from urmpipe_pipeline.sources.clocks.digits import dates_in_digits
 from urmpipe_pipeline.sources.clocks.halves import EPOCH, PERIODS, halves_beside
@@ -90,7 +90,7 @@ def without_header(
 
 def _before_pose(columns: Sequence[Column], layout: Layout, options: ReadOptions) -> Chosen | None:
     """Return what stands before x, y, z and the orientation told, if the number of columns says so."""
-    pose = 3 + (width(options.rotation) if options.rotation else 0)
+    pose = 3 + (column_count(options.rotation) if options.rotation else 0)
     if len(columns) == pose:
         why = f"the {pose} columns are a pose" if options.rotation else "three columns are x, y, z"
         return Chosen((), why)
@@ -335,7 +335,7 @@ def _odd_row(step: int, column: Column, layout: Layout, whole: Whole, *, path: b
     begins = step == 0 and 0 < steps[1] < 1.5 * usual  # the others go on from the second row
     row = step + (0 if leaps or begins else 1)
     cells = layout.cells(column.index)
-    found = shown(cells[row]) if row < len(cells) else f"{values[row]:.15g}"
+    found = format_value(cells[row]) if row < len(cells) else f"{values[row]:.15g}"
     what = "the time or a counter" if path else "the time, a counter or a joint"
     message = f"found {found} in a first column that otherwise increases, which may be {what}"
     line = lines_of_rows(layout, [row + 1]).get(row + 1)

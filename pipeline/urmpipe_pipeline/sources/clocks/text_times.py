@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from urmpipe_models.elementwise import IntArray
-from urmpipe_models.errors import Hint, LogError, shown
+from urmpipe_models.errors import Hint, LogError, format_value
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import is_missing, is_number
 from urmpipe_pipeline.sources.cells.text_cells import Bytes, TextCells
@@ -140,7 +140,7 @@ def _no_time(columns: Sequence[TextCells], readings: Sequence[Reading], fewest: 
     other = min((one for one in readings if one.unreadable > fewest), key=lambda one: one.unreadable)
     row = int(np.argmax(other.times == UNREADABLE))
     text = " ".join(cells.text(row).strip() for cells in columns)
-    return f"as {other.name} {shown(text)} in row {row + 1} is no time"
+    return f"as {other.name} {format_value(text)} in row {row + 1} is no time"
 
 
 def _read(columns: Sequence[TextCells], forms: Combination) -> Reading:
@@ -179,7 +179,7 @@ def add_nights(times: IntArray) -> int:
 def _said(reading: Reading, columns: Sequence[TextCells], evidence: Sequence[str]) -> tuple[Inference, ...]:
     """Return what was found out about a text clock."""
     text = " ".join(cells.text(0).strip() for cells in columns)
-    reasons = [f"its cells, such as {shown(text)}", *evidence]
+    reasons = [f"its cells, such as {format_value(text)}", *evidence]
     dated, zoned = any(form.dated for form in reading.forms), reading.forms[-1].has_zone(columns[-1].text(0))
     if dated and not zoned:
         reasons.append("without a time zone: taken as UTC")
@@ -201,7 +201,7 @@ def _question(layout: Layout, parts: Sequence[ClockColumn], readings: Sequence[R
     column = layout.names[parts[place].column]
     cell = layout.cells(parts[place].column)[0]
     hints = (Hint("unit", {column: key}, "specifies it") for key in keys)
-    return layout.error(f"found {shown(cell)}, which may be {names}", column, *hints, *OTHER_TIME)
+    return layout.error(f"found {format_value(cell)}, which may be {names}", column, *hints, *OTHER_TIME)
 
 
 def read_cells(cells: TextCells, form: Form) -> IntArray:

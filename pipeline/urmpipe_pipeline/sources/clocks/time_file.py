@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from urmpipe_models.errors import Finding, Hint, LogError, OptionError, shown
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.sources.clocks.chosen import Chosen
 from urmpipe_pipeline.sources.clocks.clock import Clock, clock_of
 from urmpipe_pipeline.sources.clocks.clock_columns import given_time, time_columns
@@ -53,7 +53,7 @@ def with_time_file(tables: Tables, options: ReadOptions) -> tuple[Tables, int | 
     if named is None:
         return tables, None
     if len(tables.layouts) > 1:
-        found = f"{shown(options.time or '')} for {len(tables.layouts)} tables"
+        found = f"{format_value(options.time or '')} for {len(tables.layouts)} tables"
         raise OptionError(Finding(parameter="time", found=found, allowed="FILE:COLUMN for one table"))
     plain = ReadOptions(delimiter=options.delimiter, decimal=options.decimal)
     try:

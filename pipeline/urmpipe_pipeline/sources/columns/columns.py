@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
-from urmpipe_models.errors import Finding, Hint, LogError, OptionError, shown
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.sources.cells.cell import count_numbers, is_missing
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.limits import refuse_wide
@@ -177,10 +177,10 @@ def find_column(columns: Sequence[Column], text: str, **place: str) -> Column:
     found = columns_called(columns, text)
     if len(found) == 1:
         return found[0]
-    none, allowed = f"no column {shown(text)}", listed(columns)
+    none, allowed = f"no column {format_value(text)}", listed(columns)
     if found:
         numbers = ", ".join(str(column.number) for column in found)
-        none, allowed = f"{shown(text)} as columns {numbers}", "one; give its number"
+        none, allowed = f"{format_value(text)} as columns {numbers}", "one; give its number"
     raise LogError(Finding(found=none, allowed=allowed, **place))  # type: ignore[arg-type]
 
 
@@ -244,7 +244,7 @@ def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Un
         quantities: tuple[Quantity, ...] = ("angle", "length", "time", "date") if text else ("angle",)
         if unit is None or unit.quantity not in quantities:
             allowed = ", ".join(name for quantity in quantities for name in vocabulary().spelled(quantity))
-            raise OptionError(Finding(parameter="unit", found=shown(unit_text), allowed=allowed))
+            raise OptionError(Finding(parameter="unit", found=format_value(unit_text), allowed=allowed))
         if text and options.shared and not columns_called(columns, text):
             continue
         given[find_column(columns, text, parameter="unit").number if text else 0] = unit

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.math3d import FORMS, NAMES, width
+from urmpipe_models.math3d import COLUMN_NAMES, FORMS, column_count
 from urmpipe_pipeline.joint_log import ROLES, Inference
 from urmpipe_pipeline.outputs import MOTION_ROW, PATH_ROW, TARGET_ROW
 from urmpipe_pipeline.sources.columns.columns import Column
@@ -60,8 +60,10 @@ def written_roles(columns: Sequence[Column], layout: Layout, robot: Chain | None
         check_count(joints, layout.file, robot)
     names = tuple(column.name.removeprefix(RECORDED) for column in rotation)
     told = form_of(layout)
-    forms = [form for form in FORMS if form == told] or [form for form, own in NAMES.items() if own == names]
-    forms = forms or [form for form in FORMS if rotation and width(form) == len(rotation)]
+    forms = [form for form in FORMS if form == told] or [
+        form for form, own in COLUMN_NAMES.items() if own == names
+    ]
+    forms = forms or [form for form in FORMS if rotation and column_count(form) == len(rotation)]
     arrays = layout.held is not None and GIVEN in (layout.held.schema.metadata or {})
     why = "given as an array" if arrays else "urmpipe wrote them"
     said = [joint_inference(joints, why) if joints else path_inference(_listed(position), why)]

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.errors import Finding, Hint, LogError, shown
-from urmpipe_models.math3d import width
+from urmpipe_models.errors import Finding, Hint, LogError, format_value
+from urmpipe_models.math3d import column_count
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, chosen_columns, listed
 from urmpipe_pipeline.sources.columns.pose import (
@@ -83,7 +83,7 @@ def without_header(
     for column in () if path else columns:  # of a path they are wrong rows
         if column.text:
             cell = layout.cells(column.index)[0]
-            message = f"found {shown(cell)} in a table without a header, allowed: numbers"
+            message = f"found {format_value(cell)} in a table without a header, allowed: numbers"
             raise layout.error(message, column.name, NAME_JOINTS)
     if path:
         return _path_by_place(columns, layouts, file, options, pose)
@@ -106,7 +106,7 @@ def _path_by_place(
     if pose is None and len(columns) < 3:
         raise LogError(Finding(f"found {len(columns)} columns, allowed: x, y, z", file=file))
     form = options.rotation
-    if pose is None and form is not None and len(columns) == 3 + width(form):
+    if pose is None and form is not None and len(columns) == 3 + column_count(form):
         pose = Pose(tuple(columns[:3]), tuple(columns[3:]), (form,), GIVEN)
     behind = _trailing_pose(columns, layouts, None, some=True) if pose is None else None
     pose = with_form(pose or behind or Pose(tuple(columns[:3]), evidence="there is no header"), form)

@@ -11,7 +11,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, OptionError
-from urmpipe_models.math3d import FORMS, RotationForm, width
+from urmpipe_models.math3d import FORMS, RotationForm, column_count
 from urmpipe_pipeline.sources.cells.cell import to_float
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.families import Family, drop_unknown, find_families, prefer_measured
@@ -144,7 +144,11 @@ def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
         raise OptionError(f"position: found {len(position)} columns, allowed: x, y, z")
     forms = _forms_of(rotation, options)
     if rotation and not forms:
-        allowed = f"{width(options.rotation)}, as {options.rotation} has" if options.rotation else "3, 4 or 9"
+        allowed = (
+            f"{column_count(options.rotation)}, as {options.rotation} has"
+            if options.rotation
+            else "3, 4 or 9"
+        )
         raise OptionError(f"orientation: found {len(rotation)} columns, allowed: {allowed}")
     return Pose(position, rotation, forms if rotation else (), "given as an option")
 
@@ -155,7 +159,7 @@ def _measured_pose(columns: Sequence[Column], options: ReadOptions) -> Pose:
     position, rotation = named[:3], named[3:]
     forms = _forms_of(rotation, options)
     if len(position) != 3 or (rotation and not forms):
-        widths = f"{width(options.rotation)}" if options.rotation else "3, 4 or 9"
+        widths = f"{column_count(options.rotation)}" if options.rotation else "3, 4 or 9"
         allowed = f"x, y, z, and {widths} of the orientation behind them, or none"
         raise OptionError(Finding(parameter="measured", found=f"{len(named)} columns", allowed=allowed))
     return Pose(position, rotation, forms, "given as an option", measured=True)
@@ -164,7 +168,9 @@ def _measured_pose(columns: Sequence[Column], options: ReadOptions) -> Pose:
 def _forms_of(rotation: Sequence[Column], options: ReadOptions) -> tuple[RotationForm, ...]:
     """Return the forms that so many columns of an orientation may have; none of none."""
     many = len(rotation)
-    return tuple(form for form in FORMS if many and width(form) == many and options.rotation in (None, form))
+    return tuple(
+        form for form in FORMS if many and column_count(form) == many and options.rotation in (None, form)
+    )
 
 
 def with_form(pose: Pose, form: RotationForm | None) -> Pose:
@@ -175,8 +181,8 @@ def with_form(pose: Pose, form: RotationForm | None) -> Pose:
     """
     if form is None or not pose.rotation:
         return pose
-    if width(form) != len(pose.rotation):
-        found = f"{form}, which has {width(form)} columns, for {listed(pose.rotation)}"
+    if column_count(form) != len(pose.rotation):
+        found = f"{form}, which has {column_count(form)} columns, for {listed(pose.rotation)}"
         allowed = f"a form of {len(pose.rotation)} columns"
         raise OptionError(Finding(parameter="rotation", found=found, allowed=allowed))
     return replace(pose, forms=(form,))

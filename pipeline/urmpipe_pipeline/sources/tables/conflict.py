@@ -15,7 +15,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from urmpipe_models.errors import Finding, LogError, shown
+from urmpipe_models.errors import Finding, LogError, format_value
 from urmpipe_pipeline.sources.tables.numbers import capped
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.text import Segment
@@ -58,7 +58,7 @@ class Marker:
 
     def finding(self, file: str) -> Finding:
         """Return it as a finding."""
-        found = f"{shown(self.text)}, {_MEANING[self.sign]}"
+        found = f"{format_value(self.text)}, {_MEANING[self.sign]}"
         return Finding(file=file, line=self.line, found=found, allowed="one version, without git's markers")
 
 

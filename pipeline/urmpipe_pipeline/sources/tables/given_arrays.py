@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.errors import Finding, OptionError, for_each, shown
+from urmpipe_models.errors import Finding, OptionError, format_value, map_collecting_errors
 from urmpipe_pipeline.sources.tables import numpy_columns
 from urmpipe_pipeline.sources.tables.column_facts import ROLE, UNIT
 from urmpipe_pipeline.sources.tables.frames import is_table
@@ -56,7 +56,7 @@ def held_of_arrays(
         lambda: _joints(q),
         lambda: _poses(recorded_tcp),
     )
-    times, values, poses = for_each(lambda make: make(), parts)
+    times, values, poses = map_collecting_errors(lambda make: make(), parts)
     if values is None and poses is None:
         raise OptionError(Finding(parameter="q", found="none", allowed=JOINTS))
     _refuse_lengths({"t": times, "q": values, "recorded_tcp": poses})
@@ -115,9 +115,9 @@ def _poses(given: Any) -> FloatArray | None:
         return array
     if array.ndim != 3 or not len(array) or array.shape[1:] != (4, 4):
         raise _unfit("recorded_tcp", given, POSES)
-    from urmpipe_models.math3d import quaternions
+    from urmpipe_models.math3d import to_quaternions
 
-    turned = quaternions(array[:, :3, :3].reshape(-1, 9), "matrix")
+    turned = to_quaternions(array[:, :3, :3].reshape(-1, 9), "matrix")
     return np.column_stack([array[:, :3, 3], turned])
 
 
@@ -135,7 +135,7 @@ def _numbers(parameter: str, given: Any, allowed: str) -> FloatArray:
 def _unfit(parameter: str, given: Any, allowed: str) -> OptionError:
     """Return the error about what is no array of a shape."""
     shape = getattr(given, "shape", None)
-    what = "an array" if isinstance(given, np.ndarray) else shown(given)
+    what = "an array" if isinstance(given, np.ndarray) else format_value(given)
     found = what if shape is None else f"{what} of shape {tuple(shape)}"
     return OptionError(Finding(parameter=parameter, found=found, allowed=allowed))
 

@@ -13,7 +13,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
-from urmpipe_models.errors import Finding, LogError, shown
+from urmpipe_models.errors import Finding, LogError, format_value
 from urmpipe_pipeline.joint_log import Inference, SourceFile
 from urmpipe_pipeline.sources.cells.cell import LONGEST_NS, is_text, to_float, to_nanoseconds
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
@@ -150,7 +150,7 @@ def read_held(layout: Layout, columns: Sequence[int], clock: Sequence[ClockColum
     for j, column in enumerate(columns):
         values[:, j], wrong = numbers_of(table.column(column))
         for row, text in wrong.items():
-            said = f"found {shown(text)}, allowed: {MAY_BE_MISSING}"
+            said = f"found {format_value(text)}, allowed: {MAY_BE_MISSING}"
             faults.setdefault(row, []).append(RowFault(said, (layout.names[column],)))
     findings = tuple(
         Finding(fault.said, layout.file, row=row + 1, column=fault.columns[0])

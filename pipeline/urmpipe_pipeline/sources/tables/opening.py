@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-from urmpipe_models.errors import Finding, Hint, OptionError, for_each, shown
+from urmpipe_models.errors import Finding, Hint, OptionError, format_value, map_collecting_errors
 from urmpipe_pipeline.joint_log import OWN, Inference
 from urmpipe_pipeline.sources.cells.cell import is_number
 from urmpipe_pipeline.sources.options import ReadOptions
@@ -77,12 +77,12 @@ def open_tables(files: Sequence[Path | Held], options: ReadOptions, sniff_plain:
     if not files:
         raise OptionError("found no log file, allowed: one, or several if the program writes one per plot")
     if options.source is not None and options.source not in source_names():
-        found, allowed = shown(options.source), ", ".join(source_names())
+        found, allowed = format_value(options.source), ", ".join(source_names())
         raise OptionError(Finding(parameter="source", found=found, allowed=allowed))
     is_number.cache_clear()  # cells of other logs, which may be long
-    opened = for_each(lambda one: _opened(one, options), files)
+    opened = map_collecting_errors(lambda one: _opened(one, options), files)
     texts = [one for one in opened if isinstance(one, Segment)]
-    markers = for_each(refuse_conflict, texts)
+    markers = map_collecting_errors(refuse_conflict, texts)
     titled = [
         (file.stem if isinstance(file, Path) else file.name, one)
         for file, one in zip(files, opened, strict=True)
@@ -93,8 +93,8 @@ def open_tables(files: Sequence[Path | Held], options: ReadOptions, sniff_plain:
     ):
         graphs = coppeliasim.graphs(texts[0])
         titled, forced = [*graphs] or titled, True
-    layouts = for_each(lambda item: _layout(item[1], options, sniff_plain), titled)
-    for_each(
+    layouts = map_collecting_errors(lambda item: _layout(item[1], options, sniff_plain), titled)
+    map_collecting_errors(
         lambda table: refuse_among_rows(*table),
         zip([layout for layout in layouts if layout.held is None], markers, strict=False),
     )
@@ -130,7 +130,9 @@ def _opened(one: Path | Held, options: ReadOptions) -> Segment | Held:
 def _shaped(layouts: Sequence[Layout], options: ReadOptions) -> list[Layout]:
     """Return tables with a row a sample, and none of those that end a log in what is sampled of them."""
     alone = len(layouts) == 1
-    return for_each(lambda one: without_end_rows(turned(one, options.layout, alone=alone)), layouts)
+    return map_collecting_errors(
+        lambda one: without_end_rows(turned(one, options.layout, alone=alone)), layouts
+    )
 
 
 def _encoding(texts: Sequence[Segment]) -> Iterator[Inference]:

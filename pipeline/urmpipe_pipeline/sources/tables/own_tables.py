@@ -9,7 +9,7 @@ from typing import Any, cast, get_args
 
 import pyarrow as pa
 
-from urmpipe_models.math3d import NAMES
+from urmpipe_models.math3d import COLUMN_NAMES
 from urmpipe_pipeline.joint_log import Role
 from urmpipe_pipeline.sources.tables.column_facts import ROLE, UNIT
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -71,7 +71,7 @@ def form_of(layout: Layout) -> str:
     """Return the form of the orientation in a table of ours; empty where it does not tell one."""
     metadata = {} if layout.held is None else layout.held.schema.metadata or {}
     told = metadata.get(FORM, b"").decode(errors="replace")
-    return told if told in NAMES else ""
+    return told if told in COLUMN_NAMES else ""
 
 
 def grid_roles(head: Head) -> dict[int, Role]:
@@ -92,7 +92,7 @@ def grid_roles(head: Head) -> dict[int, Role]:
     names = [name.removeprefix(RECORDED) if name.startswith(RECORDED) else None for name, _ in head]
     roles |= {k: "position" for k, name in enumerate(names) if name in ("tcp_x", "tcp_y", "tcp_z")}
     rotation = [k for k, name in enumerate(names) if name and k not in roles]
-    if tuple(names[k] for k in rotation) in NAMES.values():
+    if tuple(names[k] for k in rotation) in COLUMN_NAMES.values():
         roles |= dict.fromkeys(rotation, "rotation")
     return roles
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from select import select
 from tempfile import TemporaryFile
 
-from urmpipe_models.errors import Finding, LogError, shown
+from urmpipe_models.errors import Finding, LogError, format_value
 
 WAITS_S = (5.0, 55.0)
 """Seconds without a byte after which a pipe that brings nothing is named, and those until it is given up."""
@@ -123,7 +123,7 @@ def _state(path: Path) -> State | None:
     except OSError:
         return None
     except ValueError:
-        raise LogError(f"found {shown(str(path))}, allowed: the name of a file") from None
+        raise LogError(f"found {format_value(str(path))}, allowed: the name of a file") from None
     if stat.S_ISDIR(found.st_mode):
         return (found.st_mode,)
     return found.st_mode, found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns

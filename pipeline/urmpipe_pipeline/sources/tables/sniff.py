@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
 
-from urmpipe_models.errors import Finding, Hint, LogError, OptionError, shown
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import (
     DECIMALS,
@@ -220,7 +220,7 @@ def _choices(parameter: str, given: str | None, allowed: Sequence[str]) -> Seque
     if sign not in allowed:
         names = ", ".join(_NAMES[sign] for sign in allowed)
         allowed_signs = f"{names}, or the character itself"
-        raise OptionError(Finding(parameter=parameter, found=shown(given), allowed=allowed_signs))
+        raise OptionError(Finding(parameter=parameter, found=format_value(given), allowed=allowed_signs))
     return (sign,)
 
 
@@ -377,7 +377,7 @@ def _refuse_few(
     """Raise with each of some rows if they are few: it is they that keep the others from being understood."""
     if len(few) > FEW * len(rows):
         return
-    wrong = [(lines[k].number, shown(rows[k][column])) for k in few]
+    wrong = [(lines[k].number, format_value(rows[k][column])) for k in few]
     file = str(segment.path)
     findings = [Finding(file=file, line=line, found=cell, allowed=allowed) for line, cell in wrong]
     raise LogError(*capped(findings, file))

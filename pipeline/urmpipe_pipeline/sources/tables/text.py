@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 
 from urmpipe_models.errors import Finding, Hint, LogError
-from urmpipe_models.files import meant_by
+from urmpipe_models.files import suggest_path
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.sources.tables.limits import LONGEST_LINE, long_line
 from urmpipe_pipeline.sources.vocabulary import Container, vocabulary
@@ -186,7 +186,7 @@ def _size(path: Path) -> int:
         with path.open("rb"):
             return path.stat().st_size
     except FileNotFoundError:
-        raise LogError(Finding(f"found no such file{meant_by(path, LOGS)}", file=str(path))) from None
+        raise LogError(Finding(f"found no such file{suggest_path(path, LOGS)}", file=str(path))) from None
     except OSError as error:
         raise LogError(Finding(f"cannot be read: {error.strerror}", file=str(path))) from error
 

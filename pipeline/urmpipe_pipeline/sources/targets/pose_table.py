@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.errors import Finding, Hint, LogError, OptionError, shown
-from urmpipe_models.math3d import FORMS, RotationForm, width
+from urmpipe_models.errors import Finding, Hint, LogError, OptionError, format_value
+from urmpipe_models.math3d import FORMS, RotationForm, column_count
 from urmpipe_pipeline.joint_log import PASSED_OVER, Inference, LogWarning
 from urmpipe_pipeline.sources.clocks.time_file import named_file
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of, listed
@@ -94,7 +94,7 @@ def read_pose_table(
     further = further or {}
     if named_file(options.time):
         allowed = "a column of the table of targets"
-        raise OptionError(Finding(parameter="time", found=shown(options.time or ""), allowed=allowed))
+        raise OptionError(Finding(parameter="time", found=format_value(options.time or ""), allowed=allowed))
     with unchanged([file]):
         return _read(file, options, further, naming)
 
@@ -247,8 +247,8 @@ def _refuse_unclear(plan: Plan, naming: str, *, named: bool, timed: bool) -> Non
 def _remedies(count: int, naming: str, *, timed: bool) -> Iterator[Hint]:
     """Yield remedies for so many columns without names: a header, the form of the orientation, the time."""
     yield Hint("", does=naming)
-    yield from (Hint("rotation", form, "specifies it") for form in FORMS if 3 + width(form) == count)
-    if not timed and count - 1 in {3, *(3 + width(form) for form in FORMS)}:
+    yield from (Hint("rotation", form, "specifies it") for form in FORMS if 3 + column_count(form) == count)
+    if not timed and count - 1 in {3, *(3 + column_count(form) for form in FORMS)}:
         yield Hint("time", "1", "if the first is the time")
 
 

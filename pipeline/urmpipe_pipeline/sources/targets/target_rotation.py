@@ -8,7 +8,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Finding, Hint, LogError
-from urmpipe_models.math3d import RotationForm, angles, matrices, quaternions
+from urmpipe_models.math3d import RotationForm, is_angular, to_matrices, to_quaternions
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, listed
 from urmpipe_pipeline.sources.columns.pose import ORTHOGONAL
@@ -76,7 +76,7 @@ def rotation_units(
     they are called A, B, C as KUKA's, which are in degrees. Values are those of finite rows in the file's own
     units, shape (n, columns).
     """
-    if not angles(form):
+    if not is_angular(form):
         return [PURE] * len(columns), []
     known = [unit for unit in told if unit is not None]
     if known:
@@ -101,7 +101,7 @@ def target_rotations(
     faults = {row: RowFault(said, names) for row, said in _no_rotations(values, form)}
     sound = values.copy()
     sound[list(faults)] = np.nan
-    return matrices(quaternions(sound, form)), faults
+    return to_matrices(to_quaternions(sound, form)), faults
 
 
 def _no_rotations(values: FloatArray, form: RotationForm) -> Iterator[tuple[int, str]]:

@@ -19,7 +19,7 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import BoolArray, FloatArray, IntArray
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.math3d import RotationForm, angle_between, conjugate, quaternion_product, quaternions
+from urmpipe_models.math3d import RotationForm, angle_between, conjugate, quaternion_product, to_quaternions
 from urmpipe_models.wraps import FULL_TURN
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.units.evidence import mean_turn, spread
@@ -150,7 +150,7 @@ def _turned(arm: tuple[Chain, FloatArray], rows: IntArray) -> FloatArray:
     robot, q = arm
     around = np.clip(rows + np.array([[-1], [0], [1]]), 0, len(q) - 1)
     before, here, behind = (
-        quaternions(poses_over_log(robot, q[at])[1].reshape(-1, 9), "matrix") for at in around
+        to_quaternions(poses_over_log(robot, q[at])[1].reshape(-1, 9), "matrix") for at in around
     )
     return np.fmax(angle_between(before, here), angle_between(here, behind))
 
@@ -165,7 +165,7 @@ def _misses(
 
     def both(at: IntArray) -> tuple[FloatArray, FloatArray]:
         _, computed = poses_over_log(arm[0], arm[1][at])
-        return quaternions(computed.reshape(-1, 9), "matrix"), quaternions(rotation[at], form)
+        return to_quaternions(computed.reshape(-1, 9), "matrix"), to_quaternions(rotation[at], form)
 
     def apart(pair: tuple[FloatArray, FloatArray], turn: FloatArray) -> FloatArray:
         relative = quaternion_product(conjugate(pair[0]), pair[1])

@@ -11,9 +11,9 @@ import numpy as np
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Hint
-from urmpipe_models.hand_eye import hand_eye, rotation_miss
+from urmpipe_models.hand_eye import rotation_residual, solve_hand_eye
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.math3d import FORMS, RotationForm, angles, matrices, quaternions, width
+from urmpipe_models.math3d import FORMS, RotationForm, column_count, is_angular, to_matrices, to_quaternions
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.units.evidence import spread, turned_apart
@@ -60,10 +60,10 @@ class Choice:
 
     def quaternions(self, values: FloatArray) -> FloatArray:
         """Return values of the columns, shape (n, columns), as unit quaternions x, y, z, w [-]."""
-        return quaternions((values * [unit.factor for unit in self.units])[:, self.order], self.form)
+        return to_quaternions((values * [unit.factor for unit in self.units])[:, self.order], self.form)
 
     def __str__(self) -> str:
-        if angles(self.form):
+        if is_angular(self.form):
             return f"{self.form} in {self.units[0].name}"
         return f"{self.form} by columns" if self.by_columns else self.form
 
@@ -126,7 +126,7 @@ def settle_rotation(
     choices = [Choice(form, units) for form in sound for units in _possible_units(form, told)]
     fixed = any(one and one.by == "column" for one in told)
     if arm is not None:
-        forms = [one for one in FORMS if width(one) == len(columns) and _is_sound(values, one)]
+        forms = [one for one in FORMS if column_count(one) == len(columns) and _is_sound(values, one)]
         others = _others(choices, sound if given else forms, units=not fixed, order=not given)
         found = _by_kinematics(list(dict.fromkeys((*choices, *others))), choices, values, arm, measured)
         if found is not None and found.proved:
@@ -169,7 +169,7 @@ def _about_lengths(names: str, length: FloatArray) -> LogWarning:
 
 def _possible_units(form: RotationForm, told: Sequence[Told | None]) -> list[tuple[Unit, ...]]:
     """Return the units that the columns may have: told, or rad or deg."""
-    if not angles(form):
+    if not is_angular(form):
         return [(PURE,) * len(told)]
     known = [one.unit for one in told if one is not None]
     if known:
@@ -183,7 +183,7 @@ def _others(
     """Yield what the columns may be against their names: other forms, units and orders of a matrix."""
     told = choices[0].units
     for form in forms:
-        if not angles(form):
+        if not is_angular(form):
             yield Choice(form, (PURE,) * len(told))
             if form == "matrix" and order:
                 yield Choice(form, (PURE,) * len(told), by_columns=True)
@@ -273,12 +273,12 @@ def _apart(
     outside, at positions in [m], shape (n, 3), with the frames of base and tool that fit best.
     """
     if measured is None:
-        computed = quaternions(rotation.reshape(-1, 9), "matrix")
+        computed = to_quaternions(rotation.reshape(-1, 9), "matrix")
         yield partial(turned_apart, computed, tool=False)
         yield partial(turned_apart, computed, tool=True)
     elif np.isfinite(measured).all(axis=1).any():
-        base = hand_eye(position, rotation, measured).base_rotation
-        yield lambda recorded: rotation_miss(rotation, matrices(recorded), base)
+        base = solve_hand_eye(position, rotation, measured).base_rotation
+        yield lambda recorded: rotation_residual(rotation, to_matrices(recorded), base)
 
 
 def _without_unit(columns: Sequence[Column], choices: Sequence[Choice], values: FloatArray) -> Settled:

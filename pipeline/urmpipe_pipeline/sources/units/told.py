@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from urmpipe_models.errors import Finding, LogError, OptionError, shown
+from urmpipe_models.errors import Finding, LogError, OptionError, format_value
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.units.unit_hints import unit_hints
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Quantity, Unit, vocabulary
@@ -94,7 +94,7 @@ class Tellers:
         if column.number in self.given:
             return self.given[column.number]
         if column.unit_text and column.unit is None:
-            message = f"found the unit {shown(column.unit_text)}, allowed: rad, deg, m, mm, cm"
+            message = f"found the unit {format_value(column.unit_text)}, allowed: rad, deg, m, mm, cm"
             hints = unit_hints([column], "mm" if likely == "length" else "deg", "keeps the values unchanged")
             said = f"{message}; convert the values"
             raise LogError(Finding(said, self.file, column=column.header, hints=hints))

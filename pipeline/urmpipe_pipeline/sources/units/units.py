@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from urmpipe_models.arm.chain import Chain, JointKind
 from urmpipe_models.elementwise import FloatArray, IntArray
 from urmpipe_models.errors import Finding, Hint, LogError
-from urmpipe_models.math3d import RotationForm, angles
+from urmpipe_models.math3d import RotationForm, is_angular
 from urmpipe_pipeline.joint_log import Inference, LogWarning, Role
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.columns.questions import NAME_JOINTS
@@ -199,7 +199,7 @@ class UnitFinder:
             LogError: If a unit is not known or is none of an angle.
             OptionError: If one that the user gave is none.
         """
-        turned = any(map(angles, forms))
+        turned = any(map(is_angular, forms))
         return [self.tellers.of(column) if turned else None for column in columns]
 
     def _told_units(self, columns: Sequence[Column], told: Sequence[Told | None]) -> list[Unit | None]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_models.math3d import quaternions
+from urmpipe_models.math3d import to_quaternions
 from urmpipe_models.robots.catalogue import load_robot
 
 FASTEST = 2.0
@@ -110,7 +110,7 @@ class Motion:
     def turn(self) -> FloatArray:
         """Orientation of its tool as quaternions x, y, z, w, shape (n, 4)."""
         _, rotation = poses_over_log(load_robot(self.robot), self.q)
-        turn: FloatArray = quaternions(rotation.reshape(-1, 9), "matrix")
+        turn: FloatArray = to_quaternions(rotation.reshape(-1, 9), "matrix")
         return turn
 
     @property
