@@ -32,7 +32,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_fmus.si_units import coherent, display_conversion, same_unit
+from urmpipe_fmus.si_units import coherent_unit, display_conversion, is_same_unit
 from urmpipe_models.elementwise import Element, FloatArray
 from urmpipe_models.errors import Finding, FmuError, UnitError, format_value
 
@@ -40,7 +40,7 @@ Causality = Literal["parameter", "input", "output", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]
 ValueType = Literal["Real", "Integer", "Boolean"]
 
-LARGEST_INTEGER = 2**31 - 1
+MAX_INTEGER = 2**31 - 1
 """FMI 2.0's integers have 32 bits."""
 
 
@@ -99,7 +99,7 @@ class Variable(ABC):
             return self.start
         return (float(self.start),) * self.width
 
-    def start_of(self, scalar: str) -> float:
+    def scalar_start(self, scalar: str) -> float:
         """Return the start value of one of its scalars, by the name of that."""
         index = 0 if self.size is None else int(scalar[len(self.name) + 1 : -1]) - 1
         return self.starts[index]
@@ -121,7 +121,7 @@ class Variable(ABC):
             yield f"{self.name}: min {self.minimum:g} above max {self.maximum:g}"
         yield from (f"{self.name}: {fault}" for fault in self._unit_faults())
         for name, start in zip(self.names, self.starts, strict=False):
-            yield from (f"{name}: start value {fault}" for fault in self.refusals(start))
+            yield from (f"{name}: start value {fault}" for fault in self.rejection_reasons(start))
 
     def _unit_faults(self) -> Iterator[str]:
         if self.type != "Real" and (self.unit or self.display_unit):
@@ -139,18 +139,18 @@ class Variable(ABC):
 
     def _factor_faults(self) -> Iterator[str]:
         """Yield why a unit is none that a model's equations can be written in: 1 deg/s is not 1 rad/s."""
-        in_si = coherent(self.unit)
-        if not same_unit(self.unit, in_si):
+        in_si = coherent_unit(self.unit)
+        if not is_same_unit(self.unit, in_si):
             as_well = f", with display_unit={self.unit!r} to show it so" if not self.display_unit else ""
             yield f"found unit {self.unit!r}, allowed: values in SI, unit={in_si!r}{as_well}"
 
-    def refusals(self, value: float) -> Iterator[str]:
+    def rejection_reasons(self, value: float) -> Iterator[str]:
         """Yield why one of its scalars cannot take a value: not finite, out of range, no integer."""
         if not math.isfinite(value):
             yield f"found {value:g}, allowed: a finite number"
         elif not self.minimum <= value <= self.maximum:
             yield f"found {value:.17g}, allowed: {self.minimum:.15g} to {self.maximum:.15g}"
-        elif self.type == "Integer" and (value != round(value) or abs(value) > LARGEST_INTEGER):
+        elif self.type == "Integer" and (value != round(value) or abs(value) > MAX_INTEGER):
             yield f"found {value:.17g}, allowed: an integer of 32 bits"
         elif self.type == "Boolean" and value not in (0.0, 1.0):
             yield f"found {value:.17g}, allowed: 0 or 1"
@@ -201,7 +201,7 @@ class Output(Variable):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Remembered(Variable):
+class StateVariable(Variable):
     """A quantity that the unit remembers from step to step: a `State` or a `Memory`.
 
     Attributes:
@@ -217,10 +217,10 @@ class Remembered(Variable):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class State(Remembered):
+class State(StateVariable):
     """A continuous state: the unit's `derivatives` gives its derivative in [unit/s]."""
 
-    def start_of(self, scalar: str) -> float:
+    def scalar_start(self, scalar: str) -> float:
         """Return the start value of one of its scalars, by the name of that."""
         index = 0 if self.size is None else int(scalar[len(self.name) + 1 : -1]) - 1
         return self.starts[index]
@@ -233,7 +233,7 @@ class State(Remembered):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Memory(Remembered):
+class Memory(StateVariable):
     """A discrete state: it keeps its value between communication points, where `update` gives the next."""
 
     @property
@@ -299,8 +299,8 @@ class Table:
                 " (n, columns), at least one of each"
             )
             return
-        if len(self.t_ns) > LARGEST_INTEGER:
-            yield f"table: found {len(self.t_ns)} rows, allowed: {LARGEST_INTEGER}"
+        if len(self.t_ns) > MAX_INTEGER:
+            yield f"table: found {len(self.t_ns)} rows, allowed: {MAX_INTEGER}"
         falls = self.t_ns[1:] <= self.t_ns[:-1]  # their differences may have more than 64 bits
         if falls.any():
             row = int(np.argmax(falls)) + 2
@@ -332,7 +332,7 @@ class Table:
         return Rows(tuple(self.values[before].T), tuple(self.values[after].T), fraction)
 
 
-class NoSuchValueError(UnitError, AttributeError):
+class UnknownVariableError(UnitError, AttributeError):
     """A unit's function reads a variable that the unit has not; also what `hasattr` and `copy` expect."""
 
 
@@ -354,7 +354,7 @@ class Values:
 
     def __getattr__(self, name: str) -> Any:
         allowed = ", ".join(sorted(self.__dict__))
-        raise NoSuchValueError(f"v.{name}: found in a unit's function, allowed: {allowed}")
+        raise UnknownVariableError(f"v.{name}: found in a unit's function, allowed: {allowed}")
 
 
 Function = Callable[[Values], Mapping[str, Element | Sequence[Element]]]
@@ -457,7 +457,7 @@ class BlockModel:
         return tuple(one for one in self.variables if isinstance(one, Output))
 
     @cached_property
-    def given(self) -> tuple[Variable, ...]:
+    def arguments(self) -> tuple[Variable, ...]:
         """All that the functions are given, by kind: parameters, inputs, states, memories."""
         return (*self.parameters, *self.inputs, *self.states, *self.memories)
 

@@ -10,7 +10,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from urmpipe_fmus.fmu_file import FmuFile, open_fmu, platforms_here
+from urmpipe_fmus.fmu_file import FmuFile, host_platforms, open_fmu
 from urmpipe_fmus.process import TIMEOUT, Run, run_job
 from urmpipe_fmus.python_fmu.place import why_not_in
 from urmpipe_models.errors import Finding, FmuError
@@ -113,7 +113,7 @@ def check_fmu(path: Path, *, timeout: float = TIMEOUT) -> Checked:
     problems = _validated(path)
     platforms = _platforms(file)
     start, step, steps = _experiment(described)
-    here = platforms_here()
+    here = host_platforms()
     if set(here) & set(platforms):
         run = _run(file, described, (start, step, steps), timeout)
     else:
@@ -146,7 +146,7 @@ def _described(file: FmuFile) -> Any:
     if "CoSimulation" not in file.kinds:
         said = f"found no FMU for co-simulation, allowed: {CO_SIMULATION}"
         raise FmuError(Finding(said, file=str(file.path)))
-    return file.described()
+    return file.read_description()
 
 
 def _validated(path: Path) -> list[str]:

@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from urmpipe_fmus.fmu_file import binary_in
+from urmpipe_fmus.fmu_file import find_binary
 from urmpipe_fmus.process import CALL_BYTES, LOG_BYTES, callbacks_with, end_with_parent
 from urmpipe_models.processes import limit_memory
 
@@ -146,7 +146,7 @@ class Checked:
                 guid=self._job["guid"],
                 unzipDirectory=str(self._folder),
                 modelIdentifier=identifier,
-                libraryPath=str(binary_in(self._folder, identifier)),
+                libraryPath=str(find_binary(self._folder, identifier)),
                 instanceName=identifier,
             ),
         )

@@ -146,7 +146,7 @@ class Dependencies:
     """
 
     def __init__(self, unit: BlockModel) -> None:
-        given = [Remembering([name]) for one in unit.given for name in one.names]
+        given = [Remembering([name]) for one in unit.arguments for name in one.names]
         time, rows = Remembering([TIME]), None
         if unit.table is not None:
             columns = (Remembering([TIME]),) * unit.table.columns

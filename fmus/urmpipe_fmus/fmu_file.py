@@ -47,12 +47,12 @@ def is_windows(name: str) -> bool:
     return name.startswith("win") or name.endswith("-windows")
 
 
-def suffix_of(name: str) -> str:
+def binary_suffix(name: str) -> str:
     """Return how a binary's name ends on a platform."""
     return ".dll" if is_windows(name) else ".dylib" if "darwin" in name else ".so"
 
 
-def platforms_here() -> tuple[str, ...]:
+def host_platforms() -> tuple[str, ...]:
     """Return the names under which a binary for this platform may be, the better first.
 
     The second of an ARM processor is the short name, which other tools of FMI 2.0 still give it.
@@ -60,14 +60,14 @@ def platforms_here() -> tuple[str, ...]:
     return tuple(dict.fromkeys((this_platform(), _short(platform.system()))))
 
 
-def binaries_here(identifier: str) -> tuple[str, ...]:
+def host_binaries(identifier: str) -> tuple[str, ...]:
     """Return the paths in an FMU at which its binary for this platform may be, the better first."""
-    return tuple(f"binaries/{one}/{identifier}{suffix_of(one)}" for one in platforms_here())
+    return tuple(f"binaries/{one}/{identifier}{binary_suffix(one)}" for one in host_platforms())
 
 
-def binary_in(folder: Path, identifier: str) -> Path:
+def find_binary(folder: Path, identifier: str) -> Path:
     """Return the binary for this platform in the folder of an FMU; the better path, if there is none."""
-    paths = [folder / one for one in binaries_here(identifier)]
+    paths = [folder / one for one in host_binaries(identifier)]
     return next((one for one in paths if one.is_file()), paths[0])
 
 
@@ -132,7 +132,7 @@ RATIO, RATIO_FROM = 200.0, 1e8
 """So many times its own size an FMU may unpack to, where that is more than so many bytes: code is three times
 its packed size, XML twenty."""
 
-ENTRIES = 100_000
+MAX_ENTRIES = 100_000
 """Entries of an FMU: those with a runtime of Python or Java inside have some ten thousand."""
 
 XML_BYTES, XML_PARTS = 3.2e7, 1_600_000
@@ -153,7 +153,7 @@ LISTED = 5
 
 AN_FMU = "an FMU, such as urmpipe fmu build makes of a unit"
 
-DAMAGED = (
+ZIP_ERRORS = (
     zipfile.BadZipFile,
     zlib.error,
     struct.error,
@@ -181,7 +181,7 @@ class FmuFile:
     version: str
     kinds: tuple[str, ...]
 
-    def described(self) -> Any:
+    def read_description(self) -> Any:
         """Return FMPy's reading of the description, which is not validated.
 
         Raises:
@@ -212,7 +212,7 @@ class FmuFile:
                 archive.extractall(folder, names)
         except OSError as error:
             raise _refused(self.path, f"cannot be unpacked: {error.strerror or error}") from error
-        except (*DAMAGED, KeyError) as error:
+        except (*ZIP_ERRORS, KeyError) as error:
             raise _refused(self.path, f"cannot be unpacked: {error}") from error
 
 
@@ -254,7 +254,7 @@ def _description(path: Path) -> tuple[bytes, tuple[str, ...]]:
         ) from error
     except OSError as error:
         raise _refused(path, f"cannot be read: {error.strerror or error}") from error
-    except DAMAGED as error:
+    except ZIP_ERRORS as error:
         raise _refused(path, f"found {_no_zip(path)}, allowed: {AN_FMU}") from error
 
 
@@ -273,8 +273,8 @@ def _size_faults(path: Path, entries: Sequence[zipfile.ZipInfo]) -> Iterator[str
     zipfile unpacks no more of an entry than the size that the entry tells.
     """
     unpacked, packed = sum(one.file_size for one in entries), path.stat().st_size
-    if len(entries) > ENTRIES:
-        yield f"found {len(entries)} entries, allowed: {ENTRIES}"
+    if len(entries) > MAX_ENTRIES:
+        yield f"found {len(entries)} entries, allowed: {MAX_ENTRIES}"
     if unpacked > UNPACKED:
         yield f"found {unpacked / 1e6:.6g} MB when unpacked, allowed: {UNPACKED / 1e6:g} MB"
     elif unpacked > max(RATIO_FROM, RATIO * packed):

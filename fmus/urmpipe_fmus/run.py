@@ -18,7 +18,7 @@ import numpy as np
 
 from urmpipe_fmus.block import (
     INTERNAL_STEP,
-    LARGEST_INTEGER,
+    MAX_INTEGER,
     BlockModel,
     Function,
     Memory,
@@ -36,7 +36,7 @@ from urmpipe_models.errors import Finding, UnitError, UrmpipeError
 class Equations:
     """What a unit computes, from one element a scalar to one element a scalar.
 
-    Each method takes the elements of `model.given` in their order: parameters, inputs, states, memories.
+    Each method takes the elements of `model.arguments` in their order: parameters, inputs, states, memories.
 
     Attributes:
         model: The block model.
@@ -70,11 +70,11 @@ class Equations:
         if function is None:
             return []
         where = f"unit {self.model.name}: {what}"
-        values = Values(time, named(self.model.given, given), rows)
+        values = Values(time, elements_to_dict(self.model.arguments, given), rows)
         try:
             with np.errstate(all="ignore"):  # 1/0 is inf, as in C; who uses it asks whether it is finite
                 result = function(values)
-            return flat(result, variables)
+            return dict_to_elements(result, variables)
         except Exception as error:
             raise UnitError(*_told(where, function, error)) from error
 
@@ -92,13 +92,13 @@ def _told(where: str, function: Function, error: Exception) -> Iterator[Finding]
     return (replace(one, message=": ".join(filter(None, (where, one.message))), **place) for one in said)
 
 
-def named(variables: Sequence[Variable], elements: Sequence[Element]) -> dict[str, Any]:
+def elements_to_dict(variables: Sequence[Variable], elements: Sequence[Element]) -> dict[str, Any]:
     """Return the elements of variables by name: one, or a tuple of them for a variable with a size."""
     rest = iter(elements)
     return {one.name: next(rest) if one.size is None else tuple(islice(rest, one.size)) for one in variables}
 
 
-def flat(result: Any, variables: Sequence[Variable]) -> list[Element]:
+def dict_to_elements(result: Any, variables: Sequence[Variable]) -> list[Element]:
     """Return what a function gave by name as one element a scalar, in the order of the variables.
 
     Raises:
@@ -183,7 +183,7 @@ class Instance:
         self._owner = [variable for _, variable in model.scalars]
         self._index = {name: index for index, (name, _) in enumerate(model.scalars)}
         self._values: list[Element] = [np.float64(start) for one in model.variables for start in one.starts]
-        self._given = self._places(model.given)
+        self._given = self._places(model.arguments)
         self._states = self._places(model.states)
         self._memories = self._places(model.memories)
         self._computed = self._places(model.computed)
@@ -268,7 +268,7 @@ class Instance:
             raise
         self.time, self._stale = np.float64(time) + step, True
 
-    def begin(self, time: float, stop: float | None = None) -> None:
+    def setup_experiment(self, time: float, stop: float | None = None) -> None:
         """Put the instance at its start time in [s], before the first step; no step may go past `stop`.
 
         Raises:
@@ -309,7 +309,9 @@ class Instance:
             return [f"{name}: set while it runs, allowed: a state before the first step"]
         if self.running and isinstance(one, Parameter) and not one.tunable:
             return [f"{name}: set while it runs, allowed: a fixed parameter before the first step"]
-        return [f"{name}: {fault}" for each in _extremes(one, value) for fault in one.refusals(each)][:1]
+        return [
+            f"{name}: {fault}" for each in _extremes(one, value) for fault in one.rejection_reasons(each)
+        ][:1]
 
     def _rows(self, time: Element) -> Rows | None:
         return None if self.model.table is None else self.model.table.rows_at(time)
@@ -333,10 +335,10 @@ class Instance:
         if not self._states:
             return
         largest = self._values[self._index[INTERNAL_STEP]]
-        if step / largest > LARGEST_INTEGER:
+        if step / largest > MAX_INTEGER:
             raise UnitError(
                 f"unit {self.model.name}: found a step of {step:g} s in internal steps of {largest:g} s,"
-                f" allowed: {LARGEST_INTEGER} internal steps"
+                f" allowed: {MAX_INTEGER} internal steps"
             )
         count = max(1, math.ceil(step / largest - STEP_SLACK))
         h = step / count
@@ -445,7 +447,7 @@ def run(
     found = over(instance, t, columns, [name for one in shown for name in one.names])
     return {
         name: np.column_stack(value) if isinstance(value, tuple) else np.asarray(value)
-        for name, value in named(shown, found).items()
+        for name, value in elements_to_dict(shown, found).items()
     }
 
 

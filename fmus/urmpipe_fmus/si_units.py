@@ -117,7 +117,7 @@ _PARTS = re.compile(r"([^/()]+)(?:/(?:([^/.()]+)|\(([^/()]+)\)))?")
 
 
 @cache
-def base_unit(spelling: str) -> BaseUnit:
+def parse_unit(spelling: str) -> BaseUnit:
     """Return what a unit is in the base units of SI; an empty spelling is a number without a unit.
 
     Raises:
@@ -135,7 +135,7 @@ def base_unit(spelling: str) -> BaseUnit:
     return _product(powers, spelling)
 
 
-def same_unit(one: str | BaseUnit, other: str | BaseUnit) -> bool:
+def is_same_unit(one: str | BaseUnit, other: str | BaseUnit) -> bool:
     """Return whether values in one unit are values in the other: exponents, factor and offset are equal."""
     a, b = _base(one), _base(other)
     return (
@@ -151,7 +151,7 @@ def display_conversion(unit: str, display_unit: str) -> tuple[float, float]:
     Raises:
         UnitError: If a spelling is unknown, or the two are units of different quantities.
     """
-    held, shown = base_unit(unit), base_unit(display_unit)
+    held, shown = parse_unit(unit), parse_unit(display_unit)
     if held.exponents != shown.exponents:
         raise UnitError(
             f"display unit {display_unit!r}: found for values in {unit!r}, allowed: one of the same quantity"
@@ -159,13 +159,13 @@ def display_conversion(unit: str, display_unit: str) -> tuple[float, float]:
     return held.factor / shown.factor, (held.offset - shown.offset) / shown.factor
 
 
-def coherent(spelling: str) -> str:
+def coherent_unit(spelling: str) -> str:
     """Return the unit of SI itself, without a factor or an offset, of the same quantity: of deg/s rad/s.
 
     Raises:
         UnitError: If the spelling is none of a unit.
     """
-    base_unit(spelling)
+    parse_unit(spelling)
     return (
         "K" if spelling == "degC" else re.sub(r"[A-Za-z]+", lambda word: _without_factor(word[0]), spelling)
     )
@@ -178,7 +178,7 @@ def _without_factor(symbol: str) -> str:
 
 
 def _base(unit: str | BaseUnit) -> BaseUnit:
-    return base_unit(unit) if isinstance(unit, str) else unit
+    return parse_unit(unit) if isinstance(unit, str) else unit
 
 
 def _powers(product: str, spelling: str) -> list[tuple[str, int]]:
@@ -232,7 +232,7 @@ def _meant(spelling: str) -> str:
     text = text.translate(_ELSEWHERE)
     text = re.sub(r"[A-Za-z]+", lambda word: ".".join(_factors(word[0])) or word[0], text)
     try:
-        return text if text != spelling and base_unit(text) else ""
+        return text if text != spelling and parse_unit(text) else ""
     except UnitError:
         return ""
 

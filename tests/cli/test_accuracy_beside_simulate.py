@@ -10,7 +10,7 @@ import pytest
 import urmpipe
 from driven_paths import CONTOUR, PERIOD, begun, joint_log, planned, set_points_log, written
 from flat_arm import ARM, MASSES, drive
-from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import DRIVE_KEYS, GAIN_KEYS, DrivenJoint
 from urmpipe_models.dynamics.driven_arm import find_equilibrium
@@ -22,7 +22,9 @@ from urmpipe_pipeline.planned_paths.result import PlannedPath
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(bool(native_missing(())), reason=f"runs native FMUs: {native_missing(())}"),
+    pytest.mark.skipif(
+        bool(native_unavailable_reason(())), reason=f"runs native FMUs: {native_unavailable_reason(())}"
+    ),
 ]
 
 SET_POINTS = {"theta": "set_phi", "omega": "set_phid", "alpha": "set_phidd"}

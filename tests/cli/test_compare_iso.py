@@ -19,7 +19,7 @@ from rail_arm import rail_arm
 from repeated import PLACE, along, judged, logs, overall, value, written
 from repeated import told as told_by
 from urmpipe.main import run
-from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import poses_over_log
@@ -368,7 +368,9 @@ def test_a_plan_gives_its_corners_stops_and_speed() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(bool(native_missing(())), reason=f"runs native FMUs: {native_missing(())}")
+@pytest.mark.skipif(
+    bool(native_unavailable_reason(())), reason=f"runs native FMUs: {native_unavailable_reason(())}"
+)
 def test_repeated_logs_of_simulate_come_through() -> None:
     arm, values = load_robot("ur3"), urmpipe.simulate("driven-arm", step=5e-4).signal("arm.phi").values
     many = [joint_log(Path(f"s{k}.csv"), arm, values) for k in range(3)]

@@ -20,7 +20,7 @@ from urmpipe.api.build_fmu import build_fmu
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.blocks import block_names
 from urmpipe_fmus.check import check_fmu
-from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_models.robots.catalogue import load_robot
@@ -32,7 +32,7 @@ PAGE = (Path(__file__).parents[2] / "docs" / "fmu.md").read_text(encoding="utf-8
 
 def needs_native() -> None:
     """Skip without a C compiler or casadi."""
-    missing = native_missing()
+    missing = native_unavailable_reason()
     if missing:
         pytest.skip(missing)
 
@@ -204,7 +204,9 @@ def test_without_casadi_it_is_python_and_says_why(
     from urmpipe.main import run
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("urmpipe_fmus.native.native_missing", lambda platforms=(): "casadi is not installed")
+    monkeypatch.setattr(
+        "urmpipe_fmus.native.native_unavailable_reason", lambda platforms=(): "casadi is not installed"
+    )
     assert run(["fmu", "build", "delta_meter"]) == 0
     out, err = capsys.readouterr()
     assert out.splitlines()[1].startswith("FMU: delta_meter.fmu  (python, ")
@@ -218,7 +220,9 @@ def test_without_casadi_it_is_python_and_says_why(
 
 @pytest.mark.slow
 def test_units_on_python_are_a_warning_of_the_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("urmpipe_fmus.native.native_missing", lambda platforms=(): "casadi is not installed")
+    monkeypatch.setattr(
+        "urmpipe_fmus.native.native_unavailable_reason", lambda platforms=(): "casadi is not installed"
+    )
     told: list[str] = []
     with pytest.warns(UserWarning, match="the units run on Python"):
         result = urmpipe.simulate("one-drive", duration=0.002, told=told.append)

@@ -11,7 +11,7 @@ import pytest
 
 from urmpipe.api.build_fmu import build_fmu
 from urmpipe.api.simulate import simulate
-from urmpipe_fmus.build.fmu import ROBOT_FILE, robot_in
+from urmpipe_fmus.build.fmu import ROBOT_FILE, read_robot_entry
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.toml import robot_toml
 
@@ -51,4 +51,4 @@ def test_a_file_of_that_name_that_is_no_arm_is_none(tmp_path: Path, content: byt
         archive.writestr("modelDescription.xml", "")
         if content is not None:
             archive.writestr(ROBOT_FILE, content)
-    assert robot_in(tmp_path / "other.fmu") is None
+    assert read_robot_entry(tmp_path / "other.fmu") is None

@@ -14,7 +14,7 @@ from pages import run_lines, snippets
 from urmpipe.api.simulate import simulate
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.cosim import system_names
-from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -24,7 +24,7 @@ NAMED = set(re.findall(r"`(\w+)`", (DOCS / "json.md").read_text(encoding="utf-8"
 
 @pytest.mark.slow
 def test_the_page_of_fmpy_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    missing = native_missing()
+    missing = native_unavailable_reason()
     if missing:
         pytest.skip(missing)
     (commands,) = snippets("docs/import/fmpy.md", "sh")

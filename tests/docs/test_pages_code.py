@@ -9,14 +9,17 @@ from typing import Any
 import pytest
 
 from pages import DOCS, snippets
-from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.native import native_unavailable_reason
 
 PAGES = [
     pytest.param("accuracy", "found", marks=pytest.mark.slow),
     pytest.param(
         "fmu",
         "chain",
-        marks=[pytest.mark.slow, pytest.mark.skipif(bool(native_missing()), reason=str(native_missing()))],
+        marks=[
+            pytest.mark.slow,
+            pytest.mark.skipif(bool(native_unavailable_reason()), reason=str(native_unavailable_reason())),
+        ],
     ),
     ("dynamics", "again"),
     ("python", "pose"),

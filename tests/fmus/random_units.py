@@ -143,7 +143,7 @@ def random_starts(draw: DrawFn, model: BlockModel) -> dict[str, Any]:
     """Start values of some parameters, inputs, states and memories, by variable name."""
     return {
         one.name: draw(_values(one, one.width)) if one.size else draw(_values(one, 1))[0]
-        for one in model.given
+        for one in model.arguments
         if one.name != INTERNAL_STEP and draw(st.booleans())
     }
 

@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.cosim import Block, Recorded, load_system, prepare, simulate
-from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_fmus.run import Instance
 from urmpipe_models.drives import trapezoid
 from urmpipe_models.elementwise import FloatArray
@@ -61,7 +61,7 @@ def monolithic() -> FloatArray:
 
 
 needs_compiler = pytest.mark.skipif(
-    bool(native_missing(())), reason=f"runs native FMUs: {native_missing(())}"
+    bool(native_unavailable_reason(())), reason=f"runs native FMUs: {native_unavailable_reason(())}"
 )
 
 

@@ -20,10 +20,10 @@ from made_masses import DRIVE, driven, with_drives, with_masses
 from sliding_arm import sprung_arm
 from urmpipe_fmus.block import BlockModel, Output
 from urmpipe_fmus.blocks import make_block
-from urmpipe_fmus.blocks.driven_arm import starts_under
+from urmpipe_fmus.blocks.driven_arm import start_values
 from urmpipe_fmus.build.fmu import cached_fmu
 from urmpipe_fmus.cosim import Block, Recorded, System, load_system, prepare, simulate
-from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_fmus.run import Instance
 from urmpipe_models.arm.chain import Chain, Inertial, Joint
 from urmpipe_models.drives import (
@@ -59,7 +59,9 @@ from urmpipe_models.robots.catalogue import load_robot
 
 PERIOD = 5e-3
 
-needs_native = pytest.mark.skipif(bool(native_missing(())), reason=f"runs native FMUs: {native_missing(())}")
+needs_native = pytest.mark.skipif(
+    bool(native_unavailable_reason(())), reason=f"runs native FMUs: {native_unavailable_reason(())}"
+)
 
 
 @cache
@@ -369,7 +371,7 @@ TARGETS = np.array([0.5, 2.7, 0.6, 2.6, 0.4, 2.8])
 def system_of_urm6(step: float, duration: float) -> System:
     """Return the system, its blocks at rest where the unit `driven_arm` of `urm6()` is."""
     model = make_block("driven_arm", robot=urm6())
-    at = {scalar: one.start_of(scalar) for scalar, one in model.scalars if not isinstance(one, Output)}
+    at = {scalar: one.scalar_start(scalar) for scalar, one in model.scalars if not isinstance(one, Output)}
     still = [0.0, 0.0, 0.0]
     starts: dict[str, dict[str, Any]] = {"arm": {"phi": list(urm6().start), "force": still, "moment": still}}
     for k, (initial, target) in enumerate(zip(urm6().start, TARGETS.tolist(), strict=True), start=1):
@@ -580,7 +582,7 @@ def test_a_held_wrist_yields_to_a_force_by_its_square_of_the_length_and_no_drive
     # of currents of some 2 A, rounded
     assert before[0].current - under[0].current == pytest.approx(lifted / 5.0, rel=1e-6)
     moving = Instance(make_block("driven_arm", robot=chain))
-    put(moving, **starts_under(chain, (0.0, 0.0, 30.0)))
+    put(moving, **start_values(chain, (0.0, 0.0, 30.0)))
     start = read(moving, "phi", "last")
     assert start[1] > 3e-3
     for n in range(10):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from urmpipe_fmus.fmu_file import binaries_here, binary_in, platforms_here, suffix_of, this_platform
+from urmpipe_fmus.fmu_file import binary_suffix, find_binary, host_binaries, host_platforms, this_platform
 
 
 @pytest.fixture
@@ -39,19 +39,19 @@ def test_a_platform_has_fmis_name(
     on: Callable[[str, str], None], system: str, processor: str, name: str, suffix: str
 ) -> None:
     on(system, processor)
-    assert (this_platform(), suffix_of(name)) == (name, suffix)
+    assert (this_platform(), binary_suffix(name)) == (name, suffix)
 
 
 def test_on_arm_the_binary_under_its_own_name_is_taken_before_that_under_the_short_one(
     on: Callable[[str, str], None], tmp_path: Path
 ) -> None:
     on("Linux", "x86_64")
-    assert (platforms_here(), binaries_here("arm")) == (("linux64",), ("binaries/linux64/arm.so",))
+    assert (host_platforms(), host_binaries("arm")) == (("linux64",), ("binaries/linux64/arm.so",))
     on("Linux", "aarch64")
-    own, short = (tmp_path / one for one in binaries_here("arm"))
-    assert (own.parent.name, short.parent.name) == ("aarch64-linux", "linux64") == platforms_here()
-    assert binary_in(tmp_path, "arm") == own
+    own, short = (tmp_path / one for one in host_binaries("arm"))
+    assert (own.parent.name, short.parent.name) == ("aarch64-linux", "linux64") == host_platforms()
+    assert find_binary(tmp_path, "arm") == own
     for one in (short, own):
         one.parent.mkdir(parents=True)
         one.touch()
-        assert binary_in(tmp_path, "arm") == one
+        assert find_binary(tmp_path, "arm") == one

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from asserting import refusal
 from urmpipe_fmus.block import BlockModel, Input, Output, Parameter
-from urmpipe_fmus.si_units import BaseUnit, base_unit, coherent, display_conversion, same_unit
+from urmpipe_fmus.si_units import BaseUnit, coherent_unit, display_conversion, is_same_unit, parse_unit
 from urmpipe_models.errors import UnitError
 
 ALLOWED = (
@@ -73,7 +73,7 @@ ALLOWED = (
     ],
 )
 def test_a_spelling_is_these_base_units(spelling: str, expected: BaseUnit) -> None:
-    assert base_unit(spelling) == expected
+    assert parse_unit(spelling) == expected
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_a_spelling_is_these_base_units(spelling: str, expected: BaseUnit) -> No
     ],
 )
 def test_derived_units_are_the_products_of_which_they_are_made(coherent: str, product: str) -> None:
-    assert same_unit(coherent, product)
+    assert is_same_unit(coherent, product)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +96,7 @@ def test_derived_units_are_the_products_of_which_they_are_made(coherent: str, pr
     ],
 )
 def test_what_is_no_spelling_is_refused_with_what_is_allowed(spelling: str) -> None:
-    assert refusal(UnitError, base_unit, spelling) == str(UnitError(f"unit {spelling!r}: found, {ALLOWED}"))
+    assert refusal(UnitError, parse_unit, spelling) == str(UnitError(f"unit {spelling!r}: found, {ALLOWED}"))
 
 
 @pytest.mark.parametrize(
@@ -110,11 +110,11 @@ def test_what_is_no_spelling_is_refused_with_what_is_allowed(spelling: str) -> N
     ],
 )
 def test_what_people_write_is_refused_with_what_it_may_mean(written: str, meant: str) -> None:
-    assert refusal(UnitError, base_unit, written) == (
+    assert refusal(UnitError, parse_unit, written) == (
         f"unit {written!r}: found (did you mean {meant}?), allowed: FMI's spelling, a dot between factors and"
         " powers as digits, such as N.m, kg.m2, rad/s2"
     )
-    base_unit(meant)
+    parse_unit(meant)
 
 
 SYMBOLS = st.sampled_from(["m", "kg", "s", "A", "K", "mol", "cd", "rad", "N", "mm", "kOhm", "V", "deg", "J"])
@@ -130,8 +130,8 @@ def spelled(powers: list[tuple[str, int]]) -> str:
 def test_a_quotient_has_the_difference_of_exponents_and_the_quotient_of_factors(
     above: list[tuple[str, int]], below: list[tuple[str, int]]
 ) -> None:
-    quotient = base_unit(f"{spelled(above)}/({spelled(below)})")
-    up, down = base_unit(spelled(above)), base_unit(spelled(below))
+    quotient = parse_unit(f"{spelled(above)}/({spelled(below)})")
+    up, down = parse_unit(spelled(above)), parse_unit(spelled(below))
     assert quotient.exponents == tuple(a - b for a, b in zip(up.exponents, down.exponents, strict=True))
     # Rounding of at most 6 powers and a quotient.
     assert math.isclose(quotient.factor, up.factor / down.factor, rel_tol=1e-13)
@@ -139,13 +139,13 @@ def test_a_quotient_has_the_difference_of_exponents_and_the_quotient_of_factors(
 
 @given(above=POWERS)
 def test_the_order_of_factors_does_not_matter(above: list[tuple[str, int]]) -> None:
-    assert same_unit(spelled(above), spelled(above[::-1]))
+    assert is_same_unit(spelled(above), spelled(above[::-1]))
 
 
 @given(text=st.text(alphabet="mskgNradVA./()-+123 ", max_size=12))
 def test_any_text_is_a_unit_or_a_unit_error(text: str) -> None:
     try:
-        found = base_unit(text)
+        found = parse_unit(text)
     except UnitError:
         return
     assert math.isfinite(found.factor) and found.factor > 0.0
@@ -165,13 +165,13 @@ def test_any_text_is_a_unit_or_a_unit_error(text: str) -> None:
     ],
 )
 def test_units_are_the_same_if_their_values_are(one: str, other: str, same: bool) -> None:
-    assert same_unit(one, other) is same
-    assert same_unit(base_unit(other), one) is same
+    assert is_same_unit(one, other) is same
+    assert is_same_unit(parse_unit(other), one) is same
 
 
 def test_a_factor_written_with_ten_digits_is_the_same_unit() -> None:
-    assert same_unit("deg", BaseUnit(rad=1, factor=0.01745329252))
-    assert not same_unit("deg", BaseUnit(rad=1, factor=0.017453))
+    assert is_same_unit("deg", BaseUnit(rad=1, factor=0.01745329252))
+    assert not is_same_unit("deg", BaseUnit(rad=1, factor=0.017453))
 
 
 @pytest.mark.parametrize(
@@ -211,8 +211,8 @@ def test_a_value_is_displayed_by_factor_and_offset(
     ],
 )
 def test_the_unit_of_si_of_the_same_quantity(spelling: str, in_si: str) -> None:
-    assert coherent(spelling) == in_si
-    assert base_unit(in_si) == replace(base_unit(spelling), factor=1.0, offset=0.0)
+    assert coherent_unit(spelling) == in_si
+    assert parse_unit(in_si) == replace(parse_unit(spelling), factor=1.0, offset=0.0)
 
 
 def test_a_display_unit_of_another_quantity_is_refused() -> None:

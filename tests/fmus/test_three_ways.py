@@ -23,7 +23,7 @@ from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Table, Variable
 from urmpipe_fmus.blocks import block_names, make_block
 from urmpipe_fmus.blocks.user import load_block_file
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
-from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_fmus.run import Instance, run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError
@@ -37,7 +37,8 @@ SAME = 1e-12
 EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "examples"
 
 needs_native = pytest.mark.skipif(
-    native_missing([]) is not None, reason=f"needs what builds native FMUs: {native_missing([])}"
+    native_unavailable_reason([]) is not None,
+    reason=f"needs what builds native FMUs: {native_unavailable_reason([])}",
 )
 
 
@@ -140,7 +141,7 @@ def stepped(
     ]
 
     def put(values: Mapping[str, Any]) -> None:
-        for one in model.given:
+        for one in model.arguments:
             if one.name in values:
                 flat = np.ravel(np.broadcast_to(values[one.name], (one.width,))).tolist()
                 instance.set([instance.reference(name) for name in one.names], flat)

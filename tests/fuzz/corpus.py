@@ -313,7 +313,7 @@ def fmus() -> list[Specimen]:
     """
     from tests.fuzz.archive_mutators import packed
 
-    from urmpipe_fmus.fmu_file import binaries_here
+    from urmpipe_fmus.fmu_file import host_binaries
 
     def made(library: str) -> bytes:
         return packed(
@@ -326,5 +326,5 @@ def fmus() -> list[Specimen]:
 
     return [
         Specimen("away.fmu", made("binaries/other64/foreign.so")),
-        Specimen("here.fmu", made(binaries_here("foreign")[0])),
+        Specimen("here.fmu", made(host_binaries("foreign")[0])),
     ]

@@ -20,7 +20,7 @@ from urmpipe.driven_runs.arm_unit import ArmUnit
 from urmpipe.systems.units import Backend
 from urmpipe_datasets import ROBOTS
 from urmpipe_fmus.block import INTERNAL_STEP
-from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_models.arm.chain import GRAVITY, Chain
 from urmpipe_models.drives import DrivenJoint, PassiveJoint
 from urmpipe_models.dynamics.driven_arm import spectral_radius
@@ -30,7 +30,9 @@ from urmpipe_pipeline.accuracy.driven_motion import Errors
 from urmpipe_pipeline.accuracy.published import FIG7
 from urmpipe_pipeline.accuracy.result import Accuracy
 
-needs_native = pytest.mark.skipif(bool(native_missing(())), reason=f"runs native FMUs: {native_missing(())}")
+needs_native = pytest.mark.skipif(
+    bool(native_unavailable_reason(())), reason=f"runs native FMUs: {native_unavailable_reason(())}"
+)
 
 ROBOT, SPRING = "irb60", "irb60-spring"
 

@@ -20,7 +20,7 @@ from urmpipe.output_files import guarded_outputs
 from urmpipe.reading import UntimedReading, map_files, options_of, resolved
 from urmpipe.systems.blocks import ON_PYTHON
 from urmpipe.systems.units import Backend
-from urmpipe_fmus.build.fmu import chosen_backend
+from urmpipe_fmus.build.fmu import select_backend
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import DrivenJoint
 from urmpipe_models.dynamics.driven_arm import spectral_radius
@@ -249,7 +249,7 @@ def _runs(
 
     joints = plan(first).joints
     assert joints is not None
-    chosen, slow = chosen_backend(backend)
+    chosen, slow = select_backend(backend)
     notes = []
     if chosen == "python":
         said = f"the arm runs in NumPy, {SLOWER} times slower than machine code{f': {slow}' if slow else ''}"

@@ -64,7 +64,7 @@ def build_fmu(
     target = path / f"{made.name}.fmu" if path.is_dir() else path
     inputs = [file for one in (unit, robot, log) for file in _files(one)]
     with guarded_output(target, inputs, "fmu") as part:
-        built = build(made, part, backend=backend, platforms=tuple(one_or_many(platforms)), told=told)
+        built = build(made, part, backend=backend, platforms=tuple(one_or_many(platforms)), on_message=told)
         return replace(built, path=target)
 
 

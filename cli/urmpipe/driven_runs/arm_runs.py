@@ -63,7 +63,7 @@ class ArmRuns:
 
     def _compiled(self, velocities: Sequence[float], plans: Sequence[PlannedPath]) -> list[DrivenMotion]:
         """Return motions that are run side by side, a process each."""
-        fmu = cached_fmu(self.arm.unit, "native", told=lambda name: self.told(f"building {name} ..."))
+        fmu = cached_fmu(self.arm.unit, "native", on_message=lambda name: self.told(f"building {name} ..."))
         shares = [0.0] * len(plans)
 
         def run(k: int) -> DrivenMotion:

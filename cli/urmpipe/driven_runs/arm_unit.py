@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from urmpipe_fmus.block import BlockModel
-from urmpipe_fmus.blocks.coordinates import kinds_of
-from urmpipe_fmus.blocks.driven_arm import driven_arm, starts_under
+from urmpipe_fmus.blocks.coordinates import coordinate_kinds
+from urmpipe_fmus.blocks.driven_arm import driven_arm, start_values
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import DrivenJoint
 from urmpipe_models.elementwise import FloatArray
@@ -47,7 +47,7 @@ class ArmUnit:
     @cached_property
     def starts(self) -> Mapping[str, Sequence[Any]]:
         """Its start values by variable."""
-        return starts_under(self.robot, self.force)
+        return start_values(self.robot, self.force)
 
     @cached_property
     def driven(self) -> list[int]:
@@ -75,8 +75,8 @@ class ArmUnit:
         Its variable is called by the kind (phi, s) after a name that ends in _ or is empty; any other name
         has the kind behind it (u, u_s).
         """
-        for kind in kinds_of(self.robot):
-            own = [k for k in kind.of(self.robot) if k in among]
+        for kind in coordinate_kinds(self.robot):
+            own = [k for k in kind.indices(self.robot) if k in among]
             if coordinate in own:
                 whole = name + kind.name + ending
                 if name and not name.endswith("_"):

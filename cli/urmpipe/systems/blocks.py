@@ -16,7 +16,7 @@ from urmpipe.systems.log_tables import read_table
 from urmpipe.systems.units import Backend, column_names, unit_of
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.block import Table
-from urmpipe_fmus.build.fmu import cached_fmu, chosen_backend
+from urmpipe_fmus.build.fmu import cached_fmu, select_backend
 from urmpipe_fmus.cosim.plan import LogColumn
 from urmpipe_fmus.cosim.system import STEP
 from urmpipe_models.errors import Finding, OptionError, UrmpipeError, format_value
@@ -69,7 +69,7 @@ class Blocks:
     ) -> None:
         self._bundled, self._reading = bundled, reading or {}
         self._told = told or (lambda line: None)
-        self._backend, self._slow = chosen_backend(backend)
+        self._backend, self._slow = select_backend(backend)
         self.units: dict[str, BlockModel] = {}
         self.chains: dict[str, Chain] = {}
         self.files: list[Path] = []
@@ -186,7 +186,7 @@ class Blocks:
             """Tell that the FMU of a unit is built."""
             self._told(f"building {name} for block {block} ...")
 
-        return cached_fmu(self.units[block], self._backend, told=built)
+        return cached_fmu(self.units[block], self._backend, on_message=built)
 
     def _table(
         self, name: str, columns: list[str] | None, robot: Chain | None = None, log_map: str | None = None

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from urmpipe.systems.blocks import CHAIN, METER, Blocks
-from urmpipe_fmus.build.fmu import robot_in
+from urmpipe_fmus.build.fmu import read_robot_entry
 from urmpipe_fmus.cosim.checks import ELEMENT, Interface
 from urmpipe_fmus.cosim.plan import NANOSECOND, Plan
 from urmpipe_fmus.cosim.simulation import NotFinite, Recorded
@@ -200,7 +200,7 @@ def _value(plan: Plan, port: Port) -> float:
 def _arms(plan: Plan, recorded: Recorded, blocks: Blocks) -> Iterator[Arm]:
     """Yield the arm of each block of kinematics, as its joints were: of a unit, or of an FMU of that unit."""
     for block in plan.system.blocks:
-        chain = robot_in(block.fmu) if block.fmu else blocks.chains.get(block.name)
+        chain = read_robot_entry(block.fmu) if block.fmu else blocks.chains.get(block.name)
         if chain is None or not (block.fmu or block.unit == CHAIN):
             continue
         ports = [Port(block.name, one) for one in _joint_inputs(chain)]

@@ -15,14 +15,14 @@ from urmpipe_fmus.block import BlockModel, Input, Output, Parameter, State, Valu
 from urmpipe_fmus.blocks.coordinates import (
     KINDS,
     acceleration_outputs,
-    an_arm,
     arm_recipe,
-    gathered,
-    kinds_of,
+    check_robot,
+    coordinate_kinds,
+    format_joints,
+    gather,
     motion_states,
-    of_joints,
-    scattered,
-    values_of,
+    read_coordinates,
+    scatter,
 )
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.drives import MIN_CONSTANT
@@ -63,7 +63,7 @@ class Masses(NamedTuple):
     arm_at: Callable[[Values], Arm]
 
 
-def masses_of(robot: Chain) -> Masses:
+def chain_to_masses(robot: Chain) -> Masses:
     """Return the masses of an arm that move, their centres, and gravity as parameters.
 
     Masses that stand still and masses of 0 have no part in the motion and are left out.
@@ -138,7 +138,7 @@ def tool_inputs() -> tuple[Input, Input]:
     )
 
 
-def wrench_at(v: Values) -> Wrench:
+def read_wrench(v: Values) -> Wrench:
     """Return what acts on the tool centre point."""
     return Wrench(v.force, v.moment)
 
@@ -164,31 +164,31 @@ def chain_dynamics(robot: Chain) -> BlockModel:
 
     Source: [Iso9283]_ eq. 13, solved for the accelerations.
     """
-    an_arm("chain_dynamics", robot)
+    check_robot("chain_dynamics", robot)
     check_solvable(robot)
-    masses = masses_of(robot)
+    masses = chain_to_masses(robot)
 
     def accelerations(v: Values) -> list[Element]:
         """Return q''."""
-        torques = gathered(robot, v, {one: one.effort for one in KINDS})
+        torques = gather(robot, v, {one: one.effort for one in KINDS})
         arm, links = masses.arm_at(v)
         return forward_dynamics(
-            arm, values_of(robot, v), values_of(robot, v, "d"), torques, wrench_at(v), links
+            arm, read_coordinates(robot, v), read_coordinates(robot, v, "d"), torques, read_wrench(v), links
         )
 
     def outputs(v: Values) -> Mapping[str, Any]:
         """Return the accelerations and the energy."""
-        arm, q, qd = masses.arm_at(v).chain, values_of(robot, v), values_of(robot, v, "d")
+        arm, q, qd = masses.arm_at(v).chain, read_coordinates(robot, v), read_coordinates(robot, v, "d")
         energy = kinetic_energy(arm, q, qd) + potential_energy(arm, q)
-        return {**scattered(robot, accelerations(v), "dd"), "energy_stored": energy}
+        return {**scatter(robot, accelerations(v), "dd"), "energy_stored": energy}
 
     def derivatives(v: Values) -> Mapping[str, Any]:
         """Return the rates, the accelerations, and the power of the force on the tool."""
-        q, qd = values_of(robot, v), values_of(robot, v, "d")
+        q, qd = read_coordinates(robot, v), read_coordinates(robot, v, "d")
         return {
-            **scattered(robot, qd),
-            **scattered(robot, accelerations(v), "d"),
-            "energy_in": wrench_power(robot, q, qd, wrench_at(v)),
+            **scatter(robot, qd),
+            **scatter(robot, accelerations(v), "d"),
+            "energy_in": wrench_power(robot, q, qd, read_wrench(v)),
         }
 
     return BlockModel(
@@ -214,12 +214,12 @@ def from_robot_toml(robot: str) -> BlockModel:
 
 
 def _inputs(robot: Chain) -> Iterator[Input]:
-    for kind in kinds_of(robot):
-        at = kind.of(robot)
+    for kind in coordinate_kinds(robot):
+        at = kind.indices(robot)
         word = "Torques" if kind.effort_unit == "N.m" else "Forces"
         yield Input(
             name=kind.effort,
-            description=f"{word} {of_joints(robot, at)}",
+            description=f"{word} {format_joints(robot, at)}",
             unit=kind.effort_unit,
             size=len(at),
         )

@@ -15,11 +15,11 @@ from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import UnitError, format_value
 from urmpipe_models.robots.toml import robot_toml
 
-MOST = 1000
+MAX_COUNT = 1000
 """Most of what an option counts: as many as the links of a robot; each adds variables, equations and C."""
 
 
-def an_arm(unit: str, value: Any) -> None:
+def check_robot(unit: str, value: Any) -> None:
     """Check the option of a robot.
 
     Raises:
@@ -29,20 +29,20 @@ def an_arm(unit: str, value: Any) -> None:
         raise UnitError(f"unit {unit}: option robot: found {format_value(value)}, allowed: a robot (Chain)")
 
 
-def whole_number(unit: str, option: str, value: Any) -> int:
+def check_count(unit: str, option: str, value: Any) -> int:
     """Return an option that counts something.
 
     Raises:
-        UnitError: If it is no integer from 1 to `MOST`.
+        UnitError: If it is no integer from 1 to `MAX_COUNT`.
     """
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MOST:
-        too_many = isinstance(value, int) and value > MOST
-        allowed = f"{MOST} at most" if too_many else "an integer, 1 or more"
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MAX_COUNT:
+        too_many = isinstance(value, int) and value > MAX_COUNT
+        allowed = f"{MAX_COUNT} at most" if too_many else "an integer, 1 or more"
         raise UnitError(f"unit {unit}: option {option}: found {format_value(value)}, allowed: {allowed}")
     return value
 
 
-def yes_or_no(unit: str, option: str, value: Any) -> bool:
+def check_flag(unit: str, option: str, value: Any) -> bool:
     """Return an option that is true or false.
 
     Raises:
@@ -53,7 +53,7 @@ def yes_or_no(unit: str, option: str, value: Any) -> bool:
     return value
 
 
-def some_of(unit: str, option: str, value: Any, allowed: tuple[str, ...]) -> tuple[str, ...]:
+def check_choices(unit: str, option: str, value: Any, allowed: tuple[str, ...]) -> tuple[str, ...]:
     """Return an option that names one or some of what there is, in the order in which that stands.
 
     Raises:
@@ -97,22 +97,22 @@ class CoordinateKind:
     effort: str
     effort_unit: str
 
-    def of(self, robot: Chain) -> list[int]:
+    def indices(self, robot: Chain) -> list[int]:
         """Return the indices of the coordinates of this kind."""
         return [k for k, joint in enumerate(robot.moving) if joint.kind == self.kind]
 
 
-TURNING = CoordinateKind("revolute", "phi", "Angle", "rad", "deg", "tau", "N.m")
-SLIDING = CoordinateKind("prismatic", "s", "Way", "m", "mm", "f", "N")
-KINDS = (TURNING, SLIDING)
+REVOLUTE = CoordinateKind("revolute", "phi", "Angle", "rad", "deg", "tau", "N.m")
+PRISMATIC = CoordinateKind("prismatic", "s", "Way", "m", "mm", "f", "N")
+KINDS = (REVOLUTE, PRISMATIC)
 
 
-def kinds_of(robot: Chain) -> list[CoordinateKind]:
+def coordinate_kinds(robot: Chain) -> list[CoordinateKind]:
     """Return the kinds that an arm has."""
-    return [one for one in KINDS if one.of(robot)]
+    return [one for one in KINDS if one.indices(robot)]
 
 
-def gathered(robot: Chain, v: Values, names: Mapping[CoordinateKind, str]) -> list[Element]:
+def gather(robot: Chain, v: Values, names: Mapping[CoordinateKind, str]) -> list[Element]:
     """Return the elements of the variables of each kind in the arm's order.
 
     Args:
@@ -121,33 +121,35 @@ def gathered(robot: Chain, v: Values, names: Mapping[CoordinateKind, str]) -> li
         names: The variable of each kind.
     """
     found: dict[int, Element] = {}
-    for one in kinds_of(robot):
-        found |= zip(one.of(robot), getattr(v, names[one]), strict=True)
+    for one in coordinate_kinds(robot):
+        found |= zip(one.indices(robot), getattr(v, names[one]), strict=True)
     return [found[k] for k in range(len(robot.coordinates))]
 
 
-def values_of(robot: Chain, v: Values, suffix: str = "") -> list[Element]:
+def read_coordinates(robot: Chain, v: Values, suffix: str = "") -> list[Element]:
     """Return the coordinates in the arm's order; with suffix "d" their rates, "dd" their accelerations."""
-    return gathered(robot, v, {one: one.name + suffix for one in KINDS})
+    return gather(robot, v, {one: one.name + suffix for one in KINDS})
 
 
-def scattered(robot: Chain, elements: Sequence[Element], suffix: str = "") -> dict[str, tuple[Element, ...]]:
-    """Return elements in the arm's order by the variables of their kinds: the inverse of `values_of`."""
-    return {one.name + suffix: tuple(elements[k] for k in one.of(robot)) for one in kinds_of(robot)}
+def scatter(robot: Chain, elements: Sequence[Element], suffix: str = "") -> dict[str, tuple[Element, ...]]:
+    """Return elements in joint order by the variables of their kinds: inverse of `read_coordinates`."""
+    return {
+        one.name + suffix: tuple(elements[k] for k in one.indices(robot)) for one in coordinate_kinds(robot)
+    }
 
 
-def of_joints(robot: Chain, indices: Iterable[int]) -> str:
+def format_joints(robot: Chain, indices: Iterable[int]) -> str:
     """Return which joints a variable is of, from the base outwards."""
     return f"of the joints {', '.join(robot.coordinates[k] for k in indices)}"
 
 
 def motion_states(robot: Chain) -> Iterator[State]:
     """Yield the coordinates and their rates; they start at the start pose at rest."""
-    for kind in kinds_of(robot):
-        at = kind.of(robot)
+    for kind in coordinate_kinds(robot):
+        at = kind.indices(robot)
         yield State(
             name=kind.name,
-            description=f"{kind.word}s {of_joints(robot, at)}",
+            description=f"{kind.word}s {format_joints(robot, at)}",
             unit=kind.unit,
             display_unit=kind.display_unit,
             start=tuple(float(robot.start[k]) for k in at),
@@ -156,7 +158,7 @@ def motion_states(robot: Chain) -> Iterator[State]:
         )
         yield State(
             name=f"{kind.name}d",
-            description=f"Velocities {of_joints(robot, at)}",
+            description=f"Velocities {format_joints(robot, at)}",
             unit=f"{kind.unit}/s",
             display_unit=f"{kind.display_unit}/s",
             size=len(at),
@@ -166,11 +168,11 @@ def motion_states(robot: Chain) -> Iterator[State]:
 
 def acceleration_outputs(robot: Chain) -> Iterator[Output]:
     """Yield the accelerations of the coordinates."""
-    for kind in kinds_of(robot):
-        at = kind.of(robot)
+    for kind in coordinate_kinds(robot):
+        at = kind.indices(robot)
         yield Output(
             name=f"{kind.name}dd",
-            description=f"Accelerations {of_joints(robot, at)}",
+            description=f"Accelerations {format_joints(robot, at)}",
             unit=f"{kind.unit}/s2",
             size=len(at),
         )

@@ -13,17 +13,17 @@ from typing import Any
 import numpy as np
 
 from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Parameter, State, Values, Variable
-from urmpipe_fmus.blocks.chain_dynamics import Masses, masses_of, tool_inputs, wrench_at
+from urmpipe_fmus.blocks.chain_dynamics import Masses, chain_to_masses, read_wrench, tool_inputs
 from urmpipe_fmus.blocks.coordinates import (
     CoordinateKind,
     acceleration_outputs,
-    an_arm,
     arm_recipe,
-    kinds_of,
+    check_robot,
+    coordinate_kinds,
+    format_joints,
     motion_states,
-    of_joints,
-    scattered,
-    values_of,
+    read_coordinates,
+    scatter,
 )
 from urmpipe_fmus.blocks.drives import NO_SAMPLE
 from urmpipe_models.arm.chain import Chain
@@ -86,13 +86,13 @@ class DriveGroup:
         kind: Of the joints.
         robot: The arm.
         driven: By index of the coordinate, each joint with a drive and what holds it at rest.
-        held: By index of the coordinate, each joint with a spring and what holds it at rest.
+        passive: By index of the coordinate, each joint with a spring and what holds it at rest.
     """
 
     kind: CoordinateKind
     robot: Chain
     driven: Mapping[int, tuple[DrivenJoint, JointEquilibrium]]
-    held: Mapping[int, tuple[PassiveJoint, JointEquilibrium]]
+    passive: Mapping[int, tuple[PassiveJoint, JointEquilibrium]]
 
     @property
     def suffix(self) -> str:
@@ -100,7 +100,7 @@ class DriveGroup:
         return "" if self.kind.kind == "revolute" else "_s"
 
     @property
-    def relieved(self) -> bool:
+    def counterbalanced(self) -> bool:
         """Whether a spring relieves any of the drives."""
         return any(one.spring != NO_SPRING for one, _ in self.driven.values())
 
@@ -122,22 +122,22 @@ class DriveGroup:
             period = self._parameter("period", "Time between two samples", "s", periods, MIN_PERIOD)
             yield replace(period, tunable=False)
             yield replace(self._parameter("u_max", "Largest voltage", "V", largest, 0.0), name=self._limit)
-            if self.relieved:
+            if self.counterbalanced:
                 stiffness, rests = zip(*(one.spring for one in joints), strict=True)
                 described = "Rigidity of the spring beside the drive"
                 form = self._unit("{torque}/{way}")
                 yield self._parameter(SPRING_KEYS[0], described, form, stiffness, 0.0)
                 described = "Where the spring beside the drive gives no torque"
                 yield self._parameter(SPRING_KEYS[1], described, self.kind.unit, rests, -np.inf)
-        if self.held:
-            springs = ((one.stiffness, one.damping, rest.rest) for one, rest in self.held.values())
+        if self.passive:
+            springs = ((one.stiffness, one.damping, rest.rest) for one, rest in self.passive.values())
             k, l_held, rest = zip(*springs, strict=True)
             for name, description, unit, values, least in (
                 ("k_held", "Rigidity of the spring", self._unit("{torque}/{way}"), k, MIN_CONSTANT),
                 ("l_held", "Damping of the spring", self._unit("{torque}.s/{way}"), l_held, 0.0),
                 ("rest", "Where the spring gives no torque", self.kind.unit, rest, -np.inf),
             ):
-                yield self._parameter(name, description, unit, values, least, self.held)
+                yield self._parameter(name, description, unit, values, least, self.passive)
 
     def inputs(self) -> Iterator[Input]:
         """Yield the set points."""
@@ -162,7 +162,7 @@ class DriveGroup:
                 unit="V",
                 size=len(self.driven),
             )
-        every = sorted((*self.driven, *self.held))
+        every = sorted((*self.driven, *self.passive))
         yield Output(
             name=f"Mk{self.suffix}",
             description=f"Torques of shafts and springs {self._of(every)}",
@@ -217,10 +217,10 @@ class DriveGroup:
                 self._read(v, name)[j] for name in ("theta1", "omega1", "i_a", "last")
             )
             spring = NO_SPRING
-            if self.relieved:
+            if self.counterbalanced:
                 spring = CounterbalanceSpring(*(self._read(v, key)[j] for key in SPRING_KEYS))
             found[k] = Motor(drive, angle, rate, current, voltage, spring)
-        for j, k in enumerate(self.held):
+        for j, k in enumerate(self.passive):
             stiffness, damping, rest = (self._read(v, key)[j] for key in ("k_held", "l_held", "rest"))
             found[k] = Spring(stiffness, damping, rest)
         return found
@@ -243,7 +243,7 @@ class DriveGroup:
     def outputs(self, state: ArmState, voltages: Sequence[Element]) -> dict[str, tuple[Element, ...]]:
         """Return voltages and torques."""
         torques = shaft_torques(state)
-        found = {f"Mk{self.suffix}": tuple(torques[k] for k in sorted((*self.driven, *self.held)))}
+        found = {f"Mk{self.suffix}": tuple(torques[k] for k in sorted((*self.driven, *self.passive)))}
         return found | ({f"u{self.suffix}": tuple(voltages)} if self.driven else {})
 
     def derivatives(self, rates: Mapping[int, MotorDerivatives]) -> dict[str, tuple[Element, ...]]:
@@ -295,7 +295,7 @@ class DriveGroup:
         )
 
     def _of(self, indices: Iterable[int]) -> str:
-        return of_joints(self.robot, indices)
+        return format_joints(self.robot, indices)
 
 
 def drive_groups(robot: Chain, rests: Sequence[JointEquilibrium]) -> list[DriveGroup]:
@@ -307,10 +307,10 @@ def drive_groups(robot: Chain, rests: Sequence[JointEquilibrium]) -> list[DriveG
     """
     by_joint = {one.joint: one for one in robot.drives}
     found = []
-    for kind in kinds_of(robot):
+    for kind in coordinate_kinds(robot):
         driven: dict[int, tuple[DrivenJoint, JointEquilibrium]] = {}
         held: dict[int, tuple[PassiveJoint, JointEquilibrium]] = {}
-        for k in kind.of(robot):
+        for k in kind.indices(robot):
             own = by_joint[robot.coordinates[k]]
             if isinstance(own, DrivenJoint):
                 driven[k] = own, rests[k]
@@ -325,7 +325,7 @@ DRIVEN_ARM_OPTIONS: Mapping[str, str] = {
 }
 
 
-LONGEST_STEP = 5e-4
+MAX_INTERNAL_STEP = 5e-4
 """The longest step of the integrator in [s]."""
 
 
@@ -347,8 +347,8 @@ def driven_arm(robot: Chain) -> BlockModel:
 
     Source: [Iso9283]_ eq. 13-20, eq. 20 with the corrected sign.
     """
-    an_arm("driven_arm", robot)
-    model = _Model(robot, masses_of(robot), drive_groups(robot, find_equilibrium(robot)))
+    check_robot("driven_arm", robot)
+    model = _Model(robot, chain_to_masses(robot), drive_groups(robot, find_equilibrium(robot)))
     return BlockModel(
         name="driven_arm",
         description=f"{robot.name or 'An arm'} with its drives and controllers",
@@ -356,7 +356,7 @@ def driven_arm(robot: Chain) -> BlockModel:
         outputs=model.outputs,
         derivatives=model.derivatives,
         update=model.update if any(group.driven for group in model.groups) else None,
-        internal_step=min(LONGEST_STEP, 0.5 * max_stable_step(robot)),
+        internal_step=min(MAX_INTERNAL_STEP, 0.5 * max_stable_step(robot)),
         equations=(
             "M(q) q'' + h(q, q') + g(q) - J^T F = Mk + Ms    (eq. 13, 19; F acts on the tool from outside)",
             "Mk = k (theta1 - q) + l (omega1 - q')    (eq. 14); held: Mk = k_held (rest - q) - l_held q'",
@@ -404,7 +404,7 @@ class _Model:
 
     def outputs(self, v: Values) -> Mapping[str, Any]:
         """Return accelerations, voltages, torques of shafts and springs, and the energy."""
-        found: dict[str, Any] = dict(scattered(self.robot, self._accelerations(v), "dd"))
+        found: dict[str, Any] = dict(scatter(self.robot, self._accelerations(v), "dd"))
         for group in self.groups:
             found |= group.outputs(self._state(v), self._voltages(group, v))
         return {**found, "energy_stored": arm_energy(self.masses.arm_at(v).chain, self._state(v))}
@@ -412,11 +412,11 @@ class _Model:
     def derivatives(self, v: Values) -> Mapping[str, Any]:
         """Return how the states change."""
         state = self._state(v)
-        found: dict[str, Any] = dict(scattered(self.robot, state.qd))
-        found |= scattered(self.robot, self._accelerations(v), "d")
+        found: dict[str, Any] = dict(scatter(self.robot, state.qd))
+        found |= scatter(self.robot, self._accelerations(v), "d")
         for group in self.groups:
             found |= group.derivatives(motor_derivatives(state))
-        flows = power_flow(self.robot, state, wrench_at(v))
+        flows = power_flow(self.robot, state, read_wrench(v))
         return {**found, "energy_in": flows.supplied, "energy_lost": flows.dissipated}
 
     def update(self, v: Values) -> Mapping[str, Any]:
@@ -431,13 +431,13 @@ class _Model:
         actuators: dict[int, Actuator] = {}
         for group in self.groups:
             actuators |= group.actuators(v)
-        q = values_of(self.robot, v)
-        return ArmState(q, values_of(self.robot, v, "d"), [actuators[k] for k in range(len(q))])
+        q = read_coordinates(self.robot, v)
+        return ArmState(q, read_coordinates(self.robot, v, "d"), [actuators[k] for k in range(len(q))])
 
     def _accelerations(self, v: Values) -> list[Element]:
         """Return q''; no voltage goes into them at once."""
         chain, links = self.masses.arm_at(v)
-        return joint_accelerations(chain, self._state(v), wrench_at(v), links)
+        return joint_accelerations(chain, self._state(v), read_wrench(v), links)
 
     def _voltages(self, group: DriveGroup, v: Values) -> list[Element]:
         """Return the voltages of a group from the communication point on."""
@@ -450,7 +450,7 @@ def from_robot_toml(robot: str) -> BlockModel:
     return driven_arm(chain_from_dict(tomllib.loads(robot)))
 
 
-def starts_under(robot: Chain, force: Vector) -> dict[str, tuple[Element, ...]]:
+def start_values(robot: Chain, force: Vector) -> dict[str, tuple[Element, ...]]:
     """Return start values of `driven_arm` by name: at rest at the start pose, a force on the tool.
 
     What a spring holds has yielded to the force; the drives hold their joints where they were.
@@ -466,5 +466,5 @@ def starts_under(robot: Chain, force: Vector) -> dict[str, tuple[Element, ...]]:
     found: dict[str, tuple[Element, ...]] = {"force": force, "moment": (0.0, 0.0, 0.0)}
     for group in drive_groups(robot, rests):
         found |= {one.name: one.starts for one in (*group.states(), *group.memories())}
-        found[group.kind.name] = tuple(rests[k].q for k in group.kind.of(robot))
+        found[group.kind.name] = tuple(rests[k].q for k in group.kind.indices(robot))
     return found

@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 
 from urmpipe_fmus.block import BlockModel, Input, Output, Parameter, Values, Variable
 from urmpipe_fmus.blocks.coordinates import (
-    an_arm,
     arm_recipe,
-    kinds_of,
-    of_joints,
-    some_of,
-    values_of,
-    yes_or_no,
+    check_choices,
+    check_flag,
+    check_robot,
+    coordinate_kinds,
+    format_joints,
+    read_coordinates,
 )
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.arm.chain import Parameter as ArmParameter
@@ -41,7 +41,7 @@ class Geometry(NamedTuple):
     chain_at: Callable[[Values], Chain]
 
 
-def geometry_of(robot: Chain) -> Geometry:
+def chain_to_geometry(robot: Chain) -> Geometry:
     """Return the parameters of an arm: its lengths and tilts if they describe it, else its joints' frames.
 
     Where it stands (`base`) and its `tool` are parameters of both.
@@ -176,14 +176,14 @@ def kinematic_chain(
 
     Source: [UrmArm2021]_ eq. 1-14; v and a by the outward recursion (see `iter_point_motions`).
     """
-    an_arm("kinematic_chain", robot)
+    check_robot("kinematic_chain", robot)
     names = robot.point_names
-    chosen = some_of("kinematic_chain", "points", names if points is None else points, names)
-    sensed = some_of("kinematic_chain", "sensors", names[-1:] if sensors is None else sensors, names)
-    yes_or_no("kinematic_chain", "rates", rates)
+    chosen = check_choices("kinematic_chain", "points", names if points is None else points, names)
+    sensed = check_choices("kinematic_chain", "sensors", names[-1:] if sensors is None else sensors, names)
+    check_flag("kinematic_chain", "rates", rates)
     if not (chosen or sensed):
         raise UnitError("unit kinematic_chain: options points, sensors: found none, allowed: one of either")
-    geometry = geometry_of(robot)
+    geometry = chain_to_geometry(robot)
 
     def outputs(v: Values) -> Mapping[str, Any]:
         """Return the points, and what the sensors see."""
@@ -218,10 +218,10 @@ def from_robot_toml(robot: str, **options: Any) -> BlockModel:
 
 def _moved(arm: Chain, v: Values, rates: bool) -> tuple[Sequence[Transform], Sequence[Motion]]:
     """Return the poses of p1..pn, and their motions if the rates are known."""
-    q = values_of(arm, v)
+    q = read_coordinates(arm, v)
     if not rates:
         return forward(arm, q), ()
-    motions = tuple(iter_point_motions(arm, q, values_of(arm, v, "d"), values_of(arm, v, "dd")))
+    motions = tuple(iter_point_motions(arm, q, read_coordinates(arm, v, "d"), read_coordinates(arm, v, "dd")))
     return [motion.pose for motion in motions], motions
 
 
@@ -236,9 +236,9 @@ def _sensed(number: str, pose: Transform, motion: Motion | None) -> dict[str, An
 
 def _inputs(robot: Chain, rates: bool) -> Iterator[Input]:
     """Yield the joints' angles and ways, and their rates."""
-    for kind in kinds_of(robot):
-        at = kind.of(robot)
-        of = of_joints(robot, at)
+    for kind in coordinate_kinds(robot):
+        at = kind.indices(robot)
+        of = format_joints(robot, at)
         yield Input(
             name=kind.name,
             description=f"{kind.word}s {of}",

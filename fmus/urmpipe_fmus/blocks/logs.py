@@ -24,7 +24,7 @@ from urmpipe_fmus.block import (
     ValueType,
     Variable,
 )
-from urmpipe_fmus.blocks.coordinates import whole_number, yes_or_no
+from urmpipe_fmus.blocks.coordinates import check_count, check_flag
 from urmpipe_models import DEFAULT_TOLERANCE
 from urmpipe_models.delta import delta, exceeds_tolerance
 from urmpipe_models.elementwise import Element
@@ -70,7 +70,7 @@ def log_source(
     Raises:
         UnitError: If the columns are not as many as the table has, or with what is wrong with their names.
     """
-    yes_or_no("log_source", "interpolate", interpolate)
+    check_flag("log_source", "interpolate", interpolate)
     if not isinstance(table, Table) or isinstance(columns, str) or not isinstance(columns, Sequence):
         raise UnitError("unit log_source: found no table and columns, allowed: a Table, a list of columns")
     shown = [_column(one) for one in columns]
@@ -122,7 +122,7 @@ def _column(given: Column | Sequence[Any]) -> Column:
         raise UnitError(f"unit log_source: option columns: found {format_value(given)}, allowed: {allowed}")
     column = Column(*parts)
     if column.size is not None:
-        whole_number("log_source", f"columns: {column.name}: size", column.size)
+        check_count("log_source", f"columns: {column.name}: size", column.size)
     return column
 
 
@@ -156,7 +156,7 @@ def repolarizer(joints: int) -> BlockModel:
 
     Source: [UrmArm2021]_ eq. 15-18 with the corrections of the errata.
     """
-    whole_number("repolarizer", "joints", joints)
+    check_count("repolarizer", "joints", joints)
     return BlockModel(
         name="repolarizer",
         description="Joint angles without the jumps of joints that are limited to one period",

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from urmpipe_fmus.block import BlockModel, Input, Memory, Output, Recipe, Values, Variable
-from urmpipe_fmus.blocks.coordinates import whole_number
+from urmpipe_fmus.blocks.coordinates import check_count
 from urmpipe_models.elementwise import Element, Vector
 from urmpipe_models.errors import UnitError, format_unknown_name, format_value
 from urmpipe_models.measure_units import WRITTEN, quantity_to_si
@@ -105,7 +105,7 @@ def from_tables(network: str, points: Mapping[str, Any], newton: int) -> BlockMo
 
 def _unit(network: Network, points: Any, newton: int) -> BlockModel:
     """Return the unit of a network whose start is assembled."""
-    whole_number("network_motion", "newton", newton)
+    check_count("network_motion", "newton", newton)
     model = _Model(network, build_mechanism(network), _read_points(network, points), newton)
     if not model.inputs:
         raise _option_error("network", f"found {network.name} without a control to set, allowed: one or more")

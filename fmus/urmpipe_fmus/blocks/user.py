@@ -157,7 +157,7 @@ def _check_keeps_nothing(model: BlockModel) -> None:
         UnitError: If they differ: something is kept that an FMU would not keep, or drawn at random.
     """
     equations = Equations(model)
-    starts: list[Any] = [np.float64(start) for one in model.given for start in one.starts]
+    starts: list[Any] = [np.float64(start) for one in model.arguments for start in one.starts]
     others = [start + 0.5 + 0.01 * k for k, start in enumerate(starts)]
     for what in ("outputs", "derivatives", "update"):
         method = getattr(equations, what)

@@ -14,9 +14,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from urmpipe_fmus.block import INTERNAL_STEP, LARGEST_INTEGER, BlockModel, Input, Output, Variable
+from urmpipe_fmus.block import INTERNAL_STEP, MAX_INTEGER, BlockModel, Input, Output, Variable
 from urmpipe_fmus.dependencies import Dependencies
-from urmpipe_fmus.si_units import BASE_NAMES, base_unit, display_conversion
+from urmpipe_fmus.si_units import BASE_NAMES, display_conversion, parse_unit
 
 Backend = Literal["native", "python"]
 
@@ -112,7 +112,7 @@ def _unit_definitions(root: ET.Element, model: BlockModel) -> None:
     definitions = ET.SubElement(root, "UnitDefinitions")
     for spelling in used:
         element = ET.SubElement(definitions, "Unit", name=spelling)
-        base = base_unit(spelling)
+        base = parse_unit(spelling)
         exponents = zip(BASE_NAMES, base.exponents, strict=True)
         attributes = {name: str(value) for name, value in exponents if value}
         attributes |= _scale(base.factor, base.offset)
@@ -155,10 +155,10 @@ def _type_attributes(name: str, one: Variable) -> dict[str, str]:
     for key, bound, inside in (("min", one.minimum, math.ceil), ("max", one.maximum, math.floor)):
         if one.type == "Real" and math.isfinite(bound):
             attributes[key] = repr(float(bound))
-        elif one.type == "Integer" and abs(bound) <= LARGEST_INTEGER:
+        elif one.type == "Integer" and abs(bound) <= MAX_INTEGER:
             attributes[key] = str(inside(bound))
     if not isinstance(one, Output):
-        attributes["start"] = _number(one, one.start_of(name))
+        attributes["start"] = _number(one, one.scalar_start(name))
     return attributes
 
 

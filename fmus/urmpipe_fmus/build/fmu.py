@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe_fmus.block import BlockModel, Recipe
 from urmpipe_fmus.build.description import Backend, documentation, model_description
-from urmpipe_fmus.fmu_file import DAMAGED, content_guid, this_platform, write_fmu
+from urmpipe_fmus.fmu_file import ZIP_ERRORS, content_guid, this_platform, write_fmu
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.display import Displayable, format_headline
 from urmpipe_models.errors import Finding, FmuError, Hint, UrmpipeError
@@ -43,13 +43,13 @@ if TYPE_CHECKING:
 ROBOT_FILE = "resources/robot.toml"
 
 
-def robot_file(model: BlockModel) -> dict[str, bytes]:
+def robot_to_entry(model: BlockModel) -> dict[str, bytes]:
     """Return the file of the arm that a unit was made of, if it was."""
     robot = model.recipe.arguments.get("robot") if model.recipe else None
     return {ROBOT_FILE: robot.encode()} if isinstance(robot, str) else {}
 
 
-def robot_in(fmu: Path) -> Chain | None:
+def read_robot_entry(fmu: Path) -> Chain | None:
     """Return the arm in an FMU that `open_fmu` accepted; None if it has none that can be read.
 
     Any tool may have made the FMU, and a file of this name in it is no fault.
@@ -57,7 +57,7 @@ def robot_in(fmu: Path) -> Chain | None:
     try:
         with zipfile.ZipFile(fmu) as archive:
             return chain_from_dict(tomllib.loads(archive.read(ROBOT_FILE).decode()))
-    except (*DAMAGED, KeyError, OSError, UrmpipeError):
+    except (*ZIP_ERRORS, KeyError, OSError, UrmpipeError):
         return None
 
 
@@ -122,7 +122,7 @@ def build_fmu(
     *,
     backend: Backend | None = None,
     platforms: Sequence[str] = (),
-    told: Callable[[str], None] | None = None,
+    on_message: Callable[[str], None] | None = None,
 ) -> BuiltFmu:
     """Build the FMU of a unit; the same unit, versions and compiler give the same bytes.
 
@@ -132,16 +132,16 @@ def build_fmu(
         backend: Native or Python; None for native, or Python if native cannot be built here and no platform
             is named.
         platforms: FMI's names of platforms; by default native is for this one, Python for all it knows.
-        told: Told what takes minutes: compiling for another platform.
+        on_message: Told what takes minutes: compiling for another platform.
 
     Raises:
         FmuError: If a compiler is missing or fails, Python cannot make the unit again, or the file cannot
             be written.
         UnitError: If a function of the unit does what cannot be traced.
     """
-    chosen, missing = chosen_backend(backend, platforms)
+    chosen, missing = select_backend(backend, platforms)
     if chosen == "native":
-        files, guid, found = _native(model, platforms, told)
+        files, guid, found = _native(model, platforms, on_message)
     else:
         files, guid, found = _python(model, platforms)
     note = missing and f"{model.name}.fmu runs on Python, as no native one can be built here: {missing}"
@@ -150,7 +150,7 @@ def build_fmu(
     return BuiltFmu(path, model, chosen, found, guid, note)
 
 
-def chosen_backend(backend: Backend | None, platforms: Sequence[str] = ()) -> tuple[Backend, str]:
+def select_backend(backend: Backend | None, platforms: Sequence[str] = ()) -> tuple[Backend, str]:
     """Return the backend that builds here, and why it is Python where nobody asked for it.
 
     Args:
@@ -161,9 +161,9 @@ def chosen_backend(backend: Backend | None, platforms: Sequence[str] = ()) -> tu
         FmuError: If native, or platforms without a backend, are asked for and cannot be built here: who names
             a platform wants a file that runs there without Python.
     """
-    from urmpipe_fmus.native import native_missing
+    from urmpipe_fmus.native import native_unavailable_reason
 
-    missing = None if backend == "python" else native_missing(platforms)
+    missing = None if backend == "python" else native_unavailable_reason(platforms)
     if missing and backend == "native":
         found = f"native, which cannot be built here: {missing}"
         raise FmuError(Finding(parameter="backend", found=found, allowed="python"))
@@ -175,7 +175,7 @@ def chosen_backend(backend: Backend | None, platforms: Sequence[str] = ()) -> tu
 
 
 def _native(
-    model: BlockModel, platforms: Sequence[str], told: Callable[[str], None] | None
+    model: BlockModel, platforms: Sequence[str], on_message: Callable[[str], None] | None
 ) -> tuple[dict[str, bytes], str, tuple[str, ...]]:
     """Return files, GUID and platforms of a native FMU: machine code, and the C that it is made from."""
     from urmpipe_fmus.native import guid_header, native_binaries, native_sources, this_platform
@@ -185,7 +185,7 @@ def _native(
     sources = native_sources(model)
     compiled = [name.removeprefix("sources/") for name in sorted(sources) if name.endswith(".c")]
     files, guid = _described(model, "native", {**sources, **_table(model)}, compiled)
-    files |= native_binaries(model, sources, guid, chosen, told=told)
+    files |= native_binaries(model, sources, guid, chosen, on_message=on_message)
     return files | {GUID_HEADER: guid_header(guid)}, guid, chosen
 
 
@@ -209,7 +209,7 @@ def _described(
     model: BlockModel, backend: Backend, files: dict[str, bytes], source_files: Sequence[str]
 ) -> tuple[dict[str, bytes], str]:
     """Return files with their description, documentation and arm, and the GUID of them all."""
-    files = files | robot_file(model) | {DOCUMENTATION: documentation(model).encode()}
+    files = files | robot_to_entry(model) | {DOCUMENTATION: documentation(model).encode()}
     without = model_description(model, "", backend, source_files)
     guid = content_guid({**files, DESCRIPTION: without.encode()})
     described = without.replace(' guid=""', f' guid="{guid}"', 1)  # the root's: values hold no quotes
@@ -241,7 +241,7 @@ def cache_folder() -> Path:
 
 
 def cached_fmu(
-    model: BlockModel, backend: Backend | None = None, *, told: Callable[[str], None] | None = None
+    model: BlockModel, backend: Backend | None = None, *, on_message: Callable[[str], None] | None = None
 ) -> Path:
     """Return the FMU of a unit for this platform, built if it is not in the cache, or damaged there.
 
@@ -251,14 +251,14 @@ def cached_fmu(
     Args:
         model: The block model.
         backend: Native or Python; None for native if it can be built here, else Python.
-        told: Told the name of the unit before it is built, which takes its time.
+        on_message: Told the name of the unit before it is built, which takes its time.
 
     Raises:
         FmuError: If it cannot be built, or the cache cannot be written.
         UnitError: If a function of the unit does what cannot be traced.
     """
-    chosen, _ = chosen_backend(backend)
-    tell = told or (lambda name: None)
+    chosen, _ = select_backend(backend)
+    tell = on_message or (lambda name: None)
     folder = cache_folder() / "fmus"
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from urmpipe_fmus.cosim.system import Block, Connection, Port, System
-from urmpipe_fmus.fmu_file import binaries_here, open_fmu
-from urmpipe_fmus.si_units import BASE_NAMES, BaseUnit, base_unit, same_unit
+from urmpipe_fmus.fmu_file import host_binaries, open_fmu
+from urmpipe_fmus.si_units import BASE_NAMES, BaseUnit, is_same_unit, parse_unit
 from urmpipe_models.errors import CosimulationError, Finding, UnitError, format_unknown_name
 from urmpipe_models.measure_units import NAMES, WRITTEN, quantity_to_si
 
@@ -159,7 +159,7 @@ def read_interface(path: Path) -> Interface:
             has no binaries for this platform.
     """
     file = open_fmu(path)
-    described = file.described()
+    described = file.read_description()
     try:
         shown = _interface(path, described)
     except Exception as error:  # what a description can be wrong by is much
@@ -169,7 +169,7 @@ def read_interface(path: Path) -> Interface:
         kinds = [kind for kind in ("coSimulation", "modelExchange") if getattr(described, kind)]
         found = f"FMI {described.fmiVersion} for {' and '.join(kinds) or 'nothing'}"
         raise CosimulationError(f"{path}: found {found}, allowed: FMI 2.0 for coSimulation")
-    binaries = binaries_here(shown.identifier)
+    binaries = host_binaries(shown.identifier)
     if not set(file.names) & set(binaries):
         platforms = sorted({name.split("/")[1] for name in file.names if re.match(r"binaries/[^/]+/.", name)})
         raise CosimulationError(
@@ -211,7 +211,7 @@ def unit_fault(unit: str, base: BaseUnit | None, destination: Variable) -> str |
         return None
     if not unit or not destination.unit:
         return ""
-    if base and destination.base and same_unit(base, destination.base):
+    if base and destination.base and is_same_unit(base, destination.base):
         return None
     return f"found the unit {unit}, allowed: that of the input, {destination.unit}"
 
@@ -248,7 +248,7 @@ def si_base(unit: str, told: Any = None) -> BaseUnit | None:
         exponents = {name: getattr(told, name) for name in BASE_NAMES}
         return BaseUnit(**exponents, factor=told.factor, offset=told.offset)
     try:
-        return base_unit(unit) if unit else None
+        return parse_unit(unit) if unit else None
     except UnitError:
         return None
 

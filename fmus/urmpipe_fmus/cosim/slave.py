@@ -23,7 +23,7 @@ from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
 from urmpipe_fmus.cosim.job import BlockJob, Progress, Transfer, call_code
-from urmpipe_fmus.fmu_file import binary_in
+from urmpipe_fmus.fmu_file import find_binary
 
 Call = Callable[[], int]
 """A prepared call: returns FMI's status."""
@@ -89,7 +89,7 @@ class Slave:
                 guid=block.guid,
                 unzipDirectory=str(block.folder),
                 modelIdentifier=block.identifier,
-                libraryPath=str(binary_in(block.folder, block.identifier)),
+                libraryPath=str(find_binary(block.folder, block.identifier)),
                 instanceName=block.name,
             )
         except Exception as error:  # FMPy raises Exception itself, ctypes OSError and AttributeError

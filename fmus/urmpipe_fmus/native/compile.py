@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from urmpipe_fmus.block import INTERNAL_STEP, BlockModel, Parameter, Variable
-from urmpipe_fmus.fmu_file import is_windows, suffix_of, this_platform
+from urmpipe_fmus.fmu_file import binary_suffix, is_windows, this_platform
 from urmpipe_fmus.native.c_code import c_function, c_number
 from urmpipe_fmus.native.trace import ARGUMENTS, traced
 from urmpipe_models.errors import FmuError
@@ -175,7 +175,7 @@ TEMPORARY = ("TMPDIR", "TMP", "TEMP", "ZIG_LOCAL_CACHE_DIR")
 LINES_OF_AN_ERROR = 12
 
 
-def native_missing(platforms: Sequence[str] = ()) -> str | None:
+def native_unavailable_reason(platforms: Sequence[str] = ()) -> str | None:
     """Return why no native FMU can be built here for some platforms (default: this one), None if it can."""
     wanted = list(platforms) or [this_platform()]
     local = wanted == [this_platform()]
@@ -202,7 +202,7 @@ def native_binaries(
     guid: str,
     platforms: Sequence[str],
     *,
-    told: Callable[[str], None] | None = None,
+    on_message: Callable[[str], None] | None = None,
 ) -> dict[str, bytes]:
     """Compile the sources of a unit's FMU.
 
@@ -213,7 +213,7 @@ def native_binaries(
         sources: What `native_sources` gave.
         guid: GUID of the FMU.
         platforms: FMI's names of the platforms; this platform alone is compiled by the system's compiler.
-        told: Told each platform that zig compiles for, before it does.
+        on_message: Told each platform that zig compiles for, before it does.
 
     Returns:
         The binaries by their path in the FMU.
@@ -221,17 +221,17 @@ def native_binaries(
     Raises:
         FmuError: If a compiler is missing or fails, with its last lines.
     """
-    missing = native_missing(platforms)
+    missing = native_unavailable_reason(platforms)
     if missing:
         raise FmuError(f"unit {model.name}: no native FMU can be built: {missing}")
     files = {**sources, GUID_HEADER: guid_header(guid)}
     binaries = {}
     for k, one in enumerate(platforms):
         command = _command(platforms, one)
-        if told and "ziglang" in command:
+        if on_message and "ziglang" in command:
             place = f" ({k + 1} of {len(platforms)})" if len(platforms) > 1 else ""
-            told(f"compiling for {one}{place}; zig's first time for a platform takes minutes")
-        binaries[f"binaries/{one}/{model.name}{suffix_of(one)}"] = _compiled(model, files, one, command)
+            on_message(f"compiling for {one}{place}; zig's first time for a platform takes minutes")
+        binaries[f"binaries/{one}/{model.name}{binary_suffix(one)}"] = _compiled(model, files, one, command)
     return binaries
 
 
@@ -246,7 +246,7 @@ def _command(platforms: Sequence[str], one: str) -> list[str]:
     position = [] if is_windows(one) else ["-fPIC"]
     local = system_compiler()
     if local and list(platforms) == [this_platform()]:
-        linked = ["-Wl,--build-id=none"] if suffix_of(one) == ".so" else []
+        linked = ["-Wl,--build-id=none"] if binary_suffix(one) == ".so" else []
         return [*local, *FLAGS, *position, *linked]
     return [sys.executable, "-P", "-m", "ziglang", "cc", "-target", TARGETS[one], *FLAGS, *position]
 
@@ -261,7 +261,7 @@ def _compiled(model: BlockModel, files: Mapping[str, bytes], target: str, comman
         # As one text, so that a compiler starts once and reads the headers once: a third less of its time.
         together = sorted(name for name in files if name.endswith(".c") and name != ALONE)
         Path(folder, "together.c").write_text("".join(f'#include "{name}"\n' for name in together))
-        binary = f"binary{suffix_of(target)}"
+        binary = f"binary{binary_suffix(target)}"
         libraries = [] if is_windows(target) else ["-lm"]
         _run(model, target, [*command, "-o", binary, "together.c", ALONE, *libraries], folder)
         return Path(folder, binary).read_bytes()

@@ -49,7 +49,7 @@ def _function(unit: BlockModel, name: str) -> Any:
     fraction = casadi.SX.sym("fraction")
     rows = Rows(_symbols(before), _symbols(after), Symbol(fraction)) if columns else None
     index = {scalar: k for k, (scalar, _) in enumerate(unit.scalars)}
-    given = _symbols([values[index[scalar]] for one in unit.given for scalar in one.names])
+    given = _symbols([values[index[scalar]] for one in unit.arguments for scalar in one.names])
     method: Callable[..., list[Any]] = getattr(Equations(unit), name)
     found = method(Symbol(time), given, rows)
     try:

@@ -15,7 +15,7 @@ from functools import wraps
 from math import isfinite
 from typing import Any, ClassVar, NamedTuple
 
-from urmpipe_fmus.block import LARGEST_INTEGER, BlockModel, ValueType
+from urmpipe_fmus.block import MAX_INTEGER, BlockModel, ValueType
 from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import UnitError
 
@@ -86,7 +86,7 @@ class Fmi2Slave:
     @guarded
     def setup_experiment(self, start_time: float, stop_time: float | None = None, *_: Any) -> None:
         """Put it at the start time, and say where the simulation ends, in [s]."""
-        self.instance.begin(start_time, stop_time)
+        self.instance.setup_experiment(start_time, stop_time)
 
     def enter_initialization_mode(self) -> None:
         """Nothing is to be computed: getters do."""
@@ -116,7 +116,7 @@ class Fmi2Slave:
         """Return values of Integers: of what was computed the nearest one, of two the even one."""
         found = [round(float(one)) for one in self._got(references, "Integer")]
         for reference, one in zip(references, found, strict=True):
-            if abs(one) > LARGEST_INTEGER:
+            if abs(one) > MAX_INTEGER:
                 raise UnitError(f"{self._name(reference)}: found {one}, allowed: an integer of 32 bits")
         return found
 

@@ -156,7 +156,7 @@ def test_a_step_that_fails_leaves_all_as_it_was() -> None:
 
 def test_a_step_past_the_stop_time_is_refused() -> None:
     instance = Instance(mixed())
-    instance.begin(0.0, 0.5)
+    instance.setup_experiment(0.0, 0.5)
     instance.do_step(0.0, 0.4)
     instance.do_step(0.4, 0.1001)  # what rounding may add
     before = everything(instance)
@@ -164,10 +164,10 @@ def test_a_step_past_the_stop_time_is_refused() -> None:
         instance.do_step(0.5001, 0.25)
     assert str(error.value) == "unit mixed: found a step to 0.7501 s, allowed: to the stop time, 0.5 s"
     assert everything(instance) == before
-    instance.begin(0.5)
+    instance.setup_experiment(0.5)
     instance.do_step(0.5, 0.25)
     with pytest.raises(UnitError) as error:
-        instance.begin(1.0, 0.5)
+        instance.setup_experiment(1.0, 0.5)
     assert str(error.value) == "unit mixed: stopTime: found 0.5, allowed: from the start time 1 on"
 
 
@@ -263,7 +263,7 @@ def test_a_restored_instance_goes_on_bit_by_bit(
 ) -> None:
     model, start, columns = case
     instance = Instance(model)
-    for one in model.given:
+    for one in model.arguments:
         if one.name in start:
             instance.set([instance.reference(name) for name in one.names], np.ravel(start[one.name]).tolist())
 

@@ -107,7 +107,7 @@ def test_a_unit_without_memory_gives_at_once_what_it_gives_step_by_step(
     model, start, columns = case
     t = np.array([0.0, 0.125, 0.25, 0.375, 0.5])  # t + h is exact
     found, instance = run(model, t, columns, start), Instance(model)
-    for one in model.given:
+    for one in model.arguments:
         if one.name in start:
             instance.set([instance.reference(name) for name in one.names], np.ravel(start[one.name]).tolist())
     for k, time in enumerate(t):

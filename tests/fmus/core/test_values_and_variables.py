@@ -55,14 +55,14 @@ def test_an_array_has_a_scalar_an_element_counted_from_one() -> None:
     ],
 )  # fmt: skip
 def test_a_value_that_is_not_allowed_is_refused(variable: Variable, value: float, said: str) -> None:
-    assert list(variable.refusals(value)) == [said]
+    assert list(variable.rejection_reasons(value)) == [said]
 
 
 def test_a_value_at_a_bound_is_allowed() -> None:
     x = Input(name="x", description="", minimum=-1.0, maximum=0.5)
-    assert not [fault for value in (-1.0, 0.5, 0.0) for fault in x.refusals(value)]
+    assert not [fault for value in (-1.0, 0.5, 0.0) for fault in x.rejection_reasons(value)]
     n = Input(name="n", description="", type="Integer")
-    assert not [fault for value in (-(2.0**31) + 1, 2.0**31 - 1) for fault in n.refusals(value)]
+    assert not [fault for value in (-(2.0**31) + 1, 2.0**31 - 1) for fault in n.rejection_reasons(value)]
 
 
 def test_all_that_is_wrong_with_a_unit_is_told_at_once() -> None:
@@ -171,4 +171,4 @@ def test_a_unit_with_states_has_the_integrators_step_as_a_fixed_parameter() -> N
     assert [name for name, _ in model.scalars] == ["x", "k", INTERNAL_STEP]
     step = model.parameters[-1]
     assert (step.start, step.unit, step.minimum, step.variability) == (2e-3, "s", 1e-9, "fixed")
-    assert [one.name for one in model.given] == ["k", INTERNAL_STEP, "x"]
+    assert [one.name for one in model.arguments] == ["k", INTERNAL_STEP, "x"]

@@ -8,7 +8,7 @@ from importlib import import_module
 
 import pytest
 
-from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.native import native_unavailable_reason
 
 NEEDS = {
     "ecospy": "needs ecospy and Debian's libtbb12 and unzip",
@@ -27,7 +27,7 @@ def need(module: str) -> None:
 
 def need_builds_for(*platforms: str) -> None:
     """Skip a test that builds native FMUs where that cannot be done."""
-    if missing := native_missing(platforms):
+    if missing := native_unavailable_reason(platforms):
         pytest.skip(f"needs what builds for {' and '.join(platforms)}: {missing}")
 
 

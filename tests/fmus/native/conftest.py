@@ -22,7 +22,13 @@ from urmpipe_fmus.block import (
     Table,
     table_bytes,
 )
-from urmpipe_fmus.native import guid_header, native_binaries, native_missing, native_sources, this_platform
+from urmpipe_fmus.native import (
+    guid_header,
+    native_binaries,
+    native_sources,
+    native_unavailable_reason,
+    this_platform,
+)
 
 
 class Native:
@@ -83,7 +89,7 @@ def compiled() -> dict[int, tuple[BlockModel, dict[str, bytes]]]:
 @pytest.fixture
 def built(tmp_path: Path, compiled: dict[int, tuple[BlockModel, dict[str, bytes]]]) -> Callable[..., Path]:
     """Build a unit in an FMU's folder, without the description."""
-    missing = native_missing()
+    missing = native_unavailable_reason()
     if missing:
         pytest.skip(f"no native FMU can be built here: {missing}")
 

@@ -15,12 +15,14 @@ import pytest
 
 from c_host import GUID, host, ran, script, write
 from urmpipe_fmus.block import BlockModel
-from urmpipe_fmus.native import native_binaries, native_missing, native_sources, this_platform
+from urmpipe_fmus.native import native_binaries, native_sources, native_unavailable_reason, this_platform
 from urmpipe_fmus.native.compile import TARGETS
 from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import FmuError
 
-needs_compiler = pytest.mark.skipif(native_missing() is not None, reason=f"needs {native_missing()}")
+needs_compiler = pytest.mark.skipif(
+    native_unavailable_reason() is not None, reason=f"needs {native_unavailable_reason()}"
+)
 needs_zig = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang")
 
 
@@ -52,8 +54,8 @@ def test_only_fmi_is_visible(built: Callable[..., Path], oscillator: BlockModel)
 
 @pytest.mark.slow
 def test_the_error_of_a_compiler_is_told(oscillator: BlockModel, monkeypatch: pytest.MonkeyPatch) -> None:
-    if native_missing() is not None:
-        pytest.skip(f"needs {native_missing()}")
+    if native_unavailable_reason() is not None:
+        pytest.skip(f"needs {native_unavailable_reason()}")
     sources = {**native_sources(oscillator), "sources/model.c": b"int broken = ;\n"}
     with pytest.raises(FmuError) as error:
         native_binaries(oscillator, sources, GUID, [this_platform()])
@@ -80,18 +82,23 @@ def only_casadi(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_what_is_missing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert native_missing(["amiga", "linux64"]) == ("platform amiga: zig is asked for linux64 and win64 only")
+    assert native_unavailable_reason(["amiga", "linux64"]) == (
+        "platform amiga: zig is asked for linux64 and win64 only"
+    )
     monkeypatch.setattr("urmpipe_fmus.native.compile.this_platform", lambda: "amiga")
     monkeypatch.setattr("urmpipe_fmus.native.compile.system_compiler", lambda: None)
-    assert native_missing() == (
+    assert native_unavailable_reason() == (
         "no C compiler is found (cc, or what the variable CC names),"
         " and platform amiga: zig is asked for linux64 and win64 only"
     )
     monkeypatch.undo()
     only_casadi(monkeypatch)
-    assert native_missing(["linux64", "win64"]) == "ziglang is not installed (pip install 'urmpipe[cross]')"
+    assert (
+        native_unavailable_reason(["linux64", "win64"])
+        == "ziglang is not installed (pip install 'urmpipe[cross]')"
+    )
     monkeypatch.setattr("urmpipe_fmus.native.compile.find_spec", lambda _: None)
-    assert native_missing() == "casadi is not installed (pip install 'urmpipe[native]')"
+    assert native_unavailable_reason() == "casadi is not installed (pip install 'urmpipe[native]')"
 
 
 @pytest.fixture(scope="module")

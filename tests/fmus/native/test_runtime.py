@@ -15,7 +15,7 @@ from c_host import host, ran, script, write
 from sliding_arm import sliding_arm
 from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.blocks import make_block
-from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.native import native_unavailable_reason
 
 HERE = Path(__file__).parent
 
@@ -45,7 +45,8 @@ WARNINGS = [
 ]
 
 pytestmark = pytest.mark.skipif(
-    native_missing() is not None or shutil.which("cc") is None, reason=f"needs cc; {native_missing()}"
+    native_unavailable_reason() is not None or shutil.which("cc") is None,
+    reason=f"needs cc; {native_unavailable_reason()}",
 )
 
 

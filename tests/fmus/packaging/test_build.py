@@ -21,13 +21,13 @@ from urmpipe_fmus.blocks import block_names, make_block
 from urmpipe_fmus.blocks.logs import log_source
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.fmu_file import content_guid
-from urmpipe_fmus.native import native_missing, this_platform
+from urmpipe_fmus.native import native_unavailable_reason, this_platform
 from urmpipe_fmus.run import run
 from urmpipe_models.errors import FmuError
 from urmpipe_models.robots.catalogue import load_robot
 
 Make = Callable[..., BlockModel]
-WHY = native_missing([this_platform()])
+WHY = native_unavailable_reason([this_platform()])
 needs_native = pytest.mark.skipif(WHY is not None, reason=f"needs the native backend: {WHY}")
 
 
@@ -102,7 +102,10 @@ def test_without_a_compiler_it_is_python_and_a_line_says_why(make: Make, tmp_pat
     made = build_fmu(make("arm"), tmp_path)
     assert made.backend == "python"
     assert made.platforms == ("linux64", "win64")
-    assert made.note == f"arm.fmu runs on Python, as no native one can be built here: {native_missing(())}"
+    assert (
+        made.note
+        == f"arm.fmu runs on Python, as no native one can be built here: {native_unavailable_reason(())}"
+    )
     assert "no C compiler" in made.note
     with pytest.raises(FmuError, match="backend: found native, which cannot be built here: no C compiler"):
         build_fmu(make("arm"), tmp_path, backend="native")

@@ -22,7 +22,7 @@ from urmpipe_fmus.blocks.user import block_from_source
 from urmpipe_fmus.build.fmu import build_fmu, cached_fmu
 from urmpipe_fmus.check import check_fmu
 from urmpipe_fmus.fmu_file import write_fmu
-from urmpipe_fmus.native import native_missing, this_platform
+from urmpipe_fmus.native import native_unavailable_reason, this_platform
 from urmpipe_fmus.run import Instance
 from urmpipe_models.errors import FmuError
 
@@ -31,7 +31,7 @@ BACKENDS = ["python", "native"]
 
 
 def built(model: BlockModel, folder: Path, backend: str = "python") -> Path:
-    missing = native_missing([this_platform()])
+    missing = native_unavailable_reason([this_platform()])
     if backend == "native" and missing:
         pytest.skip(f"needs the native backend: {missing}")
     if backend == "native":

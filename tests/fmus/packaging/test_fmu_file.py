@@ -116,7 +116,7 @@ def test_what_unpacks_to_too_much_is_refused_by_what_its_entries_tell(tmp_path: 
 
 
 def test_too_many_entries_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fmu_file, "ENTRIES", 100)  # 100,000 take seconds to be packed
+    monkeypatch.setattr(fmu_file, "MAX_ENTRIES", 100)  # 100,000 take seconds to be packed
     path = packed(tmp_path / "m.fmu", *((f"r/{k}", b"") for k in range(100)))
     assert refusal(FmuError, check_fmu, path) == f"{path}: found 101 entries, allowed: 100"
 

@@ -48,7 +48,7 @@ def test_the_same_unit_is_the_same_bytes(model: BlockModel, tmp_path: Path) -> N
 def test_it_computes_what_an_instance_does_bit_by_bit(model: BlockModel) -> None:
     random = np.random.default_rng(5)
     fmu, instance = Loaded(cached_fmu(model, "python"), start=0.02), Instance(model)
-    instance.begin(0.02)
+    instance.setup_experiment(0.02)
     names = [name for name, _ in model.scalars]
     everything = range(len(names))
     for k in range(40):

@@ -87,7 +87,7 @@ def with_powers(model: BlockModel) -> BlockModel:
 
     def moving(v: Values) -> Values:
         theta2, omega2 = load_motion(v.time)
-        names = [one.name for one in model.given]
+        names = [one.name for one in model.arguments]
         return Values(
             v.time, {name: getattr(v, name) for name in names} | {"theta2": theta2, "omega2": omega2}
         )

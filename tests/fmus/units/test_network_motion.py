@@ -13,7 +13,7 @@ from urmpipe import network_drive
 from urmpipe_fmus.block import BlockModel
 from urmpipe_fmus.blocks import make_block
 from urmpipe_fmus.build.fmu import cached_fmu
-from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_fmus.run import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError, UrmpipeError
@@ -25,7 +25,7 @@ from urmpipe_models.networks.mechanism import build_mechanism
 Backend = Literal["native", "python"]
 
 needs_native = pytest.mark.skipif(
-    bool(native_missing(())), reason=f"builds native FMUs: {native_missing(())}"
+    bool(native_unavailable_reason(())), reason=f"builds native FMUs: {native_unavailable_reason(())}"
 )
 
 POINTS, TURN = 1000, 2.0 * math.pi
