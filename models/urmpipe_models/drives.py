@@ -1,32 +1,31 @@
-"""The flexible drive of a joint: a DC motor, a gear, a damped elastic shaft; and the inertia that it turns.
+"""Drives of joints: DC motor, gear and elastic shaft; set points; the sampled controller; joints of an arm.
 
-Everything is counted at the gear's output shaft: theta1 is the angle that the gear gives, theta2 that of
-the driven element, and I1 holds the rotor's inertia times i_p squared. What makes the joint flexible lies
-between theta1 and theta2.
+1. Drive. All quantities refer to the gear's output shaft: theta1 is the angle of the output shaft, theta2 the
+   angle of the driven element, and I1 includes the rotor's inertia times i_p squared. The joint is flexible
+   between theta1 and theta2 ([Iso9283]_ eq. 14-18; eq. 15 is missing in print: it is I1 theta1'' + Mk = Mn):
 
-Source: [Iso9283]_ eq. 14-18. Eq. 15 is missing in print; it is I1 theta1'' + Mk = Mn.
+       Mk = k (theta1 - theta2) + l (theta1' - theta2')        Mn = i_p C i_a
+       I1 theta1'' = Mn - Mk                                   L i_a' = U - C i_p theta1' - R i_a
 
-Set points of one joint as closed forms of time: a step, a ramp, a trapezoid of velocity.
+2. Set points of one joint as closed forms of time, from `initial` to `target`, from `begin` on. Values at a
+   corner are those after it.
 
-Each starts at `begin` and goes from `initial` to `target`. Values at a corner are those after it.
+       step        at once; velocity and acceleration stay 0 (their impulses are left out)
+       ramp        with the largest velocity all the way; acceleration stays 0 (its impulses are left out)
+       trapezoid   with the largest acceleration to the largest velocity, then constant velocity, then down; a
+                   move too short for that is a triangle, which decelerates from halfway
 
-    step        at once; velocity and acceleration stay 0 (their impulses are left out)
-    ramp        with the largest velocity all the way; acceleration stays 0 (its impulses are left out)
-    trapezoid   with the largest acceleration to the largest velocity, on with it, and down again; a move
-                too short for that is a triangle, which turns back halfway
+3. Controller. It adds to the voltage a term for each error at a sample (e: set - real, of position, velocity,
+   acceleration):
 
-The sampled controller of a drive: it adds to the voltage what the errors at a sample ask for.
+       u_n = u_n-1 + Kphi e_phi + Kw e_w + Keps e_eps
 
-    u_n = u_n-1 + Kphi e_phi + Kw e_w + Keps e_eps        (e: set - real, of position, velocity, acceleration)
+   Summed over samples of period T this is a PID on the position: the errors' integral with Kphi / T, the
+   error with Kw / T, its rate with Keps / T. The voltage is held between samples, and limited; as the
+   limited one is stored, the sum does not wind up at the limit. Source: [Iso9283]_ eq. 20, which prints a
+   minus where a plus is correct: with set - real, the minus drives the joint away from its set point.
 
-Summed up over samples of period T this is a PID on the position: the errors' integral with Kphi / T, the
-error itself with Kw / T, its rate with Keps / T. The voltage is held between samples, and limited; as the
-limited one is remembered, the sum does not wind up while the limit holds.
-
-Source: [Iso9283]_ eq. 20, which prints a minus where a plus must stand: with set - real, the minus drives
-the joint away from its set point.
-
-What holds or turns the joints of an arm: a drive under control, or a spring and a damper alone.
+4. `DrivenJoint`, `PassiveJoint`: a joint of an arm with a drive under control, or with a spring and a damper.
 """
 
 from __future__ import annotations
@@ -79,7 +78,7 @@ def shaft_torque(drive: Drive, theta1: Element, omega1: Element, theta2: Element
 
 
 def motor_torque(drive: Drive, current: Element) -> Element:
-    """Return Mn = i_p C i_a, the motor's torque at the output shaft in [N.m], of the current in [A].
+    """Return Mn = i_p C i_a, the motor's torque at the output shaft in [N.m], from the current in [A].
 
     Source: [Iso9283]_ eq. 16 and 17.
     """
@@ -117,7 +116,7 @@ def current_rate(drive: Drive, voltage: Element, omega1: Element, current: Eleme
 def stored_energy(
     drive: Drive, theta1: Element, omega1: Element, current: Element, theta2: Element
 ) -> Element:
-    """Return (I1 theta1'^2 + L i_a^2 + k (theta1 - theta2)^2) / 2, what a drive holds, in [J].
+    """Return (I1 theta1'^2 + L i_a^2 + k (theta1 - theta2)^2) / 2, the energy stored in a drive, in [J].
 
     Args:
         drive: The constants.
@@ -132,7 +131,7 @@ def stored_energy(
 
 
 def dissipated_power(drive: Drive, omega1: Element, current: Element, omega2: Element) -> Element:
-    """Return R i_a^2 + l (theta1' - theta2')^2, the heat of armature and shaft, in [W].
+    """Return R i_a^2 + l (theta1' - theta2')^2, the power lost as heat of armature and shaft, in [W].
 
     Args:
         drive: The constants.
@@ -149,35 +148,31 @@ def load_acceleration(
 ) -> Element:
     """Return theta2'' = (tau + external - d theta2') / J in [rad/s2].
 
-    One row of eq. 19 with a constant inertia, and with friction and outer torque for its other terms.
+    One row of eq. 19 with a constant inertia, and with friction and external torque for its other terms.
 
     Args:
         inertia: J in [kg.m2].
         damping: d of its bearing in [N.m.s/rad].
         omega: theta2' in [rad/s].
-        torque: tau, what the shaft drives it with, in [N.m].
-        external: Torque from outside in [N.m].
+        torque: tau, the torque of the shaft on it, in [N.m].
+        external: External torque in [N.m].
 
     Source: [Iso9283]_ eq. 19.
     """
     return (torque + external - damping * omega) / inertia
 
 
-STEP, RAMP, TRAPEZOID = 0, 1, 2
-"""The kinds, as numbers, for `set_point`."""
-
-
-CORNER_SLACK = 1e-9
-"""A corner counts as reached so early, in [s]: times that are computed miss it by their rounding."""
+STEP, RAMP, TRAPEZOID = 0, 1, 2  # kinds of set points
+CORNER_SLACK = 1e-9  # [s], before a corner, from which on it counts as reached: computed times are rounded
 
 
 class JointMotion(NamedTuple):
-    """Where a joint is or shall be.
+    """Actual state or set point of a joint.
 
     Attributes:
         position: Angle in [rad].
-        velocity: Its rate in [rad/s].
-        acceleration: Its second derivative in [rad/s2].
+        velocity: In [rad/s].
+        acceleration: In [rad/s2].
     """
 
     position: Element
@@ -190,11 +185,11 @@ def step(time: Element, begin: Element, initial: Element, target: Element) -> Jo
 
     Args:
         time: In [s].
-        begin: When it steps, in [s].
-        initial: Where from, in [rad].
-        target: Where to, in [rad].
+        begin: Time of the step in [s].
+        initial: Angle before it in [rad].
+        target: Angle after it in [rad].
     """
-    return JointMotion(np.where(_reached(time, begin), target, initial), 0.0 * time, 0.0 * time)
+    return JointMotion(np.where(_is_reached(time, begin), target, initial), 0.0 * time, 0.0 * time)
 
 
 def ramp(time: Element, begin: Element, initial: Element, target: Element, speed: Element) -> JointMotion:
@@ -202,16 +197,16 @@ def ramp(time: Element, begin: Element, initial: Element, target: Element, speed
 
     Args:
         time: In [s].
-        begin: When it starts, in [s].
-        initial: Where from, in [rad].
-        target: Where to, in [rad].
+        begin: Start time in [s].
+        initial: Initial angle in [rad].
+        target: Final angle in [rad].
         speed: Largest velocity in [rad/s], above 0.
     """
-    way, direction = np.abs(target - initial), np.sign(target - initial)
-    end = begin + way / speed
-    gone = np.maximum(time - begin, 0.0) * speed
+    distance, direction = np.abs(target - initial), np.sign(target - initial)
+    end = begin + distance / speed
+    travelled = np.maximum(time - begin, 0.0) * speed
     moving = _since(time, begin) - _since(time, end)
-    position = np.where(_reached(time, end), target, initial + direction * gone)
+    position = np.where(_is_reached(time, end), target, initial + direction * travelled)
     return JointMotion(position, direction * speed * moving, 0.0 * time)
 
 
@@ -225,31 +220,31 @@ def trapezoid(
 ) -> JointMotion:
     """Return the move with a trapezoid of velocity.
 
-    It speeds up for t_a = min(v / a, sqrt(way / a)), keeps its velocity for way / v - v / a, but not below
-    0, and slows down for t_a. Both t_a and the time between are finite for a way of 0.
+    Over a distance d it accelerates for t_a = min(v / a, sqrt(d / a)), moves with constant velocity for
+    max(d / v - v / a, 0), and decelerates for t_a. Both times are finite for a distance of 0.
 
     Args:
         time: In [s].
-        begin: When it starts, in [s].
-        initial: Where from, in [rad].
-        target: Where to, in [rad].
+        begin: Start time in [s].
+        initial: Initial angle in [rad].
+        target: Final angle in [rad].
         speed: v, the largest velocity in [rad/s], above 0.
         acceleration: a, the largest acceleration in [rad/s2], above 0.
     """
-    way, direction = np.abs(target - initial), np.sign(target - initial)
-    rise = np.minimum(speed / acceleration, np.sqrt(way / acceleration))
-    cruise = np.maximum(way / speed - speed / acceleration, 0.0)
+    distance, direction = np.abs(target - initial), np.sign(target - initial)
+    rise = np.minimum(speed / acceleration, np.sqrt(distance / acceleration))
+    cruise = np.maximum(distance / speed - speed / acceleration, 0.0)
     total = 2.0 * rise + cruise
     since = time - begin
-    up = _within(since, rise)
-    level = _within(since - rise, cruise)
-    down = _within(since - rise - cruise, rise)
+    up = _elapsed(since, rise)
+    level = _elapsed(since - rise, cruise)
+    down = _elapsed(since - rise - cruise, rise)
     peak = acceleration * rise
-    gone = 0.5 * acceleration * up * up + peak * level + (peak - 0.5 * acceleration * down) * down
-    # 1 while it speeds up, 0 after that, -1 while it slows down, 0 before and after.
+    travelled = 0.5 * acceleration * up * up + peak * level + (peak - 0.5 * acceleration * down) * down
+    # 1 during acceleration, 0 at constant velocity, -1 during deceleration, 0 before and after
     phase = _since(since, 0.0) - _since(since, rise) - _since(since, rise + cruise) + _since(since, total)
     return JointMotion(
-        np.where(_reached(since, total), target, initial + direction * gone),
+        np.where(_is_reached(since, total), target, initial + direction * travelled),
         direction * acceleration * (up - down),
         direction * acceleration * phase,
     )
@@ -264,16 +259,16 @@ def evaluate_setpoint(
     speed: Element,
     acceleration: Element,
 ) -> JointMotion:
-    """Return the set point of a kind: where the joint shall be at that time.
+    """Return the set point of a kind at a time.
 
     Args:
         kind: 0 for `step`, 1 for `ramp`, 2 for `trapezoid`.
         time: In [s].
-        begin: When it starts, in [s].
-        initial: Where from, in [rad].
-        target: Where to, in [rad].
-        speed: Of the ramp, and the largest of the trapezoid, in [rad/s], above 0; a step needs none.
-        acceleration: The largest of the trapezoid, in [rad/s2], above 0; the others need none.
+        begin: Start time in [s].
+        initial: Initial angle in [rad].
+        target: Final angle in [rad].
+        speed: Of the ramp, and the largest of the trapezoid, in [rad/s], above 0; a step does not use it.
+        acceleration: The largest of the trapezoid, in [rad/s2], above 0; the others do not use it.
     """
     forms = (
         step(time, begin, initial, target),
@@ -288,27 +283,27 @@ def evaluate_setpoint(
     )
 
 
-def _within(time: Element, duration: Element) -> Element:
-    """Return how much of a stretch that starts at 0 is over."""
+def _elapsed(time: Element, duration: Element) -> Element:
+    """Return the elapsed part of an interval that starts at 0."""
     return np.minimum(np.maximum(time, 0.0), duration)
 
 
-def _reached(time: Element, corner: Element) -> Element:
-    """Return whether a time is not before a corner."""
+def _is_reached(time: Element, corner: Element) -> Element:
     return time >= corner - CORNER_SLACK
 
 
 def _since(time: Element, corner: Element) -> Element:
     """Return 1 from a corner on, 0 before it."""
-    return np.where(_reached(time, corner), 1.0, 0.0)
+    return np.where(_is_reached(time, corner), 1.0, 0.0)
 
 
-SAMPLE_SLACK = 1e-6
-"""A sample counts as reached this share of a period early: computed, 0.3 / 0.1 is not quite 3."""
+SAMPLE_SLACK = (
+    1e-6  # of a period, before a sample, from which on it is due: computed, 0.3 / 0.1 is not quite 3
+)
 
 
 class Gains(NamedTuple):
-    """What a sample adds to the voltage for each error.
+    """Increments of the voltage per sample and error.
 
     Attributes:
         position: Kphi in [V/rad].
@@ -322,54 +317,65 @@ class Gains(NamedTuple):
 
 
 def control_voltage(
-    last: Element, gains: Gains, wanted: JointMotion, real: JointMotion, limit: Element
+    previous: Element, gains: Gains, setpoint: JointMotion, measured: JointMotion, limit: Element
 ) -> Element:
     """Return the voltage u_n of a sample in [V], within -limit .. limit.
 
     Args:
-        last: u_n-1, the voltage of the sample before, in [V].
+        previous: u_n-1, the voltage of the sample before, in [V].
         gains: Kphi, Kw, Keps.
-        wanted: The set values.
-        real: The real values.
+        setpoint: The set values.
+        measured: The real values.
         limit: Largest voltage in [V].
 
     Source: [Iso9283]_ eq. 20 with the corrected sign.
     """
     voltage = (
-        last
-        + gains.position * (wanted.position - real.position)
-        + gains.velocity * (wanted.velocity - real.velocity)
-        + gains.acceleration * (wanted.acceleration - real.acceleration)
+        previous
+        + gains.position * (setpoint.position - measured.position)
+        + gains.velocity * (setpoint.velocity - measured.velocity)
+        + gains.acceleration * (setpoint.acceleration - measured.acceleration)
     )
     return np.minimum(np.maximum(voltage, -limit), limit)
 
 
 def sample_index(time: Element, period: Element) -> Element:
-    """Return the number of the last sample instant, n T, that is not after a time in [s]."""
+    """Return the index n of the last sample instant n T that is not after a time in [s]."""
     return np.floor(time / period + SAMPLE_SLACK)
 
 
-def held_voltage(time: Element, period: Element, sample: Element, fresh: Element, last: Element) -> Element:
-    """Return the voltage from a time on in [V]: a new one where a sample is due, else the held one.
+def sampled_voltage(
+    time: Element, period: Element, sample: Element, fresh: Element, last: Element
+) -> Element:
+    """Return the voltage from a time on in [V]: a new one if a sample is due, else the held one.
 
     Args:
         time: In [s].
         period: Between two samples, in [s].
-        sample: Number of the last sample that was taken.
-        fresh: What `next_voltage` gives now, in [V].
+        sample: Index of the last sample that was taken.
+        fresh: The value of `control_voltage` at this time in [V].
         last: The voltage of the last sample in [V].
     """
     return np.where(sample_index(time, period) > sample, fresh, last)
 
 
+MIN_CONSTANT = 1e-9  # of a constant above 0, in its unit: the min of an FMI variable is an allowed value
+MIN_PERIOD = 1e-6  # [s], between two samples of a controller
+
+# Names of the constants in robot files and block models, in the order of the fields.
+DRIVE_KEYS = ("k", "l", "i_p", "C", "R", "L", "I1")  # of `Drive`
+GAIN_KEYS = ("Kphi", "Kw", "Keps")  # of `Gains`
+SPRING_KEYS = ("k_spring", "rest_spring")  # of `CounterbalanceSpring`
+
+
 @dataclass(frozen=True, slots=True)
 class PassiveJoint:
-    """A joint without a drive, held where it starts by a spring and a damper.
+    """A joint without a drive, held at its start value by a spring and a damper.
 
     Attributes:
         joint: Name of a coordinate.
-        stiffness: k in [N.m/rad], of a joint that slides in [N/m].
-        damping: l in [N.m.s/rad], of a joint that slides in [N.s/m].
+        stiffness: k in [N.m/rad], of a prismatic joint in [N/m].
+        damping: l in [N.m.s/rad], of a prismatic joint in [N.s/m].
     """
 
     joint: str
@@ -377,17 +383,17 @@ class PassiveJoint:
     damping: float
 
     def faults(self) -> Iterator[str]:
-        """Yield which constants no spring and damper have."""
-        yield from _at_least(MIN_CONSTANT, self.joint, {"k": self.stiffness})
-        yield from _at_least(0.0, self.joint, {"l": self.damping})
+        """Yield the constants that a spring and a damper cannot have."""
+        yield from _below_minimum(MIN_CONSTANT, self.joint, {"k": self.stiffness})
+        yield from _below_minimum(0.0, self.joint, {"l": self.damping})
 
 
 class CounterbalanceSpring(NamedTuple):
-    """A spring without mass beside a drive, which carries a part of the load: k (rest - q).
+    """A spring without mass parallel to a drive, which carries a part of the load: k (rest - q).
 
     Attributes:
-        stiffness: k in [N.m/rad], of a joint that slides in [N/m]; 0: there is none.
-        rest: Where it gives no torque, in [rad] or [m].
+        stiffness: k in [N.m/rad], of a prismatic joint in [N/m]; 0: no spring.
+        rest: Coordinate without torque, in [rad] or [m].
     """
 
     stiffness: Element
@@ -395,7 +401,6 @@ class CounterbalanceSpring(NamedTuple):
 
 
 NO_SPRING = CounterbalanceSpring(0.0, 0.0)
-"""Of a drive that carries all of the load."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -404,11 +409,11 @@ class DrivenJoint:
 
     Attributes:
         joint: Name of a coordinate.
-        drive: The constants of motor, gear and shaft; of a joint that slides with m for rad.
+        drive: The constants of motor, gear and shaft; of a prismatic joint with m for rad.
         period: Time between two samples of the controller in [s].
-        gains: What a sample adds to the voltage.
+        gains: The gains of the controller.
         largest_voltage: u_max in [V].
-        spring: What relieves the drive of a part of its load.
+        spring: The spring that carries a part of the load.
     """
 
     joint: str
@@ -419,44 +424,27 @@ class DrivenJoint:
     spring: CounterbalanceSpring = field(default=NO_SPRING, metadata={"stored": tuple[float, ...]})
 
     def __post_init__(self) -> None:
-        """Make drive, gains and spring of the plain numbers that a recording gives."""
+        """Convert the plain tuples of a recording to drive, gains and spring."""
         object.__setattr__(self, "drive", Drive(*self.drive))
         object.__setattr__(self, "gains", Gains(*self.gains))
         object.__setattr__(self, "spring", CounterbalanceSpring(*self.spring))
 
     def faults(self) -> Iterator[str]:
-        """Yield which constants no drive has; gains may have any sign (see `drive_controller`)."""
-        yield from _at_least(MIN_CONSTANT, self.joint, dict(zip(DRIVE_KEYS, self.drive, strict=True)))
-        yield from _at_least(MIN_PERIOD, self.joint, {"period": self.period})
-        yield from _at_least(0.0, self.joint, {"u_max": self.largest_voltage})
-        yield from _at_least(0.0, self.joint, {SPRING_KEYS[0]: self.spring.stiffness})
-        free = zip((*GAIN_KEYS, SPRING_KEYS[1]), (*self.gains, self.spring.rest), strict=True)
-        for key, value in free:
+        """Yield the constants that a drive cannot have; gains may have any sign (see `drive_controller`)."""
+        yield from _below_minimum(MIN_CONSTANT, self.joint, dict(zip(DRIVE_KEYS, self.drive, strict=True)))
+        yield from _below_minimum(MIN_PERIOD, self.joint, {"period": self.period})
+        yield from _below_minimum(0.0, self.joint, {"u_max": self.largest_voltage})
+        yield from _below_minimum(0.0, self.joint, {SPRING_KEYS[0]: self.spring.stiffness})
+        unbounded = zip((*GAIN_KEYS, SPRING_KEYS[1]), (*self.gains, self.spring.rest), strict=True)
+        for key, value in unbounded:
             if not math.isfinite(value):
                 yield f"drives.{self.joint}.{key}: found {value:g}, allowed: a finite number"
 
 
 JointDrive: TypeAlias = PassiveJoint | DrivenJoint
 
-DRIVE_KEYS = ("k", "l", "i_p", "C", "R", "L", "I1")
-"""The constants of `Drive`, as robot files and units name them."""
 
-GAIN_KEYS = ("Kphi", "Kw", "Keps")
-"""The gains, as robot files and units name them."""
-
-SPRING_KEYS = ("k_spring", "rest_spring")
-"""The constants of `ReliefSpring`, as robot files and units name them."""
-
-
-MIN_CONSTANT = 1e-9
-"""The least value of a constant that is above 0, in its unit; FMI's min is a value that is allowed."""
-
-MIN_PERIOD = 1e-6
-"""The least time between two samples of a controller in [s]."""
-
-
-def _at_least(least: float, joint: str, values: Mapping[str, float]) -> Iterator[str]:
-    """Yield which constants are not finite, or below the least value."""
+def _below_minimum(minimum: float, joint: str, values: Mapping[str, float]) -> Iterator[str]:
     for key, value in values.items():
-        if not least <= value < math.inf:
-            yield f"drives.{joint}.{key}: found {value:g}, allowed: a finite number, {least:g} or more"
+        if not minimum <= value < math.inf:
+            yield f"drives.{joint}.{key}: found {value:g}, allowed: a finite number, {minimum:g} or more"

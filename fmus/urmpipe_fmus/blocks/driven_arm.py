@@ -41,8 +41,8 @@ from urmpipe_models.drives import (
     JointMotion,
     PassiveJoint,
     control_voltage,
-    held_voltage,
     sample_index,
+    sampled_voltage,
 )
 from urmpipe_models.dynamics.driven_arm import (
     Actuator,
@@ -237,7 +237,7 @@ class DriveGroup:
             last, period, sample = (self._read(v, key)[j] for key in ("last", "period", "sample"))
             limit = getattr(v, self._limit)[j]
             fresh = control_voltage(last, gains, wanted, JointMotion(q[k], qd[k], qdd[k]), limit)
-            found.append(held_voltage(v.time, period, sample, fresh, last))
+            found.append(sampled_voltage(v.time, period, sample, fresh, last))
         return found
 
     def outputs(self, state: ArmState, voltages: Sequence[Element]) -> dict[str, tuple[Element, ...]]:

@@ -24,9 +24,9 @@ from urmpipe_models.drives import (
     control_voltage,
     current_rate,
     dissipated_power,
-    held_voltage,
     load_acceleration,
     sample_index,
+    sampled_voltage,
     shaft_acceleration,
     shaft_torque,
     stored_energy,
@@ -225,7 +225,7 @@ def _voltage(v: Values) -> Element:
         JointMotion(v.real_theta, v.real_omega, v.real_alpha),
         v.u_max,
     )
-    return held_voltage(v.time, v.period, v.sample, fresh, v.last)
+    return sampled_voltage(v.time, v.period, v.sample, fresh, v.last)
 
 
 def inertia() -> BlockModel:

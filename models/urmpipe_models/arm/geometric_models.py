@@ -1,10 +1,12 @@
-"""Arms from Denavit-Hartenberg parameters, in the standard and in Craig's modified form.
+"""Chains from the parameters of a geometric model: Denavit-Hartenberg, R and T joints, 6R arm, URM modules.
 
-Chains by the rows of a geometric model: rotations and translations about and along axes of their own.
+    dh_chain            A_i = Rz(theta_i + q_i) Tz(d_i) Tx(a_i) Rx(alpha_i)        [DenavitHartenberg1955]_
+    modified_dh_chain   A_i = Rx(alpha_{i-1}) Tx(a_{i-1}) Rz(theta_i + q_i) Tz(d_i)  [Craig2005]_
+    geometric_chain     joint k at r_k, about or along x, y or z                     [Geometric6R]_
+    articulated_6r      the geometric model of the 6R arm: joints about z, x, x, and z, x, z in one point
+    urm_chain           universal rotational modules, each tilted relative to the one before   [UrmArm2021]_
 
-The articulated 6R arm of the geometric model: three joints for the place, three about one point.
-
-URM arms: universal rotational modules, one on the other, each tilted against the one before.
+Each length and angle is a step with a name, so that it becomes a `Parameter` of the chain.
 """
 
 from __future__ import annotations
@@ -29,13 +31,13 @@ class DHRow:
 
     Attributes:
         theta: Angle about z in [rad], any element.
-        d: Way along z in [m], any element.
+        d: Translation along z in [m], any element.
         a: Link length along x in [m], any element; a_{i-1} in the modified form.
         alpha: Link twist about x in [rad], any element; alpha_{i-1} in the modified form.
-        name: The joint's name; where it is empty q1, q2, ... by coordinate, and frame1, ... by row if fixed.
+        name: The joint's name; if empty q1, q2, ... by coordinate, and frame1, ... by row if fixed.
         kind: revolute, prismatic or fixed.
-        lower: Least coordinate allowed, in [rad] or [m].
-        upper: Largest coordinate allowed, in [rad] or [m].
+        lower: Lower limit of the coordinate, in [rad] or [m].
+        upper: Upper limit of the coordinate, in [rad] or [m].
         velocity: Largest speed, in [rad/s] or [m/s].
         acceleration: Largest acceleration either way, in [rad/s2] or [m/s2].
         effort: Largest torque or force either way, in [N.m] or [N].
@@ -70,12 +72,12 @@ def dh_chain(
 
     Args:
         name: The robot's name.
-        rows: One a joint or fixed frame, from the base outwards.
-        base: Where DH frame 0 stands in the world.
+        rows: One per joint or fixed frame, from the base outwards.
+        base: DH frame 0 in the world.
         tool: The tool centre point in the last DH frame.
         start: Calibration pose q(0) in [rad] or [m].
-        description: One line for people.
-        source: Where the numbers come from.
+        description: One line of text.
+        source: Origin of the numbers.
 
     Raises:
         RobotError: If there is no row, names repeat, or start has another length.
@@ -86,7 +88,7 @@ def dh_chain(
     *origins, tip = compose_steps(), *links
     return Chain(
         name,
-        _joints(rows, origins),
+        tuple(_joints(rows, origins)),
         tip=tip,
         base=base or Transform(),
         tool=tool or Transform(),
@@ -113,12 +115,12 @@ def modified_dh_chain(
 
     Args:
         name: The robot's name.
-        rows: One a joint or fixed frame, from the base outwards: alpha_{i-1}, a_{i-1}, theta_i, d_i.
-        base: Where frame 0 stands in the world.
+        rows: One per joint or fixed frame, from the base outwards: alpha_{i-1}, a_{i-1}, theta_i, d_i.
+        base: Frame 0 in the world.
         tool: The tool centre point in the last frame.
         start: Calibration pose q(0) in [rad] or [m].
-        description: One line for people.
-        source: Where the numbers come from.
+        description: One line of text.
+        source: Origin of the numbers.
 
     Raises:
         RobotError: If there is no row, names repeat, or start has another length.
@@ -128,7 +130,7 @@ def modified_dh_chain(
     origins = [compose_steps(*_screw_x(row, k), *_screw_z(row, k)) for k, row in enumerate(rows, start=1)]
     return Chain(
         name,
-        _joints(rows, origins),
+        tuple(_joints(rows, origins)),
         tip=compose_steps(),
         base=base or Transform(),
         tool=tool or Transform(),
@@ -139,7 +141,7 @@ def modified_dh_chain(
 
 
 def _screw_z(row: DHRow, k: int) -> tuple[Step, Step]:
-    """Return Rz(theta) Tz(d) of row k, which commutes with the joint's own motion about and along z."""
+    """Return Rz(theta) Tz(d) of row k, which commutes with the joint's motion about and along z."""
     return (
         Step("about", "z", row.theta, f"theta_{k}", f"DH row {k}"),
         Step("along", "z", row.d, f"d_{k}", f"DH row {k}"),
@@ -154,11 +156,12 @@ def _screw_x(row: DHRow, k: int) -> tuple[Step, Step]:
     )
 
 
-def _joints(rows: Sequence[DHRow], origins: Sequence[Transform]) -> tuple[Joint, ...]:
-    """Return the joints of rows, each at its origin."""
-    return tuple(
-        Joint(
-            name,
+def _joints(rows: Sequence[DHRow], origins: Sequence[Transform]) -> Iterator[Joint]:
+    coordinate = 0
+    for k, (row, origin) in enumerate(zip(rows, origins, strict=True), start=1):
+        coordinate += row.kind != "fixed"
+        yield Joint(
+            row.name or (f"frame{k}" if row.kind == "fixed" else f"q{coordinate}"),
             row.kind,
             origin,
             lower=row.lower,
@@ -167,24 +170,9 @@ def _joints(rows: Sequence[DHRow], origins: Sequence[Transform]) -> tuple[Joint,
             acceleration=row.acceleration,
             effort=row.effort,
         )
-        for name, row, origin in zip(_names(rows), rows, origins, strict=True)
-    )
 
 
-def _names(rows: Sequence[DHRow]) -> Iterator[str]:
-    """Yield the name of every row, given or counted."""
-    coordinate = 0
-    for k, row in enumerate(rows, start=1):
-        coordinate += row.kind != "fixed"
-        yield row.name or (f"frame{k}" if row.kind == "fixed" else f"q{coordinate}")
-
-
-AXES = {
-    "x": (1.0, 0.0, 0.0),
-    "y": (0.0, 1.0, 0.0),
-    "z": (0.0, 0.0, 1.0),
-}
-"""Unit vectors by the names of axes."""
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,11 +180,11 @@ class GeometricModelRow:
     """One joint of the model.
 
     Attributes:
-        kind: R turns system T_k about an axis of its own by q_k in [rad]; T shifts it along one by q_k in
-            [m], and leaves it parallel to T_{k-1}.
-        axis: x, y or z.
+        kind: R rotates system T_k about its axis by q_k in [rad]; T translates it along its axis by q_k in
+            [m], parallel to T_{k-1}.
+        axis: x, y or z of T_k.
         r: r_k^{k-1}, the origin O_k in system T_{k-1} at q_k = 0, in [m], any elements.
-        name: The joint's name; q1, q2, ... where it is empty.
+        name: The joint's name; q1, q2, ... if empty.
     """
 
     kind: Literal["R", "T"]
@@ -214,15 +202,15 @@ def geometric_chain(
     description: str = "",
     source: str = "",
 ) -> Chain:
-    """Return the arm of a geometric model: joint k stands at r_k^{k-1} and is parallel to the one before.
+    """Return the arm of a geometric model: joint k is at r_k^{k-1} and parallel to the one before.
 
     Args:
         name: The robot's name.
-        rows: One a joint, from the base outwards.
+        rows: One per joint, from the base outwards.
         tip: r_{n+1}^n, the characteristic point of the gripper in the last system [m], any elements.
         start: Calibration pose q(0) in [rad] or [m].
-        description: One line for people.
-        source: Where the numbers come from.
+        description: One line of text.
+        source: Origin of the numbers.
 
     Raises:
         RobotError: If there is no row, names repeat, or start has another length.
@@ -248,12 +236,12 @@ def geometric_chain(
 
 
 def _shift(r: Vector, k: int) -> Transform:
-    """Return the frame at r_k, parallel to the one before."""
     x, y, z = r
+    source = f"geometric row {k}"
     return compose_steps(
-        Step("along", "x", x, f"r{k}.x", f"geometric row {k}"),
-        Step("along", "y", y, f"r{k}.y", f"geometric row {k}"),
-        Step("along", "z", z, f"r{k}.z", f"geometric row {k}"),
+        Step("along", "x", x, f"r{k}.x", source),
+        Step("along", "y", y, f"r{k}.y", source),
+        Step("along", "z", z, f"r{k}.z", source),
     )
 
 
@@ -290,7 +278,7 @@ def articulated_6r(
     description: str = "",
     source: str = "",
 ) -> Chain:
-    """Return the articulated 6R arm; at q = 0 it stands straight up, l0 + l1 + l2 + l3 + l4 high.
+    """Return the articulated 6R arm; at q = 0 it is straight up, l0 + l1 + l2 + l3 + l4 high.
 
     Args:
         l0: Height of joint 1 in [m], any element.
@@ -300,8 +288,8 @@ def articulated_6r(
         l4: From the wrist centre to the characteristic point of the gripper in [m].
         name: The robot's name.
         start: Calibration pose q(0) in [rad].
-        description: One line for people.
-        source: Where the numbers come from.
+        description: One line of text.
+        source: Origin of the numbers.
 
     Source: [Geometric6R]_ Figure 2, eq. 21-26, 39.
     """
@@ -314,8 +302,7 @@ def articulated_6r(
     return replace(chain, joints=tuple(joints), tip=tip)
 
 
-SEGMENT_SOURCE, TILT_SOURCE = "URM segment", "URM tilt"
-"""The sources of an arm's parameters."""
+SEGMENT_SOURCE, TILT_SOURCE = "URM segment", "URM tilt"  # `Parameter.source` of lengths and tilts
 
 
 def urm_chain(
@@ -331,16 +318,16 @@ def urm_chain(
     """Return the chain of n modules: n + 1 segments r_i, n tilts theta_2..theta_{n+1}, n joints about z.
 
     p_{i+1} = Rz1 [r_1 + sum_k prod_j (Ry_{j+1}(theta_{j+1}) Rz_{j+1}(phi_{j+1})) r_{k+1}]; the last segment
-    is the effector, tilted but not turned (there is no Rz_{n+1}).
+    is the effector, tilted but without a joint (there is no Rz_{n+1}).
 
     Args:
         name: The robot's name.
         lengths: r_1..r_{n+1} in [m], any elements.
         tilts: theta_2..theta_{n+1} in [rad], any elements.
-        directions: +1 or -1 a module; -1 for one that counter-rotates.
+        directions: +1 or -1 per module; -1 for one that counter-rotates.
         start: Calibration pose phi(0) in [rad].
-        description: One line for people.
-        source: Where the numbers come from.
+        description: One line of text.
+        source: Origin of the numbers.
 
     Raises:
         RobotError: If the counts do not fit each other.
@@ -353,15 +340,15 @@ def urm_chain(
             f"robot {name}: {len(lengths)} lengths and {modules} tilts; n modules need"
             " n + 1 lengths and n tilts"
         )
-    turns = tuple(directions) or (1,) * modules
-    if len(turns) != modules or any(turn not in (1, -1) for turn in turns):
-        raise RobotError(f"robot {name}: directions {list(turns)}; allowed: {modules} values, each 1 or -1")
+    signs = tuple(directions) or (1,) * modules
+    if len(signs) != modules or any(sign not in (1, -1) for sign in signs):
+        raise RobotError(f"robot {name}: directions {list(signs)}; allowed: {modules} values, each 1 or -1")
     *segments, end = (Step("along", "z", r, f"r{k}", SEGMENT_SOURCE) for k, r in enumerate(lengths, start=1))
-    turned = (Step("about", "y", tilt, f"theta{k}", TILT_SOURCE) for k, tilt in enumerate(tilts, start=2))
-    origins = [compose_steps(), *map(compose_steps, segments, turned)]
+    rotations = (Step("about", "y", tilt, f"theta{k}", TILT_SOURCE) for k, tilt in enumerate(tilts, start=2))
+    origins = [compose_steps(), *map(compose_steps, segments, rotations)]
     joints = [
-        Joint(f"phi{k}", "revolute", origin, (0.0, 0.0, float(turn)))
-        for k, (origin, turn) in enumerate(zip(origins, turns, strict=False), start=1)
+        Joint(f"phi{k}", "revolute", origin, (0.0, 0.0, float(sign)))
+        for k, (origin, sign) in enumerate(zip(origins, signs, strict=False), start=1)
     ]
     effector = Joint("effector", "fixed", origins[-1])
     return Chain(

@@ -1,12 +1,19 @@
-"""What an arm looks like whose description shows nothing: links and joints as solids, from its geometry."""
+"""Solids that stand for an arm whose description has no shapes: links and joints, from the frames alone.
+
+1. `_links`: the links between moving joints, as straight pieces from axis to axis (`_link_pieces`), the size
+   of the arm, and the radius of each link, which decreases from the base to the tip.
+2. `_joint_solid`: a cylinder about the axis of a revolute joint (placed by `_housing`), a box for a prismatic
+   one. Of several joints about one line at one place one is drawn (`_drawn_joints`).
+3. `_bars`, `_rails`, `_ends`: the pieces of the links, the rails of prismatic joints, flange and tool.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import accumulate, pairwise
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -24,48 +31,28 @@ from urmpipe_models.arm.chain import (
 from urmpipe_models.elementwise import FloatArray, Vector
 from urmpipe_models.math3d import Transform
 
-THICKNESS = 0.045
-"""Radius of an arm at its base as a share of its size: near that of a UR5e or a KUKA iiwa."""
-
-SLENDER = 0.4
-"""That radius as a share of the mean length of a link, at most: links that are shorter look like balls."""
-
-TAPER = 0.45
-"""Share of its radius that an arm loses from its base to its tip."""
-
-HOUSING = 1.3
-"""Radius and half the length of a joint's cylinder in radii of the link that begins there."""
-
-PLATE, NECK, FLANGE, ROD = 1.9, 0.6, 0.85, 0.25
-"""Radius of the plate under the base, of the last link, of the flange at its end, and of the rod to the tool
-centre point, in radii that a link has there."""
-
-SHORT = 0.01
-"""Links below this share of the length of all do not count for `SLENDER`: they are calibrated offsets."""
-
-STROKE = 0.25
-"""What a length that a joint slides counts beside the length of links in the size of an arm."""
-
-LONGEST_RAIL = 100.0
-"""Length of a rail in lengths of the arm, at most: limits farther away are not real."""
-
-LEAST = 1e-9
-"""What counts as nothing: a length as a share of the arm's, and the square of the sine between two axes."""
+THICKNESS = 0.045  # radius at the base / size of the arm: near that of a UR5e or a KUKA iiwa
+MAX_SLENDERNESS = 0.4  # that radius / mean length of a link: shorter links look like balls
+TAPER = 0.45  # decrease of the radius from base to tip, as a fraction of that at the base
+HOUSING = 1.3  # radius and half length of a joint's cylinder / radius of the link that begins there
+PLATE, NECK, FLANGE, ROD = 1.9, 0.6, 0.85, 0.25  # radius of base plate, last link, flange, tool rod / link's
+MIN_LINK = 0.01  # shorter links (fraction of the size) are calibrated offsets, not counted for slenderness
+STROKE = 0.25  # weight of the strokes of prismatic joints in the size of an arm, relative to link lengths
+MAX_RAIL = 100.0  # length of a rail / length of the arm: limits farther away are not real
+NEGLIGIBLE = 1e-9  # a length / the arm's; and the square of the sine between two axes
 
 Z = np.array([0.0, 0.0, 1.0])
 
-Piece: TypeAlias = tuple[FloatArray, FloatArray]
-"""A straight part of a link: where it starts and where it ends in [m], shape (3,) each."""
+Piece: TypeAlias = tuple[FloatArray, FloatArray]  # straight part of a link: start and end in [m], shape (3,)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Link:
-    """A link of the arm, in the moving frame of the joint that it hangs on.
+class _Link(NamedTuple):
+    """A link of the arm, in the moving frame of the joint before it.
 
     Attributes:
-        joint: The joint that it hangs on; of the first link, the base as a fixed one.
-        following: The joint at its other end; of the last link, the tip as a fixed one.
-        pieces: From one to the other; those without a length are left out.
+        joint: The joint before it; for the first link, the base as a fixed joint.
+        following: The joint at its other end; for the last link, the tip as a fixed joint.
+        pieces: From one to the other, without those of no length.
         radius: In [m].
     """
 
@@ -84,14 +71,14 @@ def build_placeholder_solids(chain: Chain, colours: Mapping[str, Colour] | None 
     """Return solids for the links and joints of an arm, however it was described.
 
     A link goes from its joint's frame along this joint's axis, then along the common normal to the next axis,
-    and along that to the next joint's frame: a capsule a piece. A joint that turns is a cylinder about its
-    axis; a joint that slides is a box on a rail as long as its limits, which the link before carries. A plate
-    stands under the base, a flange at the tip, and a thin rod leads to the tool centre point. All sizes are
-    shares of the arm's own lengths. Of joints about one line at one place, such as mimics, one is drawn.
+    and along that to the next joint's frame: one capsule per piece. A revolute joint is a cylinder about its
+    axis; a prismatic joint is a box on a rail as long as its limits, which the link before carries. A plate
+    is under the base, a flange at the tip, and a thin rod leads to the tool centre point. All sizes are
+    fractions of the arm's lengths. Of joints about one line at one place, such as mimics, one is drawn.
 
     Args:
         chain: The arm; its frames are numbers.
-        colours: Of joints, by name; all else has none.
+        colours: Colours of joints, by name; links do not have one.
 
     Returns:
         Shapes on the base and on moving joints, from the base outwards.
@@ -99,14 +86,14 @@ def build_placeholder_solids(chain: Chain, colours: Mapping[str, Colour] | None 
     size, links = _links(chain)
     base, tip = links[0], links[-1]
     ending = next((link for link in reversed(links) if link.pieces), tip)
-    found = [base.shape(Cylinder(PLATE * base.radius, base.radius), -base.radius / 2.0 * Z, Z)]
+    solids = [base.shape(Cylinder(PLATE * base.radius, base.radius), -base.radius / 2.0 * Z, Z)]
     drawn = _drawn_joints(links)
     for previous, link in zip([None, *links[:-1]], links, strict=True):
         if previous is not None and link.joint.name in drawn:
-            found.append(_joint_solid(previous, link, (colours or {}).get(link.joint.name)))
-        found += _bars(link, at_tip=link is ending)
-        found += _rails(link, size)
-    return (*found, *_ends(tip, chain.tool, size))
+            solids.append(_joint_solid(previous, link, (colours or {}).get(link.joint.name)))
+        solids += _bars(link, at_tip=link is ending)
+        solids += _rails(link, size)
+    return (*solids, *_ends(tip, chain.tool, size))
 
 
 def _links(chain: Chain) -> tuple[float, tuple[_Link, ...]]:
@@ -118,57 +105,58 @@ def _links(chain: Chain) -> tuple[float, tuple[_Link, ...]]:
             joints.append(replace(joint, origin=origin))
             origin = Transform()
     joints.append(Joint("", "fixed", origin @ chain.tip))
-    ways = [_way(joint, following) for joint, following in pairwise(joints)]
-    lengths = [sum(map(_length, way)) for way in ways]
+    pieces_of_links = [_link_pieces(joint, following) for joint, following in pairwise(joints)]
+    lengths = [sum(map(_length, pieces)) for pieces in pieces_of_links]
     strokes = [joint.upper - joint.lower for joint in joints if joint.kind == "prismatic"]
-    real = LONGEST_RAIL * sum(lengths) or MAX_COORDINATE
-    stroke = STROKE * sum(one for one in strokes if one <= real)
+    max_stroke = MAX_RAIL * sum(lengths) or MAX_COORDINATE
+    stroke = STROKE * sum(stroke for stroke in strokes if stroke <= max_stroke)
     size = max(sum(lengths), stroke) or math.hypot(*chain.tool.translation) or 1.0
-    long = sum(length > SHORT * size for length in lengths)
-    thick = size * min(THICKNESS, SLENDER / max(long, 1))
+    counted = sum(length > MIN_LINK * size for length in lengths)
+    radius = size * min(THICKNESS, MAX_SLENDERNESS / max(counted, 1))
     links = []
-    for (joint, following), way, before in zip(
-        pairwise(joints), ways, accumulate([0.0, *lengths]), strict=False
+    for (joint, following), pieces, start in zip(
+        pairwise(joints), pieces_of_links, accumulate([0.0, *lengths]), strict=False
     ):
-        pieces = tuple(piece for piece in way if _length(piece) > LEAST * size)
-        links.append(_Link(joint, following, pieces, thick * (1.0 - TAPER * before / size)))
+        visible = tuple(piece for piece in pieces if _length(piece) > NEGLIGIBLE * size)
+        links.append(_Link(joint, following, visible, radius * (1.0 - TAPER * start / size)))
     return size, tuple(links)
 
 
-def _way(joint: Joint, following: Joint) -> tuple[Piece, ...]:
+def _link_pieces(joint: Joint, following: Joint) -> tuple[Piece, ...]:
     """Return the pieces of the link between two joints, in the frame of the first.
 
     With the first axis u through 0, the second w through p, and c = u.w, their common normal starts at
     s u, s = (p.u - c p.w) / (1 - c2), and ends at p + (s c - p.w) w. Of axes that are nearly parallel it
-    can be far away: a way longer than three perpendicular pieces to p, sqrt(3) |p|, is not taken. Then,
+    can be far away: three pieces longer than three perpendicular ones to p, sqrt(3) |p|, are not used. Then,
     and between parallel axes, the link goes along u by p.u and straight on to p.
     """
     u, w = np.array(joint.axis), _vector(following.origin.rotate(following.axis))
     p = _vector(following.origin.translation)
     c = float(u @ w)
     corners = [np.zeros(3), (p @ u) * u, p]
-    if 1.0 - c * c > LEAST:
+    if 1.0 - c * c > NEGLIGIBLE:
         s = float(p @ u - c * (p @ w)) / (1.0 - c * c)
         normal = [np.zeros(3), s * u, p + (s * c - float(p @ w)) * w, p]
-        if sum(map(_length, pairwise(normal))) <= math.sqrt(3.0) * float(np.linalg.norm(p)) * (1.0 + LEAST):
+        longest = math.sqrt(3.0) * float(np.linalg.norm(p)) * (1.0 + NEGLIGIBLE)
+        if sum(map(_length, pairwise(normal))) <= longest:
             corners = normal
     return tuple(pairwise(corners))
 
 
 def _drawn_joints(links: Sequence[_Link]) -> set[str]:
-    """Return the names of the joints that are drawn: of several about one line at one place, one.
+    """Return the names of the joints to draw: of several about one line at one place, one.
 
-    That is the first that has a coordinate of its own, else the last.
+    That is the first with a coordinate, else the last.
     """
     groups: list[list[Joint]] = []
     for previous, link in pairwise(links):
         c = float(np.array(previous.joint.axis) @ _vector(link.joint.origin.rotate(link.joint.axis)))
-        turning = previous.joint.kind == link.joint.kind == "revolute"
-        if turning and not previous.pieces and 1.0 - c * c <= LEAST:
+        revolute = previous.joint.kind == link.joint.kind == "revolute"
+        if revolute and not previous.pieces and 1.0 - c * c <= NEGLIGIBLE:
             groups[-1].append(link.joint)
         else:
             groups.append([link.joint])
-    return {next((one for one in group if one.mimic is None), group[-1]).name for group in groups}
+    return {next((joint for joint in group if joint.mimic is None), group[-1]).name for group in groups}
 
 
 def _joint_solid(previous: _Link, link: _Link, colour: Colour | None) -> Visual:
@@ -181,30 +169,30 @@ def _joint_solid(previous: _Link, link: _Link, colour: Colour | None) -> Visual:
 
 
 def _housing(previous: _Link, link: _Link, half: float) -> tuple[float, float]:
-    """Return how far along its axis from its frame a turning joint is drawn, and half its length, in [m].
+    """Return the shift of a revolute joint along its axis from its frame, and half its length, in [m].
 
-    Across the links it is at their corner. Where a link leads along the axis the joint goes into that link:
-    by half its length if the other link goes straight on, and clear of a joint at the same place. It does not
-    reach beyond the end of that link.
+    Perpendicular to the links it is at their corner. If a link leads along the axis the joint goes into that
+    link: by half its length if the other link continues straight, and clear of a joint at the same place. It
+    does not reach beyond the end of that link.
 
     Args:
         previous: The link before the joint.
         link: The link that it moves.
-        half: Its radius, and half its length where there is room, in [m].
+        half: Its radius, and half its length if there is room, in [m].
     """
-    axis, there = np.array(link.joint.axis), _vector(link.joint.origin.rotate(link.joint.axis))
+    axis, axis_before = np.array(link.joint.axis), _vector(link.joint.origin.rotate(link.joint.axis))
     leaving = [(float(_direction(piece) @ axis), _length(piece)) for piece in link.pieces[:1]]
-    coming = [(float(_direction(piece) @ there), _length(piece)) for piece in previous.pieces[-1:]]
-    for own, other, neighbour, way in (
+    coming = [(float(_direction(piece) @ axis_before), _length(piece)) for piece in previous.pieces[-1:]]
+    for pieces, other, neighbour, sign in (
         (leaving, coming, previous.joint, 1.0),
         (coming, leaving, link.following, -1.0),
     ):
-        for along, room in own:
-            if abs(along) >= 1.0 - LEAST and room > half / 2.0:
+        for along, room in pieces:
+            if abs(along) >= 1.0 - NEGLIGIBLE and room > half / 2.0:
                 clear = half if neighbour.kind == "revolute" else 0.0
-                far = half * max(0.0, along * other[0][0]) if other else half + clear
-                far = min(far, room / 2.0)
-                return way * math.copysign(far, along), min(half, room - far)
+                shift = half * max(0.0, along * other[0][0]) if other else half + clear
+                shift = min(shift, room / 2.0)
+                return sign * math.copysign(shift, along), min(half, room - shift)
     return 0.0, half
 
 
@@ -217,15 +205,15 @@ def _bars(link: _Link, *, at_tip: bool) -> Iterator[Visual]:
 
 
 def _rails(link: _Link, size: float) -> Iterator[Visual]:
-    """Yield the rail of a sliding joint at the end of a link, from its lower to its upper limit."""
+    """Yield the rail of a prismatic joint at the end of a link, from its lower to its upper limit."""
     joint = link.following
     if joint.kind != "prismatic":
         return
-    known = LONGEST_RAIL * size
-    low = min(joint.lower, 0.0) if joint.lower >= -known else -size
-    high = max(joint.upper, 0.0) if joint.upper <= known else size
+    longest = MAX_RAIL * size
+    low = min(joint.lower, 0.0) if joint.lower >= -longest else -size
+    high = max(joint.upper, 0.0) if joint.upper <= longest else size
     axis, origin = _vector(joint.origin.rotate(joint.axis)), _vector(joint.origin.translation)
-    if high - low > LEAST * size:
+    if high - low > NEGLIGIBLE * size:
         shape = Box((link.radius, link.radius, high - low))
         yield link.shape(shape, origin + (low + high) / 2.0 * axis, axis)
 
@@ -234,10 +222,10 @@ def _ends(tip: _Link, tool: Transform, size: float) -> Iterator[Visual]:
     """Yield the flange at the end of the last link, and the rod from there to the tool centre point."""
     end = _vector(tip.following.origin.translation)
     z = _direction(tip.pieces[-1]) if tip.pieces else _vector(tip.following.origin.rotate((0.0, 0.0, 1.0)))
-    thick = tip.radius / 3.0
-    yield tip.shape(Cylinder(FLANGE * tip.radius, thick), end - thick / 2.0 * z, z)
+    thickness = tip.radius / 3.0
+    yield tip.shape(Cylinder(FLANGE * tip.radius, thickness), end - thickness / 2.0 * z, z)
     rod = (end, _vector(tip.following.origin.point(tool.translation)))
-    if _length(rod) > LEAST * size:
+    if _length(rod) > NEGLIGIBLE * size:
         yield tip.shape(Cylinder(ROD * tip.radius, _length(rod)), (rod[0] + rod[1]) / 2.0, _direction(rod))
 
 
@@ -252,21 +240,17 @@ def _rotation_to(z: FloatArray) -> tuple[Vector, Vector, Vector]:
 
 
 def _length(piece: Piece) -> float:
-    """Return the length of a piece in [m]."""
     return float(np.linalg.norm(piece[1] - piece[0]))
 
 
 def _direction(piece: Piece) -> FloatArray:
-    """Return the unit vector along a piece, shape (3,)."""
     return np.asarray((piece[1] - piece[0]) / _length(piece))
 
 
 def _vector(elements: Vector) -> FloatArray:
-    """Return three numbers as an array, shape (3,)."""
     return np.array([float(element) for element in elements])
 
 
 def _tuple(vector: FloatArray) -> tuple[float, float, float]:
-    """Return an array of shape (3,) as three numbers."""
     x, y, z = vector.tolist()
     return x, y, z

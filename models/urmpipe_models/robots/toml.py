@@ -375,7 +375,7 @@ def read_robot_file(path: str | Path) -> Chain:
     chain = _read(data, tuple(_READERS), file=str(path), stem=path.stem, folder=path.parent)
     if faults := [*_unsaid_units(data, chain)]:
         raise RobotError(*(Finding(fault, str(path)) for fault in faults))
-    return replace(chain, visuals=tuple(visual.located(path.parent) for visual in chain.visuals))
+    return replace(chain, visuals=tuple(visual.with_resolved_mesh(path.parent) for visual in chain.visuals))
 
 
 def chain_to_dict(chain: Chain) -> dict[str, Any]:

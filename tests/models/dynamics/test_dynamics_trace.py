@@ -13,7 +13,7 @@ import pytest
 from made_masses import DRIVE, with_drives, with_masses
 from sliding_arm import sliding_arm
 from urmpipe_models.arm.chain import Chain
-from urmpipe_models.drives import Drive, held_voltage
+from urmpipe_models.drives import Drive, sampled_voltage
 from urmpipe_models.dynamics.driven_arm import (
     ArmState,
     Motor,
@@ -136,6 +136,6 @@ def test_a_driven_arm_traces_with_its_drives_as_parameters() -> None:
 def test_a_held_voltage_traces() -> None:
     def voltages(values: Any) -> list[Any]:
         time, fresh, last = values
-        return [held_voltage(time, 5e-3, sample, fresh, last) for sample in (-200.0, 0.0, 200.0)]
+        return [sampled_voltage(time, 5e-3, sample, fresh, last) for sample in (-200.0, 0.0, 200.0)]
 
     assert_traced(voltages, [3])
