@@ -1,13 +1,15 @@
-"""The frames of a chain, elementwise: the value of every joint, and what it moves.
-
-Velocities and accelerations of the points of a chain, elementwise.
-
-Forward kinematics and Jacobian of a chain, elementwise, and its motion over a log.
+"""Forward kinematics of a chain, elementwise: joint values, frames, Jacobian, motion, screws; over a log.
 
 Each function takes one element per coordinate (see `elementwise`): arrays over the samples of a log,
-floats, or CasADi symbols. `over_log` runs one of them over the rows of an (n, joints) array.
+floats, or CasADi symbols. Those that end in `_over_log` run over the rows of an array, shape (n, joints).
 
-The joints of a chain as screws: what its geometry is, whatever its frames and names are.
+    joint_values, joint_rates   values of all joints from the coordinates q; here a mimic gets its value:
+                                multiplier q + offset
+    iter_frames, forward        products of frames and joint motions, from the base outwards
+    tip_position, tip_pose      the tool centre point alone, inwards: p' = o + R Rot(axis, q) p
+    jacobian                    columns (z x (p - o), z) of revolute, (z, 0) of prismatic joints
+    point_motions               velocities and accelerations by the outward recursion
+    chain_to_screws             the axes at q = 0: T(q) = exp(xi_1 q_1) ... exp(xi_n q_n) T(0)
 """
 
 from __future__ import annotations
@@ -40,22 +42,29 @@ from urmpipe_models.tape import aligned, fill_over_log
 
 
 def joint_values(chain: Chain, q: Sequence[Element]) -> list[Element]:
-    """Return the value of every joint of the chain, mimics included, fixed ones as 0 (rad or m)."""
-    of = dict(zip(chain.coordinates, q, strict=True))
-    return [_value(joint, of) for joint in chain.joints]
+    """Return the value of every joint of the chain in [rad] or [m]: fixed joints 0, mimics included."""
+    q_by_name = dict(zip(chain.coordinates, q, strict=True))
+    return [
+        plus(times(joint.mimic.multiplier, q_by_name[joint.mimic.joint]), joint.mimic.offset)
+        if joint.mimic
+        else q_by_name.get(joint.name, 0.0)
+        for joint in chain.joints
+    ]
 
 
 def joint_rates(chain: Chain, rates: Sequence[Element]) -> list[Element]:
-    """Return the derivative of every joint's value: as `joint_values`, but a mimic's offset drops out."""
-    of = dict(zip(chain.coordinates, rates, strict=True))
+    """Return the derivative of every joint's value: as `joint_values`, but without the offset of a mimic."""
+    rate_by_name = dict(zip(chain.coordinates, rates, strict=True))
     return [
-        times(joint.mimic.multiplier, of[joint.mimic.joint]) if joint.mimic else of.get(joint.name, 0.0)
+        times(joint.mimic.multiplier, rate_by_name[joint.mimic.joint])
+        if joint.mimic
+        else rate_by_name.get(joint.name, 0.0)
         for joint in chain.joints
     ]
 
 
 def iter_frames(chain: Chain, q: Sequence[Element]) -> Iterator[Transform]:
-    """Yield the base and the moving frame of every joint, in the world: what the links hang on.
+    """Yield the base and the moving frame of every joint, in the world: the frames of the links.
 
     Args:
         chain: The arm.
@@ -77,8 +86,31 @@ def apply_joint(at_joint: Transform, joint: Joint, value: Element) -> Transform:
     return at_joint
 
 
+def forward(chain: Chain, q: Sequence[Element]) -> tuple[Transform, ...]:
+    """Return the poses of the points p1..pn.
+
+    p_{i+1} = Rz1 [r_1 + sum_k prod_j (Ry_{j+1} Rz_{j+1}) r_{k+1}], for any chain as the product of its
+    frames and joint motions.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+
+    Returns:
+        A transform per point, in the world; positions in [m].
+
+    Source: [UrmArm2021]_ eq. 7 and 8.
+    """
+    _, *links = iter_frames(chain, q)
+    poses = [
+        Transform(frame.rotation, frame.point(joint.origin.translation))
+        for frame, joint in zip(links, chain.joints[1:], strict=False)
+    ]
+    return (*poses, links[-1] @ chain.tip @ chain.tool)
+
+
 def tip_position(chain: Chain, q: Sequence[Element]) -> Vector:
-    """Return the tool centre point in the world [m], without its orientation: that of `tip_pose`.
+    """Return the tool centre point in the world [m], without its orientation, as `tip_pose` does.
 
     Args:
         chain: The arm.
@@ -87,12 +119,25 @@ def tip_position(chain: Chain, q: Sequence[Element]) -> Vector:
     return tip_to_world(chain, q, chain.tip.point(chain.tool.translation))[0]
 
 
-def tip_to_world(chain: Chain, q: Sequence[Element], point: Vector, *directions: Vector) -> list[Vector]:
-    """Return a point [m] and directions that are given in the frame of the last joint, in the world.
+def tip_pose(chain: Chain, q: Sequence[Element]) -> Transform:
+    """Return the pose of the tool centre point alone, in the world: the last of `forward`, at less cost.
 
-    Inward recursion: what is known in a link's frame becomes the same in the frame before,
-    p' = o + R Rot(axis, q) p and v' = R Rot(axis, q) v, from the tool to the base. It turns one vector for
-    each of them where `frames` turns three.
+    Its axes x and y are computed with the point from the tool to the base; z = x cross y.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+    """
+    tip = chain.tip @ chain.tool
+    point, x, y = tip_to_world(chain, q, tip.translation, *tip.columns[:2])
+    return Transform(Transform((x, y, cross(x, y))).columns, point)
+
+
+def tip_to_world(chain: Chain, q: Sequence[Element], point: Vector, *directions: Vector) -> list[Vector]:
+    """Return a point [m] and directions in the world, given in the frame of the last joint.
+
+    Inward recursion from the tool to the base: p' = o + R Rot(axis, q) p and v' = R Rot(axis, q) v. It
+    rotates one vector for each of them, whereas `iter_frames` rotates three per joint.
     """
     vectors = [point, *directions]
     for joint, value in zip(reversed(chain.joints), reversed(joint_values(chain, q)), strict=True):
@@ -104,13 +149,46 @@ def tip_to_world(chain: Chain, q: Sequence[Element], point: Vector, *directions:
     return [chain.base.point(vectors[0]), *map(chain.base.rotate, vectors[1:])]
 
 
-def _value(joint: Joint, of: dict[str, Element]) -> Element:
-    """Return the value of a joint from those of the coordinates."""
-    if joint.kind == "fixed":
-        return 0.0
-    if joint.mimic is None:
-        return of[joint.name]
-    return plus(times(joint.mimic.multiplier, of[joint.mimic.joint]), joint.mimic.offset)
+def jacobian(chain: Chain, q: Sequence[Element], point: int = -1) -> tuple[tuple[Element, ...], ...]:
+    """Return the geometric Jacobian of a point p1..pn, in the world.
+
+    Column i is (z_i x (p - o_i), z_i) for a revolute and (z_i, 0) for a prismatic joint with axis z_i
+    through o_i; a mimic's column counts with its multiplier towards the joint it follows.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+        point: Index of the point, -1 for the tool centre point.
+
+    Returns:
+        One column per coordinate, each vx, vy, vz in [m/s] and wx, wy, wz in [rad/s] per unit rate.
+    """
+    count = len(chain.joints)
+    last = range(count)[point]
+    axes: list[tuple[Vector, Vector]] = []
+    frame = chain.base
+    for k, (joint, value) in enumerate(zip(chain.joints, joint_values(chain, q), strict=True)):
+        at_joint = frame @ joint.origin
+        if k == last + 1:
+            target = at_joint.translation
+            break
+        axes.append((at_joint.rotate(joint.axis), at_joint.translation))
+        frame = apply_joint(at_joint, joint, value)
+    else:
+        target = (frame @ chain.tip @ chain.tool).translation
+
+    columns: dict[str, tuple[Element, ...]] = dict.fromkeys(chain.coordinates, (0.0,) * 6)
+    for joint, (axis, origin) in zip(chain.joints, axes, strict=False):
+        if joint.kind == "fixed":
+            continue
+        column = (
+            (*cross(axis, subtract(target, origin)), *axis) if joint.kind == "revolute" else (*axis, *ZERO)
+        )
+        name, factor = (
+            (joint.name, 1.0) if joint.mimic is None else (joint.mimic.joint, joint.mimic.multiplier)
+        )
+        columns[name] = tuple(plus(a, times(factor, b)) for a, b in zip(columns[name], column, strict=True))
+    return tuple(columns.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,14 +215,14 @@ def point_motions(
 ) -> tuple[Motion, ...]:
     """Return pose, velocity and acceleration of the points p1..pn, from q, q' and q''.
 
-    Outward recursion over the joints, with d the way from one frame's origin to the next:
+    Outward recursion over the joints, with d the vector from one frame's origin to the next:
     v' = v + omega x d, a' = a + alpha x d + omega x (omega x d); a revolute joint adds z q' to omega and
     z q'' + omega x z q' to alpha, a prismatic one z q' to v and z q'' + 2 omega x z q' to a.
 
     Args:
         chain: The arm.
         q: One element per coordinate, in [rad] or [m].
-        qd: Their rates, in [rad/s] or [m/s].
+        qd: Their first derivatives, in [rad/s] or [m/s].
         qdd: Their second derivatives, in [rad/s2] or [m/s2].
 
     Source: [UrmArm2021]_ section 3, Figure 10 b and c (v7 of q', a7 of q'' and q'^2).
@@ -155,32 +233,31 @@ def point_motions(
 def iter_point_motions(
     chain: Chain, q: Sequence[Element], qd: Sequence[Element], qdd: Sequence[Element]
 ) -> Iterator[Motion]:
-    """Yield the motions of p1..pn; who wants one of them need not keep the arrays of all.
+    """Yield the motions of p1..pn one by one, so that the arrays of all need not be in memory.
 
     Args:
         chain: The arm.
         q: One element per coordinate, in [rad] or [m].
-        qd: Their rates, in [rad/s] or [m/s].
+        qd: Their first derivatives, in [rad/s] or [m/s].
         qdd: Their second derivatives, in [rad/s2] or [m/s2].
     """
-    values, rates, second = joint_values(chain, q), joint_rates(chain, qd), joint_rates(chain, qdd)
+    values, rates, accelerations = joint_values(chain, q), joint_rates(chain, qd), joint_rates(chain, qdd)
     body = Motion(chain.base, ZERO, ZERO, ZERO, ZERO)
     for k, joint in enumerate(chain.joints):
-        at_joint = _carried(body, joint.origin)
+        at_joint = _fixed_frame_motion(body, joint.origin)
         if k > 0:
-            end = Transform(body.pose.rotation, at_joint.pose.translation)
-            yield replace(at_joint, pose=end)
-        body = _driven(at_joint, joint, values[k], rates[k], second[k])
-    yield _carried(body, chain.tip @ chain.tool)
+            yield replace(at_joint, pose=Transform(body.pose.rotation, at_joint.pose.translation))
+        body = _moving_frame_motion(at_joint, joint, values[k], rates[k], accelerations[k])
+    yield _fixed_frame_motion(body, chain.tip @ chain.tool)
 
 
-def _carried(state: Motion, origin: Transform) -> Motion:
+def _fixed_frame_motion(state: Motion, origin: Transform) -> Motion:
     """Return the motion of a frame fixed to a moving body."""
     d = state.pose.rotate(origin.translation)
     spin = cross(state.omega, d)
-    turned = Transform(state.pose.rotation) @ Transform(origin.rotation)
+    rotated = Transform(state.pose.rotation) @ Transform(origin.rotation)
     return Motion(
-        Transform(turned.rotation, add(state.pose.translation, d)),
+        Transform(rotated.rotation, add(state.pose.translation, d)),
         add(state.velocity, spin),
         add(state.acceleration, add(cross(state.alpha, d), cross(state.omega, spin))),
         state.omega,
@@ -188,107 +265,29 @@ def _carried(state: Motion, origin: Transform) -> Motion:
     )
 
 
-def _driven(state: Motion, joint: Joint, value: Element, rate: Element, second: Element) -> Motion:
-    """Return the motion of the joint's moving frame from that of its fixed one; a fixed joint slides by 0."""
+def _moving_frame_motion(
+    state: Motion, joint: Joint, value: Element, rate: Element, acceleration: Element
+) -> Motion:
+    """Return the motion of the joint's moving frame from that of its fixed one; fixed joints move by 0."""
     pose = apply_joint(state.pose, joint, value)
     axis = state.pose.rotate(joint.axis)
-    own, own_second = scale(rate, axis), scale(second, axis)
-    coupling = cross(state.omega, own)
+    axis_velocity, axis_acceleration = scale(rate, axis), scale(acceleration, axis)
+    coupling = cross(state.omega, axis_velocity)
     if joint.kind == "revolute":
-        omega = add(state.omega, own)
-        alpha = add(state.alpha, add(own_second, coupling))
+        omega = add(state.omega, axis_velocity)
+        alpha = add(state.alpha, add(axis_acceleration, coupling))
         return Motion(pose, state.velocity, state.acceleration, omega, alpha)
     slide = scale(value, axis)
     spin = cross(state.omega, slide)
-    acceleration = add(cross(state.alpha, slide), cross(state.omega, spin))
-    acceleration = add(acceleration, add(scale(2.0, coupling), own_second))
+    relative = add(cross(state.alpha, slide), cross(state.omega, spin))
+    relative = add(relative, add(scale(2.0, coupling), axis_acceleration))
     return Motion(
         pose,
-        add(state.velocity, add(spin, own)),
-        add(state.acceleration, acceleration),
+        add(state.velocity, add(spin, axis_velocity)),
+        add(state.acceleration, relative),
         state.omega,
         state.alpha,
     )
-
-
-def forward(chain: Chain, q: Sequence[Element]) -> tuple[Transform, ...]:
-    """Return the poses of the points p1..pn.
-
-    p_{i+1} = Rz1 [r_1 + sum_k prod_j (Ry_{j+1} Rz_{j+1}) r_{k+1}], for any chain as the product of its
-    frames and joint motions.
-
-    Args:
-        chain: The arm.
-        q: One element per coordinate, in [rad] or [m].
-
-    Returns:
-        A transform per point, in the world; positions in [m].
-
-    Source: [UrmArm2021]_ eq. 7 and 8.
-    """
-    _, *links = iter_frames(chain, q)
-    poses = [
-        Transform(frame.rotation, frame.point(joint.origin.translation))
-        for frame, joint in zip(links, chain.joints[1:], strict=False)
-    ]
-    return (*poses, links[-1] @ chain.tip @ chain.tool)
-
-
-def tip_pose(chain: Chain, q: Sequence[Element]) -> Transform:
-    """Return the pose of the tool centre point alone, in the world: the last of `forward`, at less cost.
-
-    Its axes x and y come with the point from the tool to the base; z = x cross y.
-
-    Args:
-        chain: The arm.
-        q: One element per coordinate, in [rad] or [m].
-    """
-    tip = chain.tip @ chain.tool
-    point, x, y = tip_to_world(chain, q, tip.translation, *tip.columns[:2])
-    return Transform(Transform((x, y, cross(x, y))).columns, point)
-
-
-def jacobian(chain: Chain, q: Sequence[Element], point: int = -1) -> tuple[tuple[Element, ...], ...]:
-    """Return the geometric Jacobian of a point p1..pn, in the world.
-
-    Column i is (z_i x (p - o_i), z_i) for a revolute and (z_i, 0) for a prismatic joint with axis z_i
-    through o_i; a mimic's column counts with its multiplier towards the joint it follows.
-
-    Args:
-        chain: The arm.
-        q: One element per coordinate, in [rad] or [m].
-        point: Index of the point, -1 for the tool centre point.
-
-    Returns:
-        One column a coordinate, each vx, vy, vz in [m/s] and wx, wy, wz in [rad/s] per unit rate.
-    """
-    count = len(chain.joints)
-    last = range(count)[point]
-    axes: list[tuple[Vector, Vector]] = []
-    frame = chain.base
-    target = ZERO
-    for k, (joint, value) in enumerate(zip(chain.joints, joint_values(chain, q), strict=True)):
-        at_joint = frame @ joint.origin
-        if k == last + 1:
-            target = at_joint.translation
-            break
-        axes.append((at_joint.rotate(joint.axis), at_joint.translation))
-        frame = apply_joint(at_joint, joint, value)
-    else:
-        target = (frame @ chain.tip @ chain.tool).translation
-
-    columns: dict[str, tuple[Element, ...]] = dict.fromkeys(chain.coordinates, (0.0,) * 6)
-    for joint, (axis, origin) in zip(chain.joints, axes, strict=False):
-        if joint.kind == "fixed":
-            continue
-        column = (
-            (*cross(axis, subtract(target, origin)), *axis) if joint.kind == "revolute" else (*axis, *ZERO)
-        )
-        name, factor = (
-            (joint.name, 1.0) if joint.mimic is None else (joint.mimic.joint, joint.mimic.multiplier)
-        )
-        columns[name] = tuple(plus(a, times(factor, b)) for a, b in zip(columns[name], column, strict=True))
-    return tuple(columns.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,7 +299,7 @@ class PointLog:
         velocity: In [m/s], shape (n, 3).
         acceleration: In [m/s2], shape (n, 3).
         euler_zyx: rz, ry, rx in [rad], shape (n, 3).
-        singular: Where ry = +-pi/2 and rx = 0 by convention, shape (n,).
+        singular: True if ry = +-pi/2, where rx = 0 by convention, shape (n,).
     """
 
     position: FloatArray
@@ -334,7 +333,6 @@ def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]
     """
 
     def entries(q: Sequence[Element]) -> list[Element]:
-        """Return p and the rows of R."""
         pose = tip_pose(chain, q)
         return [element for row in (pose.translation, *pose.rotation) for element in row]
 
@@ -343,30 +341,23 @@ def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]
     return position.T, rotation.reshape(3, 3, len(q)).transpose(2, 0, 1)
 
 
-def point_over_log(
-    chain: Chain,
-    q: FloatArray,
-    qd: FloatArray,
-    qdd: FloatArray,
-    point: int = -1,
-) -> PointLog:
+def point_over_log(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray, point: int = -1) -> PointLog:
     """Return the motion of one point p1..pn over a log.
 
     Args:
         chain: The arm.
         q: Joint values in [rad] or [m], shape (n, joints).
-        qd: Their rates in [rad/s] or [m/s], shape (n, joints).
+        qd: Their first derivatives in [rad/s] or [m/s], shape (n, joints).
         qdd: Their second derivatives in [rad/s2] or [m/s2], shape (n, joints).
         point: Index of the point, -1 for the tool centre point.
     """
-    count, place = len(q), range(len(chain.joints))[point]
+    count, index = len(q), range(len(chain.joints))[point]
     position, velocity, acceleration, euler = (np.empty((3, count)) for _ in range(4))
     singular = np.empty(count, dtype=np.bool_)
 
     def work(block: slice) -> None:
-        """Fill the rows of a block."""
-        every = iter_point_motions(chain, _columns(q[block]), _columns(qd[block]), _columns(qdd[block]))
-        motion = next(islice(every, place, None))
+        motions = iter_point_motions(chain, _columns(q[block]), _columns(qd[block]), _columns(qdd[block]))
+        motion = next(islice(motions, index, None))
         rz, ry, rx, singular[block] = euler_zyx(motion.pose.rotation)
         _fill(position[:, block], motion.pose.translation)
         _fill(velocity[:, block], motion.velocity)
@@ -388,7 +379,6 @@ def points_over_log(chain: Chain, q: FloatArray) -> FloatArray:
     _fill(skeleton[0], chain.base.translation)
 
     def work(block: slice) -> None:
-        """Fill the rows of a block."""
         for k, pose in enumerate(forward(chain, _columns(q[block])), start=1):
             _fill(skeleton[k, :, block], pose.translation)
 
@@ -397,7 +387,7 @@ def points_over_log(chain: Chain, q: FloatArray) -> FloatArray:
 
 
 def frames_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return where the frames of an arm are, in the world, over a log.
+    """Return the frames of an arm in the world over a log.
 
     Args:
         chain: The arm.
@@ -411,7 +401,6 @@ def frames_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray
     position, rotation = np.empty((count, 3, len(q))), np.empty((count, 3, 3, len(q)))
 
     def work(block: slice) -> None:
-        """Fill the rows of a block."""
         for k, frame in enumerate(iter_frames(chain, _columns(q[block]))):
             _fill(position[k, :, block], frame.translation)
             for row in range(3):
@@ -436,7 +425,6 @@ def jacobian_over_log(chain: Chain, q: FloatArray, point: int = -1) -> FloatArra
     result = np.empty((len(chain.coordinates), 6, len(q)))
 
     def work(block: slice) -> None:
-        """Fill the rows of a block."""
         for i, column in enumerate(jacobian(chain, _columns(q[block]), point)):
             _fill(result[i, :, block], column)
 
@@ -445,12 +433,12 @@ def jacobian_over_log(chain: Chain, q: FloatArray, point: int = -1) -> FloatArra
 
 
 def bias_over_log(chain: Chain, q: FloatArray, qd: FloatArray) -> FloatArray:
-    """Return J' q', the acceleration of the tool centre point that the rates alone make, for every row.
+    """Return J' q', the acceleration of the tool centre point at q'' = 0, for every row.
 
     Args:
         chain: The arm.
         q: Joint values in [rad] or [m], shape (n, joints).
-        qd: Their rates in [rad/s] or [m/s], shape (n, joints).
+        qd: Their first derivatives in [rad/s] or [m/s], shape (n, joints).
 
     Returns:
         Shape (n, 6): acceleration in [m/s2], then angular acceleration in [rad/s2], in the world.
@@ -458,7 +446,6 @@ def bias_over_log(chain: Chain, q: FloatArray, qd: FloatArray) -> FloatArray:
     result = np.empty((6, len(q)))
 
     def work(block: slice) -> None:
-        """Fill the rows of a block."""
         rates = _columns(qd[block])
         *_, tip = iter_point_motions(chain, _columns(q[block]), rates, [0.0] * len(rates))
         _fill(result[:3, block], tip.acceleration)
@@ -469,12 +456,11 @@ def bias_over_log(chain: Chain, q: FloatArray, qd: FloatArray) -> FloatArray:
 
 
 def _columns(rows: FloatArray) -> list[FloatArray]:
-    """Return the columns of (m, joints) as contiguous arrays."""
     return list(np.ascontiguousarray(rows.T))
 
 
 def _fill(target: FloatArray, elements: Sequence[Element]) -> None:
-    """Write one element a row into target, shape (k, m); constants spread over the columns."""
+    """Write one element per row into target, shape (k, m); constants fill their row."""
     for i, element in enumerate(elements):
         target[i] = element
 
@@ -489,7 +475,7 @@ class Screws:
     Attributes:
         direction: Unit vector along each axis [-], shape (n, 3).
         point: A point of each axis in [m], shape (n, 3).
-        revolute: True of a revolute, false of a prismatic joint, shape (n,).
+        revolute: True for a revolute, false for a prismatic joint, shape (n,).
         rotation: Of the tool centre point at q = 0 [-], shape (3, 3).
         position: Of the tool centre point at q = 0 in [m], shape (3,).
 
@@ -504,7 +490,7 @@ class Screws:
 
     @property
     def size(self) -> float:
-        """A length of the arm in [m], to hold distances against: from axis to axis to the tip."""
+        """A length of the arm in [m] as a scale of distances: from axis to axis to the tip."""
         points = np.vstack((self.point, self.position))
         return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) or 1.0
 
@@ -512,17 +498,17 @@ class Screws:
 def chain_to_screws(chain: Chain) -> Screws | None:
     """Return the screws of a chain, base and tool included; None if a joint follows another (mimic).
 
-    Such a joint turns about a line that moves with the joint it follows, and is no screw of its own.
+    The axis of such a joint moves with the joint that it follows, so it has no constant screw.
     """
     if any(joint.mimic is not None for joint in chain.joints):
         return None
     zero = [0.0] * len(chain.coordinates)
-    placed = [
+    axes = [
         (frame.rotate(joint.axis), frame.translation, joint.kind == "revolute")
         for joint, frame in zip(chain.joints, list(iter_frames(chain, zero))[1:], strict=True)
         if joint.kind != "fixed"
     ]
-    direction, point, revolute = zip(*placed, strict=True)
+    direction, point, revolute = zip(*axes, strict=True)
     tip = tip_pose(chain, zero)
     return Screws(
         np.array(direction, dtype=float),
@@ -534,11 +520,11 @@ def chain_to_screws(chain: Chain) -> Screws | None:
 
 
 def screws_to_chain(screws: Screws, names: tuple[str, ...]) -> Chain:
-    """Return a chain that has these screws: each joint's frame on a point of its axis, turned as the world.
+    """Return a chain with these screws: each joint's frame is on its axis, parallel to the world.
 
     Args:
-        screws: Of its joints.
-        names: Of its joints.
+        screws: The screws of its joints.
+        names: The names of its joints.
     """
     offsets = np.diff(np.vstack((np.zeros(3), screws.point)), axis=0)
     joints = tuple(
@@ -557,6 +543,5 @@ def screws_to_chain(screws: Screws, names: tuple[str, ...]) -> Chain:
 
 
 def _vector(values: FloatArray) -> tuple[float, float, float]:
-    """Return three numbers as a tuple."""
-    x, y, z = (float(one) for one in values)
+    x, y, z = values.tolist()
     return x, y, z

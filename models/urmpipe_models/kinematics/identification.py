@@ -1,7 +1,11 @@
-"""Identification: how small changes of an arm's frames move its tool centre point.
+"""Identification Jacobian: effect of small changes of an arm's frames on its tool centre point.
 
-A change is a twist between two joints: a shift along, or a turn about, an axis of a frame there. Lengths and
-tilts of modules, Denavit-Hartenberg parameters, base and tool are all such twists.
+A change is a twist between two joints, F' = A exp(v) A^-1 F: a translation along, or a rotation about, an
+axis of a frame A there. Lengths and tilts of modules, Denavit-Hartenberg parameters, base and tool are such
+twists.
+
+    sensitivities   the columns (u, 0) of a translation along u, (u x (p - o), u) of a rotation  [Khalil2002]_
+    apply_twists    the arm with twists of some size, and the same twists relative to its new frames
 """
 
 from __future__ import annotations
@@ -15,17 +19,16 @@ from urmpipe_models.elementwise import ZERO, Element, Vector, cross, scale, subt
 from urmpipe_models.kinematics.forward import iter_frames
 from urmpipe_models.math3d import Transform, rotation_about, translation
 
-BASE = 0
-"""The place of the base; joint k (from 1) sits at place k, the tip at n + 1, the tool at n + 2."""
+BASE = 0  # place of the base; joint k (from 1) has place k, the tip n + 1, the tool n + 2
 
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """One way in which a frame of a chain may differ: F' = A exp(v) A^-1 F.
+    """A possible change of a frame of a chain: F' = A exp(v) A^-1 F.
 
     Attributes:
-        place: Which frame F: `BASE`, 1..n of the joints, n + 1 of the tip, n + 2 of the tool.
-        kind: along (a shift in [m]) or about (a turn in [rad]).
+        place: Index of the frame F: `BASE`, 1..n of the joints, n + 1 of the tip, n + 2 of the tool.
+        kind: along (a translation in [m]) or about (a rotation in [rad]).
         axis: Unit vector in the frame A [-].
         frame: A, in the frame that F is given in.
     """
@@ -43,17 +46,17 @@ class Twist:
 
 
 def sensitivities(chain: Chain, q: Sequence[Element], twists: Sequence[Twist]) -> list[tuple[Vector, Vector]]:
-    """Return how each twist moves the tool centre point: the columns of the identification Jacobian.
+    """Return the columns of the identification Jacobian: the motion of the tool centre point by each twist.
 
-    Of a shift along u: (u, 0); of a turn about u through o: (u x (p - o), u), all in the world.
+    For a translation along u: (u, 0); for a rotation about u through o: (u x (p - o), u), all in the world.
 
     Args:
         chain: The arm.
         q: One element per coordinate, in [rad] or [m].
-        twists: Where the arm may differ.
+        twists: The changes.
 
     Returns:
-        One a twist: the velocity in [m] and the turn in [rad] per unit of it.
+        One per twist: the translation in [m] and the rotation in [rad] per unit of it.
 
     Source: [Khalil2002]_ section 11.4.
     """
@@ -65,12 +68,12 @@ def sensitivities(chain: Chain, q: Sequence[Element], twists: Sequence[Twist]) -
 def sensitivity_columns(
     parents: Sequence[Transform], target: Vector, twists: Sequence[Twist]
 ) -> list[tuple[Vector, Vector]]:
-    """Return how each twist moves a point, as `sensitivities` does.
+    """Return the motion of a point by each twist, as `sensitivities` does for the tool centre point.
 
     Args:
-        parents: What the frame of each place is given in, in the world.
+        parents: For each place the frame in which its frame is given, in the world.
         target: The point in the world in [m], any elements.
-        twists: What may differ.
+        twists: The changes.
     """
     columns: list[tuple[Vector, Vector]] = []
     for twist in twists:
@@ -84,14 +87,14 @@ def sensitivity_columns(
 
 
 def apply_twists(chain: Chain, changes: Sequence[tuple[Twist, float]]) -> tuple[Chain, list[Twist]]:
-    """Return a chain some of whose frames differ, and the twists where they then are.
+    """Return a chain with some frames changed, and the twists relative to the new frames.
 
     Args:
         chain: The arm.
         changes: Twists, each with its value in [m] or [rad].
 
     Returns:
-        The changed arm; and the same twists for `sensitivities` of it.
+        The changed arm, and the same twists for its `sensitivities`.
     """
     (base, *origins, tip, tool), located = apply_twists_to_frames(chain.frames, changes)
     if not any(value for _, value in changes):
@@ -103,20 +106,20 @@ def apply_twists(chain: Chain, changes: Sequence[tuple[Twist, float]]) -> tuple[
 def apply_twists_to_frames(
     places: Sequence[Transform], changes: Sequence[tuple[Twist, float]]
 ) -> tuple[list[Transform], list[Twist]]:
-    """Return frames of which some differ, and the twists where they then are.
+    """Return frames after changes, and the twists relative to the new frames.
 
-    Several changes of one frame follow each other, the first is the outermost.
+    Several changes of one frame are multiplied in their order; the first is the outermost.
 
     Args:
         places: The frame of each place, in the one before it.
         changes: Twists, each with its value in [m] or [rad].
     """
-    moved: dict[int, Transform] = {}
+    motions: dict[int, Transform] = {}
     located = []
     for twist, value in changes:
-        before = moved.get(twist.place)
+        before = motions.get(twist.place)
         located.append(twist if before is None else replace(twist, frame=before @ twist.frame))
         if value:
             motion = twist.frame @ twist.motion(value) @ twist.frame.inverse()
-            moved[twist.place] = motion if before is None else before @ motion
-    return [moved[k] @ frame if k in moved else frame for k, frame in enumerate(places)], located
+            motions[twist.place] = motion if before is None else before @ motion
+    return [motions[k] @ frame if k in motions else frame for k, frame in enumerate(places)], located
