@@ -30,7 +30,7 @@ from urllib.parse import unquote
 
 import numpy as np
 
-from urmpipe_models.display import Displayable, format_headline, format_count
+from urmpipe_models.display import Displayable, format_count, format_headline
 from urmpipe_models.drives import JointDrive
 from urmpipe_models.elementwise import ZERO, Element, Vector
 from urmpipe_models.errors import RobotError, escape_html, format_unknown_name
@@ -241,7 +241,9 @@ class Chain(Displayable):
             RobotError: With every name that no parameter has.
         """
         index = {parameter.name: parameter.frame_index for parameter in self.parameters}
-        unknown = [f"robot {self.name}: parameter: {format_unknown_name(n, index)}" for n in values if n not in index]
+        unknown = [
+            f"robot {self.name}: parameter: {format_unknown_name(n, index)}" for n in values if n not in index
+        ]
         if unknown:
             raise RobotError(*unknown)
         frames = list(self.frames)

@@ -18,8 +18,8 @@ from urmpipe_models.arm.chain import Chain
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.kinematics.forward import chain_to_screws, jacobian_over_log
 
-# Sine of the angle between two axes up to which they are parallel. A calibrated arm has axes that are parallel
-# by design and deviate by 1e-4 rad: their common normal, some hundred metres away, is not part of its size.
+# Sine of the angle between two axes up to which they are parallel. Axes of a calibrated arm that are parallel
+# by design deviate by 1e-4 rad: their common normal, some hundred metres away, is not part of its size.
 MAX_PARALLEL_SINE = 0.1
 
 # Smallest singular value [-] below which a pose is nearly singular: a spherical wrist is aligned within some
