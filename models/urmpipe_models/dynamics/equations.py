@@ -1,19 +1,17 @@
-"""Inverse dynamics: the torques that a motion needs, by the recursion of Newton and Euler.
+"""Equations of motion of an arm: torques from motion, motion from torques, mass matrix, terms; over a log.
 
-Joints and bodies of an arm in one frame: the origin of its first link, the axes of the world.
+1. `inverse_dynamics`: torques of a motion, by the recursion of Newton and Euler in the frames of the links
+   ([Iso9283]_ eq. 13, [Luh1980]_).
+2. Spatial quantities about one common origin, that of the first link, in world axes. A joint's rate q' gives
+   all that it carries the velocities v(r) = q' (z x r + v). For the accelerations a(r) = G r + b a body needs
+   a force and a moment that follow from its mass m, moment h and second moments S = sum m r r^T:
 
-A joint's rate q' moves all that it carries by the field v(r) = q' (z x r + v); a body answers to any field
-a(r) = G r + b with forces that its mass, its moment h and its second moments S = sum m r r^T give:
+       sum m a = G h + m b        sum m r x a = sum over k of e_k x (G S + b h^T) e_k
 
-    sum m a = G h + m b        sum m r x a = sum over k of e_k x (G S + b h^T) e_k
-
-The mass matrix of an arm.
-
-Forward dynamics: the motion that torques make.
-
-The torques of a motion, term by term.
-
-Torques, their terms, energies and mass centres over the rows of a log.
+3. `mass_matrix`: M of T = 1/2 q'^T M q', by composite bodies ([Walker1982]_).
+4. `forward_dynamics`: q'' = M^-1 (tau - tau_0), by M = L D L^T (eq. 19). `check_solvable`: D > 0.
+5. `torque_terms`: inertia, centrifugal, Coriolis, gravity and tool terms (eq. 13).
+6. `torques_over_log` and other quantities over the rows of a log, in parallel blocks.
 """
 
 from __future__ import annotations
@@ -26,7 +24,6 @@ import numpy as np
 
 from urmpipe_models.arm.chain import Chain
 from urmpipe_models.dynamics.links import (
-    Link,
     Links,
     Symmetric,
     Wrench,
@@ -58,14 +55,17 @@ from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import apply_joint, joint_values
 from urmpipe_models.math3d import Transform
 
+SOLVABILITY_POSES = 3  # a pivot of M that is 0 in this number of random poses is 0 in all poses
+NEGLIGIBLE_PIVOT = 1e-12  # share of the scale of M (`mass_matrix_scales`); below it a pivot is rounding
+
 
 class LinkPoses(NamedTuple):
-    """The moving parts of an arm in a pose.
+    """The moving links of an arm in a pose.
 
     Attributes:
         chain: The arm.
-        arm: Its moving parts.
-        frames: The moving frame of each link in that of the link before it, the first one's in the base.
+        arm: Its moving links.
+        frames: The moving frame of each link in that of the previous one, the first one's in the base.
     """
 
     chain: Chain
@@ -80,81 +80,70 @@ def inverse_dynamics(
     qdd: Sequence[Element],
     wrench: Wrench | None = None,
 ) -> list[Element]:
-    """Return the torques that the joints must give for a motion.
+    """Return the joint torques that a motion needs.
 
     Outward, in the frame of each link: omega, alpha and a as in `kinematics.motion`, a of the base being -g.
-    Inward: f = m a + alpha x h + omega x (omega x h), n = I alpha + omega x I omega + h x a, with what the
-    next link needs; a joint that turns gives z . n, one that slides z . f. A mimic's counts with its
-    multiplier towards the joint that it follows.
+    Inward: f = m a + alpha x h + omega x (omega x h), n = I alpha + omega x I omega + h x a, plus those of
+    the next link; a revolute joint needs z . n, a prismatic one z . f. The torque of a mimic joint counts,
+    times its multiplier, for the joint that it follows.
 
     Args:
         chain: The arm, with masses.
         q: One element per coordinate, in [rad] or [m].
         qd: Their rates, in [rad/s] or [m/s].
         qdd: Their second derivatives, in [rad/s2] or [m/s2].
-        wrench: What acts on the tool centre point from outside.
+        wrench: External wrench on the tool centre point.
 
     Returns:
-        One element per coordinate, in [N.m] of a joint that turns, in [N] of one that slides.
+        One element per coordinate, in [N.m] of a revolute joint, in [N] of a prismatic one.
 
     Raises:
         RobotError: If the arm has no masses.
 
     Source: [Iso9283]_ eq. 13, by the algorithm of [Luh1980]_.
     """
-    return inverse_dynamics_at(compute_link_poses(chain, q), qd, qdd, wrench)
+    return _inverse_dynamics_at(_link_poses(chain, q), qd, qdd, wrench)
 
 
-def inverse_dynamics_at(
-    posed: LinkPoses, qd: Sequence[Element], qdd: Sequence[Element], wrench: Wrench | None = None
-) -> list[Element]:
-    """Return `inverse_dynamics` of an arm in a pose."""
-    chain, arm, frames = posed
-    forces = _link_forces(posed, qd, qdd)
-    if wrench is not None:
-        forces[-1] = _less_tool(posed, forces[-1], wrench)
-    torques: list[Element] = [0.0] * len(chain.coordinates)
-    force, moment = ZERO, ZERO
-    for link, frame, (own_force, own_moment) in zip(
-        reversed(arm.links), reversed(frames), reversed(forces), strict=True
-    ):
-        force, moment = add(force, own_force), add(moment, own_moment)
-        along = dot(link.joint.axis, moment if link.joint.kind == "revolute" else force)
-        torques[link.coordinate] = plus(torques[link.coordinate], times(link.multiplier, along))
-        if link is not arm.links[0]:  # nothing is wanted of what the base holds
-            force = frame.rotate(force)
-            moment = add(frame.rotate(moment), cross(frame.translation, force))
-    return torques
-
-
-def compute_link_poses(chain: Chain, q: Sequence[Element], arm: Links | None = None) -> LinkPoses:
-    """Return the moving parts of an arm in a pose.
-
-    Args:
-        chain: The arm, with masses.
-        q: One element per coordinate, in [rad] or [m].
-        arm: Its moving parts, where they are known.
-
-    Raises:
-        RobotError: If the arm has no masses.
-    """
+def _link_poses(chain: Chain, q: Sequence[Element], arm: Links | None = None) -> LinkPoses:
     arm = arm or chain_to_links(chain)
     values = dict(zip((joint.name for joint in chain.joints), joint_values(chain, q), strict=True))
     frames = [apply_joint(link.joint.origin, link.joint, values[link.joint.name]) for link in arm.links]
     return LinkPoses(chain, arm, frames)
 
 
-def _link_forces(
-    posed: LinkPoses, qd: Sequence[Element], qdd: Sequence[Element]
+def _inverse_dynamics_at(
+    poses: LinkPoses, qd: Sequence[Element], qdd: Sequence[Element], wrench: Wrench | None
+) -> list[Element]:
+    chain, arm, frames = poses
+    loads = _link_loads(poses, qd, qdd)
+    if wrench is not None:
+        loads[-1] = _subtract_wrench(poses, loads[-1], wrench)
+    torques: list[Element] = [0.0] * len(chain.coordinates)
+    force, moment = ZERO, ZERO
+    for link, frame, (link_force, link_moment) in zip(
+        reversed(arm.links), reversed(frames), reversed(loads), strict=True
+    ):
+        force, moment = add(force, link_force), add(moment, link_moment)
+        along = dot(link.joint.axis, moment if link.joint.kind == "revolute" else force)
+        torques[link.coordinate] = plus(torques[link.coordinate], times(link.multiplier, along))
+        if link is not arm.links[0]:  # the load on the base is not needed
+            force = frame.rotate(force)
+            moment = add(frame.rotate(moment), cross(frame.translation, force))
+    return torques
+
+
+def _link_loads(
+    poses: LinkPoses, qd: Sequence[Element], qdd: Sequence[Element]
 ) -> list[tuple[Vector, Vector]]:
-    """Return the force on each link and its moment about the origin of the link's frame."""
-    chain, arm, frames = posed
+    """Return the force that each link's motion needs, and its moment about the origin of the link's frame."""
+    chain, arm, frames = poses
     omega, alpha = ZERO, ZERO
     a = Transform(chain.base.columns).rotate(scale(-1.0, chain.gravity))
-    found = []
+    loads = []
     for link, frame in zip(arm.links, frames, strict=True):
         back = Transform(frame.columns)
-        a = add(a, _carried(omega, alpha, frame.translation))
+        a = add(a, _rigid_acceleration(omega, alpha, frame.translation))
         omega, alpha, a = back.rotate(omega), back.rotate(alpha), back.rotate(a)
         rate = scale(times(link.multiplier, qd[link.coordinate]), link.joint.axis)
         second = scale(times(link.multiplier, qdd[link.coordinate]), link.joint.axis)
@@ -163,37 +152,32 @@ def _link_forces(
             omega = add(omega, rate)
         else:
             a = add(a, add(second, scale(2.0, cross(omega, rate))))
-        found.append(_needed(link, omega, alpha, a))
-    return found
+        inertia = Transform(link.inertia)
+        force = add(scale(link.mass, a), _rigid_acceleration(omega, alpha, link.moment))
+        spin = add(inertia.rotate(alpha), cross(omega, inertia.rotate(omega)))
+        loads.append((force, add(spin, cross(link.moment, a))))
+    return loads
 
 
-def _carried(omega: Vector, alpha: Vector, d: Vector) -> Vector:
+def _rigid_acceleration(omega: Vector, alpha: Vector, d: Vector) -> Vector:
     """Return alpha x d + omega x (omega x d)."""
     return add(cross(alpha, d), cross(omega, cross(omega, d)))
 
 
-def _needed(link: Link, omega: Vector, alpha: Vector, a: Vector) -> tuple[Vector, Vector]:
-    """Return the force and the moment about its origin that a link's motion needs."""
-    inertia = Transform(link.inertia)
-    force = add(scale(link.mass, a), _carried(omega, alpha, link.moment))
-    spin = add(inertia.rotate(alpha), cross(omega, inertia.rotate(omega)))
-    return force, add(spin, cross(link.moment, a))
-
-
-def _less_tool(posed: LinkPoses, needed: tuple[Vector, Vector], wrench: Wrench) -> tuple[Vector, Vector]:
-    """Return what the last link still needs where a wrench acts on the tool."""
-    chain, arm, frames = posed
+def _subtract_wrench(poses: LinkPoses, load: tuple[Vector, Vector], wrench: Wrench) -> tuple[Vector, Vector]:
+    """Return the load of the last link without the part that an external wrench on the tool provides."""
+    chain, arm, frames = poses
     force, moment = wrench
     for frame in (chain.base, *frames):
         back = Transform(frame.columns)
         force, moment = back.rotate(force), back.rotate(moment)
     moment = add(moment, cross(arm.tool.translation, force))
-    return subtract(needed[0], force), subtract(needed[1], moment)
+    return subtract(load[0], force), subtract(load[1], moment)
 
 
 @dataclass(frozen=True, slots=True)
 class SpatialField:
-    """A field of velocity or acceleration of a rigid body: G r + b.
+    """Velocities or accelerations of a rigid body at all points r: G r + b.
 
     Attributes:
         gradient: The rows of G, in [1/s] or [1/s2].
@@ -215,14 +199,14 @@ class SpatialField:
         return SpatialField((x, y, z), scale(factor, self.offset))
 
     def after(self, other: SpatialField) -> SpatialField:
-        """Return G (G' r + b'): how this motion turns the velocities of another."""
-        turn = Transform(self.gradient)
-        return SpatialField((turn @ Transform(other.gradient)).rotation, turn.rotate(other.offset))
+        """Return G (G' r + b'): the accelerations by which this motion changes the velocities of another."""
+        gradient = Transform(self.gradient)
+        return SpatialField((gradient @ Transform(other.gradient)).rotation, gradient.rotate(other.offset))
 
 
 @dataclass(frozen=True, slots=True)
 class SpatialInertia:
-    """Masses, about the common origin in the axes of the world.
+    """Masses, about the common origin in world axes.
 
     Attributes:
         mass: m in [kg].
@@ -236,16 +220,13 @@ class SpatialInertia:
 
     def __add__(self, other: SpatialInertia) -> SpatialInertia:
         """Return both bodies as one."""
-        return SpatialInertia(
-            plus(self.mass, other.mass),
-            add(self.moment, other.moment),
-            sum_symmetric(self.second, other.second),
-        )
+        mass, moment = plus(self.mass, other.mass), add(self.moment, other.moment)
+        return SpatialInertia(mass, moment, sum_symmetric(self.second, other.second))
 
 
 @dataclass(frozen=True, slots=True)
 class SpatialForce:
-    """A force in [N] and its moment about the common origin in [N.m], along the axes of the world."""
+    """A force in [N] and its moment about the common origin in [N.m], in world axes."""
 
     force: Vector = ZERO
     moment: Vector = ZERO
@@ -257,64 +238,45 @@ class SpatialForce:
 
 @dataclass(frozen=True, slots=True)
 class MovingLink:
-    """A joint and what it carries.
+    """A joint and the body that it carries, about the common origin.
 
     Attributes:
         coordinate: Index of the coordinate that the joint follows.
-        turns: Whether it turns; else it slides.
-        axis: z of a joint that turns, 0 of one that slides, times its multiplier [-].
-        slide: v: what the velocity at the common origin is per unit of the coordinate, in [m] or [-].
-        body: What it carries.
+        is_revolute: Whether the joint is revolute; else it is prismatic.
+        axis: z of a revolute joint times its multiplier, 0 of a prismatic one [-].
+        slide: v, the velocity at the common origin per unit rate of the coordinate, in [m] or [-].
+        body: The carried body.
     """
 
     coordinate: int
-    turns: bool
+    is_revolute: bool
     axis: Vector
     slide: Vector
     body: SpatialInertia
 
     def field(self, rate: Element) -> SpatialField:
-        """Return the velocities of all that the joint carries, of a rate of the coordinate."""
+        """Return the velocities of all that the joint carries, for a rate of the coordinate."""
         x, y, z = scale(rate, self.axis)
         skew = ((0.0, minus(0.0, z), y), (z, 0.0, minus(0.0, x)), (minus(0.0, y), x, 0.0))
         return SpatialField(skew, scale(rate, self.slide))
 
     def torque(self, force: SpatialForce) -> Element:
-        """Return what a force on all that the joint carries is for its coordinate, in [N.m] or [N]."""
+        """Return the torque of the coordinate, in [N.m] or [N], for a force on all that the joint carries."""
         return plus(dot(self.axis, force.moment), dot(self.slide, force.force))
 
 
-def moving_links(posed: LinkPoses) -> tuple[list[MovingLink], Vector]:
-    """Return the moving joints and bodies of an arm from the base outwards, and where its tool is [m]."""
-    chain, arm, (first, *others) = posed
-    found, pose = [], Transform(chain.base.rotation)
-    for link, frame in zip(arm.links, (Transform(first.rotation), *others), strict=True):
+def _moving_links(poses: LinkPoses) -> tuple[list[MovingLink], Vector]:
+    """Return joints and bodies of an arm from the base outwards, and its tool centre point [m]."""
+    chain, arm, (first, *following) = poses
+    links, pose = [], Transform(chain.base.rotation)
+    for link, frame in zip(arm.links, (Transform(first.rotation), *following), strict=True):
         pose = pose @ frame
         along = scale(link.multiplier, pose.rotate(link.joint.axis))
-        turns = link.joint.kind == "revolute"
-        axis, slide = (along, cross(pose.translation, along)) if turns else (ZERO, along)
-        body = _placed(pose, link.mass, link.moment, _second_moments(link.inertia))
-        found.append(MovingLink(link.coordinate, turns, axis, slide, body))
-    return found, pose.point(arm.tool.translation)
-
-
-def inertial_force(body: SpatialInertia, field: SpatialField) -> SpatialForce:
-    """Return the force and moment that give a body accelerations G r + b in [m/s2].
-
-    See the formulas of this module.
-
-    Args:
-        body: The body.
-        field: G in [1/s2] and b in [m/s2].
-    """
-    b, (hx, hy, hz) = field.offset, body.moment
-    turn = Transform(field.gradient)
-    rows = (turn @ Transform(body.second)).rotation
-    (_, xy, xz), (yx, _, yz), (zx, zy, _) = (
-        add(row, (times(b[k], hx), times(b[k], hy), times(b[k], hz))) for k, row in enumerate(rows)
-    )
-    force = add(turn.rotate(body.moment), scale(body.mass, b))
-    return SpatialForce(force, (minus(zy, yz), minus(xz, zx), minus(yx, xy)))
+        is_revolute = link.joint.kind == "revolute"
+        axis, slide = (along, cross(pose.translation, along)) if is_revolute else (ZERO, along)
+        body = _transform_inertia(pose, link.mass, link.moment, _second_moments(link.inertia))
+        links.append(MovingLink(link.coordinate, is_revolute, axis, slide, body))
+    return links, pose.point(arm.tool.translation)
 
 
 def _second_moments(inertia: Symmetric) -> Symmetric:
@@ -325,53 +287,64 @@ def _second_moments(inertia: Symmetric) -> Symmetric:
     return (half[0], xy, xz), (xy, half[1], yz), (xz, yz, half[2])
 
 
-def _placed(pose: Transform, mass: Element, moment: Vector, second: Symmetric) -> SpatialInertia:
+def _transform_inertia(pose: Transform, mass: Element, moment: Vector, second: Symmetric) -> SpatialInertia:
     """Return a body that is given in a frame: S' = R S R^T + R h p^T + p (R h)^T + m p p^T."""
-    p, own = pose.translation, pose.rotate(moment)
-    moment = add(own, scale(mass, p))  # R h + m p
+    p, rotated = pose.translation, pose.rotate(moment)
+    moment = add(rotated, scale(mass, p))  # R h + m p
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = rotate_inertia(pose, second)
 
-    def shifted(value: Element, i: int, k: int) -> Element:
-        """Return an entry of S': (R h)_i p_k + p_i (R h + m p)_k are added."""
-        return plus(value, plus(times(own[i], p[k]), times(p[i], moment[k])))
+    def shift(value: Element, i: int, k: int) -> Element:
+        """Return an entry of S' from one of R S R^T: (R h)_i p_k + p_i (R h + m p)_k is added."""
+        return plus(value, plus(times(rotated[i], p[k]), times(p[i], moment[k])))
 
-    xy, xz, yz = shifted(xy, 0, 1), shifted(xz, 0, 2), shifted(yz, 1, 2)
-    return SpatialInertia(
-        mass, moment, ((shifted(xx, 0, 0), xy, xz), (xy, shifted(yy, 1, 1), yz), (xz, yz, shifted(zz, 2, 2)))
+    xy, xz, yz = shift(xy, 0, 1), shift(xz, 0, 2), shift(yz, 1, 2)
+    rows = (shift(xx, 0, 0), xy, xz), (xy, shift(yy, 1, 1), yz), (xz, yz, shift(zz, 2, 2))
+    return SpatialInertia(mass, moment, rows)
+
+
+def _inertial_force(body: SpatialInertia, field: SpatialField) -> SpatialForce:
+    """Return the force and moment that a body needs for accelerations G r + b (module docstring, 2)."""
+    b, (hx, hy, hz) = field.offset, body.moment
+    gradient = Transform(field.gradient)
+    rows = (gradient @ Transform(body.second)).rotation
+    (_, xy, xz), (yx, _, yz), (zx, zy, _) = (
+        add(row, (times(b[k], hx), times(b[k], hy), times(b[k], hz))) for k, row in enumerate(rows)
     )
+    force = add(gradient.rotate(body.moment), scale(body.mass, b))
+    return SpatialForce(force, (minus(zy, yz), minus(xz, zx), minus(yx, xy)))
 
 
 def mass_matrix(chain: Chain, q: Sequence[Element]) -> list[list[Element]]:
-    """Return M of T = 1/2 q'^T M q': M_ij is what a unit of q_j'' alone needs of joint i.
+    """Return M of T = 1/2 q'^T M q': M_ij is the torque of joint i for q_j'' = 1 alone.
 
-    Of the joints j from the tip inwards: the body beyond j answers to the accelerations of a unit of q_j''
-    (see `screws`), and each joint i up to j takes its part of the force. Joints of one coordinate add up.
+    For each joint j, from the tip inwards: the composite body beyond j needs a force for the accelerations
+    of q_j'' = 1 (module docstring, 2), and each joint i up to j provides its part. Entries of joints with a
+    common coordinate are added.
 
     Args:
         chain: The arm, with masses.
         q: One element per coordinate, in [rad] or [m].
 
     Returns:
-        The rows, one element per coordinate each, in [kg.m2] between joints that turn, [kg] between joints
-        that slide, [kg.m] between both.
+        The rows, one element per coordinate each, in [kg.m2] between revolute joints, [kg] between prismatic
+        joints, [kg.m] between both kinds.
 
     Raises:
         RobotError: If the arm has no masses.
 
     Source: [Iso9283]_ eq. 13, D_1, by the composite bodies of [Walker1982]_.
     """
-    return mass_matrix_at(compute_link_poses(chain, q))
+    return _mass_matrix_at(_link_poses(chain, q))
 
 
-def mass_matrix_at(posed: LinkPoses) -> list[list[Element]]:
-    """Return `mass_matrix` of an arm in a pose."""
-    links, _ = moving_links(posed)
-    count = len(posed.chain.coordinates)
+def _mass_matrix_at(poses: LinkPoses) -> list[list[Element]]:
+    links, _ = _moving_links(poses)
+    count = len(poses.chain.coordinates)
     matrix: list[list[Element]] = [[0.0] * count for _ in range(count)]
     beyond = SpatialInertia()
     for j in reversed(range(len(links))):
         beyond += links[j].body
-        force = inertial_force(beyond, links[j].field(1.0))
+        force = _inertial_force(beyond, links[j].field(1.0))
         for i in range(j + 1):
             entry, row, column = links[i].torque(force), links[i].coordinate, links[j].coordinate
             matrix[row][column] = plus(matrix[row][column], entry)
@@ -381,10 +354,10 @@ def mass_matrix_at(posed: LinkPoses) -> list[list[Element]]:
 
 
 def mass_matrix_scales(chain: Chain, q: Sequence[Element]) -> list[Element]:
-    """Return what the masses that each coordinate moves could make its entry of M, wherever its axes are.
+    """Return upper bounds of the diagonal of M for any positions of the axes: the scale of its rounding.
 
-    |z|^2 times the trace of their second moments about the common origin (see `screws`) of a joint that
-    turns, |v|^2 times their mass of one that slides: what the rounding of M counts from.
+    |z|^2 times the trace of the second moments about the common origin for a revolute joint, |v|^2 times the
+    mass for a prismatic one, of the composite body beyond the joint.
 
     Args:
         chain: The arm, with masses.
@@ -393,23 +366,16 @@ def mass_matrix_scales(chain: Chain, q: Sequence[Element]) -> list[Element]:
     Returns:
         One element per coordinate, in [kg.m2] or [kg].
     """
-    links, _ = moving_links(compute_link_poses(chain, q))
-    sizes: list[Element] = [0.0] * len(chain.coordinates)
+    links, _ = _moving_links(_link_poses(chain, q))
+    scales: list[Element] = [0.0] * len(chain.coordinates)
     beyond = SpatialInertia()
     for link in reversed(links):
         beyond += link.body
         (xx, _, _), (_, yy, _), (_, _, zz) = beyond.second
-        turning = times(dot(link.axis, link.axis), plus(plus(xx, yy), zz))
-        size = turning if link.turns else times(dot(link.slide, link.slide), beyond.mass)
-        sizes[link.coordinate] = plus(sizes[link.coordinate], size)
-    return sizes
-
-
-POSES = 3
-"""A pivot of M that is 0 in so many poses at random is 0 in all."""
-
-NO_MASS = 1e-12
-"""A pivot of M below this share of what the masses beyond could make it is 0 but for rounding."""
+        rotational = times(dot(link.axis, link.axis), plus(plus(xx, yy), zz))
+        size = rotational if link.is_revolute else times(dot(link.slide, link.slide), beyond.mass)
+        scales[link.coordinate] = plus(scales[link.coordinate], size)
+    return scales
 
 
 def forward_dynamics(
@@ -420,15 +386,15 @@ def forward_dynamics(
     wrench: Wrench | None = None,
     arm: Links | None = None,
 ) -> list[Element]:
-    """Return q'' = M^-1 (tau - tau_0), tau_0 being what the motion needs without q''.
+    """Return q'' = M^-1 (tau - tau_0), where tau_0 are the torques of the motion with q'' = 0.
 
     Args:
-        chain: The arm; each joint moves a mass (see `check_motion`).
+        chain: The arm; each joint moves a mass (see `check_solvable`).
         q: One element per coordinate, in [rad] or [m].
         qd: Their rates, in [rad/s] or [m/s].
-        tau: Torques of the joints in [N.m], forces of those that slide in [N].
-        wrench: What acts on the tool centre point from outside.
-        arm: Its moving parts, where they are known.
+        tau: Torques of revolute joints in [N.m], forces of prismatic ones in [N].
+        wrench: External wrench on the tool centre point.
+        arm: Its moving links, if they are known.
 
     Returns:
         One element per coordinate, in [rad/s2] or [m/s2].
@@ -438,10 +404,10 @@ def forward_dynamics(
 
     Source: [Iso9283]_ eq. 19, solved for the accelerations.
     """
-    posed = compute_link_poses(chain, q, arm)
-    needed = inverse_dynamics_at(posed, qd, [0.0] * len(q), wrench)
-    left = [minus(given, other) for given, other in zip(tau, needed, strict=True)]
-    return solve_ldl(mass_matrix_at(posed), left)
+    poses = _link_poses(chain, q, arm)
+    bias = _inverse_dynamics_at(poses, qd, [0.0] * len(q), wrench)
+    remaining = [minus(torque, other) for torque, other in zip(tau, bias, strict=True)]
+    return solve_ldl(_mass_matrix_at(poses), remaining)
 
 
 def solve_ldl(matrix: Sequence[Sequence[Element]], right: Sequence[Element]) -> list[Element]:
@@ -467,14 +433,14 @@ def factor_ldl(matrix: Sequence[Sequence[Element]]) -> tuple[list[list[Element]]
     """Return L below its diagonal of ones, and the pivots D, of a symmetric M = L D L^T."""
     lower: list[list[Element]] = []
     pivots: list[Element] = []
-    for i, given in enumerate(matrix):
+    for i, entries in enumerate(matrix):
         row: list[Element] = []  # of L D, then of L
         for j in range(i):
-            value = given[j]
+            value = entries[j]
             for k in range(j):
                 value = minus(value, times(row[k], lower[j][k]))
             row.append(value)
-        pivot = given[i]
+        pivot = entries[i]
         for j in range(i):
             scaled, row[j] = row[j], row[j] / pivots[j]
             pivot = minus(pivot, times(scaled, row[j]))
@@ -484,55 +450,56 @@ def factor_ldl(matrix: Sequence[Sequence[Element]]) -> tuple[list[list[Element]]
 
 
 def check_solvable(chain: Chain) -> None:
-    """Refuse an arm whose motion cannot be solved: no inertia resists a joint's own motion.
+    """Raise an error for an arm with a joint whose motion no inertia resists.
 
     Raises:
-        RobotError: If the arm has no masses, or with the name of every joint whose pivot of M is 0 in poses
-            at random, or else at the start pose.
+        RobotError: If the arm has no masses, or with the name of every joint whose pivot of M is 0 in random
+            poses, or else at the start pose.
     """
-    poses = np.random.default_rng(0).uniform(-1.0, 1.0, (len(chain.coordinates), POSES))
+    shape = len(chain.coordinates), SOLVABILITY_POSES
+    poses = np.random.default_rng(0).uniform(-1.0, 1.0, shape)
     start = np.array(chain.start, dtype=np.float64)[:, np.newaxis]
-    for where, some in (("", poses), ("at its start pose ", start)):
+    for where, q in (("", poses), ("at its start pose ", start)):
         faults = [
             f"robot {chain.name}: joint {name}: {where}no inertia resists its own motion, so that it cannot"
             " be solved; allowed: an inertial that only this joint moves"
-            for name in _without_inertia(chain, list(some))
+            for name in _joints_without_inertia(chain, list(q))
         ]
         if faults:
             raise RobotError(*faults)
 
 
-def _without_inertia(chain: Chain, q: Sequence[FloatArray]) -> Iterator[str]:
-    """Yield the coordinates whose motion needs nothing, whatever the joints before do; those are left out.
+def _joints_without_inertia(chain: Chain, q: Sequence[FloatArray]) -> Iterator[str]:
+    """Yield the coordinates whose pivot of M is 0 in all given poses; later pivots are those without them.
 
-    A pivot counts as 0 below NO_MASS of what the masses would have about the common origin.
+    A pivot counts as 0 below `NEGLIGIBLE_PIVOT` of its `mass_matrix_scales`.
 
     Args:
         chain: The arm, with masses.
-        q: Some poses in [rad] or [m], an array a coordinate.
+        q: Poses in [rad] or [m], one array of shape (n,) per coordinate.
     """
     count = len(q[0])
     matrix = [[np.broadcast_to(entry, count) for entry in row] for row in mass_matrix(chain, q)]
-    sizes = mass_matrix_scales(chain, q)
+    scales = mass_matrix_scales(chain, q)
     kept: list[int] = []
     for i, name in enumerate(chain.coordinates):
-        own = [*kept, i]
-        *_, pivot = factor_ldl([[matrix[row][column] for column in own] for row in own])[1]
-        if np.max(pivot - NO_MASS * sizes[i]) <= 0.0:
+        indices = [*kept, i]
+        *_, pivot = factor_ldl([[matrix[row][column] for column in indices] for row in indices])[1]
+        if np.max(pivot - NEGLIGIBLE_PIVOT * scales[i]) <= 0.0:
             yield name
         else:
             kept.append(i)
 
 
 class TorqueTerms(NamedTuple):
-    """What makes the torques of the joints, one element per coordinate each, in [N.m] or [N].
+    """Terms of the joint torques, one element per coordinate each, in [N.m] or [N].
 
     Attributes:
-        inertia: Of the accelerations q''.
-        centrifugal: Of the squares of the rates q'.
-        coriolis: Of the products of two rates.
-        gravity: Of the weights.
-        tool: Of what acts on the tool.
+        inertia: From the accelerations q''.
+        centrifugal: From the squares of the rates q'.
+        coriolis: From the products of two rates.
+        gravity: From the weights.
+        tool: From the external wrench on the tool.
     """
 
     inertia: list[Element]
@@ -551,58 +518,56 @@ def torque_terms(
 ) -> TorqueTerms:
     """Return the terms of the equations of motion, whose sum is `inverse_dynamics`.
 
-    Each is a field of accelerations G r + b of what a joint m carries (see `screws`): inertia
+    Each is a field of accelerations G r + b of the body of joint m (module docstring, 2): inertia
     sum_j q_j'' W_j; centrifugal sum_j q_j'^2 W_j W_j; Coriolis 2 sum_(j < k) q_j' q_k' W_j W_k, all over the
-    joints up to m; gravity -g. Two joints of one coordinate count as centrifugal: it is q'^2 that both have.
+    joints up to m; gravity -g. Products of two joints with a common coordinate count as centrifugal: both
+    have its q'^2.
 
     Args:
         chain: The arm, with masses.
         q: One element per coordinate, in [rad] or [m].
         qd: Their rates, in [rad/s] or [m/s].
         qdd: Their second derivatives, in [rad/s2] or [m/s2].
-        wrench: What acts on the tool centre point from outside.
+        wrench: External wrench on the tool centre point.
 
     Raises:
         RobotError: If the arm has no masses.
 
     Source: [Iso9283]_ eq. 13: D_1, D_2, D_(1+k), E and J^T F, the last with the sign of a force from outside.
     """
-    links, place = moving_links(compute_link_poses(chain, q))
+    links, tool_point = _moving_links(_link_poses(chain, q))
     inertia, centrifugal, coriolis = SpatialField(), SpatialField(), SpatialField()
     rates = [SpatialField() for _ in chain.coordinates]
     weight = SpatialField(offset=scale(-1.0, chain.gravity))
     forces: list[tuple[SpatialForce, ...]] = []
     for link in links:
-        own, c = link.field(qd[link.coordinate]), link.coordinate
+        velocity, c = link.field(qd[link.coordinate]), link.coordinate
         inertia += link.field(qdd[c])
-        centrifugal += own.after(own) + rates[c].after(own).scaled(2.0)
+        centrifugal += velocity.after(velocity) + rates[c].after(velocity).scaled(2.0)
         for k, other in enumerate(rates):
             if k != c:
-                coriolis += other.after(own).scaled(2.0)
-        rates[c] += own
+                coriolis += other.after(velocity).scaled(2.0)
+        rates[c] += velocity
         fields = (inertia, centrifugal, coriolis, weight)
-        forces.append(tuple(inertial_force(link.body, field) for field in fields))
+        forces.append(tuple(_inertial_force(link.body, field) for field in fields))
     tool = [SpatialForce()] * len(links)
     if wrench is not None:
-        tool[-1] = _against(wrench, place)
+        moment = add(wrench.moment, cross(tool_point, wrench.force))
+        tool[-1] = SpatialForce(scale(-1.0, wrench.force), scale(-1.0, moment))
     terms = [*zip(*forces, strict=True), tool]
-    return TorqueTerms(*(_torques(links, each, len(chain.coordinates)) for each in terms))
+    return TorqueTerms(*(_forces_to_torques(links, term, len(chain.coordinates)) for term in terms))
 
 
-def _torques(links: Sequence[MovingLink], forces: Sequence[SpatialForce], count: int) -> list[Element]:
-    """Return what each coordinate gives where every link needs a force."""
+def _forces_to_torques(
+    links: Sequence[MovingLink], forces: Sequence[SpatialForce], count: int
+) -> list[Element]:
+    """Return the torque of each coordinate that provides the forces on the links."""
     torques: list[Element] = [0.0] * count
     beyond = SpatialForce()
     for link, force in zip(reversed(links), reversed(forces), strict=True):
         beyond += force
         torques[link.coordinate] = plus(torques[link.coordinate], link.torque(beyond))
     return torques
-
-
-def _against(wrench: Wrench, place: Vector) -> SpatialForce:
-    """Return what the last link needs against what acts on the tool at its place."""
-    moment = add(wrench.moment, cross(place, wrench.force))
-    return SpatialForce(scale(-1.0, wrench.force), scale(-1.0, moment))
 
 
 def torques_over_log(
@@ -615,12 +580,12 @@ def torques_over_log(
         q: Joint values in [rad] or [m], shape (n, joints).
         qd: Their rates in [rad/s] or [m/s], shape (n, joints).
         qdd: Their second derivatives in [rad/s2] or [m/s2], shape (n, joints).
-        threads: Blocks of rows worked on at a time.
+        threads: Maximum number of blocks computed in parallel.
 
     Raises:
         RobotError: If the arm has no masses.
     """
-    return _over(
+    return _evaluate_over_log(
         lambda *columns: inverse_dynamics(chain, *columns), q.shape[1], q, qd, qdd, threads=threads
     ).T
 
@@ -640,8 +605,8 @@ def torque_terms_over_log(
         inertia, centrifugal, coriolis, gravity and tool, in [N.m] or [N], shape (n, joints) each.
     """
     names, joints = TorqueTerms._fields, q.shape[1]
-    flat = _over(
-        lambda *columns: [one for term in torque_terms(chain, *columns) for one in term],
+    flat = _evaluate_over_log(
+        lambda *columns: [torque for term in torque_terms(chain, *columns) for torque in term],
         len(names) * joints, q, qd, qdd,
     )  # fmt: skip
     return {name: flat[k * joints : (k + 1) * joints].T for k, name in enumerate(names)}
@@ -655,35 +620,36 @@ def energies_over_log(chain: Chain, q: FloatArray, qd: FloatArray) -> tuple[Floa
         q: Joint values in [rad] or [m], shape (n, joints).
         qd: Their rates in [rad/s] or [m/s], shape (n, joints).
     """
-    kinetic, potential = _over(
+    kinetic, potential = _evaluate_over_log(
         lambda q, qd: [kinetic_energy(chain, q, qd), potential_energy(chain, q)], 2, q, qd
     )
     return kinetic, potential
 
 
 def centres_of_mass_over_log(chain: Chain, q: FloatArray) -> FloatArray:
-    """Return the mass centres of an arm in the world over a log, in [m], shape (n, inertials, 3).
+    """Return the centres of the masses of an arm in the world over a log, in [m], shape (n, inertials, 3).
 
     Args:
         chain: The arm, with masses.
         q: Joint values in [rad] or [m], shape (n, joints).
     """
     count = len(chain.inertials)
-    flat = _over(lambda q: [one for centre in centres_of_mass(chain, q) for one in centre], 3 * count, q)
+    flat = _evaluate_over_log(
+        lambda q: [x for centre in centres_of_mass(chain, q) for x in centre], 3 * count, q
+    )
     return flat.T.reshape(len(q), count, 3)
 
 
-def _over(
-    work: Callable[..., Sequence[Element]], count: int, *rows: FloatArray, threads: int = THREADS
+def _evaluate_over_log(
+    function: Callable[..., Sequence[Element]], count: int, *arrays: FloatArray, threads: int = THREADS
 ) -> FloatArray:
-    """Return what work makes of the columns of some arrays of shape (n, joints), shape (count, n)."""
-    found = np.empty((count, len(rows[0])))
+    """Return a function of the columns of arrays of shape (n, joints), shape (count, n)."""
+    values = np.empty((count, len(arrays[0])))
 
     def fill(block: slice) -> None:
-        """Fill the rows of a block."""
-        columns = [list(np.ascontiguousarray(one[block].T, dtype=np.float64)) for one in rows]
-        for k, element in enumerate(work(*columns)):
-            found[k, block] = element
+        columns = [list(np.ascontiguousarray(array[block].T, dtype=np.float64)) for array in arrays]
+        for k, element in enumerate(function(*columns)):
+            values[k, block] = element
 
-    map_blocks(fill, row_blocks(len(rows[0])), threads)
-    return found
+    map_blocks(fill, row_blocks(len(arrays[0])), threads)
+    return values

@@ -1,10 +1,10 @@
-"""The moving parts of an arm as bodies: what is fixed to a joint's frame is one body with it.
+"""Links of an arm as rigid bodies, the motion of its masses, their energies, and the wrench on the tool.
 
-Where the masses of an arm are, and how they move.
-
-The energies of an arm.
-
-A force and a moment on the tool of an arm.
+1. `chain_to_links`: all masses fixed to a joint's moving frame are one body. About the origin of that frame
+   m = sum m_k, h = sum m_k c_k, I = sum I_k + m_k (c_k^2 1 - c_k c_k^T).
+2. `centres_of_mass`, `mass_motions`: position and velocity of each mass in the world ([Iso9283]_ eq. 8-12).
+3. `kinetic_energy`, `potential_energy`: T = 1/2 sum (m v_s^2 + omega . I omega), U = -sum m g . r_s.
+4. `wrench_power`: (J^T F) . q' of a force and a moment on the tool centre point.
 """
 
 from __future__ import annotations
@@ -31,12 +31,7 @@ from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import iter_frames, jacobian, joint_rates
 from urmpipe_models.math3d import Transform
 
-Symmetric: TypeAlias = tuple[Vector, Vector, Vector]
-"""The rows of a symmetric matrix."""
-
-
-_Placed: TypeAlias = tuple[Transform, Inertial]
-"""A mass, and the frame that carries it in the moving frame of a joint."""
+Symmetric: TypeAlias = tuple[Vector, Vector, Vector]  # rows of a symmetric matrix
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +39,10 @@ class Link:
     """A moving joint and the body that it carries.
 
     Attributes:
-        joint: The joint, one that moves; its origin counts from the moving frame of the link before it.
+        joint: The joint; its origin is relative to the moving frame of the previous link.
         coordinate: Index of the coordinate that it follows.
-        multiplier: Change of its value per unit of the coordinate: 1, of a mimic its multiplier.
-        mass: m of all that is fixed to its moving frame, in [kg].
+        multiplier: Change of its value per unit of the coordinate: 1, for a mimic joint its multiplier.
+        mass: m of all masses fixed to its moving frame, in [kg].
         moment: h, the sum of mass times centre in that frame, in [kg.m].
         inertia: I about the origin of that frame, in [kg.m2].
     """
@@ -62,7 +57,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Links:
-    """The moving parts of an arm.
+    """The moving links of an arm.
 
     Attributes:
         links: From the base outwards.
@@ -74,14 +69,14 @@ class Links:
 
 
 def check_masses(chain: Chain) -> None:
-    """Refuse an arm without masses.
+    """Raise an error for an arm without masses.
 
     Raises:
-        RobotError: Naming the key that is missing, or with what is wrong with the masses of its URDF.
+        RobotError: With the missing key, or with the faults of the masses in its URDF.
     """
     if chain.mass_faults:
         raise RobotError(*chain.mass_faults)
-    if all(isinstance(one.mass, float) and one.mass == 0.0 for one in chain.inertials):
+    if all(isinstance(inertial.mass, float) and inertial.mass == 0.0 for inertial in chain.inertials):
         raise RobotError(
             f"robot {chain.name}: key inertials: found none, allowed: the masses of the arm"
             " (in a URDF <inertial>)"
@@ -89,7 +84,7 @@ def check_masses(chain: Chain) -> None:
 
 
 def chain_to_links(chain: Chain) -> Links:
-    """Return the moving parts of an arm; masses before the first moving joint stand still and are left out.
+    """Return the moving links of an arm; masses before the first moving joint do not move and are left out.
 
     m = sum m_k, h = sum m_k c_k, I = sum I_k + m_k (c_k^2 1 - c_k c_k^T), with centres and inertias in the
     moving frame of the joint (parallel axis theorem).
@@ -103,43 +98,42 @@ def chain_to_links(chain: Chain) -> Links:
     check_masses(chain)
     index = {name: k for k, name in enumerate(chain.coordinates)}
     carried: dict[str | None, list[Inertial]] = {}
-    for one in chain.inertials:
-        carried.setdefault(one.joint, []).append(one)
-    moving: list[tuple[Joint, list[_Placed]]] = []
-    frame = Transform()  # of what follows in the moving frame before it
+    for inertial in chain.inertials:
+        carried.setdefault(inertial.joint, []).append(inertial)
+    moving: list[tuple[Joint, list[tuple[Transform, Inertial]]]] = []  # each mass with its carrier's frame
+    frame = Transform()  # of the next joint, in the moving frame of the previous moving joint
     for joint in chain.joints:
         frame = frame @ joint.origin
         if joint.kind != "fixed":
             moving.append((replace(joint, origin=frame), []))
             frame = Transform()
-        if moving:  # what stands before the first of them does not move
-            moving[-1][1].extend((frame, one) for one in carried.get(joint.name, ()))
+        if moving:
+            moving[-1][1].extend((frame, inertial) for inertial in carried.get(joint.name, ()))
     links = (
-        Link(joint, index[joint.name], 1.0, *_body(bodies))
+        Link(joint, index[joint.name], 1.0, *_merge_bodies(bodies))
         if joint.mimic is None
-        else Link(joint, index[joint.mimic.joint], joint.mimic.multiplier, *_body(bodies))
+        else Link(joint, index[joint.mimic.joint], joint.mimic.multiplier, *_merge_bodies(bodies))
         for joint, bodies in moving
     )
     return Links(tuple(links), frame @ chain.tip @ chain.tool)
 
 
-def _body(bodies: Sequence[_Placed]) -> tuple[Element, Vector, Symmetric]:
-    """Return mass, moment and inertia about the origin of bodies, each in a frame of its own."""
+def _merge_bodies(bodies: Sequence[tuple[Transform, Inertial]]) -> tuple[Element, Vector, Symmetric]:
+    """Return mass, moment and inertia about the common origin of masses, each given in its frame."""
     mass: Element = 0.0
     moment, inertia = ZERO, (ZERO, ZERO, ZERO)
-    for frame, one in bodies:
-        centre = frame.point(one.centre)
-        mass, moment = plus(mass, one.mass), add(moment, scale(one.mass, centre))
-        inertia = sum_symmetric(
-            inertia, rotate_inertia(frame, one.matrix), point_mass_inertia(one.mass, centre)
-        )
+    for frame, inertial in bodies:
+        centre = frame.point(inertial.centre)
+        mass, moment = plus(mass, inertial.mass), add(moment, scale(inertial.mass, centre))
+        offset = point_mass_inertia(inertial.mass, centre)
+        inertia = sum_symmetric(inertia, rotate_inertia(frame, inertial.matrix), offset)
     return mass, moment, inertia
 
 
 def rotate_inertia(frame: Transform, matrix: Symmetric) -> Symmetric:
-    """Return R A R^T: a symmetric matrix, given in a frame, seen from where the frame stands."""
-    turn = Transform(frame.rotation)
-    rows = Transform((turn @ Transform(matrix) @ Transform(turn.columns)).rotation).rotation
+    """Return R A R^T: a symmetric matrix, given in a frame, in the axes in which the frame is given."""
+    rotation = Transform(frame.rotation)
+    rows = Transform((rotation @ Transform(matrix) @ Transform(rotation.columns)).rotation).rotation
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = rows
     return (xx, xy, xz), (xy, yy, yz), (xz, yz, zz)
 
@@ -156,9 +150,22 @@ def point_mass_inertia(mass: Element, centre: Vector) -> Symmetric:
 def sum_symmetric(*matrices: Symmetric) -> Symmetric:
     """Return the sum of symmetric matrices."""
     total: Symmetric = (ZERO, ZERO, ZERO)
-    for one in matrices:
-        total = add(total[0], one[0]), add(total[1], one[1]), add(total[2], one[2])
+    for matrix in matrices:
+        total = add(total[0], matrix[0]), add(total[1], matrix[1]), add(total[2], matrix[2])
     return total
+
+
+def centres_of_mass(chain: Chain, q: Sequence[Element]) -> list[Vector]:
+    """Return the centres of the masses of an arm in the world [m], in the order of `chain.inertials`.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+
+    Source: [Iso9283]_ eq. 8.
+    """
+    carriers = dict(zip((None, *(joint.name for joint in chain.joints)), iter_frames(chain, q), strict=True))
+    return [carriers[inertial.joint].point(inertial.centre) for inertial in chain.inertials]
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,47 +203,32 @@ def mass_motions(chain: Chain, q: Sequence[Element], qd: Sequence[Element]) -> l
     Source: [Iso9283]_ eq. 8-12.
     """
     check_masses(chain)
-    moving = dict(
-        zip((None, *(joint.name for joint in chain.joints)), _frame_motions(chain, q, qd), strict=True)
-    )
-    found = []
-    for one in chain.inertials:
-        frame, velocity, omega = moving[one.joint]
-        lever = frame.rotate(one.centre)
-        spin = cross(omega, lever)
-        own = Transform(frame.columns).rotate(omega)
-        found.append(MassMotion(one, add(frame.translation, lever), add(velocity, spin), own))
-    return found
-
-
-def centres_of_mass(chain: Chain, q: Sequence[Element]) -> list[Vector]:
-    """Return the centres of the masses of an arm in the world [m], in the order of `chain.inertials`.
-
-    Args:
-        chain: The arm.
-        q: One element per coordinate, in [rad] or [m].
-
-    Source: [Iso9283]_ eq. 8.
-    """
-    placed = dict(zip((None, *(joint.name for joint in chain.joints)), iter_frames(chain, q), strict=True))
-    return [placed[one.joint].point(one.centre) for one in chain.inertials]
+    names = (None, *(joint.name for joint in chain.joints))
+    carriers = dict(zip(names, _frame_motions(chain, q, qd), strict=True))
+    motions = []
+    for inertial in chain.inertials:
+        frame, velocity, omega = carriers[inertial.joint]
+        lever = frame.rotate(inertial.centre)
+        centre, rotated = add(frame.translation, lever), Transform(frame.columns).rotate(omega)
+        motions.append(MassMotion(inertial, centre, add(velocity, cross(omega, lever)), rotated))
+    return motions
 
 
 def _frame_motions(
     chain: Chain, q: Sequence[Element], qd: Sequence[Element]
 ) -> Iterator[tuple[Transform, Vector, Vector]]:
     """Yield pose, velocity of the origin and angular velocity in the world, of the base and every joint."""
-    base, *moved = iter_frames(chain, q)
-    before, velocity, omega = base.translation, ZERO, ZERO
+    base, *joint_frames = iter_frames(chain, q)
+    previous, velocity, omega = base.translation, ZERO, ZERO
     yield base, velocity, omega
-    for frame, joint, rate in zip(moved, chain.joints, joint_rates(chain, qd), strict=True):
-        velocity = add(velocity, cross(omega, subtract(frame.translation, before)))
-        own = scale(rate, frame.rotate(joint.axis))
+    for frame, joint, rate in zip(joint_frames, chain.joints, joint_rates(chain, qd), strict=True):
+        velocity = add(velocity, cross(omega, subtract(frame.translation, previous)))
+        relative = scale(rate, frame.rotate(joint.axis))
         if joint.kind == "prismatic":
-            velocity = add(velocity, own)
+            velocity = add(velocity, relative)
         else:
-            omega = add(omega, own)  # a fixed joint's rate is 0
-        before = frame.translation
+            omega = add(omega, relative)  # the rate of a fixed joint is 0
+        previous = frame.translation
         yield frame, velocity, omega
 
 
@@ -254,10 +246,10 @@ def kinetic_energy(chain: Chain, q: Sequence[Element], qd: Sequence[Element]) ->
     Source: [Iso9283]_ section 3, from eq. 9 and 12.
     """
     energy: Element = 0.0
-    for one in mass_motions(chain, q, qd):
-        spin = Transform(one.inertial.matrix).rotate(one.omega)
-        twice = plus(times(one.inertial.mass, dot(one.velocity, one.velocity)), dot(one.omega, spin))
-        energy = plus(energy, times(0.5, twice))
+    for motion in mass_motions(chain, q, qd):
+        spin = Transform(motion.inertial.matrix).rotate(motion.omega)
+        twice = times(motion.inertial.mass, dot(motion.velocity, motion.velocity))
+        energy = plus(energy, times(0.5, plus(twice, dot(motion.omega, spin))))
     return energy
 
 
@@ -275,15 +267,15 @@ def potential_energy(chain: Chain, q: Sequence[Element]) -> Element:
     """
     check_masses(chain)
     energy: Element = 0.0
-    for one, centre in zip(chain.inertials, centres_of_mass(chain, q), strict=True):
-        energy = minus(energy, times(one.mass, dot(chain.gravity, centre)))
+    for inertial, centre in zip(chain.inertials, centres_of_mass(chain, q), strict=True):
+        energy = minus(energy, times(inertial.mass, dot(chain.gravity, centre)))
     return energy
 
 
 class Wrench(NamedTuple):
-    """What acts on the tool centre point from outside, along the axes of the world.
+    """External force and moment on the tool centre point, in world axes.
 
-    Eq. 13 of [Iso9283]_ counts the opposite: what the tool does to its surroundings.
+    Eq. 13 of [Iso9283]_ has the opposite sign: the wrench that the tool exerts on its surroundings.
 
     Attributes:
         force: In [N].
@@ -295,16 +287,16 @@ class Wrench(NamedTuple):
 
 
 def wrench_power(chain: Chain, q: Sequence[Element], qd: Sequence[Element], wrench: Wrench) -> Element:
-    """Return (J^T F) . q', the power of what acts on the tool, in [W].
+    """Return (J^T F) . q', the power of an external wrench on the tool, in [W].
 
     Args:
         chain: The arm.
         q: One element per coordinate, in [rad] or [m].
         qd: Their rates, in [rad/s] or [m/s].
-        wrench: What acts on the tool centre point from outside.
+        wrench: External wrench on the tool centre point.
     """
     power: Element = 0.0
     for column, rate in zip(jacobian(chain, q), qd, strict=True):
-        for entry, given in zip(column, (*wrench.force, *wrench.moment), strict=True):
-            power = plus(power, times(times(entry, rate), given))
+        for entry, load in zip(column, (*wrench.force, *wrench.moment), strict=True):
+            power = plus(power, times(times(entry, rate), load))
     return power
