@@ -28,11 +28,11 @@ from scipy.spatial.transform import Rotation
 import urmpipe
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.networks.assembly import assemble
-from urmpipe_models.networks.closure import closure_of, descend
-from urmpipe_models.networks.driving import drive_rows, find_driven
+from urmpipe_models.networks.closure import evaluate_closure, solve_closure
+from urmpipe_models.networks.driving import drive_rows, find_driven_variables
 from urmpipe_models.networks.file import load_network
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
-from urmpipe_models.networks.mobility import mobility_of
+from urmpipe_models.networks.mobility import analyse_mobility
 
 CLOSED = 1e-9
 """A gap of less, in lengths (of the script: in [m]) and in [rad], is closed."""
@@ -98,11 +98,11 @@ def alone(mechanism: Mechanism, x: FloatArray, *, slopes: bool) -> float:
 
         def residual(values: FloatArray, at: FloatArray = at) -> FloatArray:
             at[free, 0] = values
-            return np.asarray(closure_of(mechanism, at).residual[:, 0])
+            return np.asarray(evaluate_closure(mechanism, at).residual[:, 0])
 
         def jacobian(values: FloatArray, at: FloatArray = at) -> FloatArray:
             at[free, 0] = values
-            return np.asarray(closure_of(mechanism, at).jacobian[:, free, 0])
+            return np.asarray(evaluate_closure(mechanism, at).jacobian[:, free, 0])
 
         how: Any = jacobian if slopes else "2-point"
         found = least_squares(residual, start[free], jac=how, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14)
@@ -117,10 +117,15 @@ def batches(count: int, solves: int) -> tuple[list[str], list[Bound]]:
     few = x[:, :: max(1, solves // ALONE)][:, :ALONE]
     single = few.shape[1]
     jobs: dict[str, tuple[int, Callable[[], float]]] = {
-        "urmpipe, side by side": (solves, lambda: float(descend(mechanism, x, mechanism.free).gap.max())),
+        "urmpipe, side by side": (
+            solves,
+            lambda: float(solve_closure(mechanism, x, mechanism.free).gap.max()),
+        ),
         "urmpipe, one by one": (
             single,
-            lambda: max(float(descend(mechanism, one[:, None], mechanism.free).gap[0]) for one in few.T),
+            lambda: max(
+                float(solve_closure(mechanism, one[:, None], mechanism.free).gap[0]) for one in few.T
+            ),
         ),
         "SciPy with urmpipe's Jacobian, one by one": (single, lambda: alone(mechanism, few, slopes=True)),
         "SciPy by differences, one by one": (single, lambda: alone(mechanism, few, slopes=False)),
@@ -144,7 +149,7 @@ def batches(count: int, solves: int) -> tuple[list[str], list[Bound]]:
         ratio = statistics.median(a / b for a, b in zip(seconds, base, strict=True))
         each = 1.0 / statistics.median(seconds)
         lines.append(f"| {name} | {milliseconds(seconds)} | {each:.0f} | {gaps[name]:.0e} | {ratio:.1f} |")
-    closed = int((descend(mechanism, x, mechanism.free).gap < CLOSED).sum())
+    closed = int((solve_closure(mechanism, x, mechanism.free).gap < CLOSED).sum())
     return lines, [
         Bound("RCCC: solves a second, side by side", 1.0 / statistics.median(base), least=2000.0),
         Bound(f"RCCC: assembled of {solves}", closed, least=solves),
@@ -154,7 +159,7 @@ def batches(count: int, solves: int) -> tuple[list[str], list[Bound]]:
 def searched(mechanism: Mechanism, seed: int) -> Searched:
     """Return what urmpipe finds of a platform."""
     start = time.perf_counter()
-    found = assemble(mechanism, every=True, seed=seed)
+    found = assemble(mechanism, find_all=True, seed=seed)
     return Searched(len(found.assemblies), found.tried, time.perf_counter() - start)
 
 
@@ -235,7 +240,7 @@ def motions(rows: int, few: int = 2000) -> tuple[list[str], list[Bound]]:
     apart = float(np.abs(motion.x[:, 6:] - pose).max())
     begun = time.perf_counter()
     solved = drive_rows(
-        mechanism, assemble(mechanism).x[:, 0], find_driven(mechanism, motion.joints), lengths
+        mechanism, assemble(mechanism).x[:, 0], find_driven_variables(mechanism, motion.joints), lengths
     )
     alone_s = time.perf_counter() - begun
     base, plate = (np.array([one.points[k] for one in mechanism.network.elements]) for k in (0, 1))
@@ -286,8 +291,8 @@ def counts(count: int) -> list[str]:
     for name in COUNTED:
         mechanism = build_mechanism(load_network(name))
         x = assemble(mechanism).x_nearest
-        moves = mobility_of(mechanism, x)
-        taken = [timed(lambda at=x, one=mechanism: mobility_of(one, at)) for _ in range(count)]  # type: ignore[misc]
+        moves = analyse_mobility(mechanism, x)
+        taken = [timed(lambda at=x, one=mechanism: analyse_mobility(one, at)) for _ in range(count)]  # type: ignore[misc]
         lines.append(
             f"| {name} | {moves.variables} | {moves.rank} | {moves.mobility} | {moves.kutzbach}"
             f" | {len(moves.redundant)} | {', '.join(moves.idle)} | {milliseconds(taken)} |"

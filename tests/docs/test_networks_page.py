@@ -13,14 +13,9 @@ from asserting import there
 from pages import lay_files, snippets, text_of
 from urmpipe.main import run
 from urmpipe_models.errors import NetworkError
-from urmpipe_models.networks.assembly import CLOSED, MANY, RESTARTS, SAME
-from urmpipe_models.networks.mobility import RANK
-from urmpipe_models.networks.parts import (
-    ALLOWED_ARITHMETIC,
-    JOINT_UNITS,
-    MAX_LETTERS,
-    ElementKind,
-)
+from urmpipe_models.networks.assembly import CLOSED_TOLERANCE, DEFAULT_RESTARTS, MAX_ASSEMBLIES, SAME_ASSEMBLY
+from urmpipe_models.networks.mobility import RANK_TOLERANCE
+from urmpipe_models.networks.parts import ALLOWED_ARITHMETIC, JOINT_UNITS, MAX_LETTERS, ElementKind
 from urmpipe_pipeline.networks.finding import ROUNDED
 
 PAGE = text_of("docs/networks.md")
@@ -113,11 +108,11 @@ def test_the_code_of_the_page_runs() -> None:
 
 
 def test_numbers_of_the_page_are_those_of_the_code() -> None:
-    assert f"`--restarts` ({RESTARTS}) in a row" in PAGE
-    assert f"Singular values below {RANK:g}".replace("e-0", "e-") in PAGE
-    assert f"A gap of {CLOSED:g}".replace("e-0", "e-") in PAGE
-    assert f"within {SAME:g}".replace("e-0", "e-") in PAGE
-    assert f"At most {MANY} are listed" in PAGE
+    assert f"`--restarts` ({DEFAULT_RESTARTS}) in a row" in PAGE
+    assert f"Singular values below {RANK_TOLERANCE:g}".replace("e-0", "e-") in PAGE
+    assert f"A gap of {CLOSED_TOLERANCE:g}".replace("e-0", "e-") in PAGE
+    assert f"within {SAME_ASSEMBLY:g}".replace("e-0", "e-") in PAGE
+    assert f"At most {MAX_ASSEMBLIES} are listed" in PAGE
     assert f"{MAX_LETTERS} letters at most" in " ".join(PAGE.split())
     assert ROUNDED == 1e-4
     functions = re.findall(r"[a-z]\w+", ALLOWED_ARITHMETIC.partition("brackets")[2])

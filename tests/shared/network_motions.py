@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IntArray
-from urmpipe_models.networks.assembly import poses_at
-from urmpipe_models.networks.closure import descend
+from urmpipe_models.networks.assembly import body_poses
+from urmpipe_models.networks.closure import solve_closure
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import build_mechanism
 
@@ -41,10 +41,10 @@ def drive(network: Network, values: FloatArray, step_ns: int = 20_000_000) -> Dr
     for value in values.tolist():
         x = x.copy()
         x[mechanism.controls[0]] = value
-        reached = descend(mechanism, x, mechanism.free)
+        reached = solve_closure(mechanism, x, mechanism.free)
         assert reached.gap.max() < 1e-9
         x = reached.x
-        poses.append(poses_at(mechanism, x[:, 0]))
+        poses.append(body_poses(mechanism, x[:, 0]))
         lengths.append([float(one.value) for one in mechanism.lengths(x[:, 0])])
     every = np.array(lengths).reshape(len(values), -1)
     return DrivenNetwork(network, np.array(poses), every, np.arange(len(values)) * step_ns)

@@ -96,14 +96,14 @@ from urmpipe_models.math3d import (
     to_rotation_vectors,
     translation,
 )
-from urmpipe_models.networks.assembly import assemble, poses_at
-from urmpipe_models.networks.closure import closure_of, scaled_closure
-from urmpipe_models.networks.driving import compute_shares, drive_rows, find_driven
+from urmpipe_models.networks.assembly import assemble, body_poses
+from urmpipe_models.networks.closure import evaluate_closure, evaluate_scaled_closure
+from urmpipe_models.networks.driving import compute_shares, drive_rows, find_driven_variables
 from urmpipe_models.networks.file import load_network, network_names
 from urmpipe_models.networks.forces import Wrench as BodyWrench
 from urmpipe_models.networks.forces import compute_forces
 from urmpipe_models.networks.mechanism import build_mechanism
-from urmpipe_models.networks.mobility import mobility_of
+from urmpipe_models.networks.mobility import analyse_mobility
 from urmpipe_models.networks.rates import close_network, compute_rates
 from urmpipe_models.planning.from_rows import path_of
 from urmpipe_models.planning.joints import joints_along, largest_usage, law_of_limits
@@ -340,21 +340,21 @@ for _name in network_names():
     _mechanism = build_mechanism(load_network(_name))
     _made = assemble(_mechanism, restarts=50, seed=2)
     _x = _made.x[:, 0]
-    _closed, _can = closure_of(_mechanism, _made.x[:, :1]), mobility_of(_mechanism, _x)
+    _closed, _can = evaluate_closure(_mechanism, _made.x[:, :1]), analyse_mobility(_mechanism, _x)
     networks[_name] = {
         "x": _made.x,
         "reason": _made.reason,
-        "poses": poses_at(_mechanism, _x),
+        "poses": body_poses(_mechanism, _x),
         "residual": _closed.residual,
         "jacobian": _closed.jacobian,
-        "scaled": scaled_closure(_mechanism, _made.x[:, :1]).jacobian,
+        "scaled": evaluate_scaled_closure(_mechanism, _made.x[:, :1]).jacobian,
         "mobility": [_can.mobility, _can.kutzbach],
         "newton": np.array(close_network(_mechanism, _x.tolist(), 2), dtype=float),
     }
     if _name in _DRIVEN:
         _control, _end = _DRIVEN[_name]
         _others = [one.name for one in load_network(_name).controls if one.name != _control]
-        _by = find_driven(_mechanism, [_control, *_others])
+        _by = find_driven_variables(_mechanism, [_control, *_others])
         _shares = compute_shares("quintic", np.linspace(0, 1, 21))
         _values = np.tile(_x[_by.places], (21, 1))
         _values[:, 0] += _shares[0] * (_end - _values[0, 0])

@@ -15,7 +15,7 @@ from urmpipe.output_files import guarded_outputs, output_kind, write_drawing
 from urmpipe.reading import Reading, map_files, resolved
 from urmpipe_models.errors import Finding, LogError, OptionError, map_collecting_errors
 from urmpipe_models.networks import file as network_file
-from urmpipe_models.networks.assembly import RESTARTS
+from urmpipe_models.networks.assembly import DEFAULT_RESTARTS
 from urmpipe_models.networks.driving import Law
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.forces import Wrench
@@ -60,7 +60,7 @@ def network_check(
     *,
     controls: Mapping[str, float | str] | None = None,
     start: Mapping[str, Any] | None = None,
-    restarts: int = RESTARTS,
+    restarts: int = DEFAULT_RESTARTS,
     seed: int = 0,
     strict: bool = False,
     draw: PathLike | None = None,
@@ -101,7 +101,7 @@ def network_solve(
     controls: Mapping[str, float | str] | None = None,
     start: Mapping[str, Any] | None = None,
     every: bool = False,
-    restarts: int = RESTARTS,
+    restarts: int = DEFAULT_RESTARTS,
     seed: int = 0,
     strict: bool = False,
     draw: PathLike | None = None,
@@ -178,7 +178,7 @@ def network_drive(
     torques: Mapping[str, float | str] | None = None,
     log: PathLike | TableLike | Run | None = None,
     derivative: Method | None = None,
-    restarts: int = RESTARTS,
+    restarts: int = DEFAULT_RESTARTS,
     seed: int = 0,
     strict: bool = False,
     draw: PathLike | None = None,

@@ -17,13 +17,13 @@ from urmpipe_fmus.blocks.coordinates import check_count
 from urmpipe_models.elementwise import Element, Vector
 from urmpipe_models.errors import UnitError, format_unknown_name, format_value
 from urmpipe_models.measure_units import WRITTEN, quantity_to_si
-from urmpipe_models.networks.assembly import CLOSED, assemble, assembled_at, start_with
+from urmpipe_models.networks.assembly import CLOSED_TOLERANCE, assemble, single_assembly, start_configuration
 from urmpipe_models.networks.driving import move_to
 from urmpipe_models.networks.file import Network, load_network
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
-from urmpipe_models.networks.mobility import network_tables, with_start
 from urmpipe_models.networks.parts import POSE_UNITS
-from urmpipe_models.networks.rates import changes, close_network, largest_residual, predict_variables
+from urmpipe_models.networks.rates import close_network, largest_residual, predict_variables, variable_changes
+from urmpipe_models.networks.tables import network_tables, with_start
 from urmpipe_models.toml_tables import is_number, is_number_list
 
 NETWORK_MOTION_OPTIONS: Mapping[str, str] = {
@@ -84,16 +84,16 @@ def network_motion(
     values = {name: loaded.control_value(name, value) for name, value in (controls or {}).items()}
     assembled = assemble(mechanism, {} if start is None else values)
     if start is None and values and assembled.assemblies:  # on the branch of the network's own start
-        x, own = start_with(mechanism, values), mechanism.controls
+        x, own = start_configuration(mechanism, values), mechanism.controls
         limits = np.tile((-np.inf, np.inf), (len(x), 1))
         x, branch = move_to(mechanism, assembled.x_nearest, own, x[own], mechanism.free, limits)
         is_reached = branch is None or branch.complete
-        assembled = assembled_at(mechanism, x, "") if is_reached else assemble(mechanism, values)
+        assembled = single_assembly(mechanism, x, "") if is_reached else assemble(mechanism, values)
     if not assembled.assemblies:
         gap = assembled.gaps[0]
         raise UnitError(
             f"unit network_motion: {loaded.name} does not close: found a gap of {gap.metres:g} m and"
-            f" {gap.radians:g} rad at {gap.name}, allowed: {CLOSED:g}; see urmpipe network check"
+            f" {gap.radians:g} rad at {gap.name}, allowed: {CLOSED_TOLERANCE:g}; see urmpipe network check"
         )
     return _unit(with_start(loaded, assembled.x[:, 0].tolist()), points, newton)
 
@@ -269,7 +269,7 @@ class _Model:
     def update(self, v: Values) -> Mapping[str, Any]:
         """Return the configuration as the last one, and how it has changed."""
         x = self._configuration(v)
-        change = changes(self.mechanism, self._last(v), x)
+        change = variable_changes(self.mechanism, self._last(v), x)
         count = len(self.inputs)
         parts = zip((*LAST, *CHANGES), (x[:count], x[count:], change[:count], change[count:]), strict=True)
         return {name: tuple(part) for name, part in parts}

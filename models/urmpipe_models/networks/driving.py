@@ -20,30 +20,34 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IndexArray
 from urmpipe_models.errors import Finding, NetworkError, format_unknown_name
-from urmpipe_models.networks.closure import idle_spins, spinning_parts, unspun
 from urmpipe_models.networks.mechanism import Mechanism
-from urmpipe_models.networks.mobility import mobility_nearby
+from urmpipe_models.networks.mobility import (
+    find_idle_spins,
+    find_spinning_bodies,
+    nearby_mobility,
+    reset_idle_spins,
+)
 from urmpipe_models.networks.motion import (
     MAX_LENGTH,
     SINGULAR,
+    BranchDerivatives,
     Drive,
     LimitStop,
     SingularPose,
-    Slopes,
     Trace,
-    sample,
-    trace,
+    sample_branch,
+    trace_branch,
 )
-from urmpipe_models.networks.row_motion import follow
+from urmpipe_models.networks.row_motion import follow_rows
 
 Law = Literal["uniform", "trapezoid", "quintic"]
 LAWS: tuple[Law, ...] = get_args(Law)
 
-SAME_PLACE = 1e-9  # scaled distance of drives below which two values are the same
+SAME_TOLERANCE = 1e-9  # scaled distance of drives below which two values are the same
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Driven:
+class DrivenVariables:
     """The prescribed variables of a network.
 
     Attributes:
@@ -58,7 +62,7 @@ class Driven:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class DrivenMotion:
     """Configurations of a network along its drives, on one branch.
 
     Attributes:
@@ -75,10 +79,10 @@ class Motion:
     spins: int
     singular: tuple[SingularPose, ...] = ()
     stop: LimitStop | None = None
-    slopes: tuple[Slopes, ...] = ()
+    slopes: tuple[BranchDerivatives, ...] = ()
 
 
-def find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
+def find_driven_variables(mechanism: Mechanism, names: Sequence[str]) -> DrivenVariables:
     """Return the variables that names stand for: of controls, of joints, or JOINT[k] from 1.
 
     Raises:
@@ -117,7 +121,7 @@ def find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
     faults += [Finding(f"{name} is driven twice, allowed: once", parameter="drives") for name in repeated]
     if faults:
         raise NetworkError(*faults)
-    return Driven(tuple(names), np.array(places, dtype=np.intp), tuple(units))
+    return DrivenVariables(tuple(names), np.array(places, dtype=np.intp), tuple(units))
 
 
 def _indexed(name: str) -> tuple[str, int | None]:
@@ -142,7 +146,7 @@ def _joint_fault(
     return ""
 
 
-def split_variables(mechanism: Mechanism, x: FloatArray, driven: Driven) -> IndexArray:
+def split_variables(mechanism: Mechanism, x: FloatArray, driven: DrivenVariables) -> IndexArray:
     """Return the numbers of the variables that follow, shape (free,) [-].
 
     Args:
@@ -155,11 +159,11 @@ def split_variables(mechanism: Mechanism, x: FloatArray, driven: Driven) -> Inde
     """
     places = set(driven.places.tolist())
     others = [k for k in mechanism.controls.tolist() if k not in places]
-    spins = len(spinning_parts(mechanism, x))
+    spins = len(find_spinning_bodies(mechanism, x))
     every = np.arange(len(mechanism.variables))
     kept: list[int] = others
     if len(places) > len(mechanism.controls) - len(others):  # joints are driven in the place of controls
-        mobility = mobility_nearby(mechanism, x, every) - spins
+        mobility = nearby_mobility(mechanism, x, every) - spins
         needed = mobility - len(places)
         if needed < 0:
             found = f"found {len(places)} drives, {', '.join(driven.names)}"
@@ -171,7 +175,7 @@ def split_variables(mechanism: Mechanism, x: FloatArray, driven: Driven) -> Inde
             raise NetworkError(Finding(message, parameter="drives"))
         kept = others if needed > 0 else []
     free = np.setdiff1d(every, [*places, *kept])
-    remaining = mobility_nearby(mechanism, x, free) - spins if len(free) else 0
+    remaining = nearby_mobility(mechanism, x, free) - spins if len(free) else 0
     if remaining > 0:
         names = ", ".join(dict.fromkeys(mechanism.variables[k].owner for k in free[:12].tolist()))
         message = f"with {', '.join(driven.names)} driven, the network still moves, with mobility {remaining}"
@@ -198,7 +202,7 @@ def variable_limits(mechanism: Mechanism) -> FloatArray:
     return limits
 
 
-def within_turns(mechanism: Mechanism, x: FloatArray, limits: FloatArray) -> FloatArray:
+def shift_into_limits(mechanism: Mechanism, x: FloatArray, limits: FloatArray) -> FloatArray:
     """Return an assembly with angles beyond their limits turned by whole turns, if that helps.
 
     Args:
@@ -247,19 +251,21 @@ def move_to(
         return np.where(np.isin(np.arange(len(x)), places), x + change, x), None
     drive = Drive(mechanism, x, change, free, limits)
     singular = drive.node(drive.coordinates(x, 0.0)).distance < SINGULAR
-    branch = Trace() if singular else trace(drive, 0.0)
+    branch = Trace() if singular else trace_branch(drive, 0.0)
     if not branch.complete:
         return x, branch
-    return unspun(mechanism, idle_spins(mechanism), sample(drive, branch, np.ones(1))[0], x)[:, 0], branch
+    return reset_idle_spins(
+        mechanism, find_idle_spins(mechanism), sample_branch(drive, branch, np.ones(1))[0], x
+    )[:, 0], branch
 
 
 def drive_rows(
     mechanism: Mechanism,
     x: FloatArray,
-    driven: Driven,
+    driven: DrivenVariables,
     values: FloatArray,
     progress: Callable[[float], None] = lambda share: None,
-) -> Motion:
+) -> DrivenMotion:
     """Return the motion of a network whose drives take values row by row.
 
     If all values are on a line, the branch is traced along it once, and rows are sampled from it. Else the
@@ -279,23 +285,23 @@ def drive_rows(
             first row.
     """
     limits, places = variable_limits(mechanism), driven.places
-    x = within_turns(mechanism, x, limits)
+    x = shift_into_limits(mechanism, x, limits)
     # a driven angle begins at the turn that is nearest to the assembly
     turns = np.isin(places, mechanism.angles)
     x[places[turns]] += 2.0 * np.pi * np.round((values[0] - x[places])[turns] / (2.0 * np.pi))
     free = split_variables(mechanism, x, driven)
-    spins = len(spinning_parts(mechanism, x))
+    spins = len(find_spinning_bodies(mechanism, x))
     scaled = values / mechanism.column_scales[places]
     line = _find_line(scaled)
     if line is None:
         x = _approach(mechanism, x, driven, values[0], free, limits)
-        moved = follow(mechanism, x, places, values, free, limits, progress)
-        motion = Motion(moved.x, free, spins, tuple(moved.singular), moved.stop)
+        moved = follow_rows(mechanism, x, places, values, free, limits, progress)
+        motion = DrivenMotion(moved.x, free, spins, tuple(moved.singular), moved.stop)
     elif not len(free) or not line[1].any():
         x = _approach(mechanism, x, driven, values[0], free, limits)
         rows = np.repeat(x[:, np.newaxis], len(values), axis=1)
         rows[places] = values.T
-        motion = Motion(rows, free, spins)
+        motion = DrivenMotion(rows, free, spins)
     else:
         motion = _drive_along(mechanism, x, driven, values, *line, free, limits, progress)
     return _stop_at_driven_limits(mechanism, motion)
@@ -308,7 +314,7 @@ def _find_line(scaled: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray] 
     direction = offsets[int(np.argmax(sizes))]
     square = float(direction @ direction)
     along = offsets @ direction / square if square > 0.0 else np.zeros(len(scaled))
-    if np.linalg.norm(offsets - np.outer(along, direction), axis=1).max() > SAME_PLACE:
+    if np.linalg.norm(offsets - np.outer(along, direction), axis=1).max() > SAME_TOLERANCE:
         return None
     low, high = float(along.min()), float(along.max())
     shares = (along - low) / (high - low) if high > low else along
@@ -318,7 +324,7 @@ def _find_line(scaled: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray] 
 def _drive_along(
     mechanism: Mechanism,
     x: FloatArray,
-    driven: Driven,
+    driven: DrivenVariables,
     values: FloatArray,
     begin: FloatArray,
     scaled: FloatArray,
@@ -326,28 +332,30 @@ def _drive_along(
     free: IndexArray,
     limits: FloatArray,
     progress: Callable[[float], None],
-) -> Motion:
+) -> DrivenMotion:
     """Return a motion whose drives are on a scaled line, at places of it, shape (n,)."""
     places, scales = driven.places, mechanism.column_scales[driven.places]
     _check_length(driven, float(np.linalg.norm(scaled)))
     offset = x[places] / scales - begin
     at = float(offset @ scaled) / float(scaled @ scaled)
-    if np.linalg.norm(offset - at * scaled) > SAME_PLACE:
+    if np.linalg.norm(offset - at * scaled) > SAME_TOLERANCE:
         x, at = _approach(mechanism, x, driven, values[0], free, limits), float(shares[0])
     base, change = np.array(x), np.zeros(len(x))
     base[places], change[places] = begin * scales, scaled * scales
     drive = Drive(mechanism, base, change, free, limits)
     _check_start(drive, x, at, driven)
-    ways = {end: trace(drive, at, end, progress) for end in (1.0, 0.0) if (at < end if end else at > 0.0)}
+    ways = {
+        end: trace_branch(drive, at, end, progress) for end in (1.0, 0.0) if (at < end if end else at > 0.0)
+    }
     back, forward = ways.get(0.0, Trace(complete=True)), ways.get(1.0, Trace(complete=True))
     segments = back.segments + forward.segments
     ends = _check_ends(driven, values[0], float(shares[0]), back, forward, drive.length)
-    outside = (shares < ends[0] - SAME_PLACE) | (shares > ends[1] + SAME_PLACE)
+    outside = (shares < ends[0] - SAME_TOLERANCE) | (shares > ends[1] + SAME_TOLERANCE)
     count = int(np.argmax(outside)) if outside.any() else len(shares)
     branch = Trace(segments, [*back.singular, *forward.singular])
-    motion, slopes = sample(drive, branch, np.clip(shares[:count], *ends))
+    motion, slopes = sample_branch(drive, branch, np.clip(shares[:count], *ends))
     motion[places] = values[:count].T
-    motion = unspun(mechanism, idle_spins(mechanism), motion, x)
+    motion = reset_idle_spins(mechanism, find_idle_spins(mechanism), motion, x)
     row = partial(_find_row, shares[: count + 1])
     rows = [(pose, row(pose.s)) for pose, _ in branch.singular]
     poses = [replace(pose, s=place) for pose, place in rows if place is not None]
@@ -356,11 +364,11 @@ def _drive_along(
     if outside.any():
         stop = forward.stop if shares[count] > ends[1] else back.stop
         stop = None if stop is None else replace(stop, s=row(stop.s) or 0.0)
-    return Motion(motion, free, drive.spins, tuple(poses), stop, tuple(slopes))
+    return DrivenMotion(motion, free, drive.spins, tuple(poses), stop, tuple(slopes))
 
 
 def _check_ends(
-    driven: Driven, begin: FloatArray, share: float, back: Trace, forward: Trace, length: float
+    driven: DrivenVariables, begin: FloatArray, share: float, back: Trace, forward: Trace, length: float
 ) -> tuple[float, float]:
     """Return the places on a line to which its branch reaches.
 
@@ -371,12 +379,12 @@ def _check_ends(
     if not segments:
         _refuse_begin(driven, begin, forward if back.complete else back)
     ends = float(segments[0][0].z[-1]) / length, float(segments[-1][1].z[-1]) / length
-    if share < ends[0] - SAME_PLACE or share > ends[1] + SAME_PLACE:
+    if share < ends[0] - SAME_TOLERANCE or share > ends[1] + SAME_TOLERANCE:
         _refuse_begin(driven, begin, back if share < ends[0] else forward)
     return ends
 
 
-def _check_length(driven: Driven, length: float) -> None:
+def _check_length(driven: DrivenVariables, length: float) -> None:
     if length > MAX_LENGTH:
         distance = f"{', '.join(driven.names)} moves by {length:.6g} rad or lengths of the mechanism"
         message = f"{distance}, allowed: {MAX_LENGTH:g}; split the motion"
@@ -386,8 +394,8 @@ def _check_length(driven: Driven, length: float) -> None:
 def _find_row(shares: FloatArray, s: float) -> float | None:
     """Return the first row, with a fraction, at which places along a line reach s; None if they do not."""
     before, after = shares[:-1] - s, shares[1:] - s
-    rising = (before <= SAME_PLACE) & (after >= -SAME_PLACE)
-    falling = (before >= -SAME_PLACE) & (after <= SAME_PLACE)
+    rising = (before <= SAME_TOLERANCE) & (after >= -SAME_TOLERANCE)
+    falling = (before >= -SAME_TOLERANCE) & (after <= SAME_TOLERANCE)
     reached = np.flatnonzero(rising | falling)
     if not len(reached):
         return None
@@ -396,7 +404,7 @@ def _find_row(shares: FloatArray, s: float) -> float | None:
     return k + (float(np.clip((s - shares[k]) / step, 0.0, 1.0)) if step else 0.0)
 
 
-def _stop_at_driven_limits(mechanism: Mechanism, motion: Motion) -> Motion:
+def _stop_at_driven_limits(mechanism: Mechanism, motion: DrivenMotion) -> DrivenMotion:
     """End a motion before the first row at which a joint that controls drive is beyond its limits.
 
     Raises:
@@ -407,7 +415,9 @@ def _stop_at_driven_limits(mechanism: Mechanism, motion: Motion) -> Motion:
             if drive is None or not motion.x.shape[1]:
                 continue
             values = np.broadcast_to(mechanism.joint_values(joint, motion.x)[k].value, motion.x.shape[1])
-            beyond = np.flatnonzero((values < bounds[0] - SAME_PLACE) | (values > bounds[1] + SAME_PLACE))
+            beyond = np.flatnonzero(
+                (values < bounds[0] - SAME_TOLERANCE) | (values > bounds[1] + SAME_TOLERANCE)
+            )
             if not len(beyond):
                 continue
             row = int(beyond[0])
@@ -429,7 +439,7 @@ def _stop_at_driven_limits(mechanism: Mechanism, motion: Motion) -> Motion:
 def _approach(
     mechanism: Mechanism,
     x: FloatArray,
-    driven: Driven,
+    driven: DrivenVariables,
     begin: FloatArray,
     free: IndexArray,
     limits: FloatArray,
@@ -445,7 +455,7 @@ def _approach(
     return there
 
 
-def _check_start(drive: Drive, x: FloatArray, s: float, driven: Driven) -> None:
+def _check_start(drive: Drive, x: FloatArray, s: float, driven: DrivenVariables) -> None:
     """Raise a `NetworkError` if the branch of an assembly is not defined, or does not move."""
     node = drive.node(drive.coordinates(x, s))
     if abs(node.tangent[-1]) < SINGULAR and node.distance > SINGULAR:
@@ -458,7 +468,7 @@ def _check_start(drive: Drive, x: FloatArray, s: float, driven: Driven) -> None:
         raise NetworkError(Finding(f"{message}; allowed: {allowed}", parameter="drives"))
 
 
-def _refuse_begin(driven: Driven, begin: FloatArray, branch: Trace) -> None:
+def _refuse_begin(driven: DrivenVariables, begin: FloatArray, branch: Trace) -> None:
     """Raise a `NetworkError`: the begin of the drives is not reached from the assembly, as a trace tells."""
     why = "no step of the continuation succeeds"
     ends = [pose for pose, _ in branch.singular if pose.passage == "turns back"]
@@ -472,7 +482,7 @@ def _refuse_begin(driven: Driven, begin: FloatArray, branch: Trace) -> None:
     raise NetworkError(Finding(f"{message}; allowed: {allowed}", parameter="drives"))
 
 
-def _values_words(driven: Driven, values: FloatArray) -> str:
+def _values_words(driven: DrivenVariables, values: FloatArray) -> str:
     """Return the drives with values, as controls are given, in [rad] and [m] of joints."""
     return ", ".join(
         f"{name} = {value:.9g}" for name, value in zip(driven.names, values.tolist(), strict=True)

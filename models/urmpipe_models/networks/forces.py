@@ -19,9 +19,9 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IndexArray, Vector, cross, dot, subtract
 from urmpipe_models.math3d import Transform
-from urmpipe_models.networks.closure import body_twists, closure_of, wrench_carriers
+from urmpipe_models.networks.closure import body_twists, evaluate_closure, iter_twist_maps
 from urmpipe_models.networks.mechanism import Mechanism, Placements
-from urmpipe_models.networks.motion import Slopes, iter_chunks
+from urmpipe_models.networks.motion import BranchDerivatives, iter_chunks
 from urmpipe_models.networks.parts import Joint
 
 UNDETERMINED = 1e-7  # share of a unit multiplier that a component takes from redundant constraints
@@ -69,7 +69,7 @@ def compute_forces(
     free: IndexArray,
     wrenches: Sequence[Wrench] = (),
     torques: Mapping[str, float] | None = None,
-    slopes: Sequence[Slopes] = (),
+    slopes: Sequence[BranchDerivatives] = (),
 ) -> Forces:
     """Return the forces that hold a network under loads.
 
@@ -127,7 +127,7 @@ class _Equilibrium:
                 for place, slope in value.gradient.items():
                     forces[place] += torques[joint.name] * slope
         self.forces = forces
-        jacobian = closure_of(mechanism, x).jacobian * mechanism.row_scales[:, np.newaxis, np.newaxis]
+        jacobian = evaluate_closure(mechanism, x).jacobian * mechanism.row_scales[:, np.newaxis, np.newaxis]
         followers = jacobian[:, free] * mechanism.column_scales[free, np.newaxis]
         left, values, right = np.linalg.svd(followers.transpose(2, 0, 1))
         count = values.shape[1]
@@ -161,7 +161,7 @@ class _Equilibrium:
         on_bodies = {name: np.array(loads.get(name, np.zeros((6, n)))) for name in network.body_names}
         ground_wrenches: dict[str, FloatArray] = {}
         reactions: dict[str, FloatArray] = {}
-        for tie, rows, carrier in wrench_carriers(self.mechanism, self.x):
+        for tie, rows, carrier in iter_twist_maps(self.mechanism, self.x):
             wrench = np.einsum("rkn,rn->kn", carrier, multipliers[rows])
             on_bodies[tie.bodies[1]] += wrench
             on_bodies[tie.bodies[0]] -= wrench

@@ -27,9 +27,10 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, IndexArray
 from urmpipe_models.ik.numeric import damped_step
-from urmpipe_models.networks.closure import FLOOR, scaled_closure, spinning_parts
+from urmpipe_models.networks.closure import MIN_DAMPING, evaluate_scaled_closure
 from urmpipe_models.networks.joint_motion import wrap_rotation_vector
 from urmpipe_models.networks.mechanism import Mechanism
+from urmpipe_models.networks.mobility import find_spinning_bodies
 
 Passage = Literal["turns back", "branches", "goes through"]
 
@@ -45,7 +46,7 @@ SINGULAR = 1e-6  # smallest singular value of the scaled Jacobian that counts as
 STENCIL = 4e-3  # arc length between the configurations around a singular pose that interpolate it
 OVERRUN = 0.02  # arc length of the drive that is traced beyond an end near a singular pose
 MAX_LENGTH = 2000.0  # scaled length of a drive: 300 turns of a crank, which take some minutes
-CHUNK = 4096  # configurations solved side by side: their Jacobians fit the cache
+CHUNK_SIZE = 4096  # configurations solved side by side: their Jacobians fit the cache
 
 Segment: TypeAlias = "tuple[Node, Node]"
 
@@ -148,7 +149,7 @@ class Drive:
     @cached_property
     def spins(self) -> int:
         """The number of idle spins, which no drive prescribes."""
-        return len(spinning_parts(self.mechanism, self.x))
+        return len(find_spinning_bodies(self.mechanism, self.x))
 
     def at(self, z: FloatArray) -> FloatArray:
         """Return the variables in [m], [rad], shape (variables, n), of z [-], shape (free + 1, n)."""
@@ -162,7 +163,7 @@ class Drive:
 
     def closure(self, z: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return F and dF/dz [-], shapes (rows,) and (rows, free + 1), of z of shape (free + 1,)."""
-        closure = scaled_closure(self.mechanism, self.at(z[:, np.newaxis]))
+        closure = evaluate_scaled_closure(self.mechanism, self.at(z[:, np.newaxis]))
         jacobian = closure.jacobian[:, :, 0]
         along = jacobian @ (self.change / self.mechanism.column_scales) / self.length
         return closure.residual[:, 0], np.column_stack((jacobian[:, self.free], along))
@@ -241,7 +242,7 @@ def _turn(before: Node, after: Node) -> float:
 # ---------------------------------------------------------------------------------------- continuation
 
 
-def trace(
+def trace_branch(
     drive: Drive, s: float, end: float = 1.0, progress: Callable[[float], None] = lambda share: None
 ) -> Trace:
     """Trace the branch of `drive.x`, which closes at s, to another s.
@@ -533,7 +534,7 @@ def _share_of(here: Node, there: Node, coordinate: int, value: float) -> float:
 # ---------------------------------------------------------------------------------------- samples
 
 
-class Slopes(NamedTuple):
+class BranchDerivatives(NamedTuple):
     """Derivatives along a drive where Jacobians do not give them, next to points where branches meet.
 
     Attributes:
@@ -547,7 +548,7 @@ class Slopes(NamedTuple):
     second: FloatArray
 
 
-def sample(drive: Drive, branch: Trace, s: FloatArray) -> tuple[FloatArray, list[Slopes]]:
+def sample_branch(drive: Drive, branch: Trace, s: FloatArray) -> tuple[FloatArray, list[BranchDerivatives]]:
     """Return the configurations of a trace at places s, shape (variables, n), and slopes at branch points.
 
     Args:
@@ -570,14 +571,14 @@ def sample(drive: Drive, branch: Trace, s: FloatArray) -> tuple[FloatArray, list
         curve = _Cubic(*(part[:, local] for part in (*stacks, *slopes)))
         z = curve.at(curve.shares(at[rows]))
         z[-1] = at[rows]
-        x[:, rows] = settle(drive.mechanism, drive.at(z), drive.free)[0]
+        x[:, rows] = close_by_newton(drive.mechanism, drive.at(z), drive.free)[0]
     interpolated = [_interpolate(drive, pose, node, at, x) for pose, node in branch.singular]
     return x, [slopes for slopes in interpolated if slopes is not None]
 
 
 def _interpolate(
     drive: Drive, pose: SingularPose, node: Node, at: FloatArray, x: FloatArray
-) -> Slopes | None:
+) -> BranchDerivatives | None:
     """Replace configurations next to a singular pose, where Newton's method loses half of the digits.
 
     The branch is smooth in its arc length through the pose, where it turns back, too: a polynomial passes
@@ -606,7 +607,7 @@ def _interpolate(
         place = np.clip(place + step, -1.0, last)
     z = np.array([term(place) for term in terms])
     z[-1] = at[near]
-    residual = scaled_closure(drive.mechanism, drive.at(z)).residual
+    residual = evaluate_scaled_closure(drive.mechanism, drive.at(z)).residual
     if not len(near) or np.abs(residual).max(initial=0.0) > 1e2 * ROUNDING:
         return None
     x[:, near] = drive.at(z)
@@ -618,10 +619,10 @@ def _interpolate(
     slopes = [np.repeat(drive.change[:, np.newaxis], len(near), axis=1), np.zeros((len(drive.x), len(near)))]
     scales = drive.scales[:, np.newaxis]
     slopes[0][drive.free], slopes[1][drive.free] = rates[:-1] * scales, curvatures[:-1] * scales
-    return Slopes(near, slopes[0], slopes[1])
+    return BranchDerivatives(near, slopes[0], slopes[1])
 
 
-def settle(
+def close_by_newton(
     mechanism: Mechanism, x: FloatArray, free: IndexArray, *, wrap: bool = False
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return configurations that close next to others, by Newton's method with some variables free.
@@ -638,8 +639,8 @@ def settle(
     x, scales = np.array(x), mechanism.column_scales[free, np.newaxis]
     first = last = np.zeros(x.shape[1])
     for count in range(10):
-        closure = scaled_closure(mechanism, x)
-        step = damped_step(closure.jacobian[:, free], -closure.residual, FLOOR)
+        closure = evaluate_scaled_closure(mechanism, x)
+        step = damped_step(closure.jacobian[:, free], -closure.residual, MIN_DAMPING)
         x[free] += step * scales
         for part in mechanism.rotations if wrap else ():
             x[part] = wrap_rotation_vector(tuple(x[part]))
@@ -667,5 +668,5 @@ def nearest_rotations(mechanism: Mechanism, x: FloatArray, to: FloatArray) -> Fl
 
 def iter_chunks(count: int) -> Iterator[slice]:
     """Yield slices of at most CHUNK configurations, in their order."""
-    for start in range(0, count, CHUNK):
-        yield slice(start, min(start + CHUNK, count))
+    for start in range(0, count, CHUNK_SIZE):
+        yield slice(start, min(start + CHUNK_SIZE, count))

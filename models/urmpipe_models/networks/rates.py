@@ -63,12 +63,10 @@ from urmpipe_models.ik.numeric import damped_step
 from urmpipe_models.ik.task import product
 from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.closure import (
-    FLOOR,
-    SLIDING_SCREWS,
-    idle_spins,
+    MIN_DAMPING,
+    TRANSLATION_SCREWS,
+    evaluate_scaled_closure,
     relative_movers,
-    scaled_closure,
-    spin_angles,
 )
 from urmpipe_models.networks.joint_motion import (
     Twists,
@@ -79,7 +77,8 @@ from urmpipe_models.networks.joint_motion import (
     wrap_rotation_vector,
 )
 from urmpipe_models.networks.mechanism import Mechanism, Placements, ValueWithGradient, evaluate_expression
-from urmpipe_models.networks.motion import Slopes, iter_chunks
+from urmpipe_models.networks.mobility import find_idle_spins, spin_angles
+from urmpipe_models.networks.motion import BranchDerivatives, iter_chunks
 
 
 class Taylor(NDArrayOperatorsMixin):
@@ -294,7 +293,7 @@ def predict_variables(
     return predicted
 
 
-def changes(mechanism: Mechanism, before: Sequence[Element], x: Sequence[Element]) -> list[Element]:
+def variable_changes(mechanism: Mechanism, before: Sequence[Element], x: Sequence[Element]) -> list[Element]:
     """Return how variables have changed: of a rotation vector as if it had not been wrapped on the way.
 
     Args:
@@ -341,7 +340,7 @@ def closure_jacobian(mechanism: Mechanism, x: Sequence[Element]) -> list[Column]
     return _jacobian(mechanism, x, mechanism.placements(x), mechanism.control_values(x))
 
 
-def damped_normal_step(columns: Sequence[Column], residual: Column, damping: float = FLOOR) -> Column:
+def damped_normal_step(columns: Sequence[Column], residual: Column, damping: float = MIN_DAMPING) -> Column:
     """Return dx of (J^T J + mu I) dx = -J^T e.
 
     As J^T J is positive semidefinite, no pivot is less than mu; rounding may not make it
@@ -379,7 +378,7 @@ def _residual(
 ) -> Column:
     per_length = 1.0 / mechanism.length
     rows: Column = []
-    for first, second in cut_frames(mechanism, x, posed, controls):
+    for first, second in iter_cut_frames(mechanism, x, posed, controls):
         rows += scale(per_length, subtract(second.translation, first.translation))
         # of small turns d the sum over the axes c of c x (c + d x c) is 2 d
         pairs = zip(first.columns, second.columns, strict=True)
@@ -403,7 +402,7 @@ def _jacobian(
     first_free = len(mechanism.controls)
     columns: list[Column] = [[0.0] * mechanism.rows for _ in mechanism.free]
     cut_joints = [mechanism.network.joints[cut] for cut in mechanism.graph.cuts]
-    frames = cut_frames(mechanism, x, posed, controls)
+    frames = iter_cut_frames(mechanism, x, posed, controls)
     for row, (joint, (here, _)) in enumerate(zip(cut_joints, frames, strict=True)):
         for mover, sign in relative_movers(posed.bodies, joint.bodies, joint.name).items():
             for k, w, v in screws[mover]:
@@ -426,7 +425,7 @@ def _jacobian(
     return columns
 
 
-def cut_frames(
+def iter_cut_frames(
     mechanism: Mechanism, x: Sequence[Element], posed: Placements, controls: dict[str, ValueWithGradient]
 ) -> Iterator[tuple[Transform, Transform]]:
     """Yield the frame of each cut joint in the ground, once from each of its two bodies."""
@@ -456,7 +455,7 @@ def _free_screws(
         first = mechanism.variable_index[name, 0]
         p = posed.bodies[name].frame.translation
         axes = left_jacobian((x[first + 3], x[first + 4], x[first + 5]))
-        screws = [*SLIDING_SCREWS, *((axis, cross(p, axis)) for axis in axes)]
+        screws = [*TRANSLATION_SCREWS, *((axis, cross(p, axis)) for axis in axes)]
         twists[name] = [(first + index, *screw) for index, screw in enumerate(screws)]
     return twists
 
@@ -501,7 +500,7 @@ def compute_rates(
     driven: IndexArray,
     free: IndexArray,
     spins: int,
-    slopes: Sequence[Slopes] = (),
+    slopes: Sequence[BranchDerivatives] = (),
 ) -> Rates:
     """Return the rates of the variables that follow.
 
@@ -522,7 +521,7 @@ def compute_rates(
     transmission[driven, np.arange(len(driven))] = 1.0
     distance = np.full(x.shape[1], np.inf)
     for rows in iter_chunks(x.shape[1]) if len(free) else ():
-        jacobian = scaled_closure(mechanism, x[:, rows]).jacobian
+        jacobian = evaluate_scaled_closure(mechanism, x[:, rows]).jacobian
         followers = jacobian[:, free]
         scales = mechanism.column_scales[:, np.newaxis]
         for k, place in enumerate(driven.tolist()):
@@ -582,7 +581,7 @@ def point_motion(
 def _in_joint_frames(mechanism: Mechanism, x: FloatArray, rows: FloatArray) -> FloatArray:
     """Return rows of `closure_residual`, along the axes of the ground, along those of `scaled_closure`."""
     turned = np.array(rows)
-    frames = cut_frames(mechanism, list(x), mechanism.placements(x), mechanism.control_values(x))
+    frames = iter_cut_frames(mechanism, list(x), mechanism.placements(x), mechanism.control_values(x))
     for k, (here, _) in enumerate(frames):
         for first in (6 * k, 6 * k + 3):
             for axis, column in enumerate(here.columns):
@@ -592,9 +591,9 @@ def _in_joint_frames(mechanism: Mechanism, x: FloatArray, rows: FloatArray) -> F
 
 def _solve(jacobian: FloatArray, load: FloatArray) -> FloatArray:
     """Return the least squares solution, refined twice: normal equations alone lose twice the digits."""
-    solution = damped_step(jacobian, load, FLOOR)
+    solution = damped_step(jacobian, load, MIN_DAMPING)
     for _ in range(2):
-        solution = solution + damped_step(jacobian, load - product(jacobian, solution), FLOOR)
+        solution = solution + damped_step(jacobian, load - product(jacobian, solution), MIN_DAMPING)
     return solution
 
 
@@ -608,7 +607,7 @@ def _hold_spins(
     xdd: FloatArray | None,
 ) -> None:
     """Add to velocities, or to accelerations, what keeps the angles of idle spins, along their directions."""
-    spins = idle_spins(mechanism)
+    spins = find_idle_spins(mechanism)
     if not (count and spins):
         return
     n = x.shape[1]

@@ -17,26 +17,27 @@ import numpy as np
 
 from urmpipe_models.elementwise import BoolArray, FloatArray, IndexArray
 from urmpipe_models.ik.numeric import damped_step
-from urmpipe_models.networks.closure import FLOOR, idle_spins, scaled_closure, unspun
+from urmpipe_models.networks.closure import MIN_DAMPING, evaluate_scaled_closure
 from urmpipe_models.networks.mechanism import Mechanism
+from urmpipe_models.networks.mobility import find_idle_spins, reset_idle_spins
 from urmpipe_models.networks.motion import (
     ROUNDING,
     Drive,
     LimitStop,
     SingularPose,
+    close_by_newton,
     iter_chunks,
     nearest_rotations,
-    sample,
-    settle,
-    trace,
+    sample_branch,
+    trace_branch,
 )
 
 MAX_LINE = 3.0  # scaled length of the lines from a row along which others are solved, in steps of 2 COARSE
-COARSE = 0.05  # scaled length of the drives between rows that are solved first
+COARSE_LENGTH = 0.05  # scaled length of the drives between rows that are solved first
 MAX_DISAGREEMENT = (
     0.1  # share of a difference by which the tangents may miss it; usual is the square of COARSE
 )
-SAME = 1e-7  # scaled difference below which two solutions are the same
+SAME_SOLUTION = 1e-7  # scaled difference below which two solutions are the same
 
 
 @dataclass(eq=False)
@@ -54,7 +55,7 @@ class RowMotion:
     stop: LimitStop | None = None
 
 
-def follow(
+def follow_rows(
     mechanism: Mechanism,
     x: FloatArray,
     driven: IndexArray,
@@ -89,13 +90,13 @@ class _Follower:
         limits: FloatArray,
     ) -> None:
         self.mechanism, self.driven, self.rows, self.free, self.limits = mechanism, driven, rows, free, limits
-        self.start, self.spins = x, idle_spins(mechanism)
+        self.start, self.spins = x, find_idle_spins(mechanism)
         self.motion = RowMotion(np.repeat(x[:, np.newaxis], len(rows), axis=1))
         self.motion.x[driven] = rows.T
         self.scaled = rows / mechanism.column_scales[driven]
         steps = np.linalg.norm(np.diff(self.scaled, axis=0), axis=1)
         self.length = np.append(0.0, np.cumsum(steps))
-        marks = np.searchsorted(self.length, np.arange(0.0, self.length[-1], COARSE))
+        marks = np.searchsorted(self.length, np.arange(0.0, self.length[-1], COARSE_LENGTH))
         self.coarse = np.unique(np.append(marks, len(rows) - 1))
 
     def run(self, progress: Callable[[float], None]) -> RowMotion:
@@ -135,15 +136,15 @@ class _Follower:
         begin = start[self.driven, np.newaxis]
         scales = self.mechanism.column_scales[self.driven, np.newaxis]
         distance = np.linalg.norm((values - begin) / scales, axis=0).max()
-        steps = max(1, int(np.ceil(distance / (2.0 * COARSE))))
+        steps = max(1, int(np.ceil(distance / (2.0 * COARSE_LENGTH))))
         x = np.repeat(start[:, np.newaxis], len(ends), axis=1)
         for chunk in iter_chunks(len(ends)):
             local = x[:, chunk]
             for step in range(1, steps + 1):
                 local[self.driven] = begin + step / steps * (values[:, chunk] - begin)
-                local = settle(self.mechanism, local, self.free, wrap=True)[0]
+                local = close_by_newton(self.mechanism, local, self.free, wrap=True)[0]
             x[:, chunk] = local
-        return unspun(self.mechanism, self.spins, x, self.start)
+        return reset_idle_spins(self.mechanism, self.spins, x, self.start)
 
     def _verify(self, coarse: IndexArray) -> int:
         """Verify coarse rows, correct those of other branches, and return the last row reached."""
@@ -161,7 +162,9 @@ class _Follower:
                 if last < second:
                     return last
             x[:, second] = end
-            synchronous = bool(np.abs(self._difference(line[:, np.newaxis], end[:, np.newaxis])).max() < SAME)
+            synchronous = bool(
+                np.abs(self._difference(line[:, np.newaxis], end[:, np.newaxis])).max() < SAME_SOLUTION
+            )
         return int(coarse[-1])
 
     def _step(self, x: FloatArray, row: int) -> FloatArray | None:
@@ -170,8 +173,11 @@ class _Follower:
         end[self.driven] = self.rows[row][:, np.newaxis]
         change = end - x[:, np.newaxis]
         end[self.free] += self._tangents(x[:, np.newaxis], change)[self.free]
-        end = unspun(
-            self.mechanism, self.spins, settle(self.mechanism, end, self.free, wrap=True)[0], self.start
+        end = reset_idle_spins(
+            self.mechanism,
+            self.spins,
+            close_by_newton(self.mechanism, end, self.free, wrap=True)[0],
+            self.start,
         )
         return end[:, 0] if self._is_continuous(x[:, np.newaxis], end)[0] else None
 
@@ -183,7 +189,7 @@ class _Follower:
             change[self.driven] = self.rows[row + 1] - self.rows[row]
             if np.any(change):
                 drive = Drive(self.mechanism, x, change, self.free, self.limits)
-                branch = trace(drive, 0.0)
+                branch = trace_branch(drive, 0.0)
                 for pose, _ in branch.singular:
                     if pose.s <= 1.0:
                         self.motion.singular.append(replace(pose, s=row + pose.s))
@@ -191,8 +197,8 @@ class _Follower:
                     if branch.stop is not None:
                         self.motion.stop = replace(branch.stop, s=row + branch.stop.s)
                     return row, x
-                x = sample(drive, branch, np.ones(1))[0][:, 0]
-            x = unspun(self.mechanism, self.spins, x[:, np.newaxis], self.start)[:, 0]
+                x = sample_branch(drive, branch, np.ones(1))[0][:, 0]
+            x = reset_idle_spins(self.mechanism, self.spins, x[:, np.newaxis], self.start)[:, 0]
             self.motion.x[:, row + 1] = x
         return second, x
 
@@ -218,8 +224,8 @@ class _Follower:
         near = nearest_rotations(self.mechanism, predicted[1], predicted[0])
         x[self.free] = ((1.0 - weight) * predicted[0] + weight * near)[self.free]
         with np.errstate(all="ignore"):  # rows out of reach between coarse rows that are within
-            solved = settle(self.mechanism, x, self.free, wrap=True)[0]
-            solved = unspun(self.mechanism, self.spins, solved, self.start)
+            solved = close_by_newton(self.mechanism, x, self.free, wrap=True)[0]
+            solved = reset_idle_spins(self.mechanism, self.spins, solved, self.start)
             good = self._is_continuous(known[:, first], solved)
         known[:, rows] = solved
         for begin, stop in sorted({*zip(first[~good].tolist(), second[~good].tolist(), strict=True)}):
@@ -244,9 +250,9 @@ class _Follower:
             scales = self.mechanism.column_scales[:, np.newaxis]
             miss = np.linalg.norm(((difference - mean) / scales)[self.free], axis=0)
             size = np.linalg.norm((difference / scales)[self.free], axis=0)
-            closures = [scaled_closure(self.mechanism, x) for x in (local, other)]
+            closures = [evaluate_scaled_closure(self.mechanism, x) for x in (local, other)]
             closed = np.abs(closures[1].residual).max(axis=0, initial=0.0) < 1e3 * ROUNDING
-            is_good = closed & (miss < MAX_DISAGREEMENT * size + SAME)
+            is_good = closed & (miss < MAX_DISAGREEMENT * size + SAME_SOLUTION)
             if not self.spins:
                 jacobians = [closure.jacobian[:, self.free] for closure in closures]
                 products = np.einsum("kin,kjn->nij", *jacobians)
@@ -262,10 +268,10 @@ class _Follower:
     def _tangents(self, x: FloatArray, change: FloatArray) -> FloatArray:
         """Return how all variables change with the driven ones, to first order, shape (variables, n)."""
         scales = self.mechanism.column_scales[:, np.newaxis]
-        jacobian = scaled_closure(self.mechanism, x).jacobian
+        jacobian = evaluate_scaled_closure(self.mechanism, x).jacobian
         load = np.einsum("kdn,dn->kn", jacobian[:, self.driven], (change / scales)[self.driven])
         moved = np.array(change)
-        moved[self.free] = damped_step(jacobian[:, self.free], -load, FLOOR) * scales[self.free]
+        moved[self.free] = damped_step(jacobian[:, self.free], -load, MIN_DAMPING) * scales[self.free]
         return moved
 
     def _stop_at_limit(self) -> None:

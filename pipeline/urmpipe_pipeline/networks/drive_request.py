@@ -26,15 +26,15 @@ from urmpipe_models.errors import (
     format_value,
     map_collecting_errors,
 )
-from urmpipe_models.networks.assembly import MOST_STARTS, RESTARTS, assemble
+from urmpipe_models.networks.assembly import DEFAULT_RESTARTS, MAX_STARTS, assemble
 from urmpipe_models.networks.driving import (
     LAWS,
-    Driven,
+    DrivenMotion,
+    DrivenVariables,
     Law,
-    Motion,
     compute_shares,
     drive_rows,
-    find_driven,
+    find_driven_variables,
     variable_limits,
 )
 from urmpipe_models.networks.file import Network
@@ -105,7 +105,7 @@ class DriveRequest:
     point: str | tuple[str, Sequence[float]] | None = None
     wrenches: Sequence[str | Wrench] = ()
     torques: Mapping[str, float | str] = field(default_factory=dict)
-    restarts: int = RESTARTS
+    restarts: int = DEFAULT_RESTARTS
     seed: int = 0
 
     def check(self) -> None:
@@ -131,9 +131,9 @@ class DriveRequest:
             yield Finding(format_unknown_name(str(self.law), LAWS), parameter="law")
         elif self.law != "uniform" and self.duration is None:
             yield Finding("found without a duration, allowed: with one", parameter="law")
-        if isinstance(self.restarts, Integral) and self.restarts > MOST_STARTS:
+        if isinstance(self.restarts, Integral) and self.restarts > MAX_STARTS:
             yield Finding(
-                parameter="restarts", found=format_value(self.restarts), allowed=f"{MOST_STARTS} at most"
+                parameter="restarts", found=format_value(self.restarts), allowed=f"{MAX_STARTS} at most"
             )
         if self.branch is not None and self.start:
             yield Finding("found together with start, allowed: one of the two", parameter="branch")
@@ -254,7 +254,7 @@ def _options(
     }  # fmt: skip
 
 
-def _find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
+def _find_driven(mechanism: Mechanism, names: Sequence[str]) -> DrivenVariables:
     """Return the prescribed variables; raise an `OptionError` if there are none."""
     if not names:
         network = mechanism.network
@@ -263,7 +263,7 @@ def _find_driven(mechanism: Mechanism, names: Sequence[str]) -> Driven:
         listed = ", ".join(controls or free) or "a network with a control or a joint that can be driven"
         message = f"found nothing that drives {network.name}, allowed: {listed}"
         raise OptionError(Finding(message, parameter="drives"))
-    return find_driven(mechanism, names)
+    return find_driven_variables(mechanism, names)
 
 
 def _plain(value: Any) -> Any:
@@ -305,7 +305,7 @@ def _log_columns(network: Network, request: DriveRequest, log: Run) -> dict[str,
 
 
 def _drive_values(
-    driven: Driven,
+    driven: DrivenVariables,
     ranges: Sequence[tuple[float, float]] | None,
     factors: FloatArray,
     columns: Mapping[str, str],
@@ -360,7 +360,9 @@ def _drive_values(
     )
 
 
-def _check_control_ranges(mechanism: Mechanism, driven: Driven, values: FloatArray, log: Run | None) -> None:
+def _check_control_ranges(
+    mechanism: Mechanism, driven: DrivenVariables, values: FloatArray, log: Run | None
+) -> None:
     """Raise a `NetworkError` for drives beyond the range of a control, or the limits of a driven joint."""
     limits = variable_limits(mechanism)[driven.places]
     faults = []
@@ -384,7 +386,7 @@ def _check_control_ranges(mechanism: Mechanism, driven: Driven, values: FloatArr
 
 def _find_assembly(
     mechanism: Mechanism,
-    driven: Driven,
+    driven: DrivenVariables,
     begin: FloatArray,
     start: Mapping[str, tuple[float, ...]],
     request: DriveRequest,
@@ -398,8 +400,8 @@ def _find_assembly(
         if chosen and name in local
     }
     solution = assemble(
-        mechanism, controls, start=start or None, every=request.branch is not None, restarts=request.restarts,
-        seed=request.seed,
+        mechanism, controls, start=start or None, find_all=request.branch is not None,
+        restarts=request.restarts, seed=request.seed,
     )  # fmt: skip
     if not solution.assemblies:
         gap = solution.gaps[0] if solution.gaps else None
@@ -414,7 +416,7 @@ def _find_assembly(
 
 
 def _events(
-    mechanism: Mechanism, moved: Motion, driven: Driven, factors: FloatArray, t_ns: Any
+    mechanism: Mechanism, moved: DrivenMotion, driven: DrivenVariables, factors: FloatArray, t_ns: Any
 ) -> Iterator[MotionEvent]:
     """Yield singular poses, then the limit that ends the motion."""
 
@@ -445,7 +447,7 @@ def _events(
         yield event("limit", stop, {}, words)
 
 
-def _at_words(driven: Driven, values: Mapping[str, float]) -> str:
+def _at_words(driven: DrivenVariables, values: Mapping[str, float]) -> str:
     values = {name: round(value, 12) + 0.0 for name, value in values.items()}
     words = [
         f"{name} = {values[name]:.9g}{f' {unit}' if unit else ''}"
@@ -456,7 +458,12 @@ def _at_words(driven: Driven, values: Mapping[str, float]) -> str:
 
 
 def _transmissions(
-    mechanism: Mechanism, moved: Motion, driven: Driven, factors: FloatArray, values: FloatArray, rates: Rates
+    mechanism: Mechanism,
+    moved: DrivenMotion,
+    driven: DrivenVariables,
+    factors: FloatArray,
+    values: FloatArray,
+    rates: Rates,
 ) -> Iterator[Transmission]:
     """Yield the ratio of each joint variable that follows, and of joints that are functions of the drives."""
     labels = mechanism.labels
@@ -504,8 +511,8 @@ def _find_zeros(x: FloatArray, y: FloatArray) -> tuple[float, ...]:
 
 def _forces(
     mechanism: Mechanism,
-    moved: Motion,
-    driven: Driven,
+    moved: DrivenMotion,
+    driven: DrivenVariables,
     factors: FloatArray,
     wrenches: Sequence[Wrench],
     torques: Mapping[str, float],

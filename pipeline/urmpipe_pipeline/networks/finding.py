@@ -12,17 +12,18 @@ import numpy as np
 from urmpipe_models.display import format_count
 from urmpipe_models.errors import Finding, Hint, OptionError, format_value, map_collecting_errors
 from urmpipe_models.networks.assembly import (
-    MOST_STARTS,
-    RESTARTS,
-    Assembled,
+    DEFAULT_RESTARTS,
+    MAX_STARTS,
+    Assembly,
+    AssemblyResult,
     assemble,
-    assembled_at,
-    start_with,
+    single_assembly,
+    start_configuration,
 )
 from urmpipe_models.networks.driving import move_to
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
-from urmpipe_models.networks.mobility import Assembly, Mobility, mobility_of, stuck_controls
+from urmpipe_models.networks.mobility import Mobility, analyse_mobility, find_blocked_controls
 from urmpipe_models.networks.motion import Trace
 from urmpipe_models.networks.parts import exceeded_limits
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
@@ -52,7 +53,7 @@ class Search:
     controls: Mapping[str, float | str]
     start: Mapping[str, Any] = field(default_factory=dict)
     every: bool = False
-    restarts: int = RESTARTS
+    restarts: int = DEFAULT_RESTARTS
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -72,8 +73,8 @@ class Search:
         for key, count in (("restarts", self.restarts), ("seed", self.seed)):
             if not isinstance(count, Integral) or count < 0:
                 yield Finding(parameter=key, found=format_value(count), allowed="a whole number, 0 or more")
-            elif key == "restarts" and count > MOST_STARTS:
-                yield Finding(parameter=key, found=format_value(count), allowed=f"{MOST_STARTS} at most")
+            elif key == "restarts" and count > MAX_STARTS:
+                yield Finding(parameter=key, found=format_value(count), allowed=f"{MAX_STARTS} at most")
 
 
 def find_network(
@@ -103,7 +104,7 @@ def find_network(
     values, start = map_collecting_errors(lambda make: make(), parts)
     controls = dict(zip(search.controls, values, strict=True))
     found, unreached = _assemble(mechanism, controls, start, search, progress)
-    mobility = mobility_of(mechanism, found.x_nearest) if found.assemblies else None
+    mobility = analyse_mobility(mechanism, found.x_nearest) if found.assemblies else None
     graph = mechanism.graph
     options = {
         "network": network.name, "controls": controls, "start": start or None, "every": search.every,
@@ -134,7 +135,7 @@ def find_network(
 
 
 def _warnings(
-    mechanism: Mechanism, found: Assembled, mobility: Mobility | None, *, every: bool
+    mechanism: Mechanism, found: AssemblyResult, mobility: Mobility | None, *, every: bool
 ) -> Iterator[LogWarning]:
     """Yield what a person should know of an assembly."""
     if found.elsewhere:
@@ -157,7 +158,7 @@ def _warnings(
             " configurations nearby"
         )
         yield LogWarning("special-configuration", said)
-    for name in stuck_controls(mechanism, found.x_nearest):
+    for name in find_blocked_controls(mechanism, found.x_nearest):
         said = f"control {name} cannot move: there are too many controls, or it is at a dead point"
         yield LogWarning("stuck-control", said)
 
@@ -178,7 +179,7 @@ def _assemble(
     start: Mapping[str, tuple[float, ...]],
     search: Search,
     progress: Callable[[float], None] | None,
-) -> tuple[Assembled, list[LogWarning]]:
+) -> tuple[AssemblyResult, list[LogWarning]]:
     """Return assemblies, and a warning if the first is of another branch than the start of the network.
 
     Controls that are away from their start are moved there by continuation, from the assembly at the start.
@@ -190,9 +191,11 @@ def _assemble(
         for control in mechanism.network.controls
         if control.name in controls and controls[control.name] != control.start
     }
-    x = start_with(mechanism, controls)
+    x = start_configuration(mechanism, controls)
     if not (moved and mechanism.rows) or search.every or start:
-        found = assemble(mechanism, controls, start=start, every=search.every, progress=progress, **settings)
+        found = assemble(
+            mechanism, controls, start=start, find_all=search.every, progress=progress, **settings
+        )
         return found, []
     first = assemble(mechanism, progress=progress, **settings)
     branch: Trace | None = Trace()
@@ -201,7 +204,7 @@ def _assemble(
         own = mechanism.controls
         x, branch = move_to(mechanism, first.x_nearest, own, x[own], mechanism.free, unlimited)
     if branch is None or branch.complete:
-        return assembled_at(mechanism, x, "a motion from the start leads there"), []
+        return single_assembly(mechanism, x, "a motion from the start leads there"), []
     found = assemble(mechanism, controls, progress=progress, **settings)
     if not found.assemblies or found.continuum:
         return found, []

@@ -8,8 +8,8 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import escape_html
+from urmpipe_models.networks.assembly import Assembly
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.mobility import Assembly
 from urmpipe_pipeline.networks.parts_in_space import body_points, find_plane, parts, placed
 from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.networks.sketch import mechanism_pieces

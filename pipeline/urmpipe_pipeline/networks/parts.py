@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from urmpipe_models.networks.assembly import Assembly, Gap
 from urmpipe_models.networks.file import Network
-from urmpipe_models.networks.mobility import Assembly, Gap, Mobility
+from urmpipe_models.networks.mobility import Mobility
 from urmpipe_models.networks.parts import POSE_UNITS
 from urmpipe_pipeline.networks.result import NetworkResult
 from urmpipe_pipeline.presentation.parts import recording_fact, table_of

@@ -9,9 +9,9 @@ import numpy as np
 
 from urmpipe_models.elementwise import FloatArray, Vector
 from urmpipe_models.math3d import Transform
+from urmpipe_models.networks.assembly import Assembly
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import build_mechanism
-from urmpipe_models.networks.mobility import Assembly
 from urmpipe_models.networks.parts import ConstraintElement, Joint
 from urmpipe_pipeline.networks.drives import is_driven
 from urmpipe_pipeline.networks.shapes import (

@@ -12,9 +12,10 @@ from urmpipe_models.display import format_count, format_headline
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import Voice
 from urmpipe_models.math3d import to_quaternions
+from urmpipe_models.networks.assembly import Assembly, Gap
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Structure, build_mechanism
-from urmpipe_models.networks.mobility import Assembly, Gap, Mobility
+from urmpipe_models.networks.mobility import Mobility
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
@@ -179,7 +180,7 @@ class NetworkResult(Result):
 
 
 def _poses(matrices: FloatArray) -> list[dict[str, list[float]]]:
-    """Return positions in [m] and quaternions x, y, z, w with w >= 0 of poses, shape (bodies, 4, 4)."""
+    """Return positions in [m] and to_quaternions x, y, z, w with w >= 0 of poses, shape (bodies, 4, 4)."""
     quats = to_quaternions(matrices[:, :3, :3].reshape(-1, 9), "matrix")
     quats = np.where(quats[:, 3:] < 0.0, -quats, quats) + 0.0  # no -0
     positions = matrices[:, :3, 3] + 0.0

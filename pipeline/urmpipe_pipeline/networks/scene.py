@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.networks.mobility import Assembly
+from urmpipe_models.networks.assembly import Assembly
 from urmpipe_pipeline.networks.drives import Tie, drive_words, ties
 from urmpipe_pipeline.networks.parts_in_space import (
     CONTROL_COLOUR,

@@ -17,7 +17,7 @@ from urmpipe_fmus.native import native_unavailable_reason
 from urmpipe_fmus.run import run
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import UnitError, UrmpipeError
-from urmpipe_models.networks.closure import descend
+from urmpipe_models.networks.closure import solve_closure
 from urmpipe_models.networks.file import load_network
 from urmpipe_models.networks.joint_motion import exp3
 from urmpipe_models.networks.mechanism import build_mechanism
@@ -119,7 +119,7 @@ def converged(
         scalars.append(f"{one.owner.replace('.', '_')}{suffix}")
         factors.append(float((parts.control_unit(one.owner) or ("", 1))[1]) if one.kind == "control" else 1.0)
     x = np.array([{**found, **inputs}[name] / factor for name, factor in zip(scalars, factors, strict=True)])
-    exact = descend(mechanism, x, mechanism.free)
+    exact = solve_closure(mechanism, x, mechanism.free)
     assert exact.gap.max() < 1e-13  # rounding
     return {scalars[k]: exact.x[k] for k in mechanism.free}
 

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import Transform
-from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.closure import evaluate_closure
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Mechanism
 from urmpipe_models.networks.parts import (
@@ -290,7 +290,7 @@ def body_jacobian(mechanism: Mechanism, x: FloatArray, body: str) -> FloatArray:
 
 def twist_space(mechanism: Mechanism, x: FloatArray, body: str) -> FloatArray:
     """Return a basis of the twists that a body can have in the closed network, shape (6, k)."""
-    ways = null_space(closure_of(mechanism, x[:, np.newaxis]).jacobian[:, :, 0])
+    ways = null_space(evaluate_closure(mechanism, x[:, np.newaxis]).jacobian[:, :, 0])
     return column_space(body_jacobian(mechanism, x, body) @ ways)
 
 

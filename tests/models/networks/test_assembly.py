@@ -40,11 +40,11 @@ from urmpipe_models.ik.solutions import forward_targets
 from urmpipe_models.ik.solve import solve
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.math3d import Transform
-from urmpipe_models.networks.assembly import Assembled, assemble
-from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.assembly import AssemblyResult, assemble
+from urmpipe_models.networks.closure import evaluate_closure
 from urmpipe_models.networks.file import Network, load_network
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
-from urmpipe_models.networks.mobility import mobility_of
+from urmpipe_models.networks.mobility import analyse_mobility
 from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, frame_from_axes
 
 CLOSED = 1e-9
@@ -56,22 +56,22 @@ ANGLE = 1e-8
 
 def every(
     network: Network, controls: dict[str, float] | None = None, seed: int = 0, restarts: int = 500
-) -> Assembled:
+) -> AssemblyResult:
     """Return every assembly; all close, are apart, and have angles within -pi and pi."""
     mechanism = build_mechanism(network)
-    found = assemble(mechanism, controls or {}, every=True, restarts=restarts, seed=seed)
+    found = assemble(mechanism, controls or {}, find_all=True, restarts=restarts, seed=seed)
     assert found.continuum == 0
     assert len(found.assemblies) == found.x.shape[1]
     for one in found.assemblies:
         assert one.residual < CLOSED
-    assert np.abs(closure_of(mechanism, found.x).residual).max(initial=0.0) < CLOSED
+    assert np.abs(evaluate_closure(mechanism, found.x).residual).max(initial=0.0) < CLOSED
     assert np.abs(found.x[mechanism.angles]).max(initial=0.0) <= math.pi + 1e-12
     for some in mechanism.rotations:
         assert np.linalg.norm(found.x[some], axis=0).max(initial=0.0) <= math.pi + 1e-12
     return found
 
 
-def values(found: Assembled, joint: str) -> list[float]:
+def values(found: AssemblyResult, joint: str) -> list[float]:
     """Return the first variable of a joint in each assembly, sorted."""
     return sorted(one.values[joint][0] for one in found.assemblies)
 
@@ -545,7 +545,7 @@ def test_a_length_that_is_no_number_at_a_control_is_refused() -> None:
 @pytest.mark.slow
 def test_forty_assemblies_of_the_stewart_gough_platform_for_another_seed() -> None:
     """Dietmaier's geometry has 40, which is the most that there can be; test_shipped.py has seed 0."""
-    found = assemble(build_mechanism(load_network("stewart-gough")), every=True, seed=1)
+    found = assemble(build_mechanism(load_network("stewart-gough")), find_all=True, seed=1)
     assert len(found.assemblies) == 40
     assert max(one.residual for one in found.assemblies) < 1e-9
 
@@ -568,10 +568,10 @@ def sliding_rods(drive: str) -> Network:
 def test_pieces_of_a_rod_spin_apart() -> None:
     """Of a driven length: both branches, whatever the two spins are; the same as of a rod of one piece."""
     mechanism = build_mechanism(sliding_rods("0 * s"))
-    found = assemble(mechanism, {"s": 0.3}, every=True, restarts=60)
-    whole = assemble(build_mechanism(rssr("s")), {"s": 0.3}, every=True, restarts=60)
+    found = assemble(mechanism, {"s": 0.3}, find_all=True, restarts=60)
+    whole = assemble(build_mechanism(rssr("s")), {"s": 0.3}, find_all=True, restarts=60)
     assert (len(found.assemblies), found.continuum) == (2, 0)
-    moves = mobility_of(mechanism, found.x[:, 0])
+    moves = analyse_mobility(mechanism, found.x[:, 0])
     rods = next(one.bodies for one in mechanism.network.joints if one.name == "C")
     assert sorted(moves.idle) == sorted(rods)
     assert (moves.mobility, moves.kind) == (3, "mechanism")
@@ -594,7 +594,7 @@ def networks_that_move() -> Iterator[tuple[Network, int]]:
 
 @pytest.mark.parametrize(("network", "ways"), networks_that_move())
 def test_what_moves_with_its_controls_held_is_a_continuum(network: Network, ways: int) -> None:
-    found = assemble(build_mechanism(network), every=True)
+    found = assemble(build_mechanism(network), find_all=True)
     assert found.continuum == ways
     assert len(found.assemblies) == 1
     assert str(ways) in found.reason
@@ -609,7 +609,7 @@ def test_what_moves_with_its_controls_held_is_a_continuum(network: Network, ways
     ],
 )
 def test_a_shaky_structure_is_no_continuum(network: Network, modes: int) -> None:
-    found = assemble(build_mechanism(network), every=True, restarts=200)
+    found = assemble(build_mechanism(network), find_all=True, restarts=200)
     assert found.continuum == 0
     assert len(found.assemblies) == modes
 
@@ -645,7 +645,7 @@ def test_loops_whose_joints_are_all_driven_close_or_not() -> None:
     network = four_bar()
     joints = tuple(driven(one, "s") for one in network.joints)
     mechanism = build_mechanism(replace(network, joints=joints, controls=(Control("s"),)))
-    assert len(assemble(mechanism, every=True, restarts=20).assemblies) == 1
+    assert len(assemble(mechanism, find_all=True, restarts=20).assemblies) == 1
     assert assemble(mechanism, {"s": 0.3}, restarts=20).assemblies == ()
 
 
@@ -663,14 +663,14 @@ def test_a_user_joint_alone_is_where_its_control_puts_it() -> None:
 
 
 def test_zero_restarts_leave_what_the_start_came_to() -> None:
-    found = assemble(build_mechanism(four_bar(drive="s")), {"s": 0.3}, every=True, restarts=0)
+    found = assemble(build_mechanism(four_bar(drive="s")), {"s": 0.3}, find_all=True, restarts=0)
     assert len(found.assemblies) == 1
     assert found.tried == 1
 
 
 def test_progress_ends_at_one() -> None:
     shares: list[float] = []
-    assemble(build_mechanism(four_bar(drive="s")), every=True, progress=shares.append)
+    assemble(build_mechanism(four_bar(drive="s")), find_all=True, progress=shares.append)
     assert shares[-1] == 1.0
     assert all(0.0 <= one <= 1.0 for one in shares)
 

@@ -26,11 +26,11 @@ from random_networks import (
     vec,
 )
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.closure import evaluate_closure
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.joint_motion import measure_element
 from urmpipe_models.networks.mechanism import build_mechanism
-from urmpipe_models.networks.mobility import mobility_of
+from urmpipe_models.networks.mobility import analyse_mobility
 from urmpipe_models.networks.parts import Body, ConstraintElement, Control, ElementKind, Expression, Joint
 
 CLOSES = 1e-12
@@ -169,12 +169,12 @@ def test_an_element_equals_its_joints_on_a_hundred_networks(kind: ElementKind, o
         of_element, of_joints = build_mechanism(first), build_mechanism(second)
         x, y = of_element.start, of_joints.start
         for mechanism, at in ((of_element, x), (of_joints, y)):
-            assert np.abs(closure_of(mechanism, at[:, np.newaxis]).residual).max(initial=0.0) < CLOSES
+            assert np.abs(evaluate_closure(mechanism, at[:, np.newaxis]).residual).max(initial=0.0) < CLOSES
         held: FloatArray = np.array(of_joints.poses(y.tolist())["platform"].rotation)
         np.testing.assert_allclose(
             held, np.array(of_element.poses(x.tolist())["platform"].rotation), rtol=0.0, atol=CLOSES
         )
-        one, other = mobility_of(of_element, x), mobility_of(of_joints, y)
+        one, other = analyse_mobility(of_element, x), analyse_mobility(of_joints, y)
         assert one.mobility == 5 - others
         assert other.idle == built.idle
         assert other.mobility - len(other.idle) == one.mobility
@@ -214,8 +214,8 @@ def test_lines_that_meet_have_a_twist_space_of_five_as_well() -> None:
     network = meeting_lines(0.0)
     mechanism = build_mechanism(network)
     x = mechanism.start
-    assert np.abs(closure_of(mechanism, x[:, np.newaxis]).residual).max() == 0.0
-    found = mobility_of(mechanism, x)
+    assert np.abs(evaluate_closure(mechanism, x[:, np.newaxis]).residual).max() == 0.0
+    found = analyse_mobility(mechanism, x)
     assert (found.mobility, found.special) == (5, False)
     rng = np.random.default_rng(0)
     pose = matrix(mechanism.poses(x.tolist())["b"])
@@ -237,7 +237,7 @@ def test_the_driven_length_of_an_element_is_followed() -> None:
     )
     mechanism = build_mechanism(Network("rod", (Body("b"),), (slide,), (rod,), (Control("s", 0.25),)))
     x = np.array([0.25, 0.4])  # 0.5^2 = 0.4^2 + 0.3^2
-    closure = closure_of(mechanism, x[:, np.newaxis])
+    closure = evaluate_closure(mechanism, x[:, np.newaxis])
     assert abs(closure.residual[0, 0]) < 1e-15
     np.testing.assert_allclose(closure.jacobian[0, :, 0], [-2.0, 0.8], rtol=0.0, atol=1e-15)
 

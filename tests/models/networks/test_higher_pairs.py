@@ -18,7 +18,7 @@ from urmpipe import load_network, network_check, network_drive, network_solve
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.errors import NetworkError
 from urmpipe_models.networks.assembly import assemble
-from urmpipe_models.networks.closure import closure_of, released
+from urmpipe_models.networks.closure import evaluate_closure, iter_release_columns
 from urmpipe_models.networks.elements import transmission
 from urmpipe_models.networks.forces import Wrench, compute_forces
 from urmpipe_models.networks.mechanism import build_mechanism
@@ -184,10 +184,10 @@ def test_the_jacobian_is_that_of_differences(seed: int) -> None:
     x = mechanism.start + np.random.default_rng(seed).normal(size=len(mechanism.start))
 
     def pairs(at: FloatArray) -> FloatArray:
-        return closure_of(mechanism, at).residual[6:]
+        return evaluate_closure(mechanism, at).residual[6:]
 
     expected = difference(pairs, x)
-    found = closure_of(mechanism, x[:, np.newaxis]).jacobian[6:, :, 0]
+    found = evaluate_closure(mechanism, x[:, np.newaxis]).jacobian[6:, :, 0]
     # differences of step 1e-3 round to 1e-12; a knot of the spline within the step would cost 1e-7
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-8 * np.abs(expected).max())
 
@@ -221,7 +221,11 @@ def test_a_drive_that_repeats_a_gear_is_redundant() -> None:
 def test_a_drive_set_free_turns_its_wheel() -> None:
     both = {**GEARED, "joints": {**GEARED["joints"], "B": shaft(("ground", "b"), 300, value="30 - turn / 2")}}
     mechanism = build_mechanism(load_network(both))
-    found = {name: column for name, what, column in released(mechanism, mechanism.start) if what == "drive"}
+    found = {
+        name: column
+        for name, what, column in iter_release_columns(mechanism, mechanism.start)
+        if what == "drive"
+    }
     assert {name: column.tolist() for name, column in found.items()} == {"A": [0.5], "B": [1.0]}
 
 

@@ -19,7 +19,7 @@ from random_networks import (
 )
 from test_joint_motion import user_motion
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.closure import evaluate_closure
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.parts import Body, Control, Expression, Joint
@@ -64,7 +64,7 @@ def driven_at_random(network: Network, rng: np.random.Generator) -> Network:
 
 
 def residual_of(mechanism: Mechanism, x: FloatArray) -> FloatArray:
-    return closure_of(mechanism, x[:, np.newaxis]).residual[:, 0]
+    return evaluate_closure(mechanism, x[:, np.newaxis]).residual[:, 0]
 
 
 def assert_right(mechanism: Mechanism, x: FloatArray) -> int:
@@ -73,8 +73,8 @@ def assert_right(mechanism: Mechanism, x: FloatArray) -> int:
     held = np.ones(len(residual), dtype=bool)
     for k in range(len(mechanism.graph.cuts)):
         held[6 * k : 6 * k + 6] = np.linalg.norm(residual[6 * k + 3 : 6 * k + 6]) < HALF_TURN
-    found = closure_of(mechanism, x[:, np.newaxis]).jacobian[held, :, 0]
-    expected = difference(lambda at: closure_of(mechanism, at).residual[held], x)
+    found = evaluate_closure(mechanism, x[:, np.newaxis]).jacobian[held, :, 0]
+    expected = difference(lambda at: evaluate_closure(mechanism, at).residual[held], x)
     np.testing.assert_allclose(
         found, expected, rtol=0.0, atol=RELATIVE * max(1.0, np.abs(expected).max(initial=0.0))
     )
@@ -135,9 +135,9 @@ def test_known_mechanisms_and_many_configurations_at_once(name: str) -> None:
     mechanism = build_mechanism(MECHANISMS[name](drive="s"))
     rng = np.random.default_rng(0)
     x = mechanism.start[:, np.newaxis] + 0.3 * rng.normal(size=(len(mechanism.variables), 7))
-    together = closure_of(mechanism, x)
+    together = evaluate_closure(mechanism, x)
     for k in range(7):
-        alone = closure_of(mechanism, x[:, k : k + 1])
+        alone = evaluate_closure(mechanism, x[:, k : k + 1])
         # sums in another order
         np.testing.assert_allclose(together.residual[:, k], alone.residual[:, 0], rtol=0.0, atol=1e-14)
         np.testing.assert_allclose(together.jacobian[:, :, k], alone.jacobian[:, :, 0], rtol=0.0, atol=1e-14)

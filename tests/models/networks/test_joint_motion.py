@@ -23,7 +23,7 @@ from random_networks import (
     transform,
 )
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.closure import evaluate_closure
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.joint_motion import constraint_twists, joint_frame, joint_twists
 from urmpipe_models.networks.mechanism import build_mechanism
@@ -204,7 +204,7 @@ def test_poses_and_gaps_of_random_networks_are_those_of_matrices(seed: int) -> N
     rng = np.random.default_rng(seed)
     closed = random_network(rng, bodies=5, extra=3)
     mechanism = build_mechanism(closed)
-    assert np.abs(closure_of(mechanism, mechanism.start[:, np.newaxis]).residual).max() < ROUNDING
+    assert np.abs(evaluate_closure(mechanism, mechanism.start[:, np.newaxis]).residual).max() < ROUNDING
     network = apart(closed, rng)
     mechanism = build_mechanism(network)
     tree = {network.joints[one.joint].name for one in mechanism.graph.branches}
@@ -212,7 +212,7 @@ def test_poses_and_gaps_of_random_networks_are_those_of_matrices(seed: int) -> N
     found = mechanism.poses(mechanism.start.tolist())
     for name, pose in expected.items():
         np.testing.assert_allclose(matrix(found[name]), pose, rtol=0.0, atol=ROUNDING)
-    residual = closure_of(mechanism, mechanism.start[:, np.newaxis]).residual[:, 0]
+    residual = evaluate_closure(mechanism, mechanism.start[:, np.newaxis]).residual[:, 0]
     for k, cut in enumerate(mechanism.graph.cuts):
         joint = network.joints[cut]
         a, b = joint.bodies

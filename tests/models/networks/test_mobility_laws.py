@@ -46,10 +46,10 @@ from random_networks import (
 from urmpipe_models.elementwise import FloatArray
 from urmpipe_models.math3d import Transform
 from urmpipe_models.networks.assembly import assemble
-from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.closure import evaluate_closure
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import build_mechanism
-from urmpipe_models.networks.mobility import mobility_of, stuck_controls
+from urmpipe_models.networks.mobility import analyse_mobility, find_blocked_controls
 from urmpipe_models.networks.parts import Body, ConstraintElement, Control, Expression, Joint, JointKind
 
 SAME_POSES = 1e-8
@@ -75,9 +75,9 @@ class Facts(NamedTuple):
 def facts_of(network: Network) -> Facts:
     mechanism = build_mechanism(network)
     x = mechanism.start
-    gap = np.abs(closure_of(mechanism, x[:, np.newaxis]).residual) * mechanism.row_scales[:, np.newaxis]
+    gap = np.abs(evaluate_closure(mechanism, x[:, np.newaxis]).residual) * mechanism.row_scales[:, np.newaxis]
     assert gap.max(initial=0.0) < 1e-12  # every variant closes at its start, in lengths of the mechanism
-    found = mobility_of(mechanism, x)
+    found = analyse_mobility(mechanism, x)
     assert len(found.redundant) == mechanism.rows - found.rank == found.mobility - found.kutzbach
     return Facts(
         found.mobility, found.kutzbach, len(found.redundant), found.idle, found.special, found.kind,
@@ -216,7 +216,7 @@ def test_which_constraints_are_redundant_does_not_depend_on_the_unit_of_length()
         found = []
         for factor in (1e-3, 1.0, 1e3):
             mechanism = build_mechanism(scaled(build(), factor))
-            found.append(mobility_of(mechanism, mechanism.start).redundant)
+            found.append(analyse_mobility(mechanism, mechanism.start).redundant)
         assert found[0] == found[1] == found[2]
 
 
@@ -270,7 +270,7 @@ def test_the_motions_do_not_depend_on_where_loops_are_cut(name: str) -> None:
     spaces = []
     for k in range(len(network.joints)):
         mechanism = build_mechanism(replace(network, joints=(*network.joints[k:], *network.joints[:k])))
-        ways = null_space(closure_of(mechanism, mechanism.start[:, np.newaxis]).jacobian[:, :, 0])
+        ways = null_space(evaluate_closure(mechanism, mechanism.start[:, np.newaxis]).jacobian[:, :, 0])
         spaces.append(ways[[mechanism.variable_index[one] for one in places]])
     for one, other in pairwise(spaces):
         assert_same_space(one, other, 1e-9)  # rounding times a condition of the Jacobian below 1e5
@@ -312,7 +312,7 @@ def user_slide() -> Joint:
 def test_the_formula_of_kutzbach_by_hand(network: Network, figure: int) -> None:
     mechanism = build_mechanism(network)
     assert by_hand(network) == figure
-    assert mobility_of(mechanism, mechanism.start).kutzbach == figure
+    assert analyse_mobility(mechanism, mechanism.start).kutzbach == figure
 
 
 @pytest.mark.slow
@@ -320,7 +320,7 @@ def test_the_formula_of_kutzbach_by_hand(network: Network, figure: int) -> None:
 def test_the_formula_of_kutzbach_on_random_networks(seed: int) -> None:
     network = random_network(np.random.default_rng(seed), bodies=5, extra=3, elements=2)
     mechanism = build_mechanism(network)
-    found = mobility_of(mechanism, mechanism.start)
+    found = analyse_mobility(mechanism, mechanism.start)
     assert found.kutzbach == by_hand(network)
     assert found.mobility - found.kutzbach == len(found.redundant)
 
@@ -363,7 +363,7 @@ def test_redundant_constraints_can_be_set_free_together(build: Callable[..., Net
     """
     network = shuffled(build(), np.random.default_rng(seed))
     mechanism = build_mechanism(network)
-    found = mobility_of(mechanism, mechanism.start)
+    found = analyse_mobility(mechanism, mechanism.start)
     assert len(found.redundant) == found.mobility - found.kutzbach
     joints = {one.name: one for one in network.joints}
     bodies = list(network.bodies)
@@ -376,7 +376,7 @@ def test_redundant_constraints_can_be_set_free_together(build: Callable[..., Net
         joints[f"extra{k}"] = replace(extra, name=f"extra{k}", bodies=(extra.bodies[0], f"between{k}"))
         joints[one.joint] = replace(behind, bodies=(f"between{k}", behind.bodies[1]))
     freed = build_mechanism(replace(network, bodies=tuple(bodies), joints=tuple(joints.values())))
-    after = mobility_of(freed, freed.start)
+    after = analyse_mobility(freed, freed.start)
     assert after.mobility == found.mobility == after.kutzbach
     assert after.redundant == ()
 
@@ -405,7 +405,7 @@ def test_joints_of_a_kind_with_the_freedom_leave_the_mobility(
     network = shuffled(build(), np.random.default_rng(seed))
     before = facts_of(network)
     mechanism = build_mechanism(network)
-    for one in mobility_of(mechanism, mechanism.start).redundant:
+    for one in analyse_mobility(mechanism, mechanism.start).redundant:
         if one.constraint == "translation along n":
             after = facts_of(with_kind(network, "cylindrical", {one.joint}))
             assert (after.mobility, after.redundant) == (before.mobility, before.redundant - 1)
@@ -419,7 +419,7 @@ def wedges() -> Network:
 def test_a_slide_may_turn_about_its_axis_where_that_is_redundant() -> None:
     network = wedges()
     mechanism = build_mechanism(network)
-    found = mobility_of(mechanism, mechanism.start)
+    found = analyse_mobility(mechanism, mechanism.start)
     assert (found.mobility, found.kutzbach, len(found.redundant)) == (1, -3, 4)
     turning = [one for one in found.redundant if one.constraint == "rotation about n"]
     assert turning
@@ -432,7 +432,7 @@ def test_a_rod_too_many_is_redundant() -> None:
     network = four_bar()
     more = rod("R", ("ground", "b2"), (0.0, 0.0, 0.0), (0.4 * math.cos(0.9), 0.4 * math.sin(0.9), 0.0))
     mechanism = build_mechanism(replace(network, elements=(more,)))
-    found = mobility_of(mechanism, mechanism.start)
+    found = analyse_mobility(mechanism, mechanism.start)
     assert (found.mobility, len(found.redundant)) == (1, 4)
     assert ("R", "length") in {(one.joint, one.constraint) for one in found.redundant}
     names = [one.joint for one in found.redundant]
@@ -445,11 +445,11 @@ def test_a_drive_too_many_is_redundant() -> None:
     first, *middle, last = network.joints
     both = (driven(first, "s"), *middle, driven(last, "-s"))
     mechanism = build_mechanism(replace(network, joints=both, controls=(Control("s"),)))
-    found = mobility_of(mechanism, mechanism.start)
+    found = analyse_mobility(mechanism, mechanism.start)
     assert (found.mobility, found.kutzbach, len(found.redundant)) == (1, -3, 4)
     one_drive = replace(network, joints=(both[0], *middle, last), controls=(Control("s"),))
     assert facts_of(one_drive)[:3] == (1, -2, 3)
-    assert stuck_controls(mechanism, mechanism.start) == ()
+    assert find_blocked_controls(mechanism, mechanism.start) == ()
 
 
 # --- special configurations
@@ -465,7 +465,7 @@ class Special(NamedTuple):
 
 def special_of(network: Network) -> Special:
     mechanism = build_mechanism(network)
-    found = mobility_of(mechanism, mechanism.start)
+    found = analyse_mobility(mechanism, mechanism.start)
     assert found.special == (found.nearby < found.mobility)
     return Special(found.mobility, found.nearby, found.kind)
 
@@ -523,11 +523,11 @@ def test_at_a_dead_centre_the_slide_is_stuck_but_the_mechanism_is_not_special(cr
     """The crank still moves it one way; a control of the slide cannot."""
     assert special_of(slider_crank(crank)) == Special(1, 1, "mechanism")
     mechanism = build_mechanism(slider_crank(crank, "s"))
-    found = mobility_of(mechanism, mechanism.start)
+    found = analyse_mobility(mechanism, mechanism.start)
     assert (found.mobility, found.special) == (1, False)
-    assert stuck_controls(mechanism, mechanism.start) == ("s",)
+    assert find_blocked_controls(mechanism, mechanism.start) == ("s",)
     regular = build_mechanism(slider_crank(1.0, "s"))
-    assert stuck_controls(regular, regular.start) == ()
+    assert find_blocked_controls(regular, regular.start) == ()
 
 
 # --- edges
@@ -592,7 +592,7 @@ def test_frames_far_from_the_mechanism_do_not_matter(name: str, far: float) -> N
         for one in network.joints
     )
     mechanism = build_mechanism(replace(network, joints=joints))
-    found = mobility_of(mechanism, mechanism.start)
+    found = analyse_mobility(mechanism, mechanism.start)
     expected = EXPECTED[name]
     assert (found.mobility, found.kutzbach, found.nearby) == (
         expected.mobility,
@@ -611,7 +611,7 @@ def test_a_plane_far_from_its_bodys_origin_does_not_matter() -> None:
         "E", "eg", ("ground", "b2"), Expression("0"), (ORIGIN, (far + 0.8, far + 0.5, 0.0)), (Z, Z)
     )
     mechanism = build_mechanism(replace(network, elements=(plane,)))
-    assert mobility_of(mechanism, mechanism.start).mobility == 1
+    assert analyse_mobility(mechanism, mechanism.start).mobility == 1
 
 
 @pytest.mark.parametrize("start", [math.pi, math.pi + 1e-9])
@@ -620,7 +620,7 @@ def test_a_control_whose_effect_stands_still_at_its_start_does_not_hide_the_othe
     network = slider_crank(1.0, "0.1 * cos(s) + 0.1")
     mechanism = build_mechanism(replace(network, controls=(Control("s", start),)))
     found = assemble(mechanism, {"s": 2.0})
-    assert mobility_of(mechanism, found.x[:, 0]).mobility == 1
+    assert analyse_mobility(mechanism, found.x[:, 0]).mobility == 1
 
 
 def test_a_ring_of_thirty_bodies() -> None:

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from known_mechanisms import bennett, coupled_loops, four_bar, nine_revolutes, ring, sarrus
 from random_networks import assert_same_space, matrix, null_space, random_network, reframed, unit
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.networks.closure import closure_of
+from urmpipe_models.networks.closure import evaluate_closure
 from urmpipe_models.networks.file import Network
 from urmpipe_models.networks.mechanism import build_mechanism
-from urmpipe_models.networks.mobility import mobility_of
+from urmpipe_models.networks.mobility import analyse_mobility
 from urmpipe_models.networks.parts import Joint, JointKind
 
 pin = pytest.importorskip("pinocchio")
@@ -124,13 +124,13 @@ def assert_as_pinocchio(network: Network) -> int:
     """Hold mobility and the row space of the Jacobian to Pinocchio's; return the mobility."""
     mechanism, oracle = build_mechanism(network), oracle_of(network)
     theirs = constraint_jacobian(oracle)
-    ours = closure_of(mechanism, mechanism.start[:, np.newaxis]).jacobian[:, :, 0]
+    ours = evaluate_closure(mechanism, mechanism.start[:, np.newaxis]).jacobian[:, :, 0]
     signs = signs_of(network, oracle)
     aligned = np.zeros_like(theirs)
     for column, one in enumerate(mechanism.variables):
         aligned[:, column] = signs[one.owner] * theirs[:, oracle.columns[one.owner, one.index]]
     rank = np.linalg.matrix_rank(theirs, tol=1e-8)
-    found = mobility_of(mechanism, mechanism.start)
+    found = analyse_mobility(mechanism, mechanism.start)
     assert found.mobility == theirs.shape[1] - rank
     assert found.rank == rank
     assert_same_space(row_space(ours), row_space(aligned), SAME)
@@ -191,4 +191,4 @@ def test_a_rigid_constraint_of_pinocchio_gives_the_same_rank() -> None:
     jacobian = pin.getConstraintJacobian(oracle.model, data, contact, held)
     mechanism = build_mechanism(network)
     assert jacobian.shape == (6, 4)
-    assert mobility_of(mechanism, mechanism.start).rank == np.linalg.matrix_rank(jacobian, tol=1e-8) == 3
+    assert analyse_mobility(mechanism, mechanism.start).rank == np.linalg.matrix_rank(jacobian, tol=1e-8) == 3

@@ -13,13 +13,13 @@ from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.file import load_network, network_names
 from urmpipe_models.networks.joint_motion import exp3, wrap_rotation_vector
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
-from urmpipe_models.networks.mobility import network_tables, with_start
 from urmpipe_models.networks.rates import (
     close_network,
     closure_jacobian,
     closure_residual,
     damped_normal_step,
 )
+from urmpipe_models.networks.tables import network_tables, with_start
 
 DOOR: dict[str, Any] = {
     "angle_unit": "deg",

@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 
 from urmpipe_datasets import NETWORKS
 from urmpipe_models.elementwise import FloatArray
-from urmpipe_models.networks.assembly import Assembled, assemble
+from urmpipe_models.networks.assembly import Assembly, AssemblyResult, assemble
 from urmpipe_models.networks.file import load_network
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
-from urmpipe_models.networks.mobility import Assembly, mobility_of
+from urmpipe_models.networks.mobility import analyse_mobility
 
 CLOSED = 1e-9
 """The largest gap in [m] and [rad] that assembly lets pass."""
@@ -78,7 +78,7 @@ def test_it_assembles_from_its_start_and_moves_as_expected(name: str) -> None:
     assembled = assemble(mechanism)
     assert not assembled.elsewhere
     assert assembled.assemblies[0].residual < CLOSED
-    found = mobility_of(mechanism, assembled.x[:, 0])
+    found = analyse_mobility(mechanism, assembled.x[:, 0])
     assert Expected(found.mobility, found.rank, found.kutzbach, found.idle, found.kind) == MOVES[name]
     assert len(found.redundant) == found.mobility - found.kutzbach
     assert not found.special
@@ -455,10 +455,10 @@ def assert_perturbed(name: str, count: int, seed: int) -> None:
 
 def every_assembly(
     tables: Tables, controls: dict[str, float], restarts: int = 20
-) -> tuple[Mechanism, Assembled]:
+) -> tuple[Mechanism, AssemblyResult]:
     """Return the mechanism of tables, and its assemblies."""
     mechanism = build_mechanism(load_network(tables))
-    return mechanism, assemble(mechanism, controls, every=True, restarts=restarts)
+    return mechanism, assemble(mechanism, controls, find_all=True, restarts=restarts)
 
 
 def pose_of(mechanism: Mechanism, assembly: Assembly, body: str) -> FloatArray:
@@ -468,7 +468,7 @@ def pose_of(mechanism: Mechanism, assembly: Assembly, body: str) -> FloatArray:
 
 
 def assert_same_answers(
-    mechanism: Mechanism, assembled: Assembled, answers: list[Answer], tolerance: float
+    mechanism: Mechanism, assembled: AssemblyResult, answers: list[Answer], tolerance: float
 ) -> None:
     """Hold the assemblies against the answers, each of which must be found once; angles up to whole turns."""
     units = {one.name: one.units for one in mechanism.network.joints}

@@ -12,11 +12,11 @@ from urmpipe_models.networks.assembly import assemble
 from urmpipe_models.networks.file import Network, load_network, network_names
 from urmpipe_models.networks.mechanism import Mechanism, build_mechanism
 from urmpipe_models.networks.rates import (
-    changes,
     close_network,
     closure_jacobian,
     largest_residual,
     predict_variables,
+    variable_changes,
 )
 
 KINDS: dict[str, Any] = {
@@ -74,7 +74,7 @@ def test_steps_that_close_a_network_are_the_same_of_symbols_and_numbers(name: st
 
     def step(x: Any) -> list[Any]:
         ahead = [x[k] + 0.01 for k in mechanism.controls]
-        predicted = predict_variables(mechanism, x, changes(mechanism, before.tolist(), x), ahead)
+        predicted = predict_variables(mechanism, x, variable_changes(mechanism, before.tolist(), x), ahead)
         entries = [one for column in closure_jacobian(mechanism, predicted) for one in column]
         return [largest_residual(mechanism, predicted), *entries, *close_network(mechanism, predicted, 3)]
 

@@ -12,7 +12,8 @@ import pytest
 from asserting import there
 from made_networks import NAMES, found
 from presented import cells, facts
-from urmpipe_models.networks.mobility import Gap, Mobility
+from urmpipe_models.networks.assembly import Gap
+from urmpipe_models.networks.mobility import Mobility
 from urmpipe_pipeline.networks.parts import gap_words
 from urmpipe_pipeline.presentation.figure import Drawing
 from urmpipe_pipeline.presentation.section import Table
