@@ -1,4 +1,4 @@
-"""The deviation delta between where a point should be and where it is, and whether it is tolerated."""
+"""The deviation between a commanded and an attained point, and whether it is tolerated, elementwise."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ class Delta(NamedTuple):
 
 
 def delta(reference: Vector, actual: Vector) -> Delta:
-    """Return delta = A_s - p(phi) and its norm, elementwise.
+    """Return delta = A_s - p(phi) and its norm.
 
     Args:
-        reference: x, y, z of the point asked for, in [m].
-        actual: x, y, z of the point reached, in [m].
+        reference: x, y, z of the commanded point in [m].
+        actual: x, y, z of the attained point in [m].
 
     Source: [UrmArm2021]_ eq. 19-21, 23.
     """
@@ -39,9 +39,9 @@ def delta(reference: Vector, actual: Vector) -> Delta:
 
 
 def exceeds_tolerance(deviation: Delta, tolerance: Element) -> Element:
-    """Return where |x|, |y| or |z| is above the tolerance in [m], or has no value (1 in a trace).
+    """Return where |x|, |y| or |z| exceeds the tolerance in [m] or is NaN (1 in a trace).
 
-    Compared one by one: C's fmax passes over a value that is NaN.
+    Each coordinate is compared: C's fmax ignores NaN.
     """
-    x, y, z = (np.abs(one) <= tolerance for one in (deviation.x, deviation.y, deviation.z))
+    x, y, z = (np.abs(component) <= tolerance for component in (deviation.x, deviation.y, deviation.z))
     return np.logical_not(np.logical_and(np.logical_and(x, y), z))

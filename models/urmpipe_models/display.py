@@ -1,4 +1,4 @@
-"""How results show themselves: one line at a prompt, that line and the head of their table in a notebook."""
+"""The `repr` of results: one line at a prompt; headline, warnings and head of the table in a notebook."""
 
 from __future__ import annotations
 
@@ -8,27 +8,24 @@ from typing import Any, ClassVar
 
 from urmpipe_models.errors import escape_html, escape_line
 
-MAX_LINE_LENGTH = 120
-"""Characters of the line: it fits into a terminal, and into a list of results."""
-
-HEAD_ROWS = 8
-"""Rows of the table in a notebook."""
+MAX_LINE_LENGTH = 120  # characters of the line: fits into a terminal, and into a list of results
+HEAD_ROWS = 8  # rows of the table in a notebook
 
 
 class Displayable(ABC):
-    """A result that people look at: it has a headline, a table, and what a person should know."""
+    """A result with a headline, a table, and notes for the user."""
 
     __slots__ = ()
 
     page: ClassVar[Callable[[Any], str | None]] = staticmethod(lambda result: None)
-    """Returns what a notebook shows of a result that presents itself; set by who renders presentations."""
+    """Returns the notebook page of a result that has a presentation; set by the renderer of presentations."""
 
     @abstractmethod
     def _headline(self) -> str:
-        """Return its name and what it holds, in one line."""
+        """Return its name and content in one line."""
 
     def _notes(self) -> Sequence[str]:
-        """Return what a person should know, a line each."""
+        """Return what the user should know, one line each."""
         return [str(warning) for warning in getattr(self, "warnings", ())]
 
     def _table(self) -> str:
@@ -45,7 +42,6 @@ class Displayable(ABC):
         return f"{line if len(line) <= room else line[: room - 3] + '...'}{ending}"
 
     def _repr_html_(self) -> str:
-        """Return for a notebook what presents it, else its headline, warnings and the head of its table."""
         if (page := Displayable.page(self)) is not None:
             return page
         notes = "".join(f"<li>{escape_html(note)}</li>" for note in self._notes())
@@ -53,11 +49,11 @@ class Displayable(ABC):
         return f"{headline}{notes and f'<ul>{notes}</ul>'}{self._table()}"
 
 
-def format_count(count: int, what: str) -> str:
+def format_count(count: int, noun: str) -> str:
     """Return a number with its noun: 1 row, 2 rows."""
-    return f"{count} {what}{'' if count == 1 else 's'}"
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def format_headline(name: str, *facts: Any) -> str:
-    """Return a headline: the name, then the facts that there are."""
+    """Return a name, followed by the facts that are not empty."""
     return f"{name}: {', '.join(str(fact) for fact in facts if fact)}"

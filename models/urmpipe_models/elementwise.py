@@ -40,9 +40,9 @@ ZERO: Vector = (0.0, 0.0, 0.0)
 
 def times(a: Element, b: Element) -> Element:
     """Return a b, folding the constants 0, 1 and -1."""
-    if isinstance(b, float):
+    if type(b) is float:
         a, b = b, a
-    if isinstance(a, float):
+    if type(a) is float:
         if a == 0.0:
             return 0.0
         if a == 1.0:
@@ -54,18 +54,18 @@ def times(a: Element, b: Element) -> Element:
 
 def plus(a: Element, b: Element) -> Element:
     """Return a + b, folding the constant 0."""
-    if isinstance(a, float) and a == 0.0:
+    if type(a) is float and a == 0.0:
         return b
-    if isinstance(b, float) and b == 0.0:
+    if type(b) is float and b == 0.0:
         return a
     return a + b
 
 
 def minus(a: Element, b: Element) -> Element:
     """Return a - b, folding the constant 0."""
-    if isinstance(b, float) and b == 0.0:
+    if type(b) is float and b == 0.0:
         return a
-    if isinstance(a, float) and a == 0.0:
+    if type(a) is float and a == 0.0:
         return -b
     return a - b
 
@@ -143,7 +143,10 @@ def cosine_sine(angle: Element) -> tuple[Element, Element]:
     """
     if isinstance(angle, np.ndarray) and angle.dtype == np.float64:
         return _of_array(angle)
-    if not isinstance(angle, float):
+    if isinstance(angle, np.float64):
+        cosine, sine = cosine_sine(float(angle))
+        return np.float64(cosine), np.float64(sine)
+    if type(angle) is not float:
         return np.cos(angle), np.sin(angle)
     if not abs(angle) <= _MOST:
         cosine, sine = _of_array(np.array([angle]))

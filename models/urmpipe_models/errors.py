@@ -1,25 +1,21 @@
-"""How a parameter and its value are spelled: as an option, as a keyword, in a system file and its maps.
+"""Messages and errors: faults and notes, the parameters that the user may give, and how both are written.
 
-Values are spelled by type: a mapping goes by column or joint ("" for all of them), a list is A,B,C, a tuple
-is LOW:HIGH, True a flag, and None what the reader is to fill in.
-
-Messages as data: what is wrong or worth knowing, apart from it what the reader may give, and three voices.
-
-A message keeps its sentence, written where the fault is seen. What that is about, and the parameters that
-would change it, are fields. Who prints chooses the voice, so that a stored message reads right for everybody:
+1. Parameters: the same parameter is an option, a keyword, or a key of a system file and its log maps. Values
+   are written by type: a mapping is given per column or joint ("" for all), a list is A,B,C, a tuple is
+   LOW:HIGH, True is a flag, None is a value that the user fills in.
+2. Escapes: names come from files and may contain what ends a line, acts on a terminal or reorders letters.
+3. Messages: the sentence is written where the fault is found; its subject and the parameters that change it
+   are fields. The printer chooses the voice, so that a stored message reads right for every user:
 
     warning = Finding("no unit is given", hints=(Hint("unit", {"q1": "deg"}, "applies this"),))
     warning.format("command line")   no unit is given; --unit q1=deg applies this
     warning.format("python")         no unit is given; unit={"q1": "deg"} applies this
     warning.format("system file")    no unit is given; units.q1 = "deg" in the map of the log applies this
 
-The error tree: everything that urmpipe raises on purpose is an `UrmpipeError`.
-
-An error carries *findings*: all that is wrong with an input is collected and reported at once,
-each finding as one line that names the file, the line, the column, what was found and what is
-allowed. The command line prints these lines and exits with 2.
-
-How a name that is not there is told: with the one that may have been meant, and those that are allowed.
+4. Errors: everything that urmpipe raises on purpose is an `UrmpipeError`. It carries *findings*: all faults
+   of an input are collected and reported at once, one line per finding, with file, line, column, the value
+   found and the values allowed. The command line prints these lines and exits with 2.
+5. Unknown names: reported with the most similar allowed name and the list of allowed names.
 """
 
 from __future__ import annotations
@@ -35,17 +31,16 @@ from difflib import SequenceMatcher
 from itertools import groupby
 from typing import Any, Literal, TypeVar
 
-Voice = Literal["command line", "python", "system file"]
-"""Who reads a message, and so how parameters are spelled."""
+Voice = Literal["command line", "python", "system file"]  # the reader of a message
 
 
 class Placeholder(str):
-    """What the reader fills in: it stands without quotes."""
+    """A value that the user fills in, written without quotes."""
 
     __slots__ = ()
 
 
-_OWN: Mapping[str, Any] = {
+_PLACEHOLDERS: Mapping[str, Any] = {  # of other parameters: the name in capitals
     "audit": Placeholder("FILE.csv"),
     "base": [Placeholder("X"), Placeholder("Y"), Placeholder("Z")],
     "baseline": Placeholder("RUN.rrd"),
@@ -70,9 +65,8 @@ _OWN: Mapping[str, Any] = {
     "write_map": Placeholder("FILE.toml"),
     "write_system": Placeholder("FILE.toml"),
 }
-"""What stands for a value that is the reader's own; another parameter shows its name in capitals."""
 
-IN_MAP = {
+IN_MAP = {  # keys of a log map, which a system file names
     "source": "source",
     "delimiter": "delimiter",
     "decimal": "decimal",
@@ -85,30 +79,17 @@ IN_MAP = {
     "rotation": "tcp.form",
     "unit": "units",
 }
-"""Where the map of a log, which a system file names, says how to read it."""
+IN_FILE = {**IN_MAP, "log_map": "map", "robot": "robot"}  # keys of a system file or its log maps
+IN_NO_FILE = ("repair", "skip_bad", "derivative", "tsp")  # parameters of a log without such a key
+ARGUMENTS = ("path", "drives")  # positional arguments of the command line, shown in capitals
 
-IN_FILE = {**IN_MAP, "log_map": "map", "robot": "robot"}
-"""Where a system file, or the map of a log in it, says what is a parameter elsewhere; others are options."""
-
-ARGUMENTS = ("path", "drives")
-"""Parameters that the command line takes without an option, by their names in capitals."""
-
-_QUOTES = "'\u2018\u2019\u201a\u201b"
-"""What PowerShell takes for a single quote."""
-
-_PARTING = frozenset(_QUOTES + ' \t"\u201c\u201d\u201e&()[]{},;=@#$`^!+%~|<>')
-"""What PowerShell or cmd reads as more than a letter of a word."""
-
-_BARE = re.compile("[A-Za-z0-9_-]+")
-"""A key of TOML that needs no quotes."""
-
-
-IN_NO_FILE = ("repair", "skip_bad", "derivative", "tsp")
-"""Parameters of a log that no file says."""
+_BARE_KEY = re.compile("[A-Za-z0-9_-]+")  # a key of TOML that needs no quotes
+_QUOTES = "'\u2018\u2019\u201a\u201b"  # single quotes of PowerShell
+_SPECIAL = frozenset(_QUOTES + ' \t"\u201c\u201d\u201e&()[]{},;=@#$`^!+%~|<>')  # special in PowerShell or cmd
 
 
 def format_parameter(parameter: str, voice: Voice) -> str:
-    """Return a parameter as somebody calls it: an option, a keyword, or a key of a file."""
+    """Return the name of a parameter: an option, a keyword, or a key of a file."""
     if voice == "python":
         return parameter
     if parameter in ARGUMENTS:
@@ -117,138 +98,174 @@ def format_parameter(parameter: str, voice: Voice) -> str:
 
 
 def to_option(parameter: str) -> str:
-    """Return the option of the command line that a keyword is: `--skip-bad`."""
+    """Return the command line option of a keyword: `--skip-bad`."""
     return f"--{parameter.replace('_', '-')}"
 
 
 def format_assignment(parameter: str, value: Any, voice: Voice) -> str:
-    """Return a parameter with its value, as somebody writes it: `--unit q1=deg`, `unit={"q1": "deg"}`."""
-    own = _OWN.get(parameter, Placeholder(parameter.upper()))
+    """Return a parameter with its value: `--unit q1=deg`, `unit={"q1": "deg"}`, `units.q1 = "deg"`."""
+    placeholder = _PLACEHOLDERS.get(parameter, Placeholder(parameter.upper()))
     if isinstance(value, Mapping):
-        value = {key: own if one is None else one for key, one in value.items()}
-    value = own if value is None else value
+        value = {key: placeholder if item is None else item for key, item in value.items()}
+    value = placeholder if value is None else value
     if voice == "command line" or (voice == "system file" and parameter not in IN_FILE):
-        return " ".join(_options(to_option(parameter), value))
-    return f"{parameter}={_in_python(value)}" if voice == "python" else _in_file(parameter, value)
+        return " ".join(_iter_options(to_option(parameter), value))
+    return f"{parameter}={_to_python(value)}" if voice == "python" else _to_file(parameter, value)
 
 
-def _options(option: str, value: Any) -> Iterator[str]:
-    """Yield an option with its value, once for each column or joint that it names."""
+def _iter_options(option: str, value: Any) -> Iterator[str]:
+    """Yield an option with its value, once per column or joint of a mapping."""
     if value is True:
         yield option
     elif isinstance(value, Mapping):
-        for key, one in value.items():
-            yield f"{option} {_word(f'{key}=' if key else '', one)}"
+        for key, item in value.items():
+            yield f"{option} {_to_word(f'{key}=' if key else '', item)}"
     else:
-        yield f"{option} {_word('', value)}"
+        yield f"{option} {_to_word('', value)}"
 
 
-def _word(key: str, value: Any) -> str:
-    """Return a value behind its key as one word of a shell; what the reader fills in stays as it is."""
-    cell = _cell(value)
-    return shell_quote(key) * bool(key) + cell if _is_own(value) else shell_quote(key + cell)
+def _to_word(key: str, value: Any) -> str:
+    cell = _to_cell(value)
+    return shell_quote(key) * bool(key) + cell if _is_placeholder(value) else shell_quote(key + cell)
 
 
-def _cell(value: Any) -> str:
-    """Return a value as the command line takes it: A,B,C of a list, LOW:HIGH of two ends."""
+def _to_cell(value: Any) -> str:
     if isinstance(value, (list, tuple)):
-        return (":" if isinstance(value, tuple) else ",").join(map(_cell, value))
+        return (":" if isinstance(value, tuple) else ",").join(map(_to_cell, value))
     return value if isinstance(value, str) else f"{value:.15g}"
 
 
-def _is_own(value: Any) -> bool:
-    """Return whether a value is the reader's own, and needs no quotes of a shell."""
-    return isinstance(value, Placeholder) or (isinstance(value, (list, tuple)) and all(map(_is_own, value)))
+def _is_placeholder(value: Any) -> bool:
+    sequence = isinstance(value, (list, tuple))
+    return isinstance(value, Placeholder) or (sequence and all(map(_is_placeholder, value)))
 
 
-def _in_python(value: Any) -> str:
-    """Return a value as Python writes it."""
+def _to_python(value: Any) -> str:
     if isinstance(value, Mapping):
-        named = (f"{_quoted(key)}: {_in_python(one)}" for key, one in value.items())
-        return _in_python(value[""]) if list(value) == [""] else f"{{{', '.join(named)}}}"
+        items = (f"{_quote(key)}: {_to_python(item)}" for key, item in value.items())
+        return _to_python(value[""]) if list(value) == [""] else f"{{{', '.join(items)}}}"
     if isinstance(value, (list, tuple)):
-        inner = ", ".join(map(_in_python, value))
+        inner = ", ".join(map(_to_python, value))
         return f"[{inner}]" if isinstance(value, list) else f"({inner})"
     if isinstance(value, str) and not isinstance(value, Placeholder):
-        return _quoted(value)
-    return str(value) if isinstance(value, bool) else _cell(value)
+        return _quote(value)
+    return str(value) if isinstance(value, bool) else _to_cell(value)
 
 
-def _in_file(parameter: str, value: Any) -> str:
-    """Return what a system file, or the map of a log in it, says: as TOML."""
+def _to_file(parameter: str, value: Any) -> str:
+    """Return the line of TOML in a system file or a log map."""
     key = IN_FILE[parameter]
     if not isinstance(value, Mapping):
-        return f"{key} = {_in_toml(value)}"
-    paths = (f"{key}.{name if _BARE.fullmatch(name) else _quoted(name)}" for name in value)
-    return ", ".join(f"{path} = {_in_toml(one)}" for path, one in zip(paths, value.values(), strict=True))
+        return f"{key} = {_to_toml(value)}"
+    paths = (f"{key}.{name if _BARE_KEY.fullmatch(name) else _quote(name)}" for name in value)
+    return ", ".join(f"{path} = {_to_toml(item)}" for path, item in zip(paths, value.values(), strict=True))
 
 
-def _in_toml(value: Any) -> str:
-    """Return a value as TOML writes it."""
+def _to_toml(value: Any) -> str:
     if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(_in_toml, value))}]"
-    return str(value).lower() if isinstance(value, bool) else _in_python(value)
+        return f"[{', '.join(map(_to_toml, value))}]"
+    return str(value).lower() if isinstance(value, bool) else _to_python(value)
 
 
-def _quoted(text: str) -> str:
-    """Return a text in the quotes of Python and TOML, with escapes of both for what is not printable."""
-    return _escaped(json.dumps(text, ensure_ascii=False))
+def _quote(text: str) -> str:
+    """Return a string literal of both Python and TOML."""
+    return _escape_long(json.dumps(text, ensure_ascii=False))
 
 
-def _escaped(text: str) -> str:
-    return "".join(one if one.isprintable() else f"\\U{ord(one):08x}" for one in text)
+def _escape_long(text: str) -> str:
+    return "".join(letter if letter.isprintable() else f"\\U{ord(letter):08x}" for letter in text)
 
 
 def shell_quote(word: object, platform: str = sys.platform) -> str:
-    """Return a word as it may be pasted into a shell: quoted if this would part it or read it otherwise.
+    """Return a word that may be pasted into a shell, in quotes if the shell would split or expand it.
 
     Args:
         word: Such as the path of a file.
-        platform: As `sys.platform` tells it: on Windows the shell is PowerShell, where a backslash parts
-            folders and is not quoted; elsewhere what is not printable stands in the $'...' of bash and zsh.
+        platform: As in `sys.platform`. On Windows the shell is PowerShell, where a backslash separates
+            folders and is not quoted; elsewhere unprintable characters are in the $'...' of bash and zsh.
     """
-    said = str(word)
+    text = str(word)
     if platform == "win32":
-        quoted = re.sub(f"[{_QUOTES}]", lambda quote: 2 * quote[0], said)
-        return f"'{quoted}'" if not said or set(said) & _PARTING else said
-    if said.isprintable():
-        return shlex.quote(said)
-    inner = said.replace("\\", "\\\\").replace("'", "\\'")
-    return f"$'{_escaped(inner)}'"
+        quoted = re.sub(f"[{_QUOTES}]", lambda quote: 2 * quote[0], text)
+        return f"'{quoted}'" if not text or set(text) & _SPECIAL else text
+    if text.isprintable():
+        return shlex.quote(text)
+    inner = text.replace("\\", "\\\\").replace("'", "\\'")
+    return f"$'{_escape_long(inner)}'"
 
 
 def python_command(code: str) -> str:
-    """Return the command that runs a line of Python, in which texts stand as `repr` writes them.
+    """Return the command that runs a line of Python, in which texts are written as by `repr`.
 
-    It stands in double quotes, as cmd, too, reads it, unless a name in it has what a shell reads in these.
+    It is in double quotes, as cmd reads them, too, unless the code contains what a shell expands in these.
     """
-    return (
-        f"python -c {shell_quote(code)}"
-        if set(code) & set('"$`!\\\u201c\u201d\u201e')
-        else f'python -c "{code}"'
-    )
+    special = set(code) & set('"$`!\\\u201c\u201d\u201e')
+    return f"python -c {shell_quote(code)}" if special else f'python -c "{code}"'
 
 
 HIDDEN = "\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069"
-"""DEL, C1, and what else ends a line or reorders letters without being seen, as a range of a pattern."""
+"""Range of a pattern: DEL, C1, and other invisible characters that end a line or reorder letters."""
 
-_ACTING, _HIDDEN = re.compile(f"[\x00-\x1f{HIDDEN}]"), re.compile(f"[{HIDDEN}]")
-_UNHOLDABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+_CONTROL, _HIDDEN = re.compile(f"[\x00-\x1f{HIDDEN}]"), re.compile(f"[{HIDDEN}]")
+_INVALID_IN_XML = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
+
+
+def escape_line(text: str) -> str:
+    """Return a text with all unprintable characters as the escapes of Python's strings."""
+    if text.isprintable():
+        return text
+    return "".join(letter if letter.isprintable() else _escape(letter) for letter in text)
+
+
+def escape_control_characters(text: str, kept: str = "") -> str:
+    """Return a text with escapes of Python's strings for what ends a line, acts on a terminal or reorders.
+
+    Unlike `escape_line` it keeps letters that are merely unusual, such as a non-breaking space.
+
+    Args:
+        text: The text.
+        kept: Letters to keep, such as line ends of a text of several lines.
+    """
+    return _CONTROL.sub(lambda match: match[0] if match[0] in kept else _escape(match[0]), text)
+
+
+def escape_json(text: str) -> str:
+    """Return JSON, or a string of TOML, with escapes for invisible characters: it reads back the same."""
+    return _HIDDEN.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
+
+
+def escape_html(text: str) -> str:
+    """Return a text of HTML or SVG, on one line and without unprintable characters."""
+    return html.escape(escape_line(text))
+
+
+def escape_xml(text: str) -> str:
+    """Return escaped text of XML with references for invisible characters.
+
+    Most control characters and lone surrogates, which XML cannot contain, become escapes of Python's strings.
+    """
+    references = _HIDDEN.sub(lambda match: f"&#x{ord(match[0]):x};", text)
+    return _INVALID_IN_XML.sub(lambda match: ascii(match[0])[1:-1], references)
+
+
+def _escape(letter: str) -> str:
+    return letter.encode("unicode_escape").decode()
+
 
 Value = str | bool | float | list[str] | list[float] | Mapping[str, str | tuple[float, float] | None] | None
-"""What to give a parameter: by column or joint, "" for all; True for a flag; None for the reader's own."""
+"""Value of a parameter: per column or joint, "" for all; True for a flag; None for the user's own."""
 
 
 @dataclass(frozen=True, slots=True)
 class Hint:
-    """A parameter that would change what a message says.
+    """A parameter that would change what a message reports.
 
     Attributes:
-        parameter: Its keyword, such as "skip_bad"; empty for advice that is no parameter.
-        value: What to give it; None where that is the reader's own.
-        does: What it does, as the end of a sentence that the parameter begins: "applies this".
-        call: The command and public function that takes it, where it is another than the one that ran.
-        robot: The robot to give with it, which it is refused without, where its name says which.
+        parameter: Its keyword, such as "skip_bad"; empty for advice without a parameter.
+        value: Its value; None where the user fills it in.
+        does: Its effect, as the end of a sentence that the parameter begins: "applies this".
+        call: The command and public function with this parameter, if it is not the one that ran.
+        robot: The robot that the parameter needs, if its name states which.
     """
 
     parameter: str
@@ -265,10 +282,9 @@ class Hint:
         if not self.parameter:
             return ""
         if self.robot:
-            joined = " " if voice == "command line" else ", "
-            return joined.join(
-                (format_assignment("robot", self.robot, voice), replace(self, robot="").format(voice))
-            )
+            separator = " " if voice == "command line" else ", "
+            robot = format_assignment("robot", self.robot, voice)
+            return f"{robot}{separator}{replace(self, robot='').format(voice)}"
         if not self.call:
             return format_assignment(self.parameter, self.value, voice)
         if voice == "python":
@@ -277,21 +293,21 @@ class Hint:
 
 
 class Message:
-    """What all messages share: their words in each voice. Its classes are frozen dataclasses.
+    """Base of all messages: their text in each voice. Its classes are frozen dataclasses.
 
     Attributes:
-        message: The sentence, without what the other fields say.
+        message: The sentence, without the content of the other fields.
         parameter: Keyword of the public function that it is about, such as "tsp".
-        found: What was found.
-        allowed: What is allowed.
-        hints: What the reader may give.
+        found: The value found.
+        allowed: The values allowed.
+        hints: What the user may give.
     """
 
     __slots__ = ()
 
     message: str
     parameter: str | None
-    found: str | None
+    found: str | None  # plain: ok
     allowed: str | None
     hints: tuple[Hint, ...]
 
@@ -299,46 +315,45 @@ class Message:
         return self.format("python")
 
     def place(self) -> str:
-        """Return where it was seen, as it stands before the sentence; empty where that is unknown."""
+        """Return the place that precedes the sentence, or an empty string."""
         return ""
 
     def sentence(self, voice: Voice = "python") -> str:
-        """Return what it says without its place: subject, sentence, found, allowed and hints."""
-        told = (
-            f"{name}{said}" for name, said in (("found ", self.found), ("allowed: ", self.allowed)) if said
-        )
-        said = (": " if self.found else ", ").join(filter(None, (self.message, ", ".join(told))))
+        """Return the message without its place: subject, sentence, found, allowed and hints."""
+        fields = (("found ", self.found), ("allowed: ", self.allowed))
+        values = ", ".join(f"{label}{value}" for label, value in fields if value)
+        text = (": " if self.found else ", ").join(filter(None, (self.message, values)))
         if self.parameter:
-            said = f"{format_parameter(self.parameter, voice)}: {said}"
-        return escape_line("; ".join([said, *format_hints(self.hints, voice)]))
+            text = f"{format_parameter(self.parameter, voice)}: {text}"
+        return escape_line("; ".join([text, *format_hints(self.hints, voice)]))
 
     def format(self, voice: Voice) -> str:
-        """Return all of it in one line, as somebody reads it."""
+        """Return the whole message in one line."""
         place = escape_line(self.place())
         return f"{place}: {self.sentence(voice)}" if place else self.sentence(voice)
 
     def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return its fields for JSON, with the sentence as `message`."""
-        told: dict[str, Any] = asdict(self)  # type: ignore[call-overload]
-        return told | {"message": self.sentence(voice), "hints": list(told["hints"])}
+        fields: dict[str, Any] = asdict(self)  # type: ignore[call-overload]
+        return fields | {"message": self.sentence(voice), "hints": list(fields["hints"])}
 
 
 @dataclass(frozen=True, slots=True)
 class Finding(Message):
-    """One thing that is wrong with an input.
+    """One fault of an input.
 
     Attributes:
-        message: What is wrong; empty where `found` and `allowed` say it.
-        file: The file it was found in, as the user named it.
+        message: The fault; empty where `found` and `allowed` state it.
+        file: The file, as the user named it.
         line: Line of the file, counted from 1 (header lines count).
         row: Data row of the file, counted from 1 (header lines do not count).
         column: Name of the column or joint.
-        kind: A short word to filter by, such as "missing"; empty where none is known.
+        kind: A short word to filter by, such as "missing"; may be empty.
         about: The log, block or table of a system file that it is about.
         parameter: Keyword that it is about.
-        found: What was found.
-        allowed: What is allowed.
-        hints: What the reader may give.
+        found: The value found.
+        allowed: The values allowed.
+        hints: What the user may give.
     """
 
     message: str = ""
@@ -349,12 +364,12 @@ class Finding(Message):
     kind: str = ""
     about: str | None = None
     parameter: str | None = None
-    found: str | None = None
+    found: str | None = None  # plain: ok
     allowed: str | None = None
     hints: tuple[Hint, ...] = ()
 
     def place(self) -> str:
-        """Return file, line (or row) and column, and what it is about: "log.csv:12, column q1"."""
+        """Return file, line (or row), column and subject: "log.csv:12, column q1"."""
         file = (self.file or "") + ("" if self.line is None else f":{self.line}")
         row = None if self.row is None or self.line is not None else f"row {self.row}"
         column = None if self.column is None else f"column {self.column}"
@@ -363,95 +378,28 @@ class Finding(Message):
 
 
 def format_hints(hints: Sequence[Hint], voice: Voice) -> Iterator[str]:
-    """Yield what the reader may give, what does the same in one: "--repair or --skip-bad leaves them out".
+    """Yield one clause per effect: "--repair or --skip-bad leaves them out".
 
     Args:
-        hints: The hints; of those that belong to no file none is told to who writes a system file.
-        voice: Who reads it.
+        hints: The hints; for a system file, those of a parameter that has no key in a file are left out.
+        voice: The reader.
     """
-    for does, alike in groupby(hints, key=lambda hint: hint.does):
-        own = [
-            hint for hint in alike if hint.call or voice != "system file" or hint.parameter not in IN_NO_FILE
+    for effect, group in groupby(hints, key=lambda hint: hint.does):
+        usable = [
+            hint for hint in group if hint.call or voice != "system file" or hint.parameter not in IN_NO_FILE
         ]
-        told = " or ".join(filter(None, (hint.format(voice) for hint in own)))
-        if voice == "system file" and any(hint.parameter in IN_MAP and not hint.call for hint in own):
-            told += " in the map of the log"
-        if own:
-            yield f"{told} {does}".strip() if does else f"use {told}"
-
-
-def escape_line(text: str) -> str:
-    """Return a text with all that is not printable as the escapes of Python's strings.
-
-    Names come from files, and may hold what breaks a line or what a terminal acts on instead of showing it.
-    """
-    if text.isprintable():
-        return text
-    return "".join(one if one.isprintable() else _escape(one) for one in text)
-
-
-def escape_control_characters(text: str, kept: str = "") -> str:
-    """Return a text with escapes of Python's strings for what ends a line, acts on a terminal or reorders.
-
-    Unlike `escape_line` it leaves letters that are merely unusual, such as a space that does not break.
-
-    Args:
-        text: The text.
-        kept: Letters to leave: those that end a line where lines are meant.
-    """
-    return _ACTING.sub(lambda found: found[0] if found[0] in kept else _escape(found[0]), text)
-
-
-def escape_json(written: str) -> str:
-    """Return JSON, or a string of TOML, with escapes for what is not seen: it reads back the same."""
-    return _HIDDEN.sub(lambda found: f"\\u{ord(found[0]):04x}", written)
-
-
-def escape_html(words: str) -> str:
-    """Return words as text of HTML or SVG, on one line and without what is not printable."""
-    return html.escape(escape_line(words))
-
-
-def escape_xml(written: str) -> str:
-    """Return escaped text of XML with references for what is not seen.
-
-    For what XML cannot hold, most control characters and lone surrogates, stand escapes of Python's strings.
-    """
-    held = _HIDDEN.sub(lambda found: f"&#x{ord(found[0]):x};", written)
-    return _UNHOLDABLE.sub(lambda found: ascii(found[0])[1:-1], held)
-
-
-def _escape(letter: str) -> str:
-    return letter.encode("unicode_escape").decode()
-
-
-MAX_VALUE_LENGTH = 60
-"""So many letters of a value stand in a message."""
-
-Given = TypeVar("Given")
-Made = TypeVar("Made")
-
-
-def format_value(value: object) -> str:
-    """Return a value as a message shows it: cut where it is long, its type alone where it is an object."""
-    name = type(value).__name__
-    kind = f"{'an' if name[0] in 'AEIOUaeiou' else 'a'} {name}"
-    try:
-        text = repr(value)
-    except (ValueError, RecursionError):  # an integer of more digits than Python writes, or nested too deep
-        return f"{kind} too large to be shown"
-    if len(text) <= MAX_VALUE_LENGTH and text.isprintable() and not text.startswith("<"):
-        return text
-    if isinstance(value, (str, bytes, int, float, list, tuple, dict)):
-        return escape_line(f"{text[: MAX_VALUE_LENGTH - 3]}...")
-    return kind
+        text = " or ".join(filter(None, (hint.format(voice) for hint in usable)))
+        if voice == "system file" and any(hint.parameter in IN_MAP and not hint.call for hint in usable):
+            text += " in the map of the log"
+        if usable:
+            yield f"{text} {effect}".strip() if effect else f"use {text}"
 
 
 class UrmpipeError(Exception):
     """Root of every error that urmpipe raises on purpose.
 
     Attributes:
-        findings: All that is wrong, at least one.
+        findings: All faults, at least one.
     """
 
     def __init__(self, *findings: Finding | str) -> None:
@@ -466,15 +414,15 @@ class RobotError(UrmpipeError):
 
 
 class LogError(UrmpipeError):
-    """A log cannot be read, or holds what no log may hold."""
+    """A log cannot be read, or contains invalid data."""
 
 
 class PathError(UrmpipeError):
-    """The rows of a path make no lines and arcs, or no arm gets to them."""
+    """The rows of a path make no lines and arcs, or no arm reaches them."""
 
 
 class RecordingError(UrmpipeError):
-    """A recording cannot be read, is not ours, or holds too little for what was asked."""
+    """A recording cannot be read, is not one of urmpipe, or lacks the requested data."""
 
 
 class OutputError(UrmpipeError):
@@ -482,96 +430,116 @@ class OutputError(UrmpipeError):
 
 
 class OptionError(UrmpipeError):
-    """An option's value, or two options together, make no sense."""
+    """The value of an option is invalid, or two options contradict each other."""
 
 
 class UnitError(UrmpipeError):
-    """A unit is not described right, or refuses a value: unknown variable, not finite, out of range."""
+    """The description of a unit is invalid, or it rejects a value: unknown, not finite, out of range."""
 
 
 class FmuError(UrmpipeError):
-    """An FMU cannot be built, read, loaded or run, or reports an error of its own."""
+    """An FMU cannot be built, read, loaded or run, or reports an error."""
 
 
 class NetworkError(UrmpipeError):
-    """A network cannot be found, read or put together."""
+    """A network cannot be found, read or assembled."""
 
 
 class CosimulationError(UrmpipeError):
-    """A system of blocks cannot be put together: its file, its connections, an algebraic loop."""
+    """A system of blocks cannot be assembled: its file, its connections, an algebraic loop."""
 
 
 class ViewerError(UrmpipeError):
     """A recording cannot be shown here: there is no display, or the viewer does not start."""
 
 
-def map_collecting_errors(make: Callable[[Given], Made], items: Iterable[Given]) -> list[Made]:
-    """Return what a function makes of each item.
+_Item = TypeVar("_Item")
+_Result = TypeVar("_Result")
+
+
+def map_collecting_errors(function: Callable[[_Item], _Result], items: Iterable[_Item]) -> list[_Result]:
+    """Return the results of a function for all items.
 
     Raises:
-        UrmpipeError: With all that is wrong with any of them, of the class of the first error.
+        UrmpipeError: With the findings of all items, of the class of the first error.
     """
-    made: list[Made] = []
+    results: list[_Result] = []
     errors: list[UrmpipeError] = []
     for item in items:
         try:
-            made.append(make(item))
+            results.append(function(item))
         except UrmpipeError as error:
             errors.append(error)
     if errors:
-        found = dict.fromkeys(finding for error in errors for finding in error.findings)
-        raise type(errors[0])(*found) from errors[0]
-    return made
+        findings = dict.fromkeys(finding for error in errors for finding in error.findings)
+        raise type(errors[0])(*findings) from errors[0]
+    return results
 
 
-MAX_LISTED = 16
-"""So many names are listed; of more, those most like the one that was given."""
-MIN_SIMILARITY = 0.6
-"""Share of letters that two names have in common, from where on one may have been meant by the other."""
+MAX_VALUE_LENGTH = 60  # characters of a value in a message
 
-MAX_COMPARED_LENGTH = 200
-"""Letters of a name that may have been meant otherwise."""
+
+def format_value(value: object) -> str:
+    """Return the `repr` of a value for a message: a long one is cut, an object is named by its type."""
+    name = type(value).__name__
+    kind = f"{'an' if name[0] in 'AEIOUaeiou' else 'a'} {name}"
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # an integer of more digits than Python writes, or nested too deep
+        return f"{kind} too large to be shown"
+    if len(text) <= MAX_VALUE_LENGTH and text.isprintable() and not text.startswith("<"):
+        return text
+    if isinstance(value, (str, bytes, int, float, list, tuple, dict)):
+        return escape_line(f"{text[: MAX_VALUE_LENGTH - 3]}...")
+    return kind
+
+
+MAX_LISTED = 16  # of more names, the most similar ones are listed
+MIN_SIMILARITY = 0.6  # ratio of `difflib.SequenceMatcher` from which a name is suggested
+MAX_COMPARED_LENGTH = 200  # longer names are not compared: the time grows with the square of the length
 
 
 def format_suggestion(name: str, allowed: Iterable[str]) -> str:
-    """Return ` (did you mean NAME?)` with the allowed name most like another, or nothing if none is.
+    """Return ` (did you mean NAME?)` with the most similar allowed name, or an empty string.
 
-    Small and capital letters count as the same, hyphens, underscores and spaces for nothing.
+    Case, hyphens, underscores and spaces are ignored.
     """
-    near = closest_name(name, allowed)
-    return f" (did you mean {near}?)" if near else ""
+    closest = closest_name(name, allowed)
+    return f" (did you mean {closest}?)" if closest else ""
 
 
 def closest_name(name: str, allowed: Iterable[str]) -> str | None:
-    """Return the allowed name most like another; None if none is."""
-    near = _nearest_first(name, allowed, MIN_SIMILARITY)
-    return near[0] if near else None
+    """Return the most similar allowed name, or None if no name is similar."""
+    similar = _sort_by_similarity(name, allowed, MIN_SIMILARITY)
+    return similar[0] if similar else None
 
 
 def format_unknown_name(name: str, allowed: Iterable[str]) -> str:
-    """Return `found NAME (did you mean ONE?), allowed: ONE, ...` for a name that is not among others."""
+    """Return `found NAME (did you mean OTHER?), allowed: OTHER, ...`."""
     names = list(dict.fromkeys(allowed))
     return f"found {format_value(name)}{format_suggestion(name, names)}, allowed: {format_names(name, names)}"
 
 
 def format_names(name: str, allowed: Iterable[str]) -> str:
-    """Return the allowed names in their order; of more than `MAX_LISTED`, those like a given one."""
+    """Return the allowed names as a list; if there are more than `MAX_LISTED`, the most similar to `name`."""
     names = list(dict.fromkeys(allowed))
     if len(names) <= MAX_LISTED:
         return ", ".join(names) or "none"
-    first = ((name and _nearest_first(name, names, 0.0)) or names)[:MAX_LISTED]
+    first = ((name and _sort_by_similarity(name, names, 0.0)) or names)[:MAX_LISTED]
     return f"{', '.join(first)} and {len(names) - len(first)} others"
 
 
-def _nearest_first(name: str, allowed: Iterable[str], least: float) -> list[str]:
-    """Return the names that are at least so much like another, the nearest first; of equal ones the last."""
+def _sort_by_similarity(name: str, allowed: Iterable[str], min_similarity: float) -> list[str]:
+    """Return the names with at least the given similarity, most similar first, equal ones Z to A."""
     if len(name) > MAX_COMPARED_LENGTH:
         return []
-    wanted = _letters(name)
-    like = {one: SequenceMatcher(None, _letters(one), wanted).ratio() for one in allowed}
-    return sorted((one for one in like if like[one] >= least), key=lambda one: (like[one], one), reverse=True)
+    target = _normalise(name)
+    similarity = {
+        candidate: SequenceMatcher(None, _normalise(candidate), target).ratio() for candidate in allowed
+    }
+    similar = (candidate for candidate in similarity if similarity[candidate] >= min_similarity)
+    return sorted(similar, key=lambda candidate: (similarity[candidate], candidate), reverse=True)
 
 
-def _letters(name: str) -> str:
-    """Return a name without what is easily written otherwise."""
+def _normalise(name: str) -> str:
     return re.sub("[-_ ]", "", name.casefold())

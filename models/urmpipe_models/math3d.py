@@ -343,7 +343,7 @@ def _cosine_sine(angle: Element) -> tuple[Element, Element]:
 
     A right angle in a robot's description is meant as one: cos(pi/2) in double precision is 6e-17.
     """
-    if isinstance(angle, float):
+    if type(angle) is float:
         quarters, rest = divmod(angle, math.pi / 2)
         if rest == 0.0 and abs(quarters) <= 4:
             return _QUARTERS[int(quarters) % 4]

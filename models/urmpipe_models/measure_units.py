@@ -1,4 +1,4 @@
-"""Units of measurement that people read and write, and how many of one another is."""
+"""Units of measurement in texts: their factors, quantities with units, and conversions."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from decimal import Decimal
 
 from urmpipe_models.errors import Finding, OptionError, format_value
 
-DEGREE = Decimal("0.01745329251994329576923690768488612713443")
-"""pi / 180."""
+DEGREE = Decimal("0.01745329251994329576923690768488612713443")  # pi / 180
 
-MEASURES: dict[str, dict[str, Decimal]] = {
+MEASURES: dict[str, dict[str, Decimal]] = {  # by SI unit: the units of the same quantity, as multiples of it
     "m": {"m": Decimal(1), "mm": Decimal("1e-3"), "um": Decimal("1e-6")},
     "m/s": {"m/s": Decimal(1), "mm/s": Decimal("1e-3")},
     "m/s2": {"m/s2": Decimal(1), "mm/s2": Decimal("1e-3")},
@@ -25,24 +24,20 @@ MEASURES: dict[str, dict[str, Decimal]] = {
     "A": {"A": Decimal(1), "mA": Decimal("1e-3")},
     "V": {"V": Decimal(1), "mV": Decimal("1e-3")},
 }
-"""What is measured, named by its SI unit: its units, and how many SI units each is."""
-
-WRITTEN: dict[str, dict[str, Decimal]] = {
+WRITTEN: dict[str, dict[str, Decimal]] = {  # the units accepted in a text; "" is SI, or pt
     **{si: {"": Decimal(1), **units} for si, units in MEASURES.items()},
     "m": {"": Decimal(1), **MEASURES["m"], "cm": Decimal("1e-2")},
     "N": {"": Decimal(1), "N": Decimal(1)},
     "1": {"": Decimal(1), "%": Decimal("1e-2")},
     "pt": {"": Decimal(1), "pt": Decimal(1)},
 }
-"""The units that a text may give a number, by what is measured; "" is SI, or pt."""
-
+# Other spellings of units: m/s^2, m/s², 0.5°, 20µm (with the sign for micro, or the Greek letter).
 SPELLED = str.maketrans({"^": "", "²": "2", "³": "3", "°": "deg", "µ": "u", "μ": "u"})
-"""Other spellings of units: m/s^2, m/s², 0.5°, 20µm (with the sign for micro, or the Greek letter)."""
 
+# A number in decimal digits and its unit; Decimal limits the length of an exponent.
 QUANTITY = re.compile(r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?)\s*([^\s0-9.]\S*)?")
-"""A number in plain digits, and its unit; Decimal holds no exponent of any length."""
 
-NAMES = {
+NAMES = {  # by SI unit: the quantity in a message, with an example
     "m": "a length in m, such as 0.0004 or 0.4mm",
     "m/s": "a speed in m/s, such as 0.25 or 250mm/s",
     "m/s2": "an acceleration in m/s2, such as 0.5 or 500mm/s2",
@@ -58,14 +53,11 @@ NAMES = {
     "1": "a share, such as 5%",
     "pt": "a size in pt, such as 8pt",
 }
-"""Names for messages, with examples."""
-
-USUAL_UNITS = {"m": "mm", "rad": "deg", "1": "%"}
-"""The units in which people think of deviations, by SI unit."""
+USUAL_UNITS = {"m": "mm", "rad": "deg", "1": "%"}  # usual units of deviations, by SI unit
 
 
 def quantity_to_si(text: str, units: Mapping[str, Decimal]) -> float:
-    """Return the value in SI of a number with its unit, rounded once; NaN of any other text."""
+    """Return the value in SI of a number with its unit, rounded once, or NaN for any other text."""
     parts = _parts(text)
     return float(parts[0] * units[parts[1]]) if parts and parts[1] in units else math.nan
 
@@ -75,64 +67,64 @@ def read_quantity(text: str, si: str, *, positive: bool = True, deviation: bool 
 
     Args:
         text: The number with its unit.
-        si: What is measured, by its SI unit: a key of `NAMES`.
-        positive: Whether it has to be above 0.
-        deviation: Whether it says how large a deviation may be: see `readings`.
+        si: SI unit of the quantity: a key of `NAMES`.
+        positive: Whether it must be above 0.
+        deviation: Whether it is the limit of a deviation: see `readings`.
 
     Raises:
-        OptionError: If it is no such quantity, or a deviation that needs its unit.
+        OptionError: If it is not such a quantity, or a deviation that needs its unit.
     """
     value = quantity_to_si(text, WRITTEN[si])
     if not (0.0 < value < math.inf if positive else math.isfinite(value)):
         allowed = f"a positive {NAMES[si].partition(' ')[2]}" if positive else NAMES[si]
         raise OptionError(Finding(found=format_value(text), allowed=allowed))
-    if deviation and (both := readings(text, si)):
-        raise OptionError(Finding(found=text.strip(), allowed=f"a unit: {' or '.join(both)}"))
+    if deviation and (quantities := readings(text, si)):
+        raise OptionError(Finding(found=text.strip(), allowed=f"a unit: {' or '.join(quantities)}"))
     return value
 
 
 def readings(text: str, si: str) -> tuple[str, ...]:
-    """Return the two readings of a number without a unit that limits a deviation: ("3.5mm", "3.5m").
+    """Return the two readings of an ambiguous limit of a deviation without a unit: ("3.5mm", "3.5m").
 
-    Empty where the unit is clear: it is given, or the number is below 0.02 m, up to 0.2 rad or a share up to
-    1. Larger deviations are not accepted of an arm, so 3.5 may be a number of mm.
+    Empty if the unit is stated, or the number is below 0.02 m, up to 0.2 rad or a fraction up to 1. Larger
+    deviations are unlikely for an arm, so 3.5 may be a number of mm.
     """
     parts = _parts(text)
     if parts is None or parts[1] or si not in USUAL_UNITS:
         return ()
     number = parts[0]
-    clear = number < Decimal("0.02") if si == "m" else number <= (Decimal("0.2") if si == "rad" else 1)
-    written = text.strip()
-    in_si = f"{(100 * number).normalize():f}%" if si == "1" else f"{written}{si}"
-    return () if clear else (f"{written}{USUAL_UNITS[si]}", in_si)
+    is_clear = number < Decimal("0.02") if si == "m" else number <= (Decimal("0.2") if si == "rad" else 1)
+    stripped = text.strip()
+    in_si = f"{(100 * number).normalize():f}%" if si == "1" else f"{stripped}{si}"
+    return () if is_clear else (f"{stripped}{USUAL_UNITS[si]}", in_si)
 
 
 def _parts(text: str) -> tuple[Decimal, str] | None:
-    """Return a number and its unit as `WRITTEN` spells it; None if there is no number."""
+    """Return a number and its unit as in `WRITTEN`, or None if there is no number."""
     match = QUANTITY.fullmatch(text.strip())
     return match and (Decimal(match[1]), (match[2] or "").translate(SPELLED))
 
 
 def compatible_units(si: str) -> dict[str, Decimal]:
-    """Return the units of what an SI unit measures, and how many of that each is; none of an unknown one."""
+    """Return the units of the quantity of an SI unit, as multiples of it; empty for an unknown unit."""
     return MEASURES.get(si, {})
 
 
 def conversion_factor(unit: str, to: str) -> float:
-    """Return how many of one unit another is, rounded once: 1000 from m to mm.
+    """Return the factor from one unit to another, rounded once: 1000 from m to mm.
 
     Args:
         unit: The unit of a value.
-        to: The unit that it is wanted in.
+        to: The unit to convert to.
 
     Raises:
-        OptionError: If one is unknown, or they measure different things.
+        OptionError: If a unit is unknown, or they are units of different quantities.
     """
     for units in MEASURES.values():
         if unit in units and to in units:
             return float(units[unit] / units[to])
     known = next((units for units in MEASURES.values() if unit in units), None)
     if known is None:
-        every = ", ".join(one for units in MEASURES.values() for one in units)
-        raise OptionError(f"unit: found {format_value(unit)}, allowed: {every}")
+        allowed = ", ".join(name for units in MEASURES.values() for name in units)
+        raise OptionError(f"unit: found {format_value(unit)}, allowed: {allowed}")
     raise OptionError(f"unit: found {format_value(to)} for {format_value(unit)}, allowed: {', '.join(known)}")

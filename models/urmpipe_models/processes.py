@@ -1,4 +1,4 @@
-"""Processes of our own, for what may end the process it runs in: their start, their bounds and their end."""
+"""Child processes for what may end the process it runs in: their start, their limits and their end."""
 
 from __future__ import annotations
 
@@ -9,23 +9,22 @@ from contextlib import suppress
 from subprocess import Popen
 from typing import Any
 
-MAX_MEMORY = 4 * 2**30
-"""Bytes that such a process may ask for: far more than any file in use needs, less than a machine has."""
+MAX_MEMORY = 4 * 2**30  # bytes: far more than any file in use needs, less than a machine has
 
 
 def module_command(module: str, *arguments: str) -> list[str]:
-    """Return the command that runs a module of ours, and nothing of the working folder."""
+    """Return the command that runs a module of urmpipe, without the working folder in its import path."""
     return [sys.executable, "-P", "-m", module, *arguments]
 
 
 def module_environment() -> dict[str, str]:
-    """Return the environment in which such a module finds what this process does."""
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(one for one in sys.path if one)}
+    """Return the environment in which such a module imports the same packages as this process."""
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
 
 
 def limit_memory(size: int = MAX_MEMORY) -> None:
-    """Let this process have no more than some bytes of memory, where the system knows such a limit."""
-    with suppress(ImportError):  # Windows has none
+    """Limit the memory of this process to a number of bytes, where the system supports it."""
+    with suppress(ImportError):  # Windows has no such limit
         import resource
 
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
@@ -42,7 +41,7 @@ def end_group(process: Popen[Any]) -> None:
 
 
 def describe_exit(exit_code: int) -> str:
-    """Return how a process ended, for people.
+    """Return a text for the end of a process.
 
     Args:
         exit_code: Its exit code, or the negative number of the signal that ended it.

@@ -3,13 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_models.elementwise import Vector, add, cross, dot, minus, plus, scale, subtract, times
+from urmpipe_models.elementwise import (
+    Element,
+    Vector,
+    add,
+    cosine_sine,
+    cross,
+    dot,
+    minus,
+    plus,
+    scale,
+    subtract,
+    times,
+)
+from urmpipe_models.kinematics.forward import forward, jacobian
+from urmpipe_models.robots.catalogue import load_robot, robot_names
 
 small = st.integers(-3, 3).map(float)  # products and sums of them are exact, and 0, 1, -1 are frequent
 vectors = st.tuples(small, small, small)
@@ -57,3 +72,34 @@ def test_vectors_are_those_of_numpy(a: Vector, b: Vector, factor: float) -> None
     np.testing.assert_array_equal(scale(factor, a), factor * x)
     np.testing.assert_array_equal(cross(a, b), np.cross(x, y))
     assert dot(a, b) == x @ y
+
+
+def bits(robot: str, q: Sequence[Element]) -> list[list[int]]:
+    """Return the bits of all entries of the poses p1..pn and of their Jacobians, one list per row of q."""
+    chain = load_robot(robot)
+    poses = forward(chain, q)
+    entries = [entry for pose in poses for row in (*pose.rotation, pose.translation) for entry in row]
+    for point in range(len(poses)):
+        entries += [entry for column in jacobian(chain, q, point) for entry in column]
+    rows = np.broadcast_arrays(np.empty(np.shape(q[0]) or 1), *entries)[1:]
+    return np.array(rows, dtype=np.float64).T.copy().view(np.int64).tolist()
+
+
+@pytest.mark.parametrize("robot", robot_names())
+def test_floats_scalars_and_columns_give_the_same_bits(robot: str) -> None:
+    """Also of joints that start at right angles: the value of a joint is never taken for a constant."""
+    start = [*map(float, load_robot(robot).start)]
+    (of_floats,) = bits(robot, start)
+    assert bits(robot, [*map(np.float64, start)]) == [of_floats]
+    assert bits(robot, [np.array([value]) for value in start]) == [of_floats]
+    assert bits(robot, [np.full(3, value) for value in start]) == [of_floats] * 3
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0, -1.0])
+def test_only_a_float_is_a_constant(value: float) -> None:
+    """A value of NumPy that happens to be 0, 1 or -1 is treated as the entry of a column."""
+    x = np.float64(-0.0)
+    for got, expected in ((times(np.float64(value), x), value * x), (plus(np.float64(value), x), value + x)):
+        assert math.copysign(1.0, got) == math.copysign(1.0, expected)
+    assert {type(one) for one in cosine_sine(np.float64(value))} == {np.float64}
+    assert {type(one) for one in cosine_sine(value)} == {float}

@@ -43,7 +43,9 @@ from urmpipe_models.tape import aligned, fill_over_log
 
 def joint_values(chain: Chain, q: Sequence[Element]) -> list[Element]:
     """Return the value of every joint of the chain in [rad] or [m]: fixed joints 0, mimics included."""
-    q_by_name = dict(zip(chain.coordinates, q, strict=True))
+    # a joint value is no constant, whose products with 0 and 1 would be folded
+    values = (np.float64(value) if isinstance(value, (int, float)) else value for value in q)
+    q_by_name = dict(zip(chain.coordinates, values, strict=True))
     return [
         plus(times(joint.mimic.multiplier, q_by_name[joint.mimic.joint]), joint.mimic.offset)
         if joint.mimic

@@ -328,7 +328,7 @@ def lines_faults(parts: Parts) -> Iterator[Finding]:
         return
     mechanism = build_mechanism(parts)
     with np.errstate(all="ignore"):  # starts as large as 1e300
-        poses = mechanism.poses(mechanism.start)
+        poses = mechanism.poses(mechanism.start.tolist())  # constants: right angles are exact
     for element in skew:
         first, second = (
             poses[name].rotate(n) for name, n in zip(element.bodies, element.normals, strict=True)
